@@ -1,0 +1,1 @@
+//! What quietcut does with measured data.

@@ -1,0 +1,2 @@
+//! The `quietcut` command.
+fn main() {}

@@ -1,0 +1,1 @@
+//! The lobe table: where this machine is stable.

@@ -1,0 +1,1 @@
+//! The wire: postcard + CRC-32 + COBS, with sequence numbers and a version handshake.

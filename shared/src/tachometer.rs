@@ -1,0 +1,22 @@
+//! Tachometer edges to spindle speed and phase.
+
+use serde::{Deserialize, Serialize};
+
+use crate::units::Nanoseconds;
+
+/// A rising edge of the tachometer, on the device's clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Edge {
+    /// When it came.
+    pub time: Nanoseconds,
+}
+
+/// The wheel that makes the pulses: one mark, or a toothed wheel with a gap such as 60−2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Wheel {
+    /// Positions on the wheel, at least 1.
+    pub positions: u16,
+    /// This many positions in a row are missing; the first edge after them is immersion angle 0 of tooth 1.
+    pub missing: u16,
+}
