@@ -1,1 +1,4 @@
-//! What quietcut does with measured data.
+//! What quietcut does with measured data: the library behind the `quietcut` command.
+
+pub mod cli;
+pub mod file;

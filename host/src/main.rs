@@ -1,2 +1,6 @@
 //! The `quietcut` command.
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    quietcut::cli::main()
+}

@@ -1,0 +1,125 @@
+//! The command line: one file per verb, each with its arguments and a `run`.
+//!
+//! Exit status 0: done. 2: bad usage or bad input, with one message. 1: anything else, never a panic.
+
+pub mod demo;
+mod error;
+pub mod info;
+pub mod lobes;
+pub mod monitor;
+mod number;
+mod output;
+mod range;
+pub mod replay;
+pub mod simulate;
+pub mod table;
+pub mod upload;
+pub mod work;
+
+use std::io::IsTerminal;
+use std::panic;
+use std::process::ExitCode;
+
+use clap::{ArgAction, Parser, Subcommand};
+
+pub use error::Error;
+pub use number::{count, finite, non_negative, positive};
+pub use output::Output;
+pub use range::Range;
+
+/// Hears chatter, says what it is, knows the quiet speed.
+#[derive(Debug, Parser)]
+#[command(name = "quietcut", version, arg_required_else_help = true)]
+struct Cli {
+    /// Say more on stderr; twice for everything.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Demo(demo::Args),
+    Simulate(simulate::Args),
+    Lobes(lobes::Args),
+    Table(table::Args),
+    Upload(upload::Args),
+    Info(info::Args),
+    Work(work::Args),
+    Monitor(monitor::Args),
+    Replay(replay::Args),
+}
+
+/// Runs the command that the process was started with; what `main` returns.
+pub fn main() -> ExitCode {
+    panic::set_hook(Box::new(|fault| {
+        eprintln!("quietcut: a fault in quietcut itself, please report it: {fault}");
+    }));
+    // clap ends the process itself: status 2 for bad usage, 0 for help.
+    let cli = Cli::parse();
+    log_to_stderr(cli.verbose);
+    match panic::catch_unwind(|| run(cli.verb)) {
+        Ok(Ok(())) | Ok(Err(Error::ReaderGone)) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
+            eprintln!("quietcut: {error}");
+            ExitCode::from(error.exit_status())
+        }
+        // The hook has said what happened.
+        Err(_) => ExitCode::from(1),
+    }
+}
+
+fn run(verb: Verb) -> Result<(), Error> {
+    match verb {
+        Verb::Demo(args) => demo::run(args),
+        Verb::Simulate(args) => simulate::run(args),
+        Verb::Lobes(args) => lobes::run(args),
+        Verb::Table(args) => table::run(args),
+        Verb::Upload(args) => upload::run(args),
+        Verb::Info(args) => info::run(args),
+        Verb::Work(args) => work::run(args),
+        Verb::Monitor(args) => monitor::run(args),
+        Verb::Replay(args) => replay::run(args),
+    }
+}
+
+fn log_to_stderr(verbose: u8) {
+    let level = match verbose {
+        0 => tracing::Level::WARN,
+        1 => tracing::Level::INFO,
+        _ => tracing::Level::TRACE,
+    };
+    tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_target(false)
+        .without_time()
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr)
+        .init();
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_verb_shows_an_example() {
+        for verb in Cli::command().get_subcommands() {
+            let help = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
+            let line = format!("\n  quietcut {} ", verb.get_name());
+            assert!(
+                help.starts_with("Example:\n") && help.contains(&line),
+                "{}: {help}",
+                verb.get_name()
+            );
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Numbers on the command line: each says what it must be.
+
+use std::num::NonZeroU8;
+
+/// A finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("`{text}` is not a number")),
+    }
+}
+
+/// A number greater than 0: a speed, a depth, a duration.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if value > 0.0 {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not possible: it must be greater than 0"))
+    }
+}
+
+/// A number of 0 or more.
+pub fn non_negative(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not possible: it must be 0 or greater"))
+    }
+}
+
+/// A number of things of which there is at least one and at most 255: teeth.
+pub fn count(text: &str) -> Result<NonZeroU8, String> {
+    text.parse()
+        .map_err(|_| format!("`{text}` is not possible: it must be a whole number from 1 to 255"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_possible_passes() {
+        assert_eq!(positive("2.5"), Ok(2.5));
+        assert_eq!(non_negative("0"), Ok(0.0));
+        for text in ["0", "-1", "nan", "inf", "two", ""] {
+            assert!(positive(text).is_err(), "{text}");
+        }
+        assert!(non_negative("-0.1").is_err());
+        assert_eq!(count("4").map(NonZeroU8::get), Ok(4));
+        for text in ["0", "256", "2.0", "-1"] {
+            assert!(count(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Files that are whole or not there: written aside, then renamed.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// A file that could not be read or written; the message names it.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The file is not there, or may not be read.
+    #[error("{}: cannot read it: {cause}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+    /// The file is not text.
+    #[error("{}: byte {offset} is not UTF-8; a text file is needed", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// The first byte that does not belong.
+        offset: usize,
+    },
+    /// The file cannot be written: no such folder, no right, no space.
+    #[error("{}: cannot write it: {cause}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+}
+
+/// The bytes of a file.
+pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
+    std::fs::read(path).map_err(|cause| FileError::Read {
+        path: path.into(),
+        cause,
+    })
+}
+
+/// The text of a file.
+pub fn read_text(path: &Path) -> Result<String, FileError> {
+    String::from_utf8(read(path)?).map_err(|error| FileError::NotText {
+        path: path.into(),
+        offset: error.utf8_error().valid_up_to(),
+    })
+}
+
+/// Writes `bytes` to `path`: afterwards the file is there whole, or what was there before still is.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    write_with(path, |writer| writer.write_all(bytes))
+}
+
+/// Writes what `fill` writes to `path`: afterwards the file is there whole, or what was there before still is.
+pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), FileError> {
+    let failed = |cause| FileError::Write {
+        path: path.into(),
+        cause,
+    };
+    let aside = aside(path).map_err(failed)?;
+    let mut writer = BufWriter::new(aside);
+    fill(&mut writer).map_err(failed)?;
+    let aside = writer.into_inner().map_err(|error| failed(error.into_error()))?;
+    aside.as_file().sync_all().map_err(failed)?;
+    aside.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// A new file beside `path`, on the same file system, so that renaming it is atomic.
+fn aside(path: &Path) -> io::Result<NamedTempFile> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".quietcut-");
+    // A temporary file is private to its owner; a result has the rights of any other file.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write(&path, b"old").unwrap();
+        let failed = write_with(&path, |writer| {
+            writer.write_all(b"half")?;
+            Err(io::Error::other("disk full"))
+        });
+        assert!(matches!(failed, Err(FileError::Write { .. })));
+        assert_eq!(read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_missing_folder_and_a_missing_file_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("no/such.txt");
+        for error in [write(&path, b"").unwrap_err(), read(&path).unwrap_err()] {
+            assert!(error.to_string().contains("no/such.txt"), "{error}");
+        }
+    }
+
+    #[test]
+    fn bytes_that_are_no_text_are_located() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write(&path, b"abc\xff").unwrap();
+        assert!(matches!(
+            read_text(&path),
+            Err(FileError::NotText { offset: 3, .. })
+        ));
+    }
+}
