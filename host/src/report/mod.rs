@@ -1,0 +1,4 @@
+//! What people read: words, pictures, the HTML report, lines on a terminal.
+
+pub mod answer;
+pub mod words;
