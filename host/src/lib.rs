@@ -1,5 +1,8 @@
 //! What quietcut does with measured data: the library behind the `quietcut` command.
 
+pub mod case;
 pub mod cli;
 pub mod file;
+pub mod milling;
 pub mod report;
+pub mod structure;

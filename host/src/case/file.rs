@@ -1,0 +1,116 @@
+//! The shape of a case file as it stands in TOML, before any value is judged.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+/// A number with its place in the file.
+pub(super) type Number = Spanned<f64>;
+/// A matrix by rows, with its place in the file.
+pub(super) type Rows = Spanned<Vec<Vec<f64>>>;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CaseFile {
+    pub(super) name: Option<String>,
+    pub(super) structure: Option<Spanned<StructureFile>>,
+    pub(super) tool: Option<ToolFile>,
+    pub(super) material: Option<MaterialFile>,
+    pub(super) cut: Option<CutFile>,
+    pub(super) limits: Option<LimitsFile>,
+    pub(super) posture: Option<PostureFile>,
+    #[serde(default)]
+    pub(super) extension: BTreeMap<Spanned<String>, toml::Table>,
+}
+
+/// Both kinds of structure in one: the kind decides which keys may be there.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StructureFile {
+    pub(super) kind: Spanned<String>,
+    pub(super) directions: Spanned<Vec<String>>,
+    pub(super) mass: Option<Rows>,
+    pub(super) mass_std: Option<Rows>,
+    pub(super) damping: Option<Rows>,
+    pub(super) damping_std: Option<Rows>,
+    pub(super) stiffness: Option<Rows>,
+    pub(super) stiffness_std: Option<Rows>,
+    pub(super) cubic_damping: Option<Rows>,
+    pub(super) cubic_damping_std: Option<Rows>,
+    pub(super) cubic_stiffness: Option<Rows>,
+    pub(super) cubic_stiffness_std: Option<Rows>,
+    pub(super) mode: Option<Vec<Spanned<ModeFile>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ModeFile {
+    pub(super) frequency_hz: Number,
+    pub(super) frequency_hz_std: Option<Number>,
+    pub(super) damping_ratio: Number,
+    pub(super) damping_ratio_std: Option<Number>,
+    pub(super) left: Spanned<Vec<[f64; 2]>>,
+    pub(super) left_std: Option<Spanned<Vec<[f64; 2]>>>,
+    pub(super) right: Spanned<Vec<[f64; 2]>>,
+    pub(super) right_std: Option<Spanned<Vec<[f64; 2]>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ToolFile {
+    pub(super) teeth: Spanned<i64>,
+    pub(super) edge_angle_deg: Number,
+    pub(super) edge_angle_deg_std: Option<Number>,
+    pub(super) diameter_mm: Option<Number>,
+    pub(super) pitch_deg: Option<Spanned<Vec<f64>>>,
+    pub(super) runout_um: Option<Number>,
+    pub(super) runout_um_std: Option<Number>,
+    pub(super) runout_angle_deg: Option<Number>,
+    pub(super) runout_angle_deg_std: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MaterialFile {
+    pub(super) ktc_mpa: Number,
+    pub(super) ktc_mpa_std: Option<Number>,
+    pub(super) krc_mpa: Number,
+    pub(super) krc_mpa_std: Option<Number>,
+    pub(super) kac_mpa: Number,
+    pub(super) kac_mpa_std: Option<Number>,
+    pub(super) kte_n_per_mm: Option<Number>,
+    pub(super) kte_n_per_mm_std: Option<Number>,
+    pub(super) kre_n_per_mm: Option<Number>,
+    pub(super) kre_n_per_mm_std: Option<Number>,
+    pub(super) kae_n_per_mm: Option<Number>,
+    pub(super) kae_n_per_mm_std: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CutFile {
+    pub(super) start_deg: Number,
+    pub(super) start_deg_std: Option<Number>,
+    pub(super) exit_deg: Number,
+    pub(super) exit_deg_std: Option<Number>,
+    pub(super) feed_per_tooth_mm: Number,
+    pub(super) feed_per_tooth_mm_std: Option<Number>,
+    pub(super) feed_direction_deg: Option<Number>,
+    pub(super) feed_direction_deg_std: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LimitsFile {
+    pub(super) rpm_min: Number,
+    pub(super) rpm_max: Number,
+    pub(super) power_w: Option<Number>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PostureFile {
+    pub(super) index: Option<Spanned<i64>>,
+    pub(super) joints_deg: Option<Spanned<Vec<f64>>>,
+}

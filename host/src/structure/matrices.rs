@@ -1,0 +1,20 @@
+//! A structure by its matrices.
+
+use nalgebra::DMatrix;
+
+/// M q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = F, with ∘³ the cube of each element.
+///
+/// All square with one row per direction; SI: kg, N s/m, N/m, N s³/m³, N/m³.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrices {
+    /// M, kg.
+    pub mass: DMatrix<f64>,
+    /// C, N s/m.
+    pub damping: DMatrix<f64>,
+    /// K, N/m.
+    pub stiffness: DMatrix<f64>,
+    /// C₃, N s³/m³; `None` for linear damping.
+    pub cubic_damping: Option<DMatrix<f64>>,
+    /// K₃, N/m³; `None` for linear stiffness.
+    pub cubic_stiffness: Option<DMatrix<f64>>,
+}

@@ -1,0 +1,29 @@
+//! A structure by its complex modes.
+
+use num_complex::Complex64;
+
+/// One complex mode: H(s) gets right·leftᵀ/(s − λ) and the conjugate of the whole at the conjugate pole.
+///
+/// λ = −ζω + iω√(1 − ζ²) with ω = 2π·frequency; no conjugation and no further factor in the residue.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mode {
+    /// Natural frequency, Hz.
+    pub frequency_hz: f64,
+    /// Damping ratio ζ, in [0, 1).
+    pub damping_ratio: f64,
+    /// Left shape Ψᴸ: how forces drive the mode; one entry per direction.
+    pub left: Vec<Complex64>,
+    /// Right shape Ψᴿ: how the mode moves the structure; one entry per direction.
+    pub right: Vec<Complex64>,
+}
+
+impl Mode {
+    /// The pole λ, rad/s.
+    pub fn pole(&self) -> Complex64 {
+        let omega = std::f64::consts::TAU * self.frequency_hz;
+        Complex64::new(
+            -self.damping_ratio * omega,
+            omega * (1.0 - self.damping_ratio * self.damping_ratio).sqrt(),
+        )
+    }
+}
