@@ -1,4 +1,12 @@
-//! What people read: words, pictures, the HTML report, lines on a terminal.
+//! What people read: words, pictures, the HTML report.
 
 pub mod answer;
+pub mod lobe_chart;
+pub mod page;
+mod picture;
+pub mod spectrum;
+pub mod stroboscope;
+pub mod time_signal;
 pub mod words;
+
+pub use picture::PictureError;

@@ -1,0 +1,167 @@
+//! A picture: an SVG drawing with the house's paper, fonts and colours.
+
+use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
+use plotters::prelude::{Cartesian2d, RGBColor, SVGBackend, WHITE};
+use plotters::style::{Color, IntoFont, TextStyle};
+
+/// A picture that could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot draw the picture: {0}")]
+pub struct PictureError(String);
+
+impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for PictureError {
+    fn from(error: DrawingAreaErrorKind<E>) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl PictureError {
+    /// There is nothing to draw; `what` says what a picture needs.
+    pub(super) fn nothing(what: &str) -> Self {
+        Self(what.into())
+    }
+}
+
+/// Where a picture is drawn.
+pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// A pair of axes on a canvas.
+pub(super) type Axes<'a, 'c> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+pub(super) const INK: RGBColor = RGBColor(0x26, 0x2b, 0x33);
+pub(super) const GRID: RGBColor = RGBColor(0xdd, 0xe0, 0xe4);
+pub(super) const QUIET: RGBColor = RGBColor(0x1b, 0x86, 0x4e);
+pub(super) const CHATTER: RGBColor = RGBColor(0xc2, 0x2f, 0x2f);
+pub(super) const BLUE: RGBColor = RGBColor(0x1f, 0x5f, 0xa8);
+pub(super) const ORANGE: RGBColor = RGBColor(0xd9, 0x7a, 0x12);
+pub(super) const VIOLET: RGBColor = RGBColor(0x7a, 0x3f, 0xa0);
+
+/// The text style of labels.
+pub(super) fn text(size: u32, color: RGBColor) -> TextStyle<'static> {
+    let mut style = TextStyle::from(("sans-serif", size).into_font());
+    style.color = color.to_backend_color();
+    style
+}
+
+/// Draws on white paper of `size` pixels and returns the SVG text.
+pub(super) fn draw(
+    size: (u32, u32),
+    paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
+) -> Result<String, PictureError> {
+    let mut svg = String::new();
+    {
+        let canvas = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        canvas.fill(&WHITE)?;
+        paint(&canvas)?;
+        canvas.present()?;
+    }
+    Ok(svg)
+}
+
+/// What stands at the axes of one chart.
+pub(super) struct Labels<'a> {
+    /// Above the chart; empty for none.
+    pub(super) title: &'a str,
+    /// Quantity and unit along x.
+    pub(super) x: &'a str,
+    /// Quantity and unit along y.
+    pub(super) y: &'a str,
+}
+
+/// Axes over the two ranges, with grid and labels.
+pub(super) fn axes<'a, 'c>(
+    canvas: &'c Canvas<'a>,
+    labels: &Labels<'_>,
+    x: std::ops::Range<f64>,
+    y: std::ops::Range<f64>,
+) -> Result<Axes<'a, 'c>, PictureError> {
+    let mut builder = ChartBuilder::on(canvas);
+    builder
+        .margin(10)
+        .margin_right(22)
+        .x_label_area_size(44)
+        .y_label_area_size(62);
+    if !labels.title.is_empty() {
+        builder.caption(labels.title, text(17, INK));
+    }
+    let mut chart = builder.build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .axis_style(INK.mix(0.7))
+        .bold_line_style(GRID)
+        .light_line_style(WHITE.mix(0.0))
+        .label_style(text(13, INK))
+        .axis_desc_style(text(14, INK))
+        .x_desc(labels.x)
+        .y_desc(labels.y)
+        .x_label_formatter(&tick)
+        .y_label_formatter(&tick)
+        .draw()?;
+    Ok(chart)
+}
+
+/// A number at an axis: no noise digits of binary fractions.
+fn tick(value: &f64) -> String {
+    if *value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e6) {
+        format!("{value:.1e}")
+    } else {
+        let rounded = (value * 1e4).round() / 1e4;
+        format!("{}", rounded + 0.0)
+    }
+}
+
+/// The smallest interval that holds all finite values, a little wider at both ends; around 0 where there is none.
+pub(super) fn span(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    let (low, high) = values
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
+    if low > high {
+        return -1.0..1.0;
+    }
+    let margin = if high > low {
+        0.06 * (high - low)
+    } else {
+        0.5 * high.abs().max(1e-6)
+    };
+    low - margin..high + margin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_and_spans_are_plain() {
+        assert_eq!(tick(&0.30000000000000004), "0.3");
+        assert_eq!(tick(&-0.0), "0");
+        assert_eq!(tick(&2.5e-5), "2.5e-5");
+        assert_eq!(span([1.0, f64::NAN, 3.0].into_iter()), 0.88..3.12);
+        assert_eq!(span(std::iter::empty()), -1.0..1.0);
+        let flat = span([2.0].into_iter());
+        assert!(flat.start < 2.0 && flat.end > 2.0);
+    }
+
+    #[test]
+    fn a_picture_is_one_svg_element() {
+        let svg = draw((400, 300), |canvas| {
+            axes(
+                canvas,
+                &Labels {
+                    title: "t",
+                    x: "x",
+                    y: "y",
+                },
+                0.0..1.0,
+                0.0..1.0,
+            )
+            .map(|_| ())
+        })
+        .unwrap();
+        assert_eq!(svg.matches("<svg").count(), 1);
+        assert!(svg.trim_end().ends_with("</svg>"));
+    }
+}

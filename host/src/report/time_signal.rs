@@ -1,0 +1,99 @@
+//! A signal over time, with the moments that matter marked.
+
+use plotters::prelude::{LineSeries, PathElement, Text};
+use plotters::style::Color;
+
+use super::picture::{BLUE, CHATTER, INK, Labels, PictureError, axes, draw, span, text};
+
+/// A moment on the time axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// When.
+    pub t_s: f64,
+    /// What happens then.
+    pub label: String,
+}
+
+const SIZE: (u32, u32) = (960, 280);
+/// The line is drawn through the least and the greatest value of this many stretches of time: more than there are
+/// pixels would only make the file bigger.
+const STRETCHES: usize = 1200;
+
+/// Draws `values` at the times `t_s` (as many, in order) as SVG.
+///
+/// # Errors
+/// Where there is nothing to draw, or the drawing library refuses.
+pub fn time_signal(
+    title: &str,
+    quantity: &str,
+    t_s: &[f64],
+    values: &[f64],
+    moments: &[Moment],
+) -> Result<String, PictureError> {
+    let (Some(&from), Some(&to)) = (t_s.first(), t_s.last()) else {
+        return Err(PictureError::nothing("a signal needs samples"));
+    };
+    let y = span(values.iter().copied());
+    let labels = Labels {
+        title,
+        x: "time [s]",
+        y: quantity,
+    };
+    draw(SIZE, |canvas| {
+        let mut chart = axes(canvas, &labels, from..to, y.clone())?;
+        chart.draw_series(LineSeries::new(thinned(t_s, values), BLUE.stroke_width(1)))?;
+        for (index, moment) in moments.iter().enumerate() {
+            let line = [(moment.t_s, y.start), (moment.t_s, y.end)];
+            chart.draw_series([PathElement::new(line, CHATTER.stroke_width(2))])?;
+            let (x, top) = chart.backend_coord(&(moment.t_s, y.end));
+            // Labels of near moments must not lie on one another.
+            let row = 16 * (index as i32 % 3);
+            canvas.draw(&Text::new(
+                moment.label.as_str(),
+                (x + 6, top + 4 + row),
+                text(13, INK),
+            ))?;
+        }
+        Ok(())
+    })
+}
+
+/// The least and the greatest value of every stretch, in the order in which they come.
+fn thinned(t_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    let points: Vec<(f64, f64)> = t_s.iter().copied().zip(values.iter().copied()).collect();
+    let stretch = points.len().div_ceil(STRETCHES).max(1);
+    if stretch <= 2 {
+        return points;
+    }
+    let mut kept = Vec::with_capacity(2 * STRETCHES);
+    for part in points.chunks(stretch) {
+        let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        if let (Some(&low), Some(&high)) = (part.iter().min_by(by_value), part.iter().max_by(by_value)) {
+            if low.0 <= high.0 {
+                kept.extend([low, high]);
+            } else {
+                kept.extend([high, low]);
+            }
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_the_extremes() {
+        let t_s: Vec<f64> = (0..100_000).map(|i| i as f64 * 1e-4).collect();
+        let mut values = vec![0.0; t_s.len()];
+        values[50_001] = 7.0;
+        values[50_002] = -3.0;
+        let kept = thinned(&t_s, &values);
+        assert!(kept.len() <= 2 * STRETCHES);
+        assert!(kept.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+        for extreme in [7.0, -3.0] {
+            assert!(kept.iter().any(|&(_, value)| value == extreme), "{extreme}");
+        }
+    }
+}
