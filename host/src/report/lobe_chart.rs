@@ -1,5 +1,6 @@
 //! The stability chart: stable depths over spindle speed, the kind of each limit, and points of interest.
 
+use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, Cross, LineSeries, PathElement, Polygon, Rectangle, Text, WHITE};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
@@ -63,6 +64,10 @@ pub struct Mark {
     pub advice: Option<(f64, f64)>,
 }
 
+// Paper colours that do not mix where areas lie on one another.
+const STABLE: RGBColor = RGBColor(0xd2, 0xea, 0xdc);
+const UNSTABLE: RGBColor = RGBColor(0xfa, 0xec, 0xec);
+
 /// Size of the picture in pixels.
 const SIZE: (u32, u32) = (960, 480);
 
@@ -93,12 +98,12 @@ pub fn lobe_chart(
         let mut chart = axes(canvas, &labels, first.rpm..last.rpm, 0.0..depth_max_mm)?;
         chart.draw_series([Rectangle::new(
             [(first.rpm, 0.0), (last.rpm, depth_max_mm)],
-            CHATTER.mix(0.10).filled(),
+            UNSTABLE.filled(),
         )])?;
         chart.draw_series(
             stable_areas(columns)
                 .into_iter()
-                .map(|area| Polygon::new(area, QUIET.mix(0.22))),
+                .map(|area| Polygon::new(area, STABLE)),
         )?;
         for kind in [LimitKind::Hopf, LimitKind::Flip, LimitKind::Fold] {
             draw_limits(&mut chart, columns, depth_max_mm, kind)?;
@@ -106,6 +111,7 @@ pub fn lobe_chart(
         draw_marks(canvas, &mut chart, marks)?;
         chart
             .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
             .background_style(WHITE.mix(0.85))
             .border_style(INK.mix(0.3))
             .label_font(text(13, INK))
@@ -142,7 +148,7 @@ fn stable_areas(columns: &[Column]) -> Vec<Vec<(f64, f64)>> {
     areas
 }
 
-/// The first limits of one kind as lines, each from the speeds where the kind takes over.
+/// The first limits of one kind as lines.
 fn draw_limits(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -150,27 +156,8 @@ fn draw_limits(
     kind: LimitKind,
 ) -> Result<(), PictureError> {
     let (color, name) = limit_look(kind);
-    let mut runs: Vec<Vec<(f64, f64)>> = Vec::new();
-    let mut before: Option<&Column> = None;
-    for column in columns {
-        let limit = column.first_limit.filter(|limit| limit.depth_mm <= depth_max_mm);
-        match limit.filter(|limit| limit.kind == kind) {
-            Some(limit) => {
-                let continues = before.and_then(|b| b.first_limit).is_some_and(|b| b.kind == kind);
-                match runs.last_mut() {
-                    Some(run) if continues => run.push((column.rpm, limit.depth_mm)),
-                    _ => runs.push(vec![(column.rpm, limit.depth_mm)]),
-                }
-                before = Some(column);
-            }
-            None => before = None,
-        }
-    }
-    if runs.is_empty() {
-        return Ok(());
-    }
-    for (index, run) in runs.into_iter().enumerate() {
-        // A kind that leads at one sampled speed only is still seen.
+    for (index, run) in limit_runs(columns, depth_max_mm, kind).into_iter().enumerate() {
+        // A kind that leads at a lone speed is still seen.
         chart.draw_series(run.iter().map(|&at| Circle::new(at, 1, color.filled())))?;
         let line = chart.draw_series(LineSeries::new(run, color.stroke_width(3)))?;
         if index == 0 {
@@ -181,44 +168,113 @@ fn draw_limits(
     Ok(())
 }
 
+/// Runs of neighbouring speeds whose first limit has this kind; each goes half way to a neighbour of another kind.
+fn limit_runs(columns: &[Column], depth_max_mm: f64, kind: LimitKind) -> Vec<Vec<(f64, f64)>> {
+    let visible = |column: &Column| column.first_limit.filter(|limit| limit.depth_mm <= depth_max_mm);
+    let mut runs: Vec<Vec<(f64, f64)>> = Vec::new();
+    let mut open = false;
+    for (index, column) in columns.iter().enumerate() {
+        let Some(limit) = visible(column) else {
+            open = false;
+            continue;
+        };
+        let neighbour = index.checked_sub(1).and_then(|before| columns.get(before));
+        let half_way = neighbour.and_then(|before| {
+            let there = visible(before)?;
+            let depth_mm = 0.5 * (limit.depth_mm + there.depth_mm);
+            (there.kind != limit.kind).then_some((0.5 * (column.rpm + before.rpm), depth_mm))
+        });
+        match (limit.kind == kind, runs.last_mut()) {
+            (true, Some(run)) if open => run.push((column.rpm, limit.depth_mm)),
+            (true, _) => runs.push(
+                half_way
+                    .into_iter()
+                    .chain([(column.rpm, limit.depth_mm)])
+                    .collect(),
+            ),
+            (false, Some(run)) if open => run.extend(half_way),
+            (false, _) => {}
+        }
+        open = limit.kind == kind;
+    }
+    runs
+}
+
+/// A box on the paper: left, top, right, bottom.
+type Area = (i32, i32, i32, i32);
+
+fn overlap(a: Area, b: Area) -> bool {
+    a.0 < b.2 && b.0 < a.2 && a.1 < b.3 && b.1 < a.3
+}
+
 fn draw_marks(canvas: &Canvas<'_>, chart: &mut Axes<'_, '_>, marks: &[Mark]) -> Result<(), PictureError> {
-    let (width, _) = canvas.dim_in_pixel();
+    const RADIUS: i32 = 7;
+    let mut taken: Vec<Area> = Vec::new();
     for mark in marks {
         let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
         if let Some(advice) = mark.advice {
             draw_arrow(canvas, at, chart.backend_coord(&advice))?;
         }
+        taken.push((at.0 - RADIUS, at.1 - RADIUS, at.0 + RADIUS, at.1 + RADIUS));
     }
     for mark in marks {
         let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
-        match mark.kind {
-            MarkKind::Chatter => canvas.draw(&Cross::new(at, 7, CHATTER.stroke_width(4)))?,
-            MarkKind::Quiet => {
-                canvas.draw(&Circle::new(at, 7, WHITE.filled()))?;
-                canvas.draw(&Circle::new(at, 6, QUIET.filled()))?;
-            }
-        }
-        if mark.label.is_empty() {
-            continue;
-        }
         let color = match mark.kind {
             MarkKind::Chatter => CHATTER,
             MarkKind::Quiet => QUIET,
         };
-        let style = text(13, color);
-        let (w, h) = canvas.estimate_text_size(&mark.label, &style)?;
-        // Above the point, moved sideways where the label would leave the paper.
-        let half = w as i32 / 2 + 6;
-        let x = at.0.clamp(half, width as i32 - half);
-        let y = at.1 - 14;
-        let paper = [(x - half, y - h as i32 - 3), (x + half, y + 3)];
-        canvas.draw(&Rectangle::new(paper, WHITE.mix(0.85).filled()))?;
-        canvas.draw(&Text::new(
-            mark.label.as_str(),
-            (x, y),
-            style.pos(Pos::new(HPos::Center, VPos::Bottom)),
-        ))?;
+        match mark.kind {
+            MarkKind::Chatter => canvas.draw(&Cross::new(at, RADIUS, color.stroke_width(4)))?,
+            MarkKind::Quiet => {
+                canvas.draw(&Circle::new(at, RADIUS, WHITE.filled()))?;
+                canvas.draw(&Circle::new(at, RADIUS - 1, color.filled()))?;
+            }
+        }
+        if !mark.label.is_empty() {
+            draw_label(canvas, at, &mark.label, color, &mut taken)?;
+        }
     }
+    Ok(())
+}
+
+/// A label near `at` that covers no other: above, below, then farther away.
+fn draw_label(
+    canvas: &Canvas<'_>,
+    at: (i32, i32),
+    label: &str,
+    color: RGBColor,
+    taken: &mut Vec<Area>,
+) -> Result<(), PictureError> {
+    let style = text(13, color);
+    let (w, h) = canvas.estimate_text_size(label, &style)?;
+    let (w, h) = (w as i32 + 12, h as i32 + 6);
+    let width = canvas.dim_in_pixel().0 as i32;
+    // Moved sideways where it would leave the paper.
+    let left = (at.0 - w / 2).clamp(0, (width - w).max(0));
+    let tops = [
+        at.1 - h - 11,
+        at.1 + 11,
+        at.1 - 2 * h - 13,
+        at.1 + h + 13,
+        at.1 - 3 * h - 15,
+        at.1 + 2 * h + 15,
+    ];
+    let areas = tops.map(|top| (left, top, left + w, top + h));
+    let area = areas
+        .into_iter()
+        .find(|&area| !taken.iter().any(|&other| overlap(area, other)));
+    let area = area.unwrap_or(areas[0]);
+    taken.push(area);
+    canvas.draw(&Rectangle::new(
+        [(area.0, area.1), (area.2, area.3)],
+        WHITE.mix(0.85).filled(),
+    ))?;
+    let middle = (area.0 + w / 2, area.1 + h / 2);
+    canvas.draw(&Text::new(
+        label,
+        middle,
+        style.pos(Pos::new(HPos::Center, VPos::Center)),
+    ))?;
     Ok(())
 }
 
@@ -279,6 +335,22 @@ mod tests {
         assert_eq!(
             areas[3],
             [(1015.0, 2.3), (1020.0, 2.3), (1020.0, 2.7), (1015.0, 2.7)]
+        );
+    }
+
+    #[test]
+    fn limits_of_two_kinds_meet_half_way() {
+        let columns = [
+            column(1000.0, &[(0.0, 2.0)], LimitKind::Hopf),
+            column(1010.0, &[(0.0, 1.8)], LimitKind::Hopf),
+            column(1020.0, &[(0.0, 1.4)], LimitKind::Flip),
+            column(1030.0, &[(0.0, 9.0)], LimitKind::Hopf),
+        ];
+        let hopf = limit_runs(&columns, 4.0, LimitKind::Hopf);
+        assert_eq!(hopf, [vec![(1000.0, 2.0), (1010.0, 1.8), (1015.0, 1.6)]]);
+        assert_eq!(
+            limit_runs(&columns, 4.0, LimitKind::Flip),
+            [vec![(1015.0, 1.6), (1020.0, 1.4)]]
         );
     }
 

@@ -1,5 +1,6 @@
 //! A spectrum, with the harmonics of the tooth passing and the chatter frequency marked.
 
+use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{LineSeries, PathElement, Polygon, Rectangle, Text, WHITE};
 use plotters::style::Color;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -80,6 +81,7 @@ pub fn spectrum(
         if marks.tooth_passing_hz.is_some() {
             chart
                 .configure_series_labels()
+                .position(SeriesLabelPosition::UpperRight)
                 .background_style(WHITE.mix(0.8))
                 .border_style(GRID)
                 .label_font(text(12, INK))

@@ -1,5 +1,6 @@
 //! Samples once per tooth: one line is a quiet cut, two are period doubling, a cloud or a ring is a Hopf.
 
+use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, PathElement, WHITE};
 use plotters::style::{Color, RGBColor};
 
@@ -60,7 +61,10 @@ fn scatter(
     points: &[(f64, f64)],
     x: std::ops::Range<f64>,
 ) -> Result<(), PictureError> {
-    let mut chart = axes(canvas, labels, x, span(points.iter().map(|&(_, value)| value)))?;
+    let mut y = span(points.iter().map(|&(_, value)| value));
+    // Room for the legend above the samples.
+    y.end += 0.25 * (y.end - y.start);
+    let mut chart = axes(canvas, labels, x, y)?;
     let kinds: [(usize, RGBColor, &str); 2] = [(0, BLUE, "even teeth"), (1, ORANGE, "odd teeth")];
     for (parity, color, name) in kinds {
         let own = points.iter().skip(parity).step_by(2);
@@ -71,6 +75,7 @@ fn scatter(
     }
     chart
         .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
         .background_style(WHITE.mix(0.8))
         .border_style(GRID)
         .label_font(text(12, INK))
