@@ -1,10 +1,16 @@
 //! The structure: how the tool centre point gives way to a force.
 
+mod definiteness;
 mod direction;
+mod error;
+mod first_order;
 mod matrices;
 mod modes;
 
+pub use definiteness::{Indefinite, Remedy};
 pub use direction::Direction;
+pub use error::StructureError;
+pub use first_order::FirstOrder;
 pub use matrices::Matrices;
 pub use modes::Mode;
 
@@ -25,4 +31,33 @@ pub enum Form {
     Matrices(Matrices),
     /// Complex modes with left and right shapes.
     Modes(Vec<Mode>),
+}
+
+impl Structure {
+    /// Judges mass, damping and stiffness.
+    ///
+    /// # Errors
+    /// What is indefinite, its smallest eigenvalue, and the entries to blame.
+    pub fn check(&self) -> Result<(), StructureError> {
+        let found = match &self.form {
+            Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
+            Form::Modes(_) => Vec::new(),
+        };
+        if found.is_empty() {
+            Ok(())
+        } else {
+            Err(StructureError::Indefinite(found))
+        }
+    }
+
+    /// True where the case has cubic terms that are not all zero.
+    pub fn is_nonlinear(&self) -> bool {
+        let Form::Matrices(matrices) = &self.form else {
+            return false;
+        };
+        [&matrices.cubic_damping, &matrices.cubic_stiffness]
+            .into_iter()
+            .flatten()
+            .any(|cubic| cubic.iter().any(|&entry| entry != 0.0))
+    }
 }

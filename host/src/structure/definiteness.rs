@@ -1,0 +1,298 @@
+//! Are mass, damping and stiffness those of a passive structure, and if not, which entry is to blame?
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+
+use super::{Direction, Matrices};
+
+/// Eigenvalues above −this share of the largest count as zero: rounding, and printed matrices with few digits,
+/// move the zero of a free body about this much.
+const ZERO: f64 = 1e-9;
+
+/// A matrix that no passive structure has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Indefinite {
+    /// mass, damping or stiffness.
+    pub matrix: &'static str,
+    /// The smallest eigenvalue of its symmetric part.
+    pub eigenvalue: f64,
+    /// The smallest set of changed entries that makes it definite; empty where no one or two changes do.
+    pub remedy: Vec<Remedy>,
+}
+
+/// One change of a matrix that, alone or with others, makes it definite.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Remedy {
+    /// The off-diagonal entries (row, column) and (column, row) have the wrong sign.
+    Sign {
+        /// Row, from 1.
+        row: usize,
+        /// Column, from 1.
+        column: usize,
+        /// The entry as it is.
+        value: f64,
+        /// Names of the two degrees of freedom.
+        directions: (Direction, Direction),
+    },
+    /// The diagonal entry is too small.
+    Diagonal {
+        /// Row and column, from 1.
+        row: usize,
+        /// The entry as it is.
+        value: f64,
+        /// What it must exceed.
+        above: f64,
+        /// Name of the degree of freedom.
+        direction: Direction,
+    },
+}
+
+impl fmt::Display for Indefinite {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the {} matrix is indefinite: its smallest eigenvalue is {:.4e}",
+            self.matrix, self.eigenvalue
+        )?;
+        for (count, remedy) in self.remedy.iter().enumerate() {
+            write!(f, "{}{remedy}", if count == 0 { "; " } else { ", and " })?;
+        }
+        match self.remedy.len() {
+            0 => write!(f, "; no change of one or two entries makes it definite"),
+            1 => write!(f, " (that alone makes it definite)"),
+            _ => write!(f, " (both together make it definite)"),
+        }
+    }
+}
+
+impl fmt::Display for Remedy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sign {
+                row,
+                column,
+                value,
+                directions: (a, b),
+            } => write!(
+                f,
+                "entry ({row},{column}), {a}-{b}, is {value}: its sign is wrong, as is that of ({column},{row})"
+            ),
+            Self::Diagonal {
+                row,
+                value,
+                above,
+                direction,
+            } => write!(
+                f,
+                "entry ({row},{row}), {direction}-{direction}, is {value}: it must exceed {above:.4}"
+            ),
+        }
+    }
+}
+
+/// Everything that is indefinite in a structure's matrices, in the order mass, stiffness, damping.
+///
+/// The symmetric parts are judged: only they store or dissipate energy. Mass must be positive definite, stiffness
+/// and damping at least positive semidefinite.
+pub(super) fn indefinite(matrices: &Matrices, directions: &[Direction]) -> Vec<Indefinite> {
+    let judged = [
+        ("mass", &matrices.mass, true),
+        ("stiffness", &matrices.stiffness, false),
+        ("damping", &matrices.damping, false),
+    ];
+    judged
+        .into_iter()
+        .filter_map(|(name, matrix, strict)| judge(name, matrix, strict, &matrices.mass, directions))
+        .collect()
+}
+
+fn judge(
+    name: &'static str,
+    matrix: &DMatrix<f64>,
+    strict: bool,
+    mass: &DMatrix<f64>,
+    directions: &[Direction],
+) -> Option<Indefinite> {
+    let symmetric = (matrix + matrix.transpose()) * 0.5;
+    if is_definite(&symmetric, strict) {
+        return None;
+    }
+    Some(Indefinite {
+        matrix: name,
+        eigenvalue: smallest_eigenvalue(&symmetric),
+        remedy: remedy(&symmetric, strict, mass, directions),
+    })
+}
+
+/// Scaled so that the diagonal is one, where it is positive: translations and rotations have different units.
+fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
+    let scale = symmetric
+        .diagonal()
+        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
+    let scaled = DMatrix::from_fn(symmetric.nrows(), symmetric.ncols(), |i, j| {
+        symmetric[(i, j)] * scale[i] * scale[j]
+    });
+    let eigenvalues = scaled.symmetric_eigenvalues();
+    let threshold = ZERO * eigenvalues.amax();
+    if strict {
+        eigenvalues.min() > threshold
+    } else {
+        eigenvalues.min() >= -threshold
+    }
+}
+
+fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
+    symmetric.symmetric_eigenvalues().min()
+}
+
+/// Searches one change, then two: a turned sign, or a turned sign and a larger diagonal entry.
+///
+/// Where entries (i,j), (j,k) and (i,k) have the wrong product, turning any one of them helps. Mass, damping and
+/// stiffness of a mechanism come from diagonal matrices by the same change of coordinates, so an entry whose sign
+/// differs from that in the mass matrix is tried first.
+fn remedy(
+    symmetric: &DMatrix<f64>,
+    strict: bool,
+    mass: &DMatrix<f64>,
+    directions: &[Direction],
+) -> Vec<Remedy> {
+    let size = symmetric.nrows();
+    let mut signs: Vec<(usize, usize)> = (0..size)
+        .flat_map(|i| (i + 1..size).map(move |j| (i, j)))
+        .filter(|&entry| symmetric[entry] != 0.0)
+        .collect();
+    signs.sort_by_key(|&entry| symmetric[entry] * mass[entry] >= 0.0);
+    let sign = |(i, j): (usize, usize)| Remedy::Sign {
+        row: i + 1,
+        column: j + 1,
+        value: symmetric[(i, j)],
+        directions: (directions[i], directions[j]),
+    };
+    let diagonal = |row: usize, above: f64| Remedy::Diagonal {
+        row: row + 1,
+        value: symmetric[(row, row)],
+        above,
+        direction: directions[row],
+    };
+    for &entry in &signs {
+        if is_definite(&with_turned_sign(symmetric, entry), strict) {
+            return vec![sign(entry)];
+        }
+    }
+    for row in 0..size {
+        if let Some(above) = least_diagonal(symmetric, row, strict) {
+            return vec![diagonal(row, above)];
+        }
+    }
+    for &entry in &signs {
+        let turned = with_turned_sign(symmetric, entry);
+        for row in 0..size {
+            if let Some(above) = least_diagonal(&turned, row, strict) {
+                return vec![sign(entry), diagonal(row, above)];
+            }
+        }
+    }
+    Vec::new()
+}
+
+fn with_turned_sign(symmetric: &DMatrix<f64>, (i, j): (usize, usize)) -> DMatrix<f64> {
+    let mut turned = symmetric.clone();
+    turned[(i, j)] = -turned[(i, j)];
+    turned[(j, i)] = -turned[(j, i)];
+    turned
+}
+
+/// The value that the diagonal entry `row` must exceed for the whole to be definite, sᵀ R⁻¹ s with s the rest of
+/// the row and R the matrix without it (Schur complement); `None` where R is not definite itself.
+fn least_diagonal(symmetric: &DMatrix<f64>, row: usize, strict: bool) -> Option<f64> {
+    let rest = symmetric.clone().remove_row(row).remove_column(row);
+    if rest.is_empty() {
+        return Some(0.0);
+    }
+    if !is_definite(&rest, strict) {
+        return None;
+    }
+    let side = symmetric.column(row).into_owned().remove_row(row);
+    let solved = rest.cholesky()?.solve(&side);
+    Some(side.dot(&solved))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use crate::structure::{Form, StructureError};
+
+    fn case(name: &str) -> Case {
+        Case::read(format!(
+            "{}/../tests/cases/{name}.toml",
+            env!("CARGO_MANIFEST_DIR")
+        ))
+        .unwrap()
+    }
+
+    #[test]
+    fn the_printed_matrices_are_refused_with_the_entries_to_blame() {
+        let case = case("staubli-tx200-as-printed");
+        let StructureError::Indefinite(found) = case.structure().unwrap().check().unwrap_err() else {
+            panic!("not indefinite")
+        };
+        let names: Vec<&str> = found.iter().map(|indefinite| indefinite.matrix).collect();
+        assert_eq!(names, ["stiffness", "damping"]);
+        assert!(found.iter().all(|indefinite| indefinite.eigenvalue < 0.0));
+        let sign = |value| Remedy::Sign {
+            row: 1,
+            column: 6,
+            value,
+            directions: (Direction::X, Direction::Rz),
+        };
+        assert_eq!(found[0].remedy, [sign(4.35e6)]);
+        assert_eq!(found[1].remedy[0], sign(4616.0));
+        // With the sign turned, damping needs C44 > 489 instead of 12.
+        let Remedy::Diagonal {
+            row: 4,
+            value: 12.0,
+            above,
+            ..
+        } = found[1].remedy[1]
+        else {
+            panic!("{:?}", found[1].remedy)
+        };
+        assert!((above - 489.0).abs() < 1.0, "{above}");
+    }
+
+    #[test]
+    fn every_other_case_is_definite() {
+        for name in [
+            "staubli-tx200",
+            "kuka-kr90-full",
+            "insperger-2dof-ad1",
+            "kuka-kr90-z10",
+        ] {
+            case(name).structure().unwrap().check().unwrap();
+        }
+    }
+
+    #[test]
+    fn a_free_body_is_no_fault_and_a_body_without_mass_is() {
+        let mut case = case("insperger-2dof-ad1");
+        let Some(structure) = &mut case.structure else {
+            panic!("no structure")
+        };
+        let Form::Matrices(matrices) = &mut structure.form else {
+            panic!("no matrices")
+        };
+        matrices.stiffness = DMatrix::from_row_slice(2, 2, &[1.0, -1.0, -1.0, 1.0]);
+        assert!(structure.check().is_ok());
+        let Form::Matrices(matrices) = &mut structure.form else {
+            panic!("no matrices")
+        };
+        matrices.mass[(1, 1)] = 0.0;
+        let message = structure.check().unwrap_err().to_string();
+        assert!(
+            message.contains("mass") && message.contains("entry (2,2)"),
+            "{message}"
+        );
+    }
+}

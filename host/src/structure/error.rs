@@ -1,0 +1,30 @@
+//! A structure that cannot be used.
+
+use std::fmt;
+
+use super::Indefinite;
+
+/// Why the structure of a case cannot be used.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StructureError {
+    /// Matrices that no passive structure has.
+    Indefinite(Vec<Indefinite>),
+    /// The mass matrix has no inverse.
+    SingularMass,
+}
+
+impl fmt::Display for StructureError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Indefinite(found) => {
+                for (index, indefinite) in found.iter().enumerate() {
+                    write!(f, "{}{indefinite}", if index == 0 { "" } else { ". Also, " })?;
+                }
+                Ok(())
+            }
+            Self::SingularMass => f.write_str("the mass matrix has no inverse"),
+        }
+    }
+}
+
+impl std::error::Error for StructureError {}
