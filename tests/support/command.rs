@@ -1,0 +1,131 @@
+//! The real `quietcut` command, as a user runs it.
+
+use std::ffi::OsStr;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// No run of the command in a test takes longer, not even on a busy machine; a hang must end a test.
+const LONGEST: Duration = Duration::from_secs(120);
+
+/// The folder of the case files.
+pub fn cases() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("cases")
+}
+
+/// The command beside the test that runs: in the same target folder, of the same profile.
+pub fn binary() -> PathBuf {
+    let test = std::env::current_exe().expect("a test knows its own path");
+    let folder = test
+        .parent()
+        .and_then(Path::parent)
+        .expect("tests lie in target/PROFILE/deps");
+    let binary = folder.join("quietcut");
+    assert!(
+        binary.exists(),
+        "{} is missing: cargo build --release -p quietcut",
+        binary.display()
+    );
+    binary
+}
+
+/// A folder of its own for a test, gone afterwards.
+pub fn folder() -> TempDir {
+    tempfile::tempdir().expect("a temporary folder can be made")
+}
+
+/// What a run left behind.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Exit status; `None` where a signal ended it.
+    pub status: Option<i32>,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+impl Outcome {
+    /// The answer, which must be all of standard output.
+    pub fn json(&self) -> serde_json::Value {
+        assert_eq!(self.status, Some(0), "{self:?}");
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:?}"))
+    }
+
+    /// Asserts bad input: status 2, nothing on standard output, and all of `words` in one message.
+    #[track_caller]
+    pub fn refused(&self, words: &[&str]) {
+        assert_eq!(self.status, Some(2), "{self:?}");
+        assert_eq!(self.stdout, "", "{self:?}");
+        for word in words {
+            assert!(self.stderr.contains(word), "`{word}` is not in {self:?}");
+        }
+        assert!(!self.stderr.contains("fault in quietcut"), "{self:?}");
+    }
+}
+
+/// A run that has started.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+}
+
+impl Running {
+    /// Waits for the end; a run that does not end is killed and fails the test.
+    pub fn finish(mut self) -> Outcome {
+        let drain = |stream: Option<Box<dyn Read + Send>>| {
+            std::thread::spawn(move || {
+                let mut text = String::new();
+                if let Some(mut stream) = stream {
+                    stream
+                        .read_to_string(&mut text)
+                        .expect("the command writes UTF-8");
+                }
+                text
+            })
+        };
+        let stdout = drain(self.child.stdout.take().map(|stream| Box::new(stream) as _));
+        let stderr = drain(self.child.stderr.take().map(|stream| Box::new(stream) as _));
+        let began = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().expect("the command can be waited for") {
+                break status;
+            }
+            if began.elapsed() > LONGEST {
+                self.child.kill().expect("the command can be killed");
+                self.child.wait().expect("the command can be waited for");
+                panic!(
+                    "the command did not end in {LONGEST:?}: {}",
+                    stderr.join().unwrap_or_default()
+                );
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        };
+        Outcome {
+            status: status.code(),
+            stdout: stdout.join().expect("standard output was read"),
+            stderr: stderr.join().expect("standard error was read"),
+        }
+    }
+}
+
+/// Starts the command with `arguments` in `folder`.
+pub fn start<S: AsRef<OsStr>>(folder: &Path, arguments: &[S]) -> Running {
+    let child = Command::new(binary())
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command can be started");
+    Running { child }
+}
+
+/// Runs the command with `arguments` in `folder` to its end.
+pub fn quietcut<S: AsRef<OsStr>>(folder: &Path, arguments: &[S]) -> Outcome {
+    start(folder, arguments).finish()
+}
