@@ -2,19 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::lobes::NotKnown;
 use crate::units::{Millimeters, Rpm};
+use crate::working_point::WorkingPoint;
 
 /// What to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
-    /// Nothing: the cut is quiet.
+    /// Nothing: no chatter is heard.
     Keep,
     /// Change the spindle speed.
     Speed,
-    /// Reduce the axial depth.
+    /// Reduce the axial depth, at [`Advice::speed`].
     Depth,
-    /// No advice can be given; [`Advice::source`] and the assumptions say what is missing.
+    /// No advice can be given; [`Advice::obstacle`] says what is missing.
     NotKnown,
 }
 
@@ -28,6 +30,24 @@ pub enum Source {
     ToothPassingRule,
 }
 
+/// What kept a better source from being used.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Obstacle {
+    /// There is no lobe table.
+    NoTable,
+    /// The table does not know the present point.
+    Table(NotKnown),
+    /// The table calls the present point stable with margin, and yet it chatters: it is not true here.
+    Contradicted,
+    /// The table knows no depth that is stable with margin at any speed within the limits.
+    NothingStable,
+    /// The chatter frequency is not known, so that the rule has nothing to go by.
+    ChatterFrequency,
+    /// The rule has no speed within the limits of the machine that the table does not call unstable.
+    NoSpeedWithinLimits,
+}
+
 /// The next speed and depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -36,10 +56,13 @@ pub struct Advice {
     pub action: Action,
     /// The spindle speed to cut with.
     pub speed: Rpm,
-    /// The axial depth to cut with; not known where the host never told the working point.
+    /// The axial depth to cut with; `None` where it is not known: the host never told the working point, or the rule, which
+    /// knows no depths, says to reduce it.
     pub depth: Option<Millimeters>,
     /// What it rests on.
     pub source: Source,
-    /// True where the working point (depth, immersion, feed, posture) was not told and the table's first layer is assumed.
-    pub assumed_working_point: bool,
+    /// The working point that was assumed, where the host told none.
+    pub assumed: Option<WorkingPoint>,
+    /// Why it rests on nothing better.
+    pub obstacle: Option<Obstacle>,
 }

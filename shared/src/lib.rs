@@ -14,6 +14,7 @@
 
 pub mod acceleration;
 pub mod advice;
+pub mod checksum;
 pub mod decimation;
 pub mod detector;
 pub mod fft;

@@ -66,7 +66,7 @@ impl AdviceAnswer {
             rpm: number(advice.speed.0),
             depth_mm: advice.depth.map(|depth| number(depth.0)),
             source: words::source_key(advice.source),
-            assumed_working_point: advice.assumed_working_point,
+            assumed_working_point: advice.assumed.is_some(),
             why: words::why(advice, &report.judgement, report.speed),
         }
     }

@@ -116,7 +116,7 @@ pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String
             "there is no lobe table, and the chatter frequency or the number of teeth is not known".to_owned()
         }
     };
-    if advice.assumed_working_point && advice.source == Source::Table {
+    if advice.assumed.is_some() && advice.source == Source::Table {
         why.push_str("; the working point was not told, so the first layer of the table is assumed");
     }
     why
@@ -124,7 +124,8 @@ pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String
 
 #[cfg(test)]
 mod tests {
-    use quietcut_core::units::{Hertz, Millimeters};
+    use quietcut_core::units::{Degrees, Hertz, Millimeters};
+    use quietcut_core::working_point::WorkingPoint;
 
     use super::*;
 
@@ -142,7 +143,14 @@ mod tests {
             speed: Rpm(1480.0),
             depth: Some(Millimeters(2.0)),
             source: Source::Table,
-            assumed_working_point: true,
+            assumed: Some(WorkingPoint {
+                axial_depth: Millimeters(2.0),
+                start: Degrees(90.0),
+                exit: Degrees(180.0),
+                feed_per_tooth: Millimeters(0.15),
+                posture: 0,
+            }),
+            obstacle: None,
         };
         assert_eq!(
             verdict(&judgement),

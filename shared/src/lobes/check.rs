@@ -1,0 +1,106 @@
+//! What must be true of the entries of a table, whoever made it.
+
+use super::format::{MAX_INTERVALS, saturate};
+use super::{IMMERSION_TOLERANCE, LobeTable, TableError, Validity};
+use crate::units::Rpm;
+
+/// Checks every speed, layer, column and interval.
+pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
+    check_speeds(table.speeds())?;
+    check_layers(table.layers())?;
+    let LobeTable { bytes, shape } = table;
+    let mut expected = 0;
+    for layer in 0..shape.layers {
+        for speed in 0..shape.speeds {
+            let range = shape
+                .column_range(bytes, layer, speed)
+                .unwrap_or(usize::MAX..usize::MAX);
+            let (layer_index, speed_index) = (saturate(layer), saturate(speed));
+            if range.start != expected || range.end < range.start {
+                return Err(TableError::ColumnOrder {
+                    layer: layer_index,
+                    speed: speed_index,
+                });
+            }
+            if range.len() > MAX_INTERVALS {
+                let found = saturate(range.len());
+                return Err(TableError::TooManyIntervals {
+                    layer: layer_index,
+                    speed: speed_index,
+                    found,
+                });
+            }
+            expected = range.end;
+            let mut end_mm = shape.depth_from_mm;
+            for (position, index) in range.enumerate() {
+                let interval = shape
+                    .interval(bytes, index)
+                    .filter(|i| i.from.0 >= end_mm && i.from < i.to && i.to.0 <= shape.depth_to_mm)
+                    .ok_or(interval_order(layer, speed, position))?;
+                end_mm = interval.to.0;
+            }
+        }
+    }
+    if expected != shape.intervals {
+        return Err(TableError::Arrays {
+            needed: shape.length(),
+            found: saturate(bytes.len()),
+        });
+    }
+    Ok(())
+}
+
+/// Speeds must be positive, finite and strictly ascending.
+pub(super) fn check_speeds(speeds: impl Iterator<Item = Rpm>) -> Result<(), TableError> {
+    let mut previous = Rpm(0.0);
+    for (index, found) in speeds.enumerate() {
+        if !(found > previous && found.0.is_finite()) {
+            return Err(TableError::SpeedOrder {
+                index: saturate(index),
+                found,
+            });
+        }
+        previous = found;
+    }
+    Ok(())
+}
+
+/// Layers must hold for something, and no two for the same.
+pub(super) fn check_layers(
+    layers: impl ExactSizeIterator<Item = Validity> + Clone,
+) -> Result<(), TableError> {
+    for (index, layer) in layers.clone().enumerate() {
+        let error = TableError::Layer {
+            layer: saturate(index),
+        };
+        let is_range = layer.feed_from.0 >= 0.0
+            && layer.feed_from <= layer.feed_to
+            && layer.feed_to.0.is_finite()
+            && layer.start.0.is_finite()
+            && layer.start < layer.exit
+            && layer.exit.0.is_finite();
+        let clashes = |other: Validity| match other.is_family_of(&layer) {
+            true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
+            // One cut must not belong to two families.
+            false => other.posture == layer.posture && is_near(&other, &layer),
+        };
+        if !is_range || layers.clone().take(index).any(clashes) {
+            return Err(error);
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn interval_order(layer: usize, speed: usize, interval: usize) -> TableError {
+    TableError::IntervalOrder {
+        layer: saturate(layer),
+        speed: saturate(speed),
+        interval: saturate(interval),
+    }
+}
+
+/// True where a cut could lie within the tolerance of both.
+fn is_near(a: &Validity, b: &Validity) -> bool {
+    let tolerance = 2.0 * IMMERSION_TOLERANCE.0;
+    (a.start.0 - b.start.0).abs() <= tolerance && (a.exit.0 - b.exit.0).abs() <= tolerance
+}

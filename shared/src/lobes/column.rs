@@ -1,0 +1,261 @@
+//! One column of the table: the depths that are not stable at one speed and working point.
+
+use heapless::Vec;
+
+use super::{Answer, Interval, Kind, NotKnown};
+use crate::units::{Hertz, Millimeters};
+
+/// Intervals of a column after joining up to four columns; more are merged to the unstable side.
+const CAPACITY: usize = 24;
+
+/// The depths that are not stable at one speed, sorted and without overlaps; intervals may touch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    depth_from_mm: f32,
+    depth_to_mm: f32,
+    intervals: Vec<Interval, CAPACITY>,
+}
+
+impl Column {
+    /// A column of a table for these depths in which all is stable.
+    pub(super) fn new(depth_from_mm: f32, depth_to_mm: f32) -> Self {
+        Self {
+            depth_from_mm,
+            depth_to_mm,
+            intervals: Vec::new(),
+        }
+    }
+
+    /// Puts an interval behind the others.
+    ///
+    /// Where the column is full the last interval grows over it: depths may be called unstable that are not, never the reverse.
+    pub(super) fn push(&mut self, interval: Interval) {
+        if let Some(last) = self.intervals.last_mut()
+            && last.to == interval.from
+            && last.kind == interval.kind
+            && last.chatter == interval.chatter
+        {
+            last.to = interval.to;
+            return;
+        }
+        if self.intervals.push(interval).is_err()
+            && let Some(last) = self.intervals.last_mut()
+        {
+            last.to = Millimeters(f32::max(last.to.0, interval.to.0));
+        }
+    }
+
+    /// The intervals that are not stable, ascending.
+    pub fn intervals(&self) -> &[Interval] {
+        &self.intervals
+    }
+
+    /// The first interval that is not stable: where stability is lost when the depth grows from the smallest of the table.
+    pub fn first_limit(&self) -> Option<&Interval> {
+        self.intervals.first()
+    }
+
+    /// The stable depths as pairs [from, to), ascending; the last depth of the table counts where it is the end.
+    pub fn stable(&self) -> impl Iterator<Item = (Millimeters, Millimeters)> + '_ {
+        let starts = core::iter::once(self.depth_from_mm).chain(self.intervals.iter().map(|i| i.to.0));
+        let ends = self
+            .intervals
+            .iter()
+            .map(|i| i.from.0)
+            .chain(core::iter::once(self.depth_to_mm));
+        starts
+            .zip(ends)
+            .filter(|(from, to)| from < to)
+            .map(|(from, to)| (Millimeters(from), Millimeters(to)))
+    }
+
+    /// True where all depths of [from, to] are stable and inside the table.
+    pub fn is_stable_within(&self, from: Millimeters, to: Millimeters) -> bool {
+        from.0 >= self.depth_from_mm
+            && to.0 <= self.depth_to_mm
+            && self
+                .intervals
+                .iter()
+                .all(|i| (i.to <= from && i.to.0 < self.depth_to_mm) || i.from > to)
+    }
+
+    /// What this column says of a depth.
+    pub fn at(&self, depth: Millimeters) -> Answer {
+        // Written so that NaN lands here too.
+        if !(depth.0 >= self.depth_from_mm && depth.0 <= self.depth_to_mm) {
+            return Answer::NotKnown(NotKnown::Depth {
+                asked: depth,
+                from: Millimeters(self.depth_from_mm),
+                to: Millimeters(self.depth_to_mm),
+            });
+        }
+        let hit = self.intervals.iter().position(|i| self.covers(i, depth.0));
+        let Some((index, interval)) = hit.and_then(|index| Some((index, self.intervals.get(index)?))) else {
+            return Answer::Stable {
+                margin: Millimeters(self.distance_to_unstable_mm(depth.0)),
+            };
+        };
+        if interval.kind == Kind::Undecided {
+            return Answer::NotKnown(NotKnown::Undecided);
+        }
+        let (from_mm, to_mm) = self.unstable_range_mm(index, interval);
+        Answer::Unstable {
+            kind: interval.kind,
+            chatter: interval.chatter,
+            margin: Millimeters(f32::min(depth.0 - from_mm, to_mm - depth.0)),
+        }
+    }
+
+    /// True where the interval holds at this depth: the end does not belong to it, but for the end of the table.
+    fn covers(&self, interval: &Interval, depth_mm: f32) -> bool {
+        interval.from.0 <= depth_mm
+            && (depth_mm < interval.to.0
+                || (interval.to.0 >= self.depth_to_mm && depth_mm <= self.depth_to_mm))
+    }
+
+    fn distance_to_unstable_mm(&self, depth_mm: f32) -> f32 {
+        let below = self.intervals.iter().rev().find(|i| i.to.0 <= depth_mm);
+        let above = self.intervals.iter().find(|i| i.from.0 > depth_mm);
+        let from_mm = match below {
+            Some(interval) => interval.to.0,
+            // Depth 0 is no cut: below it there is nothing to lose.
+            None if self.depth_from_mm > 0.0 => self.depth_from_mm,
+            None => f32::NEG_INFINITY,
+        };
+        let to_mm = above.map_or(self.depth_to_mm, |interval| interval.from.0);
+        f32::min(depth_mm - from_mm, to_mm - depth_mm)
+    }
+
+    /// The interval with those that touch it: kinds may change within.
+    fn unstable_range_mm(&self, index: usize, interval: &Interval) -> (f32, f32) {
+        let (mut from_mm, mut to_mm) = (interval.from.0, interval.to.0);
+        for before in self.intervals.iter().take(index).rev() {
+            if before.to.0 < from_mm {
+                break;
+            }
+            from_mm = before.from.0;
+        }
+        for after in self.intervals.iter().skip(index + 1) {
+            if after.from.0 > to_mm {
+                break;
+            }
+            to_mm = after.to.0;
+        }
+        (from_mm, to_mm)
+    }
+
+    /// The column between two neighbouring ones; `weight` of `b` from 0 to 1.
+    ///
+    /// Intervals that overlap or touch, in one column or across, form a group. A group with the same sequence of kinds in both
+    /// columns, overlapping pair by pair, is interpolated; any other is unstable where either column is.
+    pub(super) fn blend(a: &Self, b: &Self, weight: f32) -> Self {
+        if weight <= 0.0 {
+            return a.clone();
+        }
+        if weight >= 1.0 {
+            return b.clone();
+        }
+        let mut out = Self::new(a.depth_from_mm, a.depth_to_mm);
+        let (mut rest_a, mut rest_b) = (a.intervals.as_slice(), b.intervals.as_slice());
+        while !(rest_a.is_empty() && rest_b.is_empty()) {
+            let (count_a, count_b) = group(rest_a, rest_b);
+            let (group_a, tail_a) = rest_a.split_at(count_a.min(rest_a.len()));
+            let (group_b, tail_b) = rest_b.split_at(count_b.min(rest_b.len()));
+            if is_same_topology(group_a, group_b) {
+                for (x, y) in group_a.iter().zip(group_b) {
+                    out.push(out.interpolate(x, y, weight));
+                }
+            } else if weight <= 0.5 {
+                out.push_union(group_a, group_b);
+            } else {
+                out.push_union(group_b, group_a);
+            }
+            (rest_a, rest_b) = (tail_a, tail_b);
+        }
+        out
+    }
+
+    /// The interval between two that belong together.
+    ///
+    /// An end that lies at the end of the table is not known further than that: the result then keeps it.
+    fn interpolate(&self, a: &Interval, b: &Interval, weight: f32) -> Interval {
+        let between = |x: f32, y: f32| x + (y - x) * weight;
+        let from_mm = if f32::min(a.from.0, b.from.0) <= self.depth_from_mm {
+            self.depth_from_mm
+        } else {
+            between(a.from.0, b.from.0)
+        };
+        let to_mm = if f32::max(a.to.0, b.to.0) >= self.depth_to_mm {
+            self.depth_to_mm
+        } else {
+            between(a.to.0, b.to.0)
+        };
+        let chatter_hz = if a.chatter.0 == 0.0 || b.chatter.0 == 0.0 {
+            0.0
+        } else {
+            between(a.chatter.0, b.chatter.0)
+        };
+        Interval {
+            from: Millimeters(from_mm),
+            to: Millimeters(to_mm),
+            kind: a.kind,
+            chatter: Hertz(chatter_hz),
+        }
+    }
+
+    /// Unstable where either group is; kind and frequency of `near` where both are.
+    fn push_union(&mut self, near: &[Interval], far: &[Interval]) {
+        let mut depth_mm = f32::NEG_INFINITY;
+        loop {
+            let beyond = |i: &&Interval| i.to.0 > depth_mm;
+            let next_near = near.iter().find(beyond);
+            let next_far = far.iter().find(beyond);
+            let start_near_mm = next_near.map_or(f32::INFINITY, |i| f32::max(i.from.0, depth_mm));
+            let start_far_mm = next_far.map_or(f32::INFINITY, |i| f32::max(i.from.0, depth_mm));
+            let piece = match (next_near, next_far) {
+                (Some(i), _) if start_near_mm <= start_far_mm => Interval {
+                    from: Millimeters(start_near_mm),
+                    ..*i
+                },
+                (_, Some(i)) => Interval {
+                    from: Millimeters(start_far_mm),
+                    to: Millimeters(f32::min(i.to.0, start_near_mm)),
+                    ..*i
+                },
+                _ => return,
+            };
+            depth_mm = piece.to.0;
+            self.push(piece);
+        }
+    }
+}
+
+/// How many of the first intervals of two columns form one group: each overlaps or touches another of it.
+fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
+    let (mut count_a, mut count_b) = (0, 0);
+    let mut end_mm = f32::min(
+        a.first().map_or(f32::INFINITY, |i| i.from.0),
+        b.first().map_or(f32::INFINITY, |i| i.from.0),
+    );
+    loop {
+        if let Some(i) = a.get(count_a).filter(|i| i.from.0 <= end_mm) {
+            end_mm = f32::max(end_mm, i.to.0);
+            count_a += 1;
+        } else if let Some(i) = b.get(count_b).filter(|i| i.from.0 <= end_mm) {
+            end_mm = f32::max(end_mm, i.to.0);
+            count_b += 1;
+        } else if count_a + count_b == 0 {
+            // Only entries that are not numbers come here: take one, so that the caller comes to an end.
+            return (1, 1);
+        } else {
+            return (count_a, count_b);
+        }
+    }
+}
+
+fn is_same_topology(a: &[Interval], b: &[Interval]) -> bool {
+    a.len() == b.len()
+        && a.iter()
+            .zip(b)
+            .all(|(x, y)| x.kind == y.kind && x.from < y.to && y.from < x.to)
+}

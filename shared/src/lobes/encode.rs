@@ -1,0 +1,264 @@
+//! Content to the bytes of a table, into the caller's buffer.
+
+use super::check::{check_layers, check_speeds, interval_order};
+use super::format::{
+    HEADER_LENGTH, Header, MAX_INTERVALS, NAME_CAPACITY, SCHEMA, STEPS, Shape, kind_code, saturate,
+};
+use super::{Interval, LobeTable, TableError, Validity};
+use crate::units::{Millimeters, Rpm};
+use crate::working_point::Limits;
+
+/// What a table is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Content<'a> {
+    /// Name of the case; at most [`NAME_CAPACITY`] bytes.
+    pub name: &'a str,
+    /// Number of teeth of the tool.
+    pub teeth: u8,
+    /// Limits of the machine, where known.
+    pub limits: Option<Limits>,
+    /// The smallest depth that was computed.
+    pub depth_from: Millimeters,
+    /// The largest depth that was computed.
+    pub depth_to: Millimeters,
+    /// Spindle speeds, strictly ascending; the steps may be of any size, finer in pockets and at flips.
+    pub speeds: &'a [Rpm],
+    /// The layers, in any order.
+    pub layers: &'a [Layer<'a>],
+}
+
+/// One layer of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer<'a> {
+    /// What it holds for.
+    pub validity: Validity,
+    /// Per speed the depths that are not stable, ascending and without overlaps; a speed that could not be
+    /// computed has one interval over all depths of kind [`Undecided`](super::Kind::Undecided).
+    pub columns: &'a [&'a [Interval]],
+}
+
+/// Bytes that [`encode`] needs.
+pub fn encoded_length(content: &Content<'_>) -> u64 {
+    shape_of(content).length()
+}
+
+/// Writes the table into `buffer` and returns its bytes: header with generation 0, CRC-32, content.
+pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], TableError> {
+    let shape = shape_of(content);
+    shape.check()?;
+    check_speeds(content.speeds.iter().copied())?;
+    check_layers(content.layers.iter().map(|layer| layer.validity))?;
+    if content.name.len() > NAME_CAPACITY {
+        return Err(TableError::Name {
+            length: saturate(content.name.len()),
+        });
+    }
+    let (needed, found) = (shape.length(), buffer.len() as u64);
+    let bytes = usize::try_from(needed)
+        .ok()
+        .filter(|_| needed <= u64::from(u32::MAX))
+        .and_then(|length| buffer.get_mut(..length))
+        .ok_or(TableError::Buffer { needed, found })?;
+
+    let (head, payload) = bytes
+        .split_at_mut_checked(HEADER_LENGTH)
+        .ok_or(TableError::Buffer { needed, found })?;
+    write_payload(content, &shape, payload)?;
+    let header = Header {
+        schema: SCHEMA,
+        length: needed as u32,
+        generation: 0,
+        crc: 0,
+    };
+    head.copy_from_slice(&header.with_generation(0, payload).to_bytes());
+    // What this code writes this code must read: the last word belongs to the reader.
+    LobeTable::parse(bytes).map(|table| table.bytes())
+}
+
+fn shape_of(content: &Content<'_>) -> Shape {
+    let intervals = || {
+        content
+            .layers
+            .iter()
+            .flat_map(|layer| layer.columns)
+            .flat_map(|column| column.iter())
+    };
+    Shape {
+        teeth: content.teeth,
+        limits: content.limits,
+        depth_from_mm: content.depth_from.0,
+        depth_to_mm: content.depth_to.0,
+        // `max` passes over NaN; `write_column` refuses it.
+        chatter_max_hz: intervals().map(|i| i.chatter.0).fold(0.0, f32::max),
+        layers: content.layers.len(),
+        speeds: content.speeds.len(),
+        intervals: intervals().count(),
+        name_length: content.name.len(),
+    }
+}
+
+fn write_payload(content: &Content<'_>, shape: &Shape, payload: &mut [u8]) -> Result<(), TableError> {
+    let mut writer = Writer { rest: payload };
+    let limits = content.limits.unwrap_or(Limits {
+        rpm_min: Rpm(0.0),
+        rpm_max: Rpm(0.0),
+    });
+    writer.put(&[content.teeth, content.name.len() as u8]);
+    writer.put(&(content.layers.len() as u16).to_le_bytes());
+    writer.put(&(content.speeds.len() as u16).to_le_bytes());
+    writer.put(&u16::from(content.limits.is_some()).to_le_bytes());
+    for value in [
+        limits.rpm_min.0,
+        limits.rpm_max.0,
+        shape.depth_from_mm,
+        shape.depth_to_mm,
+        shape.chatter_max_hz,
+    ] {
+        writer.put(&value.to_le_bytes());
+    }
+    writer.put(&saturate(shape.intervals).to_le_bytes());
+    let mut name = [0; NAME_CAPACITY];
+    for (slot, byte) in name.iter_mut().zip(content.name.bytes()) {
+        *slot = byte;
+    }
+    writer.put(&name);
+    write_layers(content, &mut writer)?;
+    for speed in content.speeds {
+        writer.put(&speed.0.to_le_bytes());
+    }
+    for (index, layer) in content.layers.iter().enumerate() {
+        write_column_starts(index, layer, &mut writer)?;
+    }
+    for (index, layer) in content.layers.iter().enumerate() {
+        for (speed, column) in layer.columns.iter().enumerate() {
+            write_column(shape, (index, speed), column, &mut writer)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_layers(content: &Content<'_>, writer: &mut Writer<'_>) -> Result<(), TableError> {
+    let mut first_interval = 0;
+    for (index, layer) in content.layers.iter().enumerate() {
+        if layer.columns.len() != content.speeds.len() {
+            return Err(TableError::Columns {
+                layer: saturate(index),
+                found: saturate(layer.columns.len()),
+                speeds: saturate(content.speeds.len()),
+            });
+        }
+        let validity = layer.validity;
+        for value in [
+            validity.feed_from.0,
+            validity.feed_to.0,
+            validity.start.0,
+            validity.exit.0,
+        ] {
+            writer.put(&value.to_le_bytes());
+        }
+        writer.put(&[validity.posture, 0, 0, 0]);
+        writer.put(&saturate(first_interval).to_le_bytes());
+        first_interval += layer.columns.iter().map(|column| column.len()).sum::<usize>();
+    }
+    Ok(())
+}
+
+fn write_column_starts(index: usize, layer: &Layer<'_>, writer: &mut Writer<'_>) -> Result<(), TableError> {
+    let mut start = 0_usize;
+    writer.put(&0_u16.to_le_bytes());
+    for (speed, column) in layer.columns.iter().enumerate() {
+        start += column.len();
+        let too_many = |found| TableError::TooManyIntervals {
+            layer: saturate(index),
+            speed: saturate(speed),
+            found: saturate(found),
+        };
+        if column.len() > MAX_INTERVALS {
+            return Err(too_many(column.len()));
+        }
+        let code = u16::try_from(start).map_err(|_| too_many(start))?;
+        writer.put(&code.to_le_bytes());
+    }
+    Ok(())
+}
+
+fn write_column(
+    shape: &Shape,
+    (layer, speed): (usize, usize),
+    column: &[Interval],
+    writer: &mut Writer<'_>,
+) -> Result<(), TableError> {
+    let (mut end_mm, mut end_code) = (shape.depth_from_mm, 0);
+    for (index, interval) in column.iter().enumerate() {
+        let (from_mm, to_mm) = (interval.from.0, interval.to.0);
+        // Written so that NaN is refused too.
+        if !(from_mm >= end_mm && from_mm < to_mm && to_mm <= shape.depth_to_mm) {
+            return Err(interval_order(layer, speed, index));
+        }
+        if !(interval.chatter.0 >= 0.0 && interval.chatter.0.is_finite()) {
+            return Err(TableError::Chatter {
+                found: interval.chatter,
+            });
+        }
+        // Each interval keeps one step at least, also those that follow: none is lost however thin it is.
+        let following = (column.len() - 1 - index) as u16;
+        let top = u16::MAX.saturating_sub(following);
+        let from = depth_code_down(shape, from_mm)
+            .max(end_code)
+            .min(top.saturating_sub(1));
+        let to = depth_code_up(shape, to_mm).min(top).max(from.saturating_add(1));
+        for code in [from, to, chatter_code(shape, interval.chatter.0)] {
+            writer.put(&code.to_le_bytes());
+        }
+        writer.put(&[kind_code(interval.kind), 0]);
+        (end_mm, end_code) = (to_mm, to);
+    }
+    Ok(())
+}
+
+/// Steps are snapped when they are this close: a decoded depth must come back to the step it came from.
+const SNAP_STEPS: f64 = 0.01;
+
+// f64 and the truncating, saturating cast: exact to far below `SNAP_STEPS`, on the host that makes tables.
+fn depth_steps(shape: &Shape, depth_mm: f32) -> f64 {
+    let range_mm = f64::from(shape.depth_to_mm) - f64::from(shape.depth_from_mm);
+    (f64::from(depth_mm) - f64::from(shape.depth_from_mm)) / range_mm * f64::from(STEPS)
+}
+
+fn depth_code_down(shape: &Shape, depth_mm: f32) -> u16 {
+    (depth_steps(shape, depth_mm) + SNAP_STEPS) as u16
+}
+
+fn depth_code_up(shape: &Shape, depth_mm: f32) -> u16 {
+    let steps = depth_steps(shape, depth_mm) - SNAP_STEPS;
+    let below = steps as u16;
+    if f64::from(below) < steps {
+        below.saturating_add(1)
+    } else {
+        below
+    }
+}
+
+fn chatter_code(shape: &Shape, chatter_hz: f32) -> u16 {
+    if chatter_hz == 0.0 {
+        return 0;
+    }
+    let steps = f64::from(chatter_hz) / f64::from(shape.chatter_max_hz) * f64::from(STEPS);
+    ((steps + 0.5) as u16).max(1)
+}
+
+/// Writes piece by piece; the length was taken from the same content, so that nothing is left out.
+struct Writer<'b> {
+    rest: &'b mut [u8],
+}
+
+impl Writer<'_> {
+    fn put(&mut self, piece: &[u8]) {
+        let rest = core::mem::take(&mut self.rest);
+        let (slot, rest) = rest.split_at_mut(piece.len().min(rest.len()));
+        for (to, from) in slot.iter_mut().zip(piece) {
+            *to = *from;
+        }
+        self.rest = rest;
+    }
+}

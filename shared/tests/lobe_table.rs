@@ -1,0 +1,805 @@
+//! The lobe table: bytes, refusals, lookups.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use proptest::prelude::*;
+use quietcut_core::checksum::crc32;
+use quietcut_core::lobes::format::{HEADER_LENGTH, MAX_INTERVALS};
+use quietcut_core::lobes::{
+    Answer, Column, Content, Header, Interval, Kind, Layer, LobeTable, NotKnown, TableError, Validity,
+    encode, encoded_length,
+};
+use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
+use quietcut_core::working_point::{Limits, WorkingPoint};
+
+/// A table with its own memory.
+#[derive(Clone, Debug)]
+struct Owned {
+    depth_from_mm: f32,
+    depth_to_mm: f32,
+    speeds: Vec<Rpm>,
+    layers: Vec<(Validity, Vec<Vec<Interval>>)>,
+}
+
+impl Owned {
+    fn encode(&self) -> Result<Vec<u8>, TableError> {
+        let columns: Vec<Vec<&[Interval]>> = self
+            .layers
+            .iter()
+            .map(|(_, columns)| columns.iter().map(Vec::as_slice).collect())
+            .collect();
+        let layers: Vec<Layer> = self
+            .layers
+            .iter()
+            .zip(&columns)
+            .map(|((validity, _), columns)| Layer {
+                validity: *validity,
+                columns,
+            })
+            .collect();
+        let content = Content {
+            name: "kuka-kr90-acetal",
+            teeth: 2,
+            limits: Some(Limits {
+                rpm_min: Rpm(600.0),
+                rpm_max: Rpm(2400.0),
+            }),
+            depth_from: Millimeters(self.depth_from_mm),
+            depth_to: Millimeters(self.depth_to_mm),
+            speeds: &self.speeds,
+            layers: &layers,
+        };
+        let mut buffer = vec![0; encoded_length(&content) as usize];
+        let written = encode(&content, &mut buffer)?.len();
+        assert_eq!(written, buffer.len());
+        Ok(buffer)
+    }
+
+    /// What a reader of the bytes would write again.
+    fn decode(table: &LobeTable) -> Self {
+        let (from, to) = table.depths();
+        let entries = |layer| {
+            (0..table.speeds().len())
+                .map(|speed| table.entry(layer, speed).unwrap().intervals().to_vec())
+                .collect()
+        };
+        Self {
+            depth_from_mm: from.0,
+            depth_to_mm: to.0,
+            speeds: table.speeds().collect(),
+            layers: table
+                .layers()
+                .enumerate()
+                .map(|(layer, validity)| (validity, entries(layer)))
+                .collect(),
+        }
+    }
+}
+
+fn validity(feed_mm: f32) -> Validity {
+    Validity {
+        feed_from: Millimeters(feed_mm),
+        feed_to: Millimeters(feed_mm),
+        start: Degrees(90.0),
+        exit: Degrees(180.0),
+        posture: 0,
+    }
+}
+
+fn working_point(validity: &Validity, depth_mm: f32) -> WorkingPoint {
+    WorkingPoint {
+        axial_depth: Millimeters(depth_mm),
+        start: validity.start,
+        exit: validity.exit,
+        feed_per_tooth: validity.feed_from,
+        posture: validity.posture,
+    }
+}
+
+fn interval(from_mm: f32, to_mm: f32, kind: Kind, chatter_hz: f32) -> Interval {
+    Interval {
+        from: Millimeters(from_mm),
+        to: Millimeters(to_mm),
+        kind,
+        chatter: Hertz(chatter_hz),
+    }
+}
+
+/// Half-immersion down-milling of acetal near its flip notch: values of the case `kuka-kr90-acetal`, rounded.
+fn acetal() -> Owned {
+    let hopf = |from_mm, chatter_hz| interval(from_mm, 6.0, Kind::Hopf, chatter_hz);
+    let columns = vec![
+        vec![hopf(1.723, 17.4)],
+        vec![
+            interval(1.575, 2.334, Kind::Flip, 17.27),
+            interval(2.712, 6.0, Kind::Hopf, 19.0),
+        ],
+        vec![
+            interval(1.327, 4.023, Kind::Flip, 17.42),
+            interval(4.023, 6.0, Kind::Hopf, 19.2),
+        ],
+        vec![hopf(2.223, 20.0)],
+        vec![],
+    ];
+    Owned {
+        depth_from_mm: 0.0,
+        depth_to_mm: 6.0,
+        speeds: [900.0, 1036.0, 1045.0, 1100.0, 3000.0].map(Rpm).to_vec(),
+        layers: vec![(validity(0.15), columns)],
+    }
+}
+
+fn kind() -> impl Strategy<Value = Kind> {
+    prop_oneof![
+        Just(Kind::Hopf),
+        Just(Kind::Flip),
+        Just(Kind::Fold),
+        Just(Kind::Undecided)
+    ]
+}
+
+/// Columns with ends on a grid of 1/40 of the range: often touching, often at the ends of the range.
+fn column(depth_from_mm: f32, depth_to_mm: f32) -> impl Strategy<Value = Vec<Interval>> {
+    (
+        prop::collection::btree_set(0_u8..=40, 0..8),
+        prop::collection::vec((kind(), 0.0_f32..300.0, any::<bool>()), 8),
+    )
+        .prop_map(move |(ends, kinds)| {
+            let at_mm = |step: u8| match step {
+                40 => depth_to_mm,
+                _ => depth_from_mm + (depth_to_mm - depth_from_mm) * f32::from(step) / 40.0,
+            };
+            let ends: Vec<u8> = ends.into_iter().collect();
+            ends.windows(2)
+                .zip(kinds)
+                .filter(|(_, (_, _, is_there))| *is_there)
+                .map(|(ends, (kind, hz, _))| interval(at_mm(ends[0]), at_mm(ends[1]), kind, hz))
+                .collect()
+        })
+}
+
+fn table() -> impl Strategy<Value = Owned> {
+    (
+        1_usize..6,
+        1_usize..4,
+        prop_oneof![Just(0.0_f32), 0.1_f32..1.0],
+        1.5_f32..20.0,
+    )
+        .prop_flat_map(|(speeds, layers, depth_from_mm, depth_to_mm)| {
+            let columns = prop::collection::vec(column(depth_from_mm, depth_to_mm), speeds);
+            let steps = prop::collection::vec(0.5_f32..400.0, speeds);
+            (steps, prop::collection::vec(columns, layers)).prop_map(move |(steps, layers)| {
+                let speeds = steps.iter().scan(500.0, |rpm, step| {
+                    *rpm += step;
+                    Some(Rpm(*rpm))
+                });
+                let feeds = (1_u8..).map(|index| validity(0.05 * f32::from(index)));
+                Owned {
+                    depth_from_mm,
+                    depth_to_mm,
+                    speeds: speeds.collect(),
+                    layers: feeds.zip(layers).collect(),
+                }
+            })
+        })
+}
+
+fn is_stable(column: &Column, depth_mm: f32) -> bool {
+    matches!(column.at(Millimeters(depth_mm)), Answer::Stable { .. })
+}
+
+proptest! {
+    #[test]
+    fn entries_come_back_within_a_step_to_the_unstable_side(content in table()) {
+        let bytes = content.encode().unwrap();
+        let table = LobeTable::parse(&bytes).unwrap();
+        prop_assert_eq!(table.name(), "kuka-kr90-acetal");
+        prop_assert_eq!(table.teeth(), 2);
+        prop_assert_eq!(table.limits(), Some(Limits { rpm_min: Rpm(600.0), rpm_max: Rpm(2400.0) }));
+        prop_assert_eq!(table.speeds().collect::<Vec<_>>(), content.speeds.clone());
+        // One step, 1/100 of one for snapping, and rounding of an f32 of the size of the depth.
+        let step_mm = table.depth_step().0;
+        let (outward_mm, inward_mm) = (1.01 * step_mm, 0.02 * step_mm + 2e-7 * content.depth_to_mm);
+        for (layer, (validity, columns)) in content.layers.iter().enumerate() {
+            prop_assert_eq!(table.layers().nth(layer), Some(*validity));
+            for (speed, column) in columns.iter().enumerate() {
+                let entry = table.entry(layer, speed).unwrap();
+                // Touching intervals of the same kind and frequency are one.
+                prop_assert!(entry.intervals().len() <= column.len());
+                if entry.intervals().len() < column.len() { continue }
+                for (read, written) in entry.intervals().iter().zip(column) {
+                    prop_assert_eq!(read.kind, written.kind);
+                    let from_mm = written.from.0 - read.from.0;
+                    let to_mm = read.to.0 - written.to.0;
+                    prop_assert!((-inward_mm - step_mm..=outward_mm).contains(&from_mm), "{} {}", read.from, written.from);
+                    prop_assert!((-inward_mm..=outward_mm).contains(&to_mm), "{} {}", read.to, written.to);
+                    // Half a step, and rounding; a frequency above 0 stays above.
+                    let tolerance_hz = table.chatter_error().0 * 2.0 + 1e-4;
+                    prop_assert!((read.chatter.0 - written.chatter.0).abs() <= tolerance_hz);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn reading_and_writing_again_keeps_the_bytes(content in table()) {
+        let bytes = content.encode().unwrap();
+        let once = Owned::decode(&LobeTable::parse(&bytes).unwrap()).encode().unwrap();
+        let twice = Owned::decode(&LobeTable::parse(&once).unwrap()).encode().unwrap();
+        prop_assert_eq!(once, twice);
+    }
+
+    #[test]
+    fn a_flipped_bit_is_refused(content in table(), position in any::<prop::sample::Index>(), bit in 0..8) {
+        let mut bytes = content.encode().unwrap();
+        let position = position.index(bytes.len());
+        bytes[position] ^= 1_u8 << bit;
+        prop_assert!(LobeTable::parse(&bytes).is_err());
+    }
+
+    #[test]
+    fn damaged_bytes_that_were_checked_before_do_no_harm(
+        content in table(), damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..20),
+        rpm in 400.0_f32..3000.0, depth_mm in -1.0_f32..25.0,
+    ) {
+        let mut bytes = content.encode().unwrap();
+        for (position, byte) in damage {
+            let position = position.index(bytes.len());
+            bytes[position] = byte;
+        }
+        if let Ok(table) = LobeTable::reopen(&bytes) {
+            for layer in table.layers() {
+                let _ = table.lookup(Rpm(rpm), &working_point(&layer, depth_mm));
+            }
+        }
+    }
+
+    #[test]
+    fn at_the_speeds_of_the_grid_the_entries_come_back(content in table()) {
+        let bytes = content.encode().unwrap();
+        let table = LobeTable::parse(&bytes).unwrap();
+        for (layer, validity) in table.layers().enumerate() {
+            for (speed, rpm) in table.speeds().enumerate() {
+                let column = table.column(rpm, &working_point(&validity, 1.0)).unwrap();
+                prop_assert_eq!(Some(column), table.entry(layer, speed));
+            }
+        }
+    }
+
+    #[test]
+    fn between_speeds_a_depth_is_what_both_neighbours_agree_on(
+        content in table(), position in 0.0_f32..1.0, depth in 0.0_f32..1.0,
+    ) {
+        prop_assume!(content.speeds.len() > 1);
+        let bytes = content.encode().unwrap();
+        let table = LobeTable::parse(&bytes).unwrap();
+        let depth_mm = content.depth_from_mm + depth * (content.depth_to_mm - content.depth_from_mm);
+        let at = working_point(&validity(0.05), depth_mm);
+        let (a, b) = (table.entry(0, 0).unwrap(), table.entry(0, 1).unwrap());
+        let rpm = content.speeds[0].0 + position * (content.speeds[1].0 - content.speeds[0].0);
+        let between = table.column(Rpm(rpm), &at).unwrap();
+        match (is_stable(&a, depth_mm), is_stable(&b, depth_mm)) {
+            (true, true) => prop_assert!(is_stable(&between, depth_mm)),
+            (false, false) => prop_assert!(!is_stable(&between, depth_mm)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn a_limit_moves_monotonously_between_its_neighbours(
+        limits_mm in prop::array::uniform4(0.5_f32..5.0), steps in prop::collection::vec(0.0_f32..1.0, 2..20),
+    ) {
+        let columns = limits_mm.map(|mm| vec![interval(mm, 6.0, Kind::Hopf, 20.0 * mm)]);
+        let [a, b, c, d] = columns;
+        let content = Owned {
+            depth_from_mm: 0.0, depth_to_mm: 6.0, speeds: vec![Rpm(1000.0), Rpm(1100.0)],
+            layers: vec![(validity(0.1), vec![a, b]), (validity(0.2), vec![c, d])],
+        };
+        let bytes = content.encode().unwrap();
+        let table = LobeTable::parse(&bytes).unwrap();
+        let limit = |rpm: f32, feed_mm: f32| {
+            let mut at = working_point(&validity(0.1), 1.0);
+            at.feed_per_tooth = Millimeters(feed_mm);
+            let column = table.column(Rpm(rpm), &at).unwrap();
+            let first = column.first_limit().unwrap();
+            (first.from.0, first.chatter.0)
+        };
+        let mut sorted = steps;
+        sorted.sort_by(f32::total_cmp);
+        // Rounding of an f32 between two of this size.
+        let rounding_mm = 1e-6;
+        for pair in sorted.windows(2) {
+            let along = |from: (f32, f32), to: (f32, f32), earlier: (f32, f32), later: (f32, f32)| {
+                (later.0 - earlier.0) * (to.0 - from.0).signum() >= -rounding_mm
+                    && (later.1 - earlier.1) * (to.1 - from.1).signum() >= -20.0 * rounding_mm
+            };
+            let [x, y] = [1000.0 + 100.0 * pair[0], 1000.0 + 100.0 * pair[1]];
+            prop_assert!(along(limit(1000.0, 0.1), limit(1100.0, 0.1), limit(x, 0.1), limit(y, 0.1)));
+            let [x, y] = [0.1 + 0.1 * pair[0], 0.1 + 0.1 * pair[1]];
+            prop_assert!(along(limit(1050.0, 0.1), limit(1050.0, 0.2), limit(1050.0, x), limit(1050.0, y)));
+        }
+    }
+}
+
+#[test]
+fn every_flipped_bit_and_every_other_length_is_refused() {
+    let bytes = acetal().encode().unwrap();
+    for bit in 0..8 * bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        assert!(LobeTable::parse(&damaged).is_err(), "bit {bit}");
+    }
+    for length in 0..bytes.len() {
+        assert!(LobeTable::parse(&bytes[..length]).is_err(), "length {length}");
+    }
+    let longer = [bytes.as_slice(), &[0]].concat();
+    let [header, found] = [bytes.len() as u32, longer.len() as u32];
+    assert_eq!(
+        LobeTable::parse(&longer).unwrap_err(),
+        TableError::Length { header, found }
+    );
+}
+
+#[test]
+fn each_fault_has_its_own_error() {
+    let good = acetal().encode().unwrap();
+    // Changes bytes and makes the CRC right again: what is left to find is the content.
+    let forged = |offset: usize, with: &[u8]| {
+        let mut bytes = good.clone();
+        bytes[offset..offset + with.len()].copy_from_slice(with);
+        let crc = crc32([&bytes[..28], &bytes[32..]]);
+        bytes[28..32].copy_from_slice(&crc.to_le_bytes());
+        LobeTable::parse(&bytes).unwrap_err()
+    };
+    assert_eq!(forged(0, b"PNG!"), TableError::Magic { found: *b"PNG!" });
+    assert_eq!(forged(4, &[2, 0]), TableError::Schema { found: 2, known: 1 });
+    assert!(
+        matches!(forged(6, &[1]), TableError::Crc { .. }),
+        "a header that is not zero where it must be"
+    );
+    assert_eq!(
+        forged(8, &[9, 0, 0, 0]),
+        TableError::TooShort { needed: 96, found: 9 }
+    );
+    assert!(matches!(
+        forged(8, &[0, 1, 0, 0]),
+        TableError::Length { header: 256, .. }
+    ));
+    assert_eq!(forged(32, &[0]), TableError::Teeth);
+    assert_eq!(forged(33, &[33]), TableError::Name { length: 33 });
+    assert_eq!(forged(64, &[0xFF]), TableError::Name { length: 16 });
+    assert!(matches!(forged(34, &[2]), TableError::Arrays { .. }));
+    assert!(matches!(
+        forged(40, &f32::NAN.to_le_bytes()),
+        TableError::Limits { .. }
+    ));
+    assert!(matches!(
+        forged(48, &7.0_f32.to_le_bytes()),
+        TableError::Depths { .. }
+    ));
+    assert!(matches!(
+        forged(56, &f32::INFINITY.to_le_bytes()),
+        TableError::Chatter { .. }
+    ));
+    assert_eq!(
+        forged(96, &(-1.0_f32).to_le_bytes()),
+        TableError::Layer { layer: 0 }
+    );
+    let second_speed = 96 + 24 + 4;
+    assert_eq!(
+        forged(second_speed, &900.0_f32.to_le_bytes()),
+        TableError::SpeedOrder {
+            index: 1,
+            found: Rpm(900.0)
+        }
+    );
+    let columns = 96 + 24 + 5 * 4;
+    assert_eq!(
+        forged(columns, &[1]),
+        TableError::ColumnOrder { layer: 0, speed: 0 }
+    );
+    let intervals = columns + 6 * 2;
+    assert_eq!(
+        forged(intervals + 6, &[4]),
+        TableError::IntervalOrder {
+            layer: 0,
+            speed: 0,
+            interval: 0
+        },
+        "a kind that does not exist"
+    );
+    assert_eq!(
+        forged(intervals + 8, &[0xFF, 0xFF]),
+        TableError::IntervalOrder {
+            layer: 0,
+            speed: 1,
+            interval: 0
+        }
+    );
+
+    let mut damaged = good.clone();
+    damaged[70] ^= 1;
+    let TableError::Crc { header, computed } = LobeTable::parse(&damaged).unwrap_err() else {
+        panic!("a CRC error")
+    };
+    assert_ne!(header, computed);
+}
+
+#[test]
+fn content_that_is_no_table_is_refused() {
+    let error = |change: fn(&mut Owned)| {
+        let mut content = acetal();
+        change(&mut content);
+        content.encode().unwrap_err()
+    };
+    assert_eq!(
+        error(|c| c.speeds[2] = Rpm(1036.0)),
+        TableError::SpeedOrder {
+            index: 2,
+            found: Rpm(1036.0)
+        }
+    );
+    assert!(matches!(
+        error(|c| c.speeds[2] = Rpm(f32::NAN)),
+        TableError::SpeedOrder { index: 2, .. }
+    ));
+    assert_eq!(
+        error(|c| c.layers[0].1.truncate(3)),
+        TableError::Columns {
+            layer: 0,
+            found: 3,
+            speeds: 5
+        }
+    );
+    assert_eq!(
+        error(|c| c.layers.clear()),
+        TableError::Count { speeds: 5, layers: 0 }
+    );
+    assert_eq!(
+        error(|c| c.layers.push(c.layers[0].clone())),
+        TableError::Layer { layer: 1 }
+    );
+    let near = |c: &mut Owned| {
+        let mut layer = c.layers[0].clone();
+        layer.0.exit = Degrees(180.4);
+        c.layers.push(layer);
+    };
+    assert_eq!(error(near), TableError::Layer { layer: 1 });
+    let order = |interval| TableError::IntervalOrder {
+        layer: 0,
+        speed: 1,
+        interval,
+    };
+    assert_eq!(error(|c| c.layers[0].1[1][1].from = Millimeters(2.0)), order(1));
+    assert_eq!(error(|c| c.layers[0].1[1][1].to = Millimeters(6.5)), order(1));
+    assert_eq!(
+        error(|c| c.layers[0].1[1][0].from = Millimeters(f32::NAN)),
+        order(0)
+    );
+    assert_eq!(
+        error(|c| c.layers[0].1[1][0].chatter = Hertz(-1.0)),
+        TableError::Chatter { found: Hertz(-1.0) }
+    );
+    let many = |c: &mut Owned| {
+        c.layers[0].1[4] = (0..13_u8)
+            .map(|k| interval(f32::from(k) / 4.0, f32::from(k) / 4.0 + 0.1, Kind::Fold, 0.0))
+            .collect();
+    };
+    assert_eq!(
+        error(many),
+        TableError::TooManyIntervals {
+            layer: 0,
+            speed: 4,
+            found: 13
+        }
+    );
+
+    let content = Content {
+        name: "a name that is longer than thirty-two bytes",
+        teeth: 2,
+        limits: None,
+        depth_from: Millimeters(0.0),
+        depth_to: Millimeters(1.0),
+        speeds: &[Rpm(1000.0)],
+        layers: &[Layer {
+            validity: validity(0.1),
+            columns: &[&[]],
+        }],
+    };
+    assert_eq!(
+        encode(&content, &mut [0; 500]).unwrap_err(),
+        TableError::Name { length: 43 }
+    );
+    let content = Content {
+        name: "short",
+        ..content
+    };
+    let needed = encoded_length(&content);
+    assert_eq!(
+        encode(&content, &mut [0; 50]).unwrap_err(),
+        TableError::Buffer { needed, found: 50 }
+    );
+    let mut buffer = [0; 500];
+    let bytes = encode(&content, &mut buffer).unwrap();
+    assert_eq!(LobeTable::parse(bytes).unwrap().limits(), None);
+}
+
+#[test]
+fn an_interval_thinner_than_a_step_is_kept() {
+    let mut content = acetal();
+    let sliver = |from_mm: f32, to_mm: f32| interval(from_mm, to_mm, Kind::Flip, 17.0);
+    content.layers[0].1[0] = vec![
+        interval(1.0, 2.0, Kind::Hopf, 20.0),
+        sliver(2.0, 2.000_001),
+        interval(3.0, 5.999_99, Kind::Hopf, 20.0),
+        sliver(5.999_99, 6.0),
+    ];
+    let bytes = content.encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    let entry = table.entry(0, 0).unwrap();
+    let kinds: Vec<Kind> = entry.intervals().iter().map(|i| i.kind).collect();
+    assert_eq!(kinds, [Kind::Hopf, Kind::Flip, Kind::Hopf, Kind::Flip]);
+}
+
+#[test]
+fn the_generation_of_a_slot_is_under_the_checksum() {
+    let bytes = acetal().encode().unwrap();
+    let header = Header::read(&bytes).unwrap();
+    assert_eq!((header.generation, header.length as usize), (0, bytes.len()));
+    let renewed = header.with_generation(7, &bytes[HEADER_LENGTH..]);
+    let slot = [&renewed.to_bytes(), &bytes[HEADER_LENGTH..]].concat();
+    assert_eq!(LobeTable::parse(&slot).unwrap().header().unwrap().generation, 7);
+    let old_crc = Header {
+        generation: 8,
+        ..renewed
+    };
+    let slot = [&old_crc.to_bytes(), &bytes[HEADER_LENGTH..]].concat();
+    assert!(matches!(LobeTable::parse(&slot), Err(TableError::Crc { .. })));
+}
+
+#[test]
+fn six_layers_of_six_hundred_speeds_take_about_a_hundred_kilobytes() {
+    let island = [
+        interval(1.0, 1.2, Kind::Flip, 17.0),
+        interval(1.4, 1.6, Kind::Fold, 17.0),
+        interval(2.0, 6.0, Kind::Hopf, 19.0),
+    ];
+    let columns = vec![island.to_vec(); 600];
+    let content = Owned {
+        depth_from_mm: 0.0,
+        depth_to_mm: 6.0,
+        speeds: (0..600_u16).map(|k| Rpm(600.0 + 3.0 * f32::from(k))).collect(),
+        layers: (1..=6_u8)
+            .map(|k| (validity(0.05 * f32::from(k)), columns.clone()))
+            .collect(),
+    };
+    assert_eq!(
+        content.encode().unwrap().len(),
+        96 + 6 * 24 + 600 * 4 + 6 * 601 * 2 + 6 * 600 * 3 * 8
+    );
+}
+
+/// Rounding to a step of 6 mm/65 535.
+const STEP_MM: f32 = 1e-4;
+
+fn assert_unstable(answer: Answer, expected: Kind, hz: f32, depth_margin_mm: f32) {
+    let Answer::Unstable {
+        kind,
+        chatter,
+        margin,
+    } = answer
+    else {
+        panic!("{answer:?}")
+    };
+    assert_eq!(kind, expected);
+    assert!((chatter.0 - hz).abs() < 0.01, "{chatter} for {hz}");
+    assert!(
+        (margin.0 - depth_margin_mm).abs() < 2.0 * STEP_MM,
+        "{margin} for {depth_margin_mm}"
+    );
+}
+
+#[test]
+fn a_flip_island_at_a_speed_of_the_grid() {
+    let bytes = acetal().encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    let at = |depth_mm| table.lookup(Rpm(1036.0), &working_point(&validity(0.15), depth_mm));
+    let assert_stable = |depth_mm: f32, margin_mm: f32| match at(depth_mm) {
+        Answer::Stable { margin } => assert!((margin.0 - margin_mm).abs() < 2.0 * STEP_MM, "{margin}"),
+        other => panic!("{other:?}"),
+    };
+    assert_stable(0.0, 1.575);
+    assert_stable(1.5, 0.075);
+    assert_unstable(at(1.6), Kind::Flip, 17.27, 0.025);
+    assert_stable(2.4, 0.066);
+    assert_unstable(at(3.0), Kind::Hopf, 19.0, 0.288);
+    assert_unstable(at(6.0), Kind::Hopf, 19.0, 0.0);
+    let column = table
+        .column(Rpm(1036.0), &working_point(&validity(0.15), 0.0))
+        .unwrap();
+    let stable: Vec<(f32, f32)> = column.stable().map(|(from, to)| (from.0, to.0)).collect();
+    assert_eq!(stable.len(), 2);
+    for ((from, to), (low, high)) in stable.into_iter().zip([(0.0, 1.575), (2.334, 2.712)]) {
+        assert!((from - low).abs() < STEP_MM && (to - high).abs() < STEP_MM);
+    }
+    assert!(column.is_stable_within(Millimeters(2.34), Millimeters(2.7)));
+    assert!(!column.is_stable_within(Millimeters(1.5), Millimeters(2.4)));
+    assert!(!column.is_stable_within(Millimeters(2.4), Millimeters(2.8)));
+}
+
+#[test]
+fn kinds_that_touch_are_one_unstable_range() {
+    let bytes = acetal().encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    // 4.0 mm at 1 045 rev/min is a flip; above 4.023 it is a Hopf, so the nearest stable depth is 1.327.
+    let answer = table.lookup(Rpm(1045.0), &working_point(&validity(0.15), 4.0));
+    assert_unstable(answer, Kind::Flip, 17.42, 2.0);
+}
+
+#[test]
+fn between_a_flip_island_and_none_the_island_stays() {
+    let bytes = acetal().encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    // Between 900 (Hopf from 1.723) and 1 036 (flip 1.575 to 2.334, Hopf from 2.712): unstable where either is.
+    let at = |depth_mm| table.lookup(Rpm(1000.0), &working_point(&validity(0.15), depth_mm));
+    assert!(matches!(at(1.5), Answer::Stable { .. }));
+    assert!(matches!(at(1.6), Answer::Unstable { kind: Kind::Flip, .. }));
+    assert!(matches!(at(2.5), Answer::Unstable { kind: Kind::Hopf, .. }));
+    // Between 1 100 (Hopf from 2.223) and 3 000 (nothing): the same.
+    let at = |depth_mm| table.lookup(Rpm(2999.0), &working_point(&validity(0.15), depth_mm));
+    assert!(matches!(at(2.2), Answer::Stable { .. }));
+    assert!(matches!(at(2.3), Answer::Unstable { kind: Kind::Hopf, .. }));
+}
+
+#[test]
+fn outside_of_the_table_the_answer_is_not_known() {
+    let mut content = acetal();
+    let mut independent = content.layers[0].clone();
+    independent.0.posture = 2;
+    independent.0.feed_to = Millimeters(0.3);
+    content.layers.push(independent);
+    let mut second_feed = content.layers[0].clone();
+    second_feed.0.feed_from = Millimeters(0.25);
+    second_feed.0.feed_to = Millimeters(0.25);
+    content.layers.push(second_feed);
+    let bytes = content.encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    let base = working_point(&validity(0.15), 1.0);
+    let ask = |rpm, at| match table.lookup(Rpm(rpm), &at) {
+        Answer::NotKnown(why) => Some(why),
+        _ => None,
+    };
+    assert_eq!(ask(1000.0, base), None);
+
+    let speed = |asked| {
+        Some(NotKnown::Speed {
+            asked: Rpm(asked),
+            from: Rpm(900.0),
+            to: Rpm(3000.0),
+        })
+    };
+    assert_eq!(ask(899.9, base), speed(899.9));
+    assert_eq!(ask(3000.1, base), speed(3000.1));
+    assert!(matches!(ask(f32::NAN, base), Some(NotKnown::Speed { .. })));
+    assert_eq!(ask(900.0, base), None);
+    assert_eq!(ask(3000.0, base), None);
+
+    let depth = |mm| {
+        ask(
+            1000.0,
+            WorkingPoint {
+                axial_depth: Millimeters(mm),
+                ..base
+            },
+        )
+    };
+    for mm in [-0.1, 6.1, f32::NAN] {
+        assert!(matches!(depth(mm), Some(NotKnown::Depth { .. })), "{mm}");
+    }
+    let feed = |mm| {
+        ask(
+            1000.0,
+            WorkingPoint {
+                feed_per_tooth: Millimeters(mm),
+                ..base
+            },
+        )
+    };
+    let range = |asked| {
+        let [asked, from, to] = [asked, 0.15, 0.25].map(Millimeters);
+        Some(NotKnown::Feed { asked, from, to })
+    };
+    assert_eq!(feed(0.2), None);
+    assert_eq!(feed(0.14), range(0.14));
+    assert_eq!(feed(0.26), range(0.26));
+    assert!(matches!(feed(f32::NAN), Some(NotKnown::Feed { .. })));
+
+    let exit = |degrees| {
+        ask(
+            1000.0,
+            WorkingPoint {
+                exit: Degrees(degrees),
+                ..base
+            },
+        )
+    };
+    assert_eq!(exit(180.4), None);
+    assert_eq!(
+        exit(179.0),
+        Some(NotKnown::Immersion {
+            start: Degrees(90.0),
+            exit: Degrees(179.0)
+        })
+    );
+    assert_eq!(
+        ask(1000.0, WorkingPoint { posture: 1, ..base }),
+        Some(NotKnown::Posture { asked: 1 })
+    );
+    // The layer of posture 2 holds for all feeds from 0.15 to 0.3.
+    let posture_2 = WorkingPoint {
+        posture: 2,
+        feed_per_tooth: Millimeters(0.3),
+        ..base
+    };
+    assert_eq!(ask(1000.0, posture_2), None);
+}
+
+#[test]
+fn an_undecided_depth_is_not_known() {
+    let mut content = acetal();
+    content.layers[0].1[3] = vec![interval(0.0, 6.0, Kind::Undecided, 0.0)];
+    content.layers[0].1[0].insert(0, interval(1.7, 1.723, Kind::Undecided, 0.0));
+    let bytes = content.encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    let ask = |rpm, depth_mm| table.lookup(Rpm(rpm), &working_point(&validity(0.15), depth_mm));
+    let undecided = Answer::NotKnown(NotKnown::Undecided);
+    assert_eq!(ask(1100.0, 1.0), undecided);
+    assert_eq!(ask(900.0, 1.71), undecided);
+    assert!(matches!(
+        ask(900.0, 1.8),
+        Answer::Unstable { kind: Kind::Hopf, .. }
+    ));
+    // Stable in one neighbour, undecided in the other: not known.
+    assert_eq!(ask(1090.0, 1.0), undecided);
+    assert_eq!(ask(1050.0, 1.0), undecided);
+}
+
+#[test]
+fn a_full_column_grows_to_the_unstable_side() {
+    // Twelve islands against twelve others in two speeds and two feeds: 48 after joining, more than a column holds.
+    let islands = |shift_mm: f32| -> Vec<Interval> {
+        (0..MAX_INTERVALS as u8)
+            .map(|k| {
+                interval(
+                    f32::from(k) * 0.4 + shift_mm,
+                    f32::from(k) * 0.4 + shift_mm + 0.05,
+                    Kind::Flip,
+                    10.0 + f32::from(k),
+                )
+            })
+            .collect()
+    };
+    let content = Owned {
+        depth_from_mm: 0.0,
+        depth_to_mm: 6.0,
+        speeds: vec![Rpm(1000.0), Rpm(1100.0)],
+        layers: vec![
+            (validity(0.1), vec![islands(0.01), islands(0.11)]),
+            (validity(0.2), vec![islands(0.21), islands(0.31)]),
+        ],
+    };
+    let bytes = content.encode().unwrap();
+    let table = LobeTable::parse(&bytes).unwrap();
+    for (_, columns) in &content.layers {
+        for island in columns.iter().flatten() {
+            let middle_mm = 0.5 * (island.from.0 + island.to.0);
+            let at = WorkingPoint {
+                feed_per_tooth: Millimeters(0.15),
+                ..working_point(&validity(0.1), middle_mm)
+            };
+            assert!(
+                matches!(table.lookup(Rpm(1050.0), &at), Answer::Unstable { .. }),
+                "{middle_mm}"
+            );
+        }
+    }
+}
