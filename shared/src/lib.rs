@@ -21,6 +21,7 @@ pub mod fft;
 pub mod lobes;
 pub mod math;
 pub mod monitor;
+pub mod peaks;
 pub mod protocol;
 pub mod spectrum;
 pub mod stroboscope;
