@@ -17,6 +17,7 @@ pub mod advice;
 pub mod checksum;
 pub mod decimation;
 pub mod detector;
+pub mod event_clock;
 pub mod fft;
 pub mod lobes;
 pub mod math;
