@@ -2,4 +2,6 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+pub mod accelerometer;
+pub mod acquisition;
 pub mod stimulus;
