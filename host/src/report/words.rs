@@ -138,6 +138,7 @@ pub fn obstacle(obstacle: &Obstacle) -> String {
     match obstacle {
         Obstacle::NoTable => "the device has no lobe table".into(),
         Obstacle::Table(why) => format!("the lobe table does not know this cut: {}", not_known(why)),
+        Obstacle::Speed => "the spindle speed is not a positive number".into(),
         Obstacle::Contradicted => {
             "the lobe table calls this cut stable, and yet it chatters: the table is not true here".into()
         }
