@@ -25,6 +25,25 @@ fn boots_and_answers() {
     );
 }
 
+#[test]
+fn answers_on_a_serial_device() {
+    let memory = Memory::erased();
+    let emulator = Emulator::start(&memory);
+    let device = emulator.serial_device();
+    let mut port = serialport::new(device.path(), 921_600)
+        .timeout(emulator::PATIENCE)
+        .open()
+        .expect("a serial device");
+    for round in 0..3 {
+        let began = std::time::Instant::now();
+        port.write_all(b"quietcut").expect("the device takes bytes");
+        let mut answer = [0; 8];
+        port.read_exact(&mut answer).expect("the device answers");
+        assert_eq!(&answer, b"quietcut");
+        println!("round trip {round}: {:?}", began.elapsed());
+    }
+}
+
 fn cut(blocks: u32) -> Vec<Stimulus> {
     let block = |sequence: u32| Block {
         sequence,

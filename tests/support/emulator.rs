@@ -19,6 +19,7 @@ use tempfile::TempDir;
 
 use crate::device_log;
 use crate::firmware_image;
+use crate::pty::Pty;
 
 /// The most that a read from the link or an answer of the virtual sensor may take: a loaded
 /// machine needs some tenths of a second at worst, a stored recording some seconds.
@@ -118,18 +119,38 @@ impl<'m> Emulator<'m> {
         let mut process = spawn(command);
         let link = accept(&link, &mut process);
         let spindle = accept(&spindle, &mut process);
-        Self {
+        let mut emulator = Self {
             memory,
             process,
             directory,
             link,
             spindle,
+        };
+        emulator.wait_for_start();
+        emulator
+    }
+
+    /// Waits for the first entry of the log, which the device writes when its ports are open.
+    fn wait_for_start(&mut self) {
+        let began = Instant::now();
+        while fs::metadata(self.log_path()).map_or(0, |log| log.len()) == 0 {
+            let end = self.end();
+            assert!(
+                end.is_empty() && began.elapsed() < PATIENCE,
+                "the device does not start{end}"
+            );
+            std::thread::sleep(Duration::from_millis(1));
         }
     }
 
     /// The link to the device, as a stream of bytes with a limit on every wait.
     pub fn link(&self) -> UnixStream {
         self.link.try_clone().expect("a second handle of the link")
+    }
+
+    /// The link as a serial device, for programs that open one; not to be used beside [`Self::link`].
+    pub fn serial_device(&self) -> Pty {
+        Pty::to_socket(self.link())
     }
 
     /// Sends stimuli over the board's serial port; returns once all of them went through the pipeline.
@@ -184,8 +205,12 @@ impl<'m> Emulator<'m> {
 
     /// What the device logged so far, one line per entry.
     pub fn log(&self) -> String {
-        let frames = fs::read(self.directory.path().join("log")).unwrap_or_default();
+        let frames = fs::read(self.log_path()).unwrap_or_default();
         device_log::decode(&firmware_image::qemu_mps2(), &frames)
+    }
+
+    fn log_path(&self) -> PathBuf {
+        self.directory.path().join("log")
     }
 
     /// How the emulator ended, where it has.

@@ -7,3 +7,4 @@ pub mod command;
 pub mod device_log;
 pub mod emulator;
 pub mod firmware_image;
+pub mod pty;
