@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use serialport::{SerialPort, TTYPort};
+use quietcut::device::pseudo_terminal::PseudoTerminal;
 
 /// How long the threads wait before they look whether they are still wanted.
 const TURN: Duration = Duration::from_millis(20);
@@ -15,8 +15,6 @@ const TURN: Duration = Duration::from_millis(20);
 /// A serial device that lasts as long as this.
 pub struct Pty {
     path: String,
-    /// Kept open: without a second end the first one reads an error until somebody opens it.
-    _device: TTYPort,
     wanted: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -24,24 +22,28 @@ pub struct Pty {
 impl Pty {
     /// A serial device that passes bytes to and from this socket.
     pub fn to_socket(socket: UnixStream) -> Self {
-        let (mut master, device) = TTYPort::pair().expect("a pseudo-terminal");
-        let path = device.name().expect("the name of the pseudo-terminal");
-        master.set_timeout(TURN).expect("a limit on reading");
-        socket.set_read_timeout(Some(TURN)).expect("a limit on reading");
+        let terminal = PseudoTerminal::new().expect("a pseudo-terminal");
+        let path = terminal.path().to_owned();
         let wanted = Arc::new(AtomicBool::new(true));
-        let to_socket = pass(
-            master
-                .try_clone_native()
-                .expect("a second handle of the pseudo-terminal"),
-            socket.try_clone().expect("a second handle of the socket"),
-            wanted.clone(),
-        );
-        let from_socket = pass(socket, master, wanted.clone());
+        socket.set_read_timeout(Some(TURN)).expect("a limit on reading");
+        let second = terminal
+            .try_clone()
+            .expect("a second handle of the pseudo-terminal");
+        let threads = vec![
+            std::thread::spawn({
+                let (terminal, socket, wanted) = (second, socket.try_clone(), wanted.clone());
+                let socket = socket.expect("a second handle of the socket");
+                move || to_socket(terminal, socket, &wanted)
+            }),
+            std::thread::spawn({
+                let wanted = wanted.clone();
+                move || from_socket(terminal, socket, &wanted)
+            }),
+        ];
         Self {
             path,
-            _device: device,
             wanted,
-            threads: vec![to_socket, from_socket],
+            threads,
         }
     }
 
@@ -61,30 +63,35 @@ impl Drop for Pty {
     }
 }
 
-/// Passes bytes until one end is closed or nobody wants them any more.
-fn pass(
-    mut from: impl Read + Send + 'static,
-    mut to: impl Write + Send + 'static,
-    wanted: Arc<AtomicBool>,
-) -> JoinHandle<()> {
-    std::thread::spawn(move || {
-        let mut bytes = [0; 4096];
-        while wanted.load(Ordering::Relaxed) {
-            let count = match from.read(&mut bytes) {
-                Ok(0) => return,
-                Ok(count) => count,
-                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => continue,
-                Err(_) => return,
-            };
-            let mut rest = &bytes[..count];
-            while !rest.is_empty() {
-                match to.write(rest) {
-                    Ok(count) => rest = &rest[count..],
-                    // Nobody reads at the other end: the sender is held back.
-                    Err(error) if error.kind() == ErrorKind::TimedOut && wanted.load(Ordering::Relaxed) => {}
-                    Err(_) => return,
-                }
-            }
+/// Passes bytes on until one end is closed or nobody wants them any more.
+fn to_socket(mut terminal: PseudoTerminal, mut socket: UnixStream, wanted: &AtomicBool) {
+    let mut bytes = [0; 4096];
+    while wanted.load(Ordering::Relaxed) {
+        let Ok(count) = terminal.receive(&mut bytes, TURN) else {
+            return;
+        };
+        if socket.write_all(&bytes[..count]).is_err() {
+            return;
         }
-    })
+    }
+}
+
+/// Passes bytes back; where nobody reads them at the other end the sender is held back.
+fn from_socket(mut terminal: PseudoTerminal, mut socket: UnixStream, wanted: &AtomicBool) {
+    let mut bytes = [0; 4096];
+    while wanted.load(Ordering::Relaxed) {
+        let count = match socket.read(&mut bytes) {
+            Ok(0) => return,
+            Ok(count) => count,
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => continue,
+            Err(_) => return,
+        };
+        let mut rest = &bytes[..count];
+        while !rest.is_empty() && wanted.load(Ordering::Relaxed) {
+            let Ok(count) = terminal.send(rest, TURN) else {
+                return;
+            };
+            rest = &rest[count..];
+        }
+    }
 }

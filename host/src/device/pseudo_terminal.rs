@@ -31,6 +31,19 @@ impl PseudoTerminal {
         })
     }
 
+    /// A second handle of the same pseudo-terminal, so that one thread can receive while another sends.
+    ///
+    /// # Errors
+    /// Where the system has no handles left.
+    pub fn try_clone(&self) -> Result<Self, DeviceError> {
+        let failed = |cause| DeviceError::PseudoTerminal { cause };
+        Ok(Self {
+            path: self.path.clone(),
+            device_end: self.device_end.try_clone_native().map_err(failed)?,
+            _host_end: self._host_end.try_clone_native().map_err(failed)?,
+        })
+    }
+
     /// The path that a host opens.
     pub fn path(&self) -> &str {
         &self.path
