@@ -4,4 +4,6 @@
 
 pub mod accelerometer;
 pub mod acquisition;
+pub mod flash_model;
 pub mod stimulus;
+pub mod storage;

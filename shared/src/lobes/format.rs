@@ -124,25 +124,29 @@ impl Header {
                 found: saturate(bytes.len()),
             });
         }
-        let computed = self.crc_with(bytes.get(HEADER_LENGTH..).unwrap_or_default());
-        if computed != self.crc {
-            return Err(TableError::Crc {
-                header: self.crc,
-                computed,
-            });
+        let payload = bytes.get(HEADER_LENGTH..).unwrap_or_default();
+        self.check_payload(payload)?;
+        // The CRC was taken with zeros where the header has them: they must be there.
+        if bytes.get(..HEADER_LENGTH) == Some(&self.to_bytes()) {
+            return Ok(());
         }
-        // The rest of the header is zeros: what the CRC saw must be what is there.
-        let zeros = bytes
-            .get(6..8)
-            .into_iter()
-            .chain(bytes.get(16..CRC_OFFSET))
-            .flatten();
-        match zeros.fold(0, |sum, byte| sum | byte) {
-            0 => Ok(()),
-            _ => Err(TableError::Crc {
+        let header = bytes.get(..CRC_OFFSET).unwrap_or_default();
+        Err(TableError::Crc {
+            header: self.crc,
+            computed: crc32([header, payload]),
+        })
+    }
+
+    /// Refuses a payload, the bytes behind the header, that does not have the CRC of this header.
+    pub fn check_payload(&self, payload: &[u8]) -> Result<(), TableError> {
+        let computed = self.crc_with(payload);
+        if computed == self.crc {
+            Ok(())
+        } else {
+            Err(TableError::Crc {
                 header: self.crc,
                 computed,
-            }),
+            })
         }
     }
 
