@@ -2,7 +2,7 @@
 //!
 //! | band | flat | rate |
 //! |---|---|---|
-//! | tool | to 5 kHz | half the input where that still holds 5 kHz, else the input itself |
+//! | tool | to 5 kHz | the input halved as often as it still holds 5 kHz; slower inputs as they are |
 //! | structure | to 400 Hz | the input halved to the smallest rate of at least 1 600 Hz |
 //!
 //! Every stage is a symmetric half-band filter: y\[n\] = Σ h\[i\]·x\[2n − i\], i = 0 … 4m − 2, whose odd taps but the middle
@@ -21,21 +21,23 @@ pub type Sample = [i32; 3];
 
 /// Bits below one count.
 ///
-/// With them a full-scale count is 2²⁷; the 4 bits left above hold the overshoot of any input, which the taps' absolute
-/// sums bound by 2³ over the whole cascade.
+/// With them a full-scale count is 2²⁷; of the 4 bits left above one holds the overshoot of any input, less than
+/// twice full scale in both bands, and one the sum of two samples.
 pub const FRACTION_BITS: u32 = 12;
 
 /// Slowest input rate.
 pub const MIN_RATE: Hertz = Hertz(1_000.0);
 /// Fastest input rate.
-pub const MAX_RATE: Hertz = Hertz(32_000.0);
+pub const MAX_RATE: Hertz = Hertz(102_400.0);
 /// Upper end of the tool band.
 pub const TOOL_BAND: Hertz = Hertz(5_000.0);
 /// Upper end of the structure band.
 pub const STRUCTURE_BAND: Hertz = Hertz(400.0);
 
-/// The filter to the tool band is flat to this fraction of its input rate.
-const TOOL_FLAT: f32 = 0.195;
+/// To this fraction of its input rate the sharp filter is flat.
+const SHARP_FLAT: f32 = 0.195;
+/// To this fraction of its input rate the medium filter is flat.
+const MEDIUM_FLAT: f32 = 0.13;
 
 /// Rate of an input that the cascade does not take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,116 +100,119 @@ const fn bessel_i0(square: f64) -> f64 {
     sum
 }
 
-const TOOL_SIDE: usize = 15;
-const EARLY_SIDE: usize = 5;
-const LAST_SIDE: usize = 7;
-
-// For each length the β that gives the most rejection over the stated band, found by trying.
-
-/// To the tool band: flat to 0.195 of the input rate, shut from 0.305.
-static TOOL_TAPS: [i32; TOOL_SIDE] = half_band(10.3);
-/// To the structure band, all stages but the last: flat to 0.065 of the input rate, shut from 0.435.
-static EARLY_TAPS: [i32; EARLY_SIDE] = half_band(11.4);
-/// The last stage to the structure band: flat to 0.13 of the input rate, shut from 0.37.
-static LAST_TAPS: [i32; LAST_SIDE] = half_band(10.6);
+/// Length of a half-band filter with this many taps on a side.
+const fn length(side: usize) -> usize {
+    4 * side - 1
+}
 
 /// Input samples by which the middle tap of a filter lags its newest one.
 const fn delay(side: usize) -> u32 {
     2 * side as u32 - 1
 }
 
-/// The last LENGTH = 4·M − 1 samples of a stage, kept twice so that they always lie in one piece; RING = 2·LENGTH.
+const SHARP_SIDE: usize = 15;
+const MEDIUM_SIDE: usize = 7;
+const EASY_SIDE: usize = 5;
+
+// For each length the β that gives the most rejection over the stated band, found by trying.
+
+/// Flat to 0.195 of the input rate, shut from 0.305: the last stage to the tool band.
+static SHARP: [i32; SHARP_SIDE] = half_band(10.3);
+/// Flat to 0.13 of the input rate, shut from 0.37: stages to the tool band at rates far above it; the last stage to the structure band.
+static MEDIUM: [i32; MEDIUM_SIDE] = half_band(10.6);
+/// Flat to 0.065 of the input rate, shut from 0.435: all other stages to the structure band.
+static EASY: [i32; EASY_SIDE] = half_band(11.4);
+
+/// What a stage remembers: its last LENGTH samples, twice, so that they always lie in one piece.
 #[derive(Clone, Debug)]
-struct Stage<const RING: usize> {
-    ring: [Sample; RING],
-    /// Where the next sample goes, below RING/2.
+struct Stage<const LENGTH: usize> {
+    samples: [[Sample; LENGTH]; 2],
+    /// Where the next sample goes in both copies.
     next: usize,
-    /// The next sample completes a pair.
-    odd: bool,
+    /// The next sample is the second of a pair, which gives no output.
+    second: bool,
     filled: bool,
 }
 
-impl<const RING: usize> Stage<RING> {
+impl<const LENGTH: usize> Stage<LENGTH> {
     const fn new() -> Self {
         Self {
-            ring: [[0; 3]; RING],
+            samples: [[[0; 3]; LENGTH]; 2],
             next: 0,
-            odd: false,
+            second: false,
             filled: false,
         }
     }
 
     /// Takes a sample and returns the filtered one for the first of every two.
-    fn step(&mut self, taps: &[i32], x: Sample) -> Option<Sample> {
-        let length = RING / 2;
+    fn step<const SIDE: usize>(&mut self, taps: &[i32; SIDE], x: Sample) -> Option<Sample> {
         if !self.filled {
             // As if the first sample had always been there: gravity makes no step.
-            self.ring = [x; RING];
+            self.samples.as_flattened_mut().fill(x);
             self.filled = true;
         }
         let newest = self.next;
-        if let Some(slot) = self.ring.get_mut(newest) {
-            *slot = x;
+        for copy in &mut self.samples {
+            *copy.get_mut(newest)? = x;
         }
-        if let Some(slot) = self.ring.get_mut(newest + length) {
-            *slot = x;
-        }
-        self.next = if newest + 1 == length { 0 } else { newest + 1 };
-        self.odd = !self.odd;
-        if !self.odd {
+        self.next = if newest + 1 == LENGTH { 0 } else { newest + 1 };
+        self.second = !self.second;
+        if !self.second {
             return None;
         }
-        self.ring
-            .get(newest + 1..=newest + length)
-            .map(|window| filter(window, taps))
+        let window = self.samples.as_flattened().get(newest + 1..)?.first_chunk()?;
+        // Hidden from the compiler, which takes a product with a known number apart into slower ones.
+        let taps = core::hint::black_box(taps);
+        Some([0, 1, 2].map(|axis| filter::<LENGTH, SIDE>(window, axis, taps)))
     }
 }
 
-/// Σ of the taps times the window, whose middle has the tap ½.
-fn filter(window: &[Sample], taps: &[i32]) -> Sample {
-    let middle = window.len() / 2;
-    let (older, rest) = window.split_at(middle);
-    let [centre, newer @ ..] = rest else { return [0; 3] };
-    let mut sums = centre.map(|x| (i64::from(x) << 30) + (1 << 30));
-    // Every second neighbour of the middle, going outwards.
-    for ((a, b), &tap) in older
-        .iter()
-        .rev()
-        .step_by(2)
-        .zip(newer.iter().step_by(2))
-        .zip(taps)
-    {
-        for axis in 0..3 {
-            sums[axis] += i64::from(a[axis] + b[axis]) * i64::from(tap);
-        }
+/// Σ of the taps times one axis of the window, whose middle has the tap ½.
+#[inline(always)]
+fn filter<const LENGTH: usize, const SIDE: usize>(
+    window: &[Sample; LENGTH],
+    axis: usize,
+    taps: &[i32; SIDE],
+) -> i32 {
+    const { assert!(LENGTH == length(SIDE)) };
+    let middle = LENGTH / 2;
+    let mut sum = (i64::from(window[middle][axis]) << 30) + (1 << 30);
+    for (j, &tap) in taps.iter().enumerate() {
+        // Every second neighbour of the middle, going outwards.
+        let pair = window[middle - 1 - 2 * j][axis] + window[middle + 1 + 2 * j][axis];
+        sum += i64::from(pair) * i64::from(tap);
     }
-    sums.map(|sum| (sum >> 31) as i32)
+    (sum >> 31) as i32
 }
 
 /// The cascade for one nominal input rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decimation {
-    /// Whether the tool band has half the input rate.
-    tool_halved: bool,
-    /// Halvings from the tool band to the structure band, 0 to 4.
+    /// Halvings with the medium filter to the tool band, 0 to 2.
+    medium_halvings: u8,
+    /// Whether one with the sharp filter follows.
+    sharp_halving: bool,
+    /// Halvings from the tool band to the structure band, 0 to 4: the easy filter, at last the medium one.
     structure_halvings: u8,
 }
 
 /// What the cascade remembers.
 #[derive(Clone, Debug)]
 pub struct State {
-    tool: Stage<{ 2 * (4 * TOOL_SIDE - 1) }>,
-    early: [Stage<{ 2 * (4 * EARLY_SIDE - 1) }>; 3],
-    last: Stage<{ 2 * (4 * LAST_SIDE - 1) }>,
+    medium: [Stage<{ length(MEDIUM_SIDE) }>; 2],
+    sharp: Stage<{ length(SHARP_SIDE) }>,
+    easy: [Stage<{ length(EASY_SIDE) }>; 3],
+    last: Stage<{ length(MEDIUM_SIDE) }>,
 }
 
 impl State {
     /// Before the first sample.
     pub const fn new() -> Self {
         Self {
-            tool: Stage::new(),
-            early: [const { Stage::new() }; 3],
+            medium: [const { Stage::new() }; 2],
+            sharp: Stage::new(),
+            easy: [const { Stage::new() }; 3],
             last: Stage::new(),
         }
     }
@@ -239,29 +244,28 @@ impl Decimation {
         if !(MIN_RATE.0..=MAX_RATE.0).contains(&nominal_rate.0) {
             return Err(RateOutOfRange(nominal_rate));
         }
-        let tool_halved = nominal_rate.0 * TOOL_FLAT >= TOOL_BAND.0;
-        let mut rate = if tool_halved {
-            nominal_rate.0 / 2.0
-        } else {
-            nominal_rate.0
+        let mut rate = nominal_rate.0;
+        let mut halvings_while = |possible: &dyn Fn(f32) -> bool| {
+            let mut halvings = 0;
+            while possible(rate) {
+                rate /= 2.0;
+                halvings += 1;
+            }
+            halvings
         };
-        let mut structure_halvings = 0;
-        while rate / 2.0 >= 4.0 * STRUCTURE_BAND.0 {
-            rate /= 2.0;
-            structure_halvings += 1;
-        }
         Ok(Self {
-            tool_halved,
-            structure_halvings,
+            medium_halvings: halvings_while(&|rate| rate * MEDIUM_FLAT >= TOOL_BAND.0),
+            sharp_halving: halvings_while(&|rate| rate * SHARP_FLAT >= TOOL_BAND.0) == 1,
+            structure_halvings: halvings_while(&|rate| rate / 2.0 >= 4.0 * STRUCTURE_BAND.0),
         })
     }
 
-    /// Input samples per sample of the tool band: 1 or 2.
+    /// Input samples per sample of the tool band: 1, 2 or 4.
     pub fn tool_divisor(&self) -> u32 {
-        if self.tool_halved { 2 } else { 1 }
+        1 << (self.medium_halvings + u8::from(self.sharp_halving))
     }
 
-    /// Input samples per sample of the structure band: 1 to 16.
+    /// Input samples per sample of the structure band: 1 to 64.
     pub fn structure_divisor(&self) -> u32 {
         self.tool_divisor() << self.structure_halvings
     }
@@ -270,37 +274,39 @@ impl Decimation {
     ///
     /// The output that comes with input sample i shows the signal as it was at input sample i − delay.
     pub fn tool_delay(&self) -> u32 {
-        if self.tool_halved { delay(TOOL_SIDE) } else { 0 }
+        let medium = delay(MEDIUM_SIDE) * ((1 << self.medium_halvings) - 1);
+        let sharp = if self.sharp_halving {
+            delay(SHARP_SIDE) << self.medium_halvings
+        } else {
+            0
+        };
+        medium + sharp
     }
 
     /// Group delay of the structure band in input samples, as for [`tool_delay`](Self::tool_delay).
     pub fn structure_delay(&self) -> u32 {
-        let mut total = self.tool_delay();
-        for stage in 0..self.structure_halvings {
-            let side = if stage + 1 == self.structure_halvings {
-                LAST_SIDE
-            } else {
-                EARLY_SIDE
-            };
-            total += delay(side) * (self.tool_divisor() << stage);
-        }
-        total
+        let Some(easy) = self.structure_halvings.checked_sub(1) else {
+            return self.tool_delay();
+        };
+        let after_tool_band = delay(EASY_SIDE) * ((1 << easy) - 1) + (delay(MEDIUM_SIDE) << easy);
+        self.tool_delay() + self.tool_divisor() * after_tool_band
     }
 
     /// Takes one sample of the sensor.
     pub fn step(&self, state: &mut State, counts: Counts) -> Output {
-        let x = counts.map(|c| i32::from(c) << FRACTION_BITS);
-        let tool = if self.tool_halved {
-            state.tool.step(&TOOL_TAPS, x)
-        } else {
-            Some(x)
-        };
+        let mut tool = Some(counts.map(|c| i32::from(c) << FRACTION_BITS));
+        for stage in state.medium.iter_mut().take(self.medium_halvings.into()) {
+            tool = tool.and_then(|x| stage.step(&MEDIUM, x));
+        }
+        if self.sharp_halving {
+            tool = tool.and_then(|x| state.sharp.step(&SHARP, x));
+        }
         let mut structure = tool;
-        if let Some(early) = self.structure_halvings.checked_sub(1) {
-            for stage in state.early.iter_mut().take(usize::from(early)) {
-                structure = structure.and_then(|x| stage.step(&EARLY_TAPS, x));
+        if let Some(easy) = self.structure_halvings.checked_sub(1) {
+            for stage in state.easy.iter_mut().take(easy.into()) {
+                structure = structure.and_then(|x| stage.step(&EASY, x));
             }
-            structure = structure.and_then(|x| state.last.step(&LAST_TAPS, x));
+            structure = structure.and_then(|x| state.last.step(&MEDIUM, x));
         }
         Output { tool, structure }
     }

@@ -2,26 +2,42 @@
 //!
 //! Forward transform, X\[k\] = Σ x\[n\]·exp(−2πi·k·n/N), of N = 256 … 4096 real values, in place.
 //!
-//! The N real values are taken as N/2 complex ones, sorted into bit-reversed order, transformed by
-//! one pass of multiplication-free butterflies (radix 4, or radix 8 where N/2 is no power of four), radix-4
-//! passes with twiddle factors, and split into the spectrum of the real values.
+//! The N real values are taken as N/2 complex ones. A radix-4 pass without multiplications transforms those a quarter
+//! apart; then they are sorted into bit-reversed order; where N/2 is no power of four a radix-2 pass follows; radix-4
+//! passes with twiddle factors do the rest, and the result is split into the spectrum of the real values.
 //!
 //! **Scaling.** The input is shifted once, as a block, so that its largest value has just the room that the transform
 //! needs; no later pass looks at the data. A product with a Q31 factor keeps the high word, which halves it; the
-//! one leg of a radix-4 butterfly that has no factor is halved to match. So each radix-4 pass with factors grows a tone by two and white
-//! noise not at all, and the result of every size ends just below 2³¹.
+//! one leg of a radix-4 butterfly that has no factor is halved to match. So each radix-4 pass with factors doubles a tone
+//! and leaves white noise as it is, and the result of every size ends just below 2³¹.
 //!
-//! **Why nothing overflows.** With M = 2^(31+p)/N, p the number of radix-4 passes with factors, the input lies in −M … M−1.
-//! 1. Before a pass of span L every complex value is a sum of L/4 packed inputs of modulus ≤ √2·M times unit factors, halved in each of the
-//!    earlier passes; after the last pass |Z| ≤ √2·(N/2)·M/2^p = 2³⁰·√2 < 2³¹. Inside a butterfly the partial
-//!    sums are sums over fewer inputs with the same weights, hence smaller.
-//! 2. The split forms Z\[k\] ± Z*\[N/2−k\], twice the transform of the even or the odd samples:
-//!    ≤ 2·(N/2)·M/2^p·c, c the mean of |cos| over the sampled phases. c = 1 only for k = 0, which is treated apart; for all other
-//!    k it is at most √½ (four phases per turn), hence ≤ 2³¹·√½.
-//! 3. |X\[k\]| ≤ N·M/2^p·√½ = 2³¹·√½ for the same reason, and for X\[0\] and X\[N/2\] ≤ 2³¹, attained by a block of −M;
-//!    these two sums saturate.
+//! **Why nothing overflows.** Let p be the number of radix-4 passes with factors and M = 2^(31+p)/N; the shifted input lies in
+//! −M … M − 1.
+//! 1. Every value on the way to Z, the transform of the packed values, is a sum of some of them, of modulus ≤ √2·M, times unit
+//!    factors, halved in each pass with factors. All N/2 of them give at most |Z| ≤ √2·(N/2)·M/2^p = √½·2³¹; before
+//!    the last pass it is half of that at most, and the sums inside a butterfly have fewer terms than its results.
+//! 2. The split forms Z\[k\] ± Z*\[N/2 − k\], twice the transform of the even or the odd samples. Its real or imaginary part
+//!    is at most 2·(N/2)·M/2^p·c = 2³¹·c, where c is the mean of |cos| over the phases that the samples see: 1 for k = 0, which
+//!    is treated apart, and at most √½ for all other k < N/4 (four phases per turn).
+//! 3. X\[k\] itself is bounded by 2³¹·√½ for the same reason. Only X\[0\] and X\[N/2\] can reach 2³¹, for a block of −M,
+//!    and these two sums saturate.
 //!
-//! Rounding adds less than 2^p·8 units to any of these, far inside the margins of 1 to 3.
+//! Rounding adds less than 2^(p+3) units to any of these, far inside the margins of 1 to 3.
+//!
+//! **Cost and accuracy**, 1024 points, on an emulated Cortex-M4F, 16-bit tone between two bins at −1 and −40 dBFS against an exact
+//! transform:
+//!
+//! | | instructions | SNR |
+//! |---|---|---|
+//! | this one, rustc 1.95, target-cpu=cortex-m4 | 45 225 | 146 / 143 dB |
+//! | microfft `rfft_1024` (f32), the same | 50 059 | float |
+//! | microfft `rfft_1024` (f32), rustc 1.95, no target-cpu | 47 538 | float |
+//! | CMSIS-DSP `arm_rfft_fast_f32`, gcc 12.2 -O3, loops unrolled | 44 676 | float |
+//! | CMSIS-DSP `arm_rfft_q15`, the same | 44 234 | 47 / 10 dB |
+//! | CMSIS-DSP `arm_rfft_q31`, the same | 87 025 | 139 / 100 dB |
+//!
+//! A test across crates counts the first two anew and holds them to these figures. Without `target-cpu=cortex-m4` the compiler
+//! does not mind its registers, and this transform takes 58 515.
 
 /// Complex number with integer parts: real, imaginary.
 pub type Complex = [i32; 2];
@@ -38,19 +54,13 @@ fn multiply_add(sum: i32, a: i32, b: i32) -> i32 {
     ((((sum as i64) << 32) + a as i64 * b as i64 + 0x8000_0000) >> 32) as i32
 }
 
-/// `sum` − a·b/2³², rounded.
-#[inline(always)]
-fn multiply_subtract(sum: i32, a: i32, b: i32) -> i32 {
-    ((((sum as i64) << 32) + 0x8000_0000 - a as i64 * b as i64) >> 32) as i32
-}
-
 /// Half the product of z and exp(−iφ), given as \[cos φ, sin φ\] in Q31.
 #[inline(always)]
 fn turn(z: Complex, factor: Complex) -> Complex {
     let [cos, sin] = factor;
     [
         multiply_add(multiply(z[0], cos), z[1], sin),
-        multiply_subtract(multiply(z[1], cos), z[0], sin),
+        multiply(z[1], cos) - multiply(z[0], sin),
     ]
 }
 
@@ -76,71 +86,71 @@ fn add_i(a: Complex, b: Complex) -> Complex {
     [a[0] - b[1], a[1] + b[0]]
 }
 
-/// Transform of four values in bit-reversed order x0, x2, x1, x3.
+/// First pass: transforms of the four values a quarter apart, each passed through `scale`; results in bit-reversed order.
 #[inline(always)]
-fn butterfly4(x0: Complex, x2: Complex, x1: Complex, x3: Complex) -> [Complex; 4] {
-    let (even_sum, even_difference) = (add(x0, x2), subtract(x0, x2));
-    let (odd_sum, odd_difference) = (add(x1, x3), subtract(x1, x3));
-    [
-        add(even_sum, odd_sum),
-        subtract_i(even_difference, odd_difference),
-        subtract(even_sum, odd_sum),
-        add_i(even_difference, odd_difference),
-    ]
+fn first_pass(data: &mut [Complex], scale: impl Fn(i32) -> i32) {
+    let (lower, upper) = data.split_at_mut(data.len() / 2);
+    let (x0, x1) = lower.split_at_mut(lower.len() / 2);
+    let (x2, x3) = upper.split_at_mut(upper.len() / 2);
+    for (((x0, x1), x2), x3) in x0.iter_mut().zip(x1).zip(x2).zip(x3) {
+        let [a, b, c, d] = [*x0, *x1, *x2, *x3].map(|z| z.map(&scale));
+        let (even_sum, even_difference) = (add(a, c), subtract(a, c));
+        let (odd_sum, odd_difference) = (add(b, d), subtract(b, d));
+        *x0 = add(even_sum, odd_sum);
+        *x1 = subtract(even_sum, odd_sum);
+        *x2 = subtract_i(even_difference, odd_difference);
+        *x3 = add_i(even_difference, odd_difference);
+    }
 }
 
-/// √½ in Q31.
-const SQRT_HALF: i32 = 0x5A82_799A;
-
-/// √½·v for |v| < 2³⁰.
+/// Radix-2 pass over blocks of eight values, each two transforms of length 4.
 #[inline(always)]
-fn sqrt_half(v: i32) -> i32 {
-    multiply(v << 1, SQRT_HALF)
-}
-
-/// First pass, radix 8, on eight values in bit-reversed order.
-#[inline(always)]
-fn butterfly8(x: &mut [Complex; 8]) {
-    let even = butterfly4(x[0], x[1], x[2], x[3]);
-    let odd = butterfly4(x[4], x[5], x[6], x[7]);
-    let eighth = [sqrt_half(odd[1][0] + odd[1][1]), sqrt_half(odd[1][1] - odd[1][0])];
-    let three_eighths = [
-        sqrt_half(odd[3][1] - odd[3][0]),
-        -sqrt_half(odd[3][0] + odd[3][1]),
-    ];
-    x[0] = add(even[0], odd[0]);
-    x[4] = subtract(even[0], odd[0]);
-    x[1] = add(even[1], eighth);
-    x[5] = subtract(even[1], eighth);
-    x[2] = subtract_i(even[2], odd[2]);
-    x[6] = add_i(even[2], odd[2]);
-    x[3] = add(even[3], three_eighths);
-    x[7] = subtract(even[3], three_eighths);
+fn radix2_pass(data: &mut [Complex]) {
+    const SQRT_HALF: i32 = 0x5A82_799A;
+    // Hidden from the compiler, which takes a product with a known number apart into slower ones.
+    let root = core::hint::black_box(SQRT_HALF);
+    let sqrt_half = |v: i32| multiply(v << 1, root);
+    for x in data.as_chunks_mut::<8>().0 {
+        (x[0], x[4]) = (add(x[0], x[4]), subtract(x[0], x[4]));
+        let turned = [sqrt_half(x[5][0] + x[5][1]), sqrt_half(x[5][1] - x[5][0])];
+        (x[1], x[5]) = (add(x[1], turned), subtract(x[1], turned));
+        (x[2], x[6]) = (subtract_i(x[2], x[6]), add_i(x[2], x[6]));
+        let turned = [sqrt_half(x[7][0] + x[7][1]), sqrt_half(x[7][1] - x[7][0])];
+        (x[3], x[7]) = (subtract_i(x[3], turned), add_i(x[3], turned));
+    }
 }
 
 /// Radix-4 pass over blocks of 4·Q values, each four transforms of length Q; halves its results.
 #[inline(always)]
 fn radix4_pass<const Q: usize>(data: &mut [Complex], factors: &[[Complex; 3]; Q]) {
     for block in data.chunks_exact_mut(4 * Q) {
-        let Some((x0, rest)) = block.split_first_chunk_mut::<Q>() else {
-            return;
-        };
-        let Some((x2, rest)) = rest.split_first_chunk_mut::<Q>() else {
-            return;
-        };
-        let Some((x1, rest)) = rest.split_first_chunk_mut::<Q>() else {
-            return;
-        };
-        let Some(x3) = rest.first_chunk_mut::<Q>() else {
+        // The transforms stand in bit-reversed order too.
+        let Some([x0, x2, x1, x3]) = quarters::<Q>(block) else {
             return;
         };
         for j in 0..Q {
-            let [w1, w2, w3] = factors[j];
-            let whole = [x0[j][0] >> 1, x0[j][1] >> 1];
-            [x0[j], x2[j], x1[j], x3[j]] =
-                butterfly4(whole, turn(x2[j], w2), turn(x1[j], w1), turn(x3[j], w3));
+            let w = &factors[j];
+            let t1 = turn(x1[j], w[0]);
+            let t3 = turn(x3[j], w[2]);
+            let (odd_sum, odd_difference) = (add(t1, t3), subtract(t1, t3));
+            let t2 = turn(x2[j], w[1]);
+            let t0 = [x0[j][0] >> 1, x0[j][1] >> 1];
+            let (even_sum, even_difference) = (add(t0, t2), subtract(t0, t2));
+            x0[j] = add(even_sum, odd_sum);
+            x2[j] = subtract_i(even_difference, odd_difference);
+            x1[j] = subtract(even_sum, odd_sum);
+            x3[j] = add_i(even_difference, odd_difference);
         }
     }
+}
+
+/// A block of 4·Q values in four.
+#[inline(always)]
+fn quarters<const Q: usize>(block: &mut [Complex]) -> Option<[&mut [Complex; Q]; 4]> {
+    let (first, rest) = block.split_first_chunk_mut()?;
+    let (second, rest) = rest.split_first_chunk_mut()?;
+    let (third, rest) = rest.split_first_chunk_mut()?;
+    Some([first, second, third, rest.first_chunk_mut()?])
 }
 
 /// Splits the transform of the packed complex values into the lower half of the spectrum of the real ones.
@@ -164,34 +174,44 @@ fn split(data: &mut [Complex], factors: &[Complex]) {
     }
 }
 
-/// Exchanges the values whose indices are each other's bit reversal, and passes every value through `scale`.
+/// Exchanges the values whose indices are each other's bit reversal.
 #[inline(always)]
-fn sort_bit_reversed<const M: usize>(data: &mut [Complex; M], scale: impl Fn(i32) -> i32) {
-    let unused_bits = usize::BITS - M.trailing_zeros();
-    for i in 0..M {
-        let j = i.reverse_bits() >> unused_bits;
-        if i <= j {
-            let (a, b) = (data[i], data[j % M]);
-            data[i] = [scale(b[0]), scale(b[1])];
-            data[j % M] = [scale(a[0]), scale(a[1])];
+fn sort_bit_reversed<const M: usize>(data: &mut [Complex; M]) {
+    // An index is a high half, a middle bit where their number is odd, and a low half.
+    let half = M.trailing_zeros() / 2;
+    let odd = M.trailing_zeros() % 2;
+    let reversed = |bits: usize| bits.reverse_bits() >> (usize::BITS - half);
+    for a in 0..1 << half {
+        for b in a + 1..1 << half {
+            for middle in 0..1 << odd {
+                let i = a << (half + odd) | middle << half | reversed(b);
+                let j = b << (half + odd) | middle << half | reversed(a);
+                data.swap(i % M, j % M);
+            }
         }
     }
 }
 
-/// Sorts and shifts the block so that it fills `bits` bits and its sign; returns by how many bits it went left.
+/// Bits that the largest value needs beside its sign.
 #[inline(always)]
-fn sort_and_normalize<const M: usize>(data: &mut [Complex; M], bits: i32) -> i32 {
-    let mut union = 0;
-    for z in data.iter() {
-        union |= (z[0] ^ (z[0] >> 31)) | (z[1] ^ (z[1] >> 31));
-    }
-    let left = bits - (i32::BITS - union.leading_zeros()) as i32;
+fn bits_used(data: &[Complex]) -> i32 {
+    let magnitude = |v: i32| v ^ (v >> 31);
+    let union = data
+        .iter()
+        .fold(0, |union, z| union | magnitude(z[0]) | magnitude(z[1]));
+    (i32::BITS - union.leading_zeros()) as i32
+}
+
+/// First pass on the block shifted so that it takes `bits` bits beside the sign; returns by how many it went left.
+#[inline(always)]
+fn normalized_first_pass(data: &mut [Complex], bits: i32) -> i32 {
+    let left = bits - bits_used(data);
     if left >= 0 {
-        sort_bit_reversed(data, |v| v << left);
+        first_pass(data, |v| v << left);
     } else {
-        // Rounded, and one less than M at most: M itself would be one too many.
-        let (half, top) = (1 << (-left - 1), (1 << bits) - 1);
-        sort_bit_reversed(data, |v| (v.saturating_add(half) >> -left).min(top));
+        // To round up may need one bit more: the largest value stays below.
+        let (half, largest) = (1 << (-left - 1), (1 << bits) - 1);
+        first_pass(data, |v| (v.saturating_add(half) >> -left).min(largest));
     }
     left
 }
@@ -273,20 +293,8 @@ static PASS_128: [[Complex; 3]; 128] = pass_factors();
 static PASS_256: [[Complex; 3]; 256] = pass_factors();
 static PASS_512: [[Complex; 3]; 512] = pass_factors();
 
-/// First pass of transforms whose half length is a power of four.
-fn first_pass_4(data: &mut [Complex]) {
-    for x in data.as_chunks_mut::<4>().0 {
-        *x = butterfly4(x[0], x[1], x[2], x[3]);
-    }
-}
-
-/// First pass of all others.
-fn first_pass_8(data: &mut [Complex]) {
-    data.as_chunks_mut::<8>().0.iter_mut().for_each(butterfly8);
-}
-
 macro_rules! real_transform {
-    ($name:ident, $points:literal, $first:ident, $($factors:ident),+) => {
+    ($name:ident, $points:literal, $($factors:ident),+) => {
         #[doc = concat!("Transform of ", stringify!($points), " real values in place.")]
         pub fn $name(data: &mut [i32; $points]) -> Transform<'_> {
             const PASSES: i32 = [$($factors.len()),+].len() as i32;
@@ -297,8 +305,11 @@ macro_rules! real_transform {
             let Some(values) = complex.first_chunk_mut::<{ $points / 2 }>() else {
                 return Transform { bins: &[], exponent: 0 };
             };
-            let left = sort_and_normalize(values, BITS);
-            $first(values);
+            let left = normalized_first_pass(values, BITS);
+            sort_bit_reversed(values);
+            if !values.len().trailing_zeros().is_multiple_of(2) {
+                radix2_pass(values);
+            }
             $(radix4_pass(values, &$factors);)+
             split(values, &SPLIT);
             Transform { bins: values, exponent: PASSES - left }
@@ -306,8 +317,42 @@ macro_rules! real_transform {
     };
 }
 
-real_transform!(rfft_256, 256, first_pass_8, PASS_8, PASS_32);
-real_transform!(rfft_512, 512, first_pass_4, PASS_4, PASS_16, PASS_64);
-real_transform!(rfft_1024, 1024, first_pass_8, PASS_8, PASS_32, PASS_128);
-real_transform!(rfft_2048, 2048, first_pass_4, PASS_4, PASS_16, PASS_64, PASS_256);
-real_transform!(rfft_4096, 4096, first_pass_8, PASS_8, PASS_32, PASS_128, PASS_512);
+real_transform!(rfft_256, 256, PASS_8, PASS_32);
+real_transform!(rfft_512, 512, PASS_4, PASS_16, PASS_64);
+real_transform!(rfft_1024, 1024, PASS_8, PASS_32, PASS_128);
+real_transform!(rfft_2048, 2048, PASS_4, PASS_16, PASS_64, PASS_256);
+real_transform!(rfft_4096, 4096, PASS_8, PASS_32, PASS_128, PASS_512);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every factor is the rounded cosine and sine; 1 − 2⁻³¹ stands for 1.
+    #[test]
+    fn factors_are_rounded_cosines_and_sines() {
+        let check = |found: Complex, turns: f64| {
+            let (sin, cos) = (core::f64::consts::TAU * turns).sin_cos();
+            for (found, exact) in found.into_iter().zip([cos, sin]) {
+                let exact = (exact * 2f64.powi(31)).min(f64::from(i32::MAX));
+                // Half a unit, and the error of the double-precision reference.
+                assert!(
+                    (f64::from(found) - exact).abs() <= 0.5 + 1e-6,
+                    "{turns} turns: {found} for {exact}"
+                );
+            }
+        };
+        for span in [16, 32, 64, 128, 256, 512, 1024, 2048, 4096] {
+            for i in 0..3 * span / 4 {
+                check(cos_sin(i, span), f64::from(i) / f64::from(span));
+            }
+        }
+        for (j, factors) in PASS_128.iter().enumerate() {
+            for (r, &factor) in factors.iter().enumerate() {
+                check(factor, ((r + 1) * j) as f64 / 512.0);
+            }
+        }
+        for (k, &factor) in split_factors::<255>().iter().enumerate() {
+            check(factor, (k + 1) as f64 / 1024.0);
+        }
+    }
+}

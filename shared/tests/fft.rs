@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use proptest::prelude::*;
 use quietcut_core::fft::{self, Transform};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -95,4 +96,139 @@ fn accuracy_against_the_exact_transform() {
             assert!(snr >= 130.0, "{points} points, {name}: {snr:.1} dB (seed {seed})");
         }
     }
+}
+
+/// The exact transform used here is itself the sum of the definition.
+#[test]
+fn reference_is_the_definition() {
+    let samples: Vec<i32> = (0..256).map(|n| (n * n * 31 + 7 * n) % 1009 - 500).collect();
+    for (k, found) in exact(&samples).iter().enumerate() {
+        let sum: Complex64 = (0..256)
+            .map(|n| f64::from(samples[n]) * Complex64::cis(-TAU * ((k * n) % 256) as f64 / 256.0))
+            .sum();
+        assert!((found - sum).norm() < 1e-7, "bin {k}");
+    }
+}
+
+/// Blocks that drive single bins, sums of bins and inner values of the butterflies as high as any input can.
+fn extreme_blocks(points: usize, high: i32, low: i32) -> Vec<(String, Vec<i32>)> {
+    let mut blocks = vec![
+        ("all high".into(), vec![high; points]),
+        ("all low".into(), vec![low; points]),
+        (
+            "first high".into(),
+            (0..points).map(|n| if n == 0 { high } else { 0 }).collect(),
+        ),
+        (
+            "last low".into(),
+            (0..points)
+                .map(|n| if n == points - 1 { low } else { 0 })
+                .collect(),
+        ),
+    ];
+    // The sign of a tone drives its bin to the sum of all |cos|: bins at and near the fractions of the sample rate.
+    for part in [2, 3, 4, 5, 6, 8, 12, 16, 32, points] {
+        for bin in [points / part, points / part - 1, points / 2 - points / part + 1] {
+            for phase in [0.0, 0.125, 0.25, 0.3] {
+                let sign =
+                    |n: usize| (TAU * ((bin * n % points) as f64 / points as f64 + phase)).cos() >= 0.0;
+                let block = (0..points).map(|n| if sign(n) { high } else { low }).collect();
+                blocks.push((format!("square wave of bin {bin}, phase {phase}"), block));
+            }
+        }
+    }
+    blocks
+}
+
+/// Runs with overflow checks in the dev profile: an overflow ends the test.
+///
+/// The exact result proves that nothing wraps in the release profile either.
+#[test]
+fn extreme_inputs_neither_overflow_nor_lose_accuracy() {
+    for points in SIZES {
+        // 16-bit full scale, the largest block that needs no shift, one bit more, and all of 32 bits.
+        let bits = points.trailing_zeros();
+        let radix4_passes = 2 + (bits - 7) / 2;
+        let largest = 1 << (31 + radix4_passes - bits);
+        for (high, low) in [
+            (32_767, -32_768),
+            (largest - 1, -largest),
+            (largest, -largest - 1),
+            (i32::MAX, i32::MIN),
+        ] {
+            for (name, block) in extreme_blocks(points, high, low) {
+                let snr = snr_db(&block);
+                // A lone impulse has N times less energy than a tone as high: it ends near 2¹⁸ with 4096 points.
+                assert!(
+                    snr >= 105.0,
+                    "{points} points, {high} … {low}, {name}: {snr:.1} dB"
+                );
+            }
+        }
+        assert!(transform(&vec![0; points]).iter().all(|z| *z == Complex64::ZERO));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Blocks of random extremes, which have more ways to add up than any list has.
+    #[test]
+    fn random_extremes_do_not_overflow(
+        size in 0..SIZES.len(),
+        signs in proptest::collection::vec(any::<bool>(), 4096),
+        bits in 0..32u32,
+    ) {
+        let (high, low) = (i32::MAX >> (31 - bits), i32::MIN >> (31 - bits));
+        let block: Vec<i32> = signs[..SIZES[size]].iter().map(|&s| if s { high } else { low }).collect();
+        let snr = snr_db(&block);
+        prop_assert!(snr >= 120.0, "{snr} dB");
+    }
+
+    /// T(a·x + b·y) = a·T(x) + b·T(y) and Σ|x|² = Σ|X|²/N to the accuracy of the word length.
+    #[test]
+    fn linear_and_true_to_energy(
+        size in 0..SIZES.len(),
+        x in proptest::collection::vec(-8_000..8_000i32, 4096),
+        y in proptest::collection::vec(-8_000..8_000i32, 4096),
+        a in -2..=2i32,
+        b in -2..=2i32,
+    ) {
+        let points = SIZES[size];
+        let (x, y) = (&x[..points], &y[..points]);
+        let sum: Vec<i32> = x.iter().zip(y).map(|(x, y)| a * x + b * y).collect();
+        let (tx, ty, ts) = (transform(x), transform(y), transform(&sum));
+        // 130 dB below the largest value that noise of this height has.
+        let tolerance = 32_000.0 * (points as f64).sqrt() * 10f64.powf(-130.0 / 20.0) * 4.0;
+        for k in 0..ts.len() {
+            let expected = f64::from(a) * tx[k] + f64::from(b) * ty[k];
+            prop_assert!((ts[k] - expected).norm() <= tolerance, "bin {k}: {} for {expected}", ts[k]);
+        }
+        let energy: f64 = x.iter().map(|&v| f64::from(v).powi(2)).sum();
+        let ends = tx[0].norm_sqr() + tx[points / 2].norm_sqr();
+        let spectrum = (2.0 * tx.iter().map(|z| z.norm_sqr()).sum::<f64>() - ends) / points as f64;
+        prop_assert!((spectrum - energy).abs() <= 1e-6 * energy, "{spectrum} for {energy}");
+    }
+}
+
+/// microfft is another implementation in single precision: both agree to its accuracy, about 120 dB.
+#[test]
+fn agrees_with_microfft() {
+    macro_rules! compare {
+        ($($points:literal $theirs:ident),*) => {$(
+            let samples = tone($points, -6.0, 31.3, 0.7);
+            let mut floats: [f32; $points] = std::array::from_fn(|n| samples[n] as f32);
+            let theirs = microfft::real::$theirs(&mut floats);
+            let ours = transform(&samples);
+            let largest = ours.iter().map(|z| z.norm()).fold(0.0, f64::max);
+            for k in 1..$points / 2 {
+                let theirs = Complex64::new(f64::from(theirs[k].re), f64::from(theirs[k].im));
+                assert!((ours[k] - theirs).norm() <= 1e-6 * largest, "{} points, bin {k}", $points);
+            }
+            let ends = Complex64::new(f64::from(theirs[0].re), f64::from(theirs[0].im));
+            assert!((ours[0].re - ends.re).abs() <= 1e-6 * largest);
+            assert!((ours[$points / 2].re - ends.im).abs() <= 1e-6 * largest);
+        )*};
+    }
+    compare!(256 rfft_256, 512 rfft_512, 1024 rfft_1024, 2048 rfft_2048, 4096 rfft_4096);
 }

@@ -36,6 +36,14 @@ fn sqrt_is_within_one_ulp() {
     assert_eq!(math::sqrt(0.0).to_bits(), 0);
     assert_eq!(math::sqrt(f32::INFINITY), f32::INFINITY);
     assert!(math::sqrt(-1.0).is_nan() && math::sqrt(f32::NAN).is_nan());
+    for end in [f32::from_bits(1), f32::MIN_POSITIVE, 2f32.powi(126), f32::MAX] {
+        for x in [end.next_down(), end, end.next_up()]
+            .into_iter()
+            .filter(|x| x.is_finite())
+        {
+            assert!(ulps(math::sqrt(x), f64::from(x).sqrt()) <= 1.0, "{x:e}");
+        }
+    }
     for n in 0..=4096u16 {
         assert_eq!(
             math::sqrt(f32::from(n) * f32::from(n)),
@@ -150,14 +158,23 @@ fn floor_and_round_are_exact() {
 }
 
 #[test]
-fn decibel_is_good_enough_to_read() {
+fn decibel_is_within_its_bound() {
     let error = worst(positive(1009).filter(|x| x.is_normal()).map(|x| {
         (
             x,
             (f64::from(math::decibel(x)) - 10.0 * f64::from(x).log10()).abs(),
         )
     }));
-    assert!(error <= 0.001);
+    assert!(error <= 1e-4);
     assert_eq!(math::decibel(0.0), math::decibel(f32::MIN_POSITIVE));
     assert_eq!(math::decibel(f32::NAN), math::decibel(-3.0));
+}
+
+#[test]
+fn powers_of_two_are_exact() {
+    for exponent in -126..=127 {
+        assert_eq!(math::exp2i(exponent), 2f32.powi(exponent), "{exponent}");
+    }
+    assert_eq!(math::exp2i(i32::MIN), f32::MIN_POSITIVE);
+    assert_eq!(math::exp2i(i32::MAX), 2f32.powi(127));
 }
