@@ -5,5 +5,6 @@ pub mod cli;
 pub mod device;
 pub mod file;
 pub mod milling;
+pub mod recording;
 pub mod report;
 pub mod structure;

@@ -1,5 +1,7 @@
 //! Verdicts and advice as JSON objects: what `replay` and `monitor` answer with.
 
+use std::fmt;
+
 use quietcut_core::advice::Advice;
 use quietcut_core::monitor::Report;
 use serde::Serialize;
@@ -84,9 +86,9 @@ pub struct VerdictLog {
 /// A stream of reports in a few words.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// The last verdict; `None` where there was no report.
+    /// The first kind of chatter that was heard; without chatter the last verdict. `None` where there was no report.
     pub verdict: Option<&'static str>,
-    /// Since when it stands.
+    /// Since when it was heard.
     pub since_s: Option<f64>,
     /// Blocks that were judged.
     pub blocks: u64,
@@ -96,6 +98,22 @@ pub struct Summary {
     pub gaps: u32,
     #[serde(skip)]
     lost: u32,
+    #[serde(skip)]
+    heard_chatter: bool,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.verdict, self.since_s) {
+            (Some(verdict), Some(since)) => write!(f, "{verdict} since {since:.2} s")?,
+            _ => write!(f, "no verdict")?,
+        }
+        write!(
+            f,
+            "; {} blocks, {} clipped samples, {} gaps",
+            self.blocks, self.clipped, self.gaps
+        )
+    }
 }
 
 /// Advice to another speed counts as other advice where it differs by more than this share: the tooth-passing rule
@@ -111,7 +129,8 @@ impl VerdictLog {
         summary.clipped = report.clipped;
         summary.gaps += u32::from(report.lost > summary.lost);
         summary.lost = report.lost;
-        if summary.verdict != Some(next.verdict) {
+        if !summary.heard_chatter && summary.verdict != Some(next.verdict) {
+            summary.heard_chatter = report.judgement.verdict.is_chatter();
             summary.verdict = Some(next.verdict);
             summary.since_s = Some(next.t_s);
         }

@@ -3,6 +3,7 @@
 use quietcut_core::advice::{Action, Advice, Obstacle, Source};
 use quietcut_core::detector::{Judgement, Reason, Verdict};
 use quietcut_core::lobes::NotKnown;
+use quietcut_core::monitor::Report;
 use quietcut_core::units::Rpm;
 use quietcut_core::working_point::WorkingPoint;
 
@@ -68,6 +69,24 @@ pub fn reason(reason: Reason) -> &'static str {
         }
         Reason::SpeedChanging => "the spindle speed is changing",
         Reason::DamagedSignal => "too many samples are clipped or lost",
+    }
+}
+
+/// A report on one line: time, speed, verdict, advice.
+pub fn line(report: &Report) -> String {
+    let speed = report.speed.map_or_else(
+        || "      speed ?".into(),
+        |speed| format!("{:6.0} rev/min", speed.0),
+    );
+    let seconds = report.time.0 as f64 * 1e-9;
+    let said = verdict(&report.judgement);
+    match &report.advice {
+        Some(advice) if advice.action != Action::Keep => format!(
+            "{seconds:9.2} s  {speed}  {said}: {} ({})",
+            action(advice),
+            why(advice, &report.judgement, report.speed)
+        ),
+        _ => format!("{seconds:9.2} s  {speed}  {said}"),
     }
 }
 
