@@ -7,4 +7,5 @@ pub mod file;
 pub mod milling;
 pub mod recording;
 pub mod report;
+pub mod stability;
 pub mod structure;

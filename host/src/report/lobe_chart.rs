@@ -6,19 +6,11 @@ use plotters::style::{Color, RGBColor};
 use quietcut_core::lobes::{self, LobeTable};
 use quietcut_core::units::{Millimeters, Rpm};
 
+pub use crate::stability::Kind as LimitKind;
+
 use super::marks::{Mark, draw_marks};
 use super::picture::{Axes, BLUE, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, text};
-
-/// How stability is lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LimitKind {
-    /// A complex pair of multipliers (secondary Hopf, torus).
-    Hopf,
-    /// A multiplier through −1 (period doubling).
-    Flip,
-    /// A multiplier through +1.
-    Fold,
-}
+use crate::stability::SpeedLine;
 
 /// Where stability is first lost over depth at one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +68,20 @@ impl Column {
                 .map(|interval| pair(interval.from, interval.to))
                 .collect(),
             first_limit,
+        }
+    }
+}
+
+impl From<&SpeedLine> for Column {
+    fn from(line: &SpeedLine) -> Self {
+        Self {
+            rpm: line.rpm,
+            stable_mm: line.stable_mm.iter().map(|&[from, to]| (from, to)).collect(),
+            undecided_mm: Vec::new(),
+            first_limit: line.first_limit.map(|limit| FirstLimit {
+                depth_mm: limit.depth_mm,
+                kind: limit.kind,
+            }),
         }
     }
 }
