@@ -2,10 +2,8 @@
 
 pub mod case;
 pub mod cli;
-pub mod device;
 pub mod file;
 pub mod milling;
-pub mod recording;
 pub mod report;
-pub mod stability;
+pub mod simulate;
 pub mod structure;

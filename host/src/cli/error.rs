@@ -4,7 +4,6 @@ use std::error::Error as StdError;
 use std::io;
 
 use crate::file::FileError;
-use crate::stability::{BuildError, StabilityError};
 
 type Cause = Box<dyn StdError + Send + Sync>;
 
@@ -81,24 +80,6 @@ impl From<FileError> for Error {
                 | io::ErrorKind::IsADirectory => Self::input(error),
                 _ => Self::other(error),
             },
-        }
-    }
-}
-
-impl From<StabilityError> for Error {
-    fn from(error: StabilityError) -> Self {
-        match error {
-            StabilityError::BrokeDown { .. } => Self::other(error),
-            _ => Self::input(error),
-        }
-    }
-}
-
-impl From<BuildError> for Error {
-    fn from(error: BuildError) -> Self {
-        match error {
-            BuildError::Stability(error) => error.into(),
-            _ => Self::input(error),
         }
     }
 }

@@ -2,7 +2,6 @@
 
 pub mod answer;
 pub mod lobe_chart;
-pub mod marks;
 pub mod page;
 mod picture;
 pub mod spectrum;

@@ -1,0 +1,46 @@
+//! Why a simulation cannot be made or cannot go on.
+
+use crate::structure::StructureError;
+
+/// What is wrong with a simulation.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimulateError {
+    /// A structure that no machine has.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
+    /// Pitches that do not fit the number of teeth or do not go once around.
+    #[error(
+        "{teeth} teeth with the pitches {pitch_deg:?} degrees: as many pitches as teeth are needed, with the sum 360"
+    )]
+    Pitch {
+        /// Number of teeth.
+        teeth: usize,
+        /// The pitches.
+        pitch_deg: Vec<f64>,
+    },
+    /// The tool feeds into the workpiece and its size is not known.
+    #[error(
+        "the tool's diameter is not known, so its way into the workpiece is not: give diameter_mm in [tool], or let the depth grow instead"
+    )]
+    NoDiameter,
+    /// The motion left every bound.
+    #[error(
+        "at {time_s:.6} s the tool is displaced by {displacement_mm:.3} mm and growing: beyond that the model means nothing (a softening spring has given way, or the cut is so unstable that loss of contact does not bound it)"
+    )]
+    Diverged {
+        /// When.
+        time_s: f64,
+        /// How far the tool was.
+        displacement_mm: f64,
+    },
+    /// A tooth that neither cuts nor leaves the surface.
+    #[error(
+        "at {time_s:.6} s tooth {tooth} leaves the surface the moment it touches it and touches it the moment it leaves: the edge force is too large for this structure"
+    )]
+    ContactUndecided {
+        /// When.
+        time_s: f64,
+        /// Which, from 1.
+        tooth: usize,
+    },
+}

@@ -1,0 +1,202 @@
+//! A virtual cut of a case: what is asked for, and what comes of it.
+
+use quietcut_core::acceleration::Block;
+use quietcut_core::tachometer::Edge;
+
+use super::effect::{Effect, EffectError};
+use super::sensor::{Accelerometer, Sampler, TachometerModel};
+use super::{Cutter, Cutting, Dynamics, Model, Passage, Settings, SimulateError, Spindle, Statistics};
+use crate::case::{Case, CaseError};
+
+/// A cut of a case.
+#[derive(Clone, Debug)]
+pub struct VirtualCut {
+    /// Spindle speed, rev/min.
+    pub spindle_rpm: f64,
+    /// Axial depth of cut, mm.
+    pub depth_mm: f64,
+    /// How long it is watched, s.
+    pub seconds: f64,
+    /// How the tool comes into the workpiece.
+    pub entry: Entry,
+    /// Air before and after the cut, s.
+    pub air_s: f64,
+    /// What the case does not have, or has otherwise.
+    pub effects: Vec<Effect>,
+}
+
+/// How the tool comes into the workpiece, and out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entry {
+    /// In full cut from the start to the end.
+    None,
+    /// The depth grows, and shrinks, over so many seconds.
+    Ramp {
+        /// Duration, s.
+        seconds: f64,
+    },
+    /// Through the face of the workpiece: immersion grows as the tool feeds in, and shrinks as it feeds out.
+    Feed,
+}
+
+/// Why a case cannot be cut.
+#[derive(Debug, thiserror::Error)]
+pub enum VirtualCutError {
+    /// The case lacks a section.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// An effect that cannot be.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// The simulation cannot be made or go on.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// The time is over before the cut is whole.
+    #[error(
+        "{seconds} s are too short: with {air_s} s of air at both ends, way in and way out take {needed_s:.2} s, so give more than that"
+    )]
+    TooShort {
+        /// The time given, s.
+        seconds: f64,
+        /// Air, s.
+        air_s: f64,
+        /// The time needed, s.
+        needed_s: f64,
+    },
+}
+
+/// What the sensors of a cut deliver, and what it took.
+#[derive(Clone, Debug)]
+pub struct Heard {
+    /// Samples in blocks.
+    pub blocks: Vec<Block>,
+    /// Edges of the tachometer, in their order.
+    pub edges: Vec<Edge>,
+    /// What the integration took.
+    pub statistics: Statistics,
+}
+
+impl VirtualCut {
+    /// A cut with entry and exit through the faces of the workpiece, and a fifth of a second of air at both ends.
+    pub fn new(spindle_rpm: f64, depth_mm: f64, seconds: f64) -> Self {
+        Self {
+            spindle_rpm,
+            depth_mm,
+            seconds,
+            entry: Entry::Feed,
+            air_s: 0.2,
+            effects: Vec::new(),
+        }
+    }
+
+    /// The model of this cut of `case`.
+    ///
+    /// # Errors
+    /// The case lacks a section or has an extension that cannot be simulated; the time is too short; the tool's
+    /// size is needed and not known.
+    pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
+        let mut cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3 * self.depth_mm)?;
+        for effect in Effect::of_case(case)?
+            .into_iter()
+            .chain(self.effects.iter().copied())
+        {
+            effect.apply(&mut cutter)?;
+        }
+        let spindle = Spindle::new(self.spindle_rpm);
+        let passage = self.passage(&cutter, &spindle)?;
+        let structure = case.structure()?;
+        Ok(Model {
+            dynamics: Dynamics::new(structure).map_err(SimulateError::from)?,
+            cutting: Some(Cutting {
+                cutter,
+                spindle,
+                passage,
+                remembers: true,
+            }),
+            drive: None,
+        })
+    }
+
+    /// When the tool is in full cut, from and to in s.
+    ///
+    /// # Errors
+    /// As [`Self::model`].
+    pub fn full_cut_s(&self, case: &Case) -> Result<[f64; 2], VirtualCutError> {
+        let model = self.model(case)?;
+        let whole = [0.0, self.seconds];
+        let Some(cutting) = &model.cutting else {
+            return Ok(whole);
+        };
+        Ok(match cutting.passage {
+            Passage::Air => [0.0, 0.0],
+            Passage::Steady => whole,
+            Passage::Ramp {
+                start_s,
+                ramp_s,
+                end_s,
+            } => [start_s + ramp_s, end_s - ramp_s],
+            Passage::Feed { start_s, end_s } => {
+                let way_s = Passage::way_in_s(&cutting.cutter, &cutting.spindle)?;
+                [start_s + way_s, end_s]
+            }
+        })
+    }
+
+    fn passage(&self, cutter: &Cutter, spindle: &Spindle) -> Result<Passage, VirtualCutError> {
+        let (start_s, end_s) = (self.air_s, self.seconds - self.air_s);
+        let long_enough = |way_s: f64| {
+            let needed_s = 2.0 * (self.air_s + way_s);
+            if needed_s < self.seconds {
+                Ok(())
+            } else {
+                Err(VirtualCutError::TooShort {
+                    seconds: self.seconds,
+                    air_s: self.air_s,
+                    needed_s,
+                })
+            }
+        };
+        match self.entry {
+            Entry::None => Ok(Passage::Steady),
+            Entry::Ramp { seconds } => {
+                long_enough(seconds)?;
+                Ok(Passage::Ramp {
+                    start_s,
+                    ramp_s: seconds,
+                    end_s,
+                })
+            }
+            Entry::Feed => {
+                let way_s = Passage::way_in_s(cutter, spindle)?;
+                long_enough(way_s)?;
+                Ok(Passage::Feed {
+                    start_s,
+                    end_s: end_s - way_s,
+                })
+            }
+        }
+    }
+
+    /// Cuts, and listens with these sensors; `seed` makes their noise repeat.
+    ///
+    /// # Errors
+    /// As [`Self::model`], and what [`Model::run`] says.
+    pub fn hear(
+        &self,
+        case: &Case,
+        accelerometer: Accelerometer,
+        tachometer: TachometerModel,
+        seed: u64,
+    ) -> Result<Heard, VirtualCutError> {
+        let model = self.model(case)?;
+        let mut sampler = Sampler::new(&model, accelerometer);
+        let statistics = model.run(self.seconds + sampler.tail_s(), Settings::default(), |segment| {
+            sampler.observe(segment);
+        })?;
+        Ok(Heard {
+            blocks: sampler.blocks(seed),
+            edges: tachometer.edges(&Spindle::new(self.spindle_rpm), self.seconds, seed),
+            statistics,
+        })
+    }
+}
