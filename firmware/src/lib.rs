@@ -1,3 +1,9 @@
 //! What quietcut does with pins: device logic, generic over embedded-hal, embedded-io and embedded-storage.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
+
+pub mod accelerometer;
+pub mod acquisition;
+pub mod flash_model;
+pub mod stimulus;
+pub mod storage;

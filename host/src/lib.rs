@@ -2,8 +2,11 @@
 
 pub mod case;
 pub mod cli;
+pub mod device;
 pub mod file;
 pub mod milling;
+pub mod recording;
 pub mod report;
 pub mod simulate;
+pub mod stability;
 pub mod structure;

@@ -1,187 +1,18 @@
 //! The lobe table: bytes, refusals, lookups.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod support;
+
 use proptest::prelude::*;
 use quietcut_core::checksum::crc32;
 use quietcut_core::lobes::format::{HEADER_LENGTH, MAX_INTERVALS};
 use quietcut_core::lobes::{
-    Answer, Column, Content, Header, Interval, Kind, Layer, LobeTable, NotKnown, TableError, Validity,
-    encode, encoded_length,
+    Answer, Column, Content, Header, Interval, Kind, Layer, LobeTable, NotKnown, TableError, encode,
+    encoded_length,
 };
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
-use quietcut_core::working_point::{Limits, WorkingPoint};
-
-/// A table with its own memory.
-#[derive(Clone, Debug)]
-struct Owned {
-    depth_from_mm: f32,
-    depth_to_mm: f32,
-    speeds: Vec<Rpm>,
-    layers: Vec<(Validity, Vec<Vec<Interval>>)>,
-}
-
-impl Owned {
-    fn encode(&self) -> Result<Vec<u8>, TableError> {
-        let columns: Vec<Vec<&[Interval]>> = self
-            .layers
-            .iter()
-            .map(|(_, columns)| columns.iter().map(Vec::as_slice).collect())
-            .collect();
-        let layers: Vec<Layer> = self
-            .layers
-            .iter()
-            .zip(&columns)
-            .map(|((validity, _), columns)| Layer {
-                validity: *validity,
-                columns,
-            })
-            .collect();
-        let content = Content {
-            name: "kuka-kr90-acetal",
-            teeth: 2,
-            limits: Some(Limits {
-                rpm_min: Rpm(600.0),
-                rpm_max: Rpm(2400.0),
-            }),
-            depth_from: Millimeters(self.depth_from_mm),
-            depth_to: Millimeters(self.depth_to_mm),
-            speeds: &self.speeds,
-            layers: &layers,
-        };
-        let mut buffer = vec![0; encoded_length(&content) as usize];
-        let written = encode(&content, &mut buffer)?.len();
-        assert_eq!(written, buffer.len());
-        Ok(buffer)
-    }
-
-    /// What a reader of the bytes would write again.
-    fn decode(table: &LobeTable) -> Self {
-        let (from, to) = table.depths();
-        let entries = |layer| {
-            (0..table.speeds().len())
-                .map(|speed| table.entry(layer, speed).unwrap().intervals().to_vec())
-                .collect()
-        };
-        Self {
-            depth_from_mm: from.0,
-            depth_to_mm: to.0,
-            speeds: table.speeds().collect(),
-            layers: table
-                .layers()
-                .enumerate()
-                .map(|(layer, validity)| (validity, entries(layer)))
-                .collect(),
-        }
-    }
-}
-
-fn validity(feed_mm: f32) -> Validity {
-    Validity {
-        feed_from: Millimeters(feed_mm),
-        feed_to: Millimeters(feed_mm),
-        start: Degrees(90.0),
-        exit: Degrees(180.0),
-        posture: 0,
-    }
-}
-
-fn working_point(validity: &Validity, depth_mm: f32) -> WorkingPoint {
-    WorkingPoint {
-        axial_depth: Millimeters(depth_mm),
-        start: validity.start,
-        exit: validity.exit,
-        feed_per_tooth: validity.feed_from,
-        posture: validity.posture,
-    }
-}
-
-fn interval(from_mm: f32, to_mm: f32, kind: Kind, chatter_hz: f32) -> Interval {
-    Interval {
-        from: Millimeters(from_mm),
-        to: Millimeters(to_mm),
-        kind,
-        chatter: Hertz(chatter_hz),
-    }
-}
-
-/// Half-immersion down-milling of acetal near its flip notch: values of the case `kuka-kr90-acetal`, rounded.
-fn acetal() -> Owned {
-    let hopf = |from_mm, chatter_hz| interval(from_mm, 6.0, Kind::Hopf, chatter_hz);
-    let columns = vec![
-        vec![hopf(1.723, 17.4)],
-        vec![
-            interval(1.575, 2.334, Kind::Flip, 17.27),
-            interval(2.712, 6.0, Kind::Hopf, 19.0),
-        ],
-        vec![
-            interval(1.327, 4.023, Kind::Flip, 17.42),
-            interval(4.023, 6.0, Kind::Hopf, 19.2),
-        ],
-        vec![hopf(2.223, 20.0)],
-        vec![],
-    ];
-    Owned {
-        depth_from_mm: 0.0,
-        depth_to_mm: 6.0,
-        speeds: [900.0, 1036.0, 1045.0, 1100.0, 3000.0].map(Rpm).to_vec(),
-        layers: vec![(validity(0.15), columns)],
-    }
-}
-
-fn kind() -> impl Strategy<Value = Kind> {
-    prop_oneof![
-        Just(Kind::Hopf),
-        Just(Kind::Flip),
-        Just(Kind::Fold),
-        Just(Kind::Undecided)
-    ]
-}
-
-/// Columns with ends on a grid of 1/40 of the range: often touching, often at the ends of the range.
-fn column(depth_from_mm: f32, depth_to_mm: f32) -> impl Strategy<Value = Vec<Interval>> {
-    (
-        prop::collection::btree_set(0_u8..=40, 0..8),
-        prop::collection::vec((kind(), 0.0_f32..300.0, any::<bool>()), 8),
-    )
-        .prop_map(move |(ends, kinds)| {
-            let at_mm = |step: u8| match step {
-                40 => depth_to_mm,
-                _ => depth_from_mm + (depth_to_mm - depth_from_mm) * f32::from(step) / 40.0,
-            };
-            let ends: Vec<u8> = ends.into_iter().collect();
-            ends.windows(2)
-                .zip(kinds)
-                .filter(|(_, (_, _, is_there))| *is_there)
-                .map(|(ends, (kind, hz, _))| interval(at_mm(ends[0]), at_mm(ends[1]), kind, hz))
-                .collect()
-        })
-}
-
-fn table() -> impl Strategy<Value = Owned> {
-    (
-        1_usize..6,
-        1_usize..4,
-        prop_oneof![Just(0.0_f32), 0.1_f32..1.0],
-        1.5_f32..20.0,
-    )
-        .prop_flat_map(|(speeds, layers, depth_from_mm, depth_to_mm)| {
-            let columns = prop::collection::vec(column(depth_from_mm, depth_to_mm), speeds);
-            let steps = prop::collection::vec(0.5_f32..400.0, speeds);
-            (steps, prop::collection::vec(columns, layers)).prop_map(move |(steps, layers)| {
-                let speeds = steps.iter().scan(500.0, |rpm, step| {
-                    *rpm += step;
-                    Some(Rpm(*rpm))
-                });
-                let feeds = (1_u8..).map(|index| validity(0.05 * f32::from(index)));
-                Owned {
-                    depth_from_mm,
-                    depth_to_mm,
-                    speeds: speeds.collect(),
-                    layers: feeds.zip(layers).collect(),
-                }
-            })
-        })
-}
+use quietcut_core::working_point::WorkingPoint;
+use support::{LIMITS, Owned, acetal, interval, table, validity, working_point};
 
 fn is_stable(column: &Column, depth_mm: f32) -> bool {
     matches!(column.at(Millimeters(depth_mm)), Answer::Stable { .. })
@@ -194,11 +25,11 @@ proptest! {
         let table = LobeTable::parse(&bytes).unwrap();
         prop_assert_eq!(table.name(), "kuka-kr90-acetal");
         prop_assert_eq!(table.teeth(), 2);
-        prop_assert_eq!(table.limits(), Some(Limits { rpm_min: Rpm(600.0), rpm_max: Rpm(2400.0) }));
+        prop_assert_eq!(table.limits(), LIMITS);
         prop_assert_eq!(table.speeds().collect::<Vec<_>>(), content.speeds.clone());
-        // One step, 1/100 of one for snapping, and rounding of an f32 of the size of the depth.
+        // One step, 1/50 of one for snapping, and rounding of an f32 of the size of the depth.
         let step_mm = table.depth_step().0;
-        let (outward_mm, inward_mm) = (1.01 * step_mm, 0.02 * step_mm + 2e-7 * content.depth_to_mm);
+        let (outward_mm, inward_mm) = (1.02 * step_mm, 0.02 * step_mm + 2e-7 * content.depth_to_mm);
         for (layer, (validity, columns)) in content.layers.iter().enumerate() {
             prop_assert_eq!(table.layers().nth(layer), Some(*validity));
             for (speed, column) in columns.iter().enumerate() {
@@ -210,6 +41,7 @@ proptest! {
                     prop_assert_eq!(read.kind, written.kind);
                     let from_mm = written.from.0 - read.from.0;
                     let to_mm = read.to.0 - written.to.0;
+                    // An interval that touches the one before begins where that one's end was rounded to.
                     prop_assert!((-inward_mm - step_mm..=outward_mm).contains(&from_mm), "{} {}", read.from, written.from);
                     prop_assert!((-inward_mm..=outward_mm).contains(&to_mm), "{} {}", read.to, written.to);
                     // Half a step, and rounding; a frequency above 0 stays above.
@@ -269,7 +101,7 @@ proptest! {
     fn between_speeds_a_depth_is_what_both_neighbours_agree_on(
         content in table(), position in 0.0_f32..1.0, depth in 0.0_f32..1.0,
     ) {
-        prop_assume!(content.speeds.len() > 1);
+        if content.speeds.len() < 2 { return Ok(()) }
         let bytes = content.encode().unwrap();
         let table = LobeTable::parse(&bytes).unwrap();
         let depth_mm = content.depth_from_mm + depth * (content.depth_to_mm - content.depth_from_mm);
@@ -291,6 +123,7 @@ proptest! {
         let columns = limits_mm.map(|mm| vec![interval(mm, 6.0, Kind::Hopf, 20.0 * mm)]);
         let [a, b, c, d] = columns;
         let content = Owned {
+            limits: LIMITS,
             depth_from_mm: 0.0, depth_to_mm: 6.0, speeds: vec![Rpm(1000.0), Rpm(1100.0)],
             layers: vec![(validity(0.1), vec![a, b]), (validity(0.2), vec![c, d])],
         };
@@ -565,6 +398,7 @@ fn six_layers_of_six_hundred_speeds_take_about_a_hundred_kilobytes() {
     ];
     let columns = vec![island.to_vec(); 600];
     let content = Owned {
+        limits: LIMITS,
         depth_from_mm: 0.0,
         depth_to_mm: 6.0,
         speeds: (0..600_u16).map(|k| Rpm(600.0 + 3.0 * f32::from(k))).collect(),
@@ -779,6 +613,7 @@ fn a_full_column_grows_to_the_unstable_side() {
             .collect()
     };
     let content = Owned {
+        limits: LIMITS,
         depth_from_mm: 0.0,
         depth_to_mm: 6.0,
         speeds: vec![Rpm(1000.0), Rpm(1100.0)],

@@ -1,5 +1,11 @@
-//! What several tests share: where the binary, the cases and the measured data are.
+//! What several tests share: where the binary, the cases and the measured data are, the firmware
+//! images and the emulator that runs them.
 // A helper that cannot do its work fails the test that called it.
 #![allow(clippy::expect_used, clippy::panic)]
 
+pub mod chain_bits;
 pub mod command;
+pub mod device_log;
+pub mod emulator;
+pub mod firmware_image;
+pub mod pty;

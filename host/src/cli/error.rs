@@ -4,6 +4,7 @@ use std::error::Error as StdError;
 use std::io;
 
 use crate::file::FileError;
+use crate::stability::{BuildError, StabilityError};
 
 type Cause = Box<dyn StdError + Send + Sync>;
 
@@ -80,6 +81,24 @@ impl From<FileError> for Error {
                 | io::ErrorKind::IsADirectory => Self::input(error),
                 _ => Self::other(error),
             },
+        }
+    }
+}
+
+impl From<StabilityError> for Error {
+    fn from(error: StabilityError) -> Self {
+        match error {
+            StabilityError::BrokeDown { .. } => Self::other(error),
+            _ => Self::input(error),
+        }
+    }
+}
+
+impl From<BuildError> for Error {
+    fn from(error: BuildError) -> Self {
+        match error {
+            BuildError::Stability(error) => error.into(),
+            _ => Self::input(error),
         }
     }
 }

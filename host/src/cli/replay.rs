@@ -1,9 +1,15 @@
 //! `quietcut replay`: a recording through the same pipeline, here or on a device.
 
 use std::num::NonZeroU8;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use quietcut_core::lobes::LobeTable;
+use quietcut_core::monitor::{Monitor, State};
 
 use super::{Error, Output, count, positive};
+use crate::recording::{Recording, RecordingError, Sensed, Speed};
+use crate::report::answer::VerdictLog;
+use crate::report::words;
 
 /// A recording through the same pipeline as on the spindle, here or on a device.
 #[derive(Debug, clap::Args)]
@@ -11,7 +17,7 @@ use super::{Error, Output, count, positive};
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut replay cut.csv"
 )]
 pub struct Args {
-    /// The recording: CSV, UFF 58, WAV or MAT.
+    /// The recording: CSV, WAV or MAT.
     #[arg(value_name = "REC")]
     recording: PathBuf,
     /// Lobe table for the advice.
@@ -32,13 +38,61 @@ pub struct Args {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args {
-        recording: _,
-        table: _,
-        port: _,
-        rpm: _,
-        teeth: _,
-        output: _,
-    } = args;
-    Err(Error::not_built("replay"))
+    let recording = Recording::read(&args.recording)?;
+    let speed = Speed {
+        rpm: args.rpm,
+        teeth: args.teeth.map(NonZeroU8::get),
+    };
+    let sensed = Sensed::new(&recording, speed)?;
+    if !sensed.is_calibrated {
+        tracing::warn!(
+            "{}: the unit of the channel is not known, so amplitudes are relative to the largest sample",
+            args.recording.display()
+        );
+    }
+    let table = args.table.as_deref().map(crate::file::read).transpose()?;
+    let log = match &args.port {
+        Some(_) => return Err(Error::not_built("replay --port")),
+        None => here(&args, &sensed, table.as_deref())?,
+    };
+    args.output.answer(&log, format_args!("{}", log.summary))
+}
+
+/// Through the pipeline in this process.
+fn here(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
+    let monitor = Monitor::new(sensed.settings)
+        .map_err(|error| Error::input(format!("{}: {error}", args.recording.display())))?;
+    let table = match (table, &args.table) {
+        (Some(bytes), Some(path)) => Some(parse(path, bytes)?),
+        _ => None,
+    };
+    let mut state = State::default();
+    let mut log = VerdictLog::default();
+    for (block, edges) in sensed.steps() {
+        let report = monitor.step(
+            &mut state,
+            block,
+            edges,
+            table.as_ref(),
+            sensed.working_point.as_ref(),
+        );
+        if log.take(&report).is_some() {
+            args.output.line(words::line(&report))?;
+        }
+    }
+    Ok(log)
+}
+
+/// The table in the bytes of a file.
+fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<LobeTable<'a>, Error> {
+    LobeTable::parse(bytes).map_err(|error| Error::input(format!("{}: {error}", path.display())))
+}
+
+impl From<RecordingError> for Error {
+    fn from(error: RecordingError) -> Self {
+        match error {
+            RecordingError::File(cause) => cause.into(),
+            other => Self::input(other),
+        }
+    }
 }

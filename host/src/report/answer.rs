@@ -1,5 +1,7 @@
 //! Verdicts and advice as JSON objects: what `replay` and `monitor` answer with.
 
+use std::fmt;
+
 use quietcut_core::advice::Advice;
 use quietcut_core::monitor::Report;
 use serde::Serialize;
@@ -72,9 +74,93 @@ impl AdviceAnswer {
     }
 }
 
+/// What a stream of reports comes to: the answer of `replay` and `monitor`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct VerdictLog {
+    /// The first verdict, and each that differs from the one before in verdict or advice.
+    pub verdicts: Vec<VerdictAnswer>,
+    /// All of them together.
+    pub summary: Summary,
+}
+
+/// A stream of reports in a few words.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// The first kind of chatter that was heard; without chatter the last verdict. `None` where there was no report.
+    pub verdict: Option<&'static str>,
+    /// Since when it was heard.
+    pub since_s: Option<f64>,
+    /// Blocks that were judged.
+    pub blocks: u64,
+    /// Samples clipped.
+    pub clipped: u32,
+    /// Places where samples are missing.
+    pub gaps: u32,
+    #[serde(skip)]
+    lost: u32,
+    #[serde(skip)]
+    heard_chatter: bool,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.verdict, self.since_s) {
+            (Some(verdict), Some(since)) => write!(f, "{verdict} since {since:.2} s")?,
+            _ => write!(f, "no verdict")?,
+        }
+        write!(
+            f,
+            "; {} blocks, {} clipped samples, {} gaps",
+            self.blocks, self.clipped, self.gaps
+        )
+    }
+}
+
+/// Advice to another speed counts as other advice where it differs by more than this share: the tooth-passing rule
+/// follows every hertz that the estimate of the chatter frequency moves.
+const SAME_SPEED: f64 = 0.01;
+
+impl VerdictLog {
+    /// Takes the next report; the new verdict, where it differs from the one before.
+    pub fn take(&mut self, report: &Report) -> Option<&VerdictAnswer> {
+        let next = VerdictAnswer::new(report);
+        let summary = &mut self.summary;
+        summary.blocks += 1;
+        summary.clipped = report.clipped;
+        summary.gaps += u32::from(report.lost > summary.lost);
+        summary.lost = report.lost;
+        if !summary.heard_chatter && summary.verdict != Some(next.verdict) {
+            summary.heard_chatter = report.judgement.verdict.is_chatter();
+            summary.verdict = Some(next.verdict);
+            summary.since_s = Some(next.t_s);
+        }
+        let is_new = self.verdicts.last().is_none_or(|last| {
+            last.verdict != next.verdict || !is_same_advice(last.advice.as_ref(), next.advice.as_ref())
+        });
+        if !is_new {
+            return None;
+        }
+        self.verdicts.push(next);
+        self.verdicts.last()
+    }
+}
+
+fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
+    match (a, b) {
+        (None, None) => true,
+        (Some(a), Some(b)) => {
+            let near = (a.rpm - b.rpm).abs() <= SAME_SPEED * a.rpm;
+            // To keep cutting at whatever speed the spindle has is always the same advice.
+            let same_target = a.action == "keep" || (near && a.depth_mm == b.depth_mm);
+            a.action == b.action && a.source == b.source && same_target
+        }
+        _ => false,
+    }
+}
+
 /// The time of a report in seconds: whole nanoseconds of the first 104 days are exact in an `f64`.
 pub fn seconds(report: &Report) -> f64 {
-    report.time.0 as f64 * 1e-9
+    report.time.0 as f64 / 1e9
 }
 
 /// The shortest decimal number that is this `f32`: 900.1, not 900.0999755859375.
@@ -89,23 +175,56 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn the_object_has_the_names_that_scripts_rely_on() {
-        let report = Report {
+    fn report(t_ms: u64, verdict: Verdict, lost: u32) -> Report {
+        Report {
             sequence: 7,
-            time: Nanoseconds(1_250_000_000),
+            time: Nanoseconds(t_ms * 1_000_000),
             speed: Some(Rpm(900.1)),
             judgement: Judgement {
-                verdict: Verdict::PeriodDoubling,
+                verdict,
                 reason: Reason::Growing,
                 chatter: Some(Hertz(17.9)),
                 multiplier_abs: None,
                 confidence: 0.98,
             },
             advice: None,
-            clipped: 0,
-            lost: 0,
+            clipped: 3,
+            lost,
+        }
+    }
+
+    #[test]
+    fn the_log_holds_changes_and_counts_all() {
+        let mut log = VerdictLog::default();
+        assert!(log.take(&report(100, Verdict::Stable, 0)).is_some());
+        assert!(log.take(&report(200, Verdict::Stable, 5)).is_none());
+        assert!(log.take(&report(300, Verdict::Hopf, 5)).is_some());
+        assert!(log.take(&report(400, Verdict::Hopf, 9)).is_none());
+        assert_eq!(
+            serde_json::to_value(&log.summary).unwrap(),
+            serde_json::json!({"verdict": "hopf", "since_s": 0.3, "blocks": 4, "clipped": 3, "gaps": 2})
+        );
+        assert_eq!(log.verdicts.len(), 2);
+    }
+
+    #[test]
+    fn advice_that_moves_a_little_is_the_same_advice() {
+        let advice = |rpm| AdviceAnswer {
+            action: "speed",
+            rpm,
+            depth_mm: None,
+            source: "tooth-passing-rule",
+            assumed_working_point: false,
+            why: String::new(),
         };
+        assert!(is_same_advice(Some(&advice(1000.0)), Some(&advice(1009.0))));
+        assert!(!is_same_advice(Some(&advice(1000.0)), Some(&advice(1011.0))));
+        assert!(!is_same_advice(None, Some(&advice(1000.0))));
+    }
+
+    #[test]
+    fn the_object_has_the_names_that_scripts_rely_on() {
+        let report = report(1250, Verdict::PeriodDoubling, 0);
         assert_eq!(
             serde_json::to_string(&VerdictAnswer::new(&report)).unwrap(),
             r#"{"t_s":1.25,"verdict":"period-doubling","chatter_hz":17.9,"confidence":0.98,"spindle_rpm":900.1,"advice":null}"#

@@ -1,24 +1,16 @@
 //! The stability chart: stable depths over spindle speed, the kind of each limit, and points of interest.
 
 use plotters::chart::SeriesLabelPosition;
-use plotters::prelude::{Circle, Cross, LineSeries, PathElement, Polygon, Rectangle, Text, WHITE};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::prelude::{Circle, LineSeries, PathElement, Polygon, Rectangle, WHITE};
 use plotters::style::{Color, RGBColor};
+use quietcut_core::lobes::{self, LobeTable};
+use quietcut_core::units::{Millimeters, Rpm};
 
-use super::picture::{
-    Axes, BLUE, CHATTER, Canvas, INK, Labels, ORANGE, PictureError, QUIET, VIOLET, axes, draw, text,
-};
+pub use crate::stability::Kind as LimitKind;
 
-/// How stability is lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LimitKind {
-    /// A complex pair of multipliers (secondary Hopf, torus).
-    Hopf,
-    /// A multiplier through −1 (period doubling).
-    Flip,
-    /// A multiplier through +1.
-    Fold,
-}
+use super::marks::{Mark, draw_marks};
+use super::picture::{Axes, BLUE, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, text};
+use crate::stability::SpeedLine;
 
 /// Where stability is first lost over depth at one speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,36 +28,67 @@ pub struct Column {
     pub rpm: f64,
     /// Depths that are stable, as intervals in order.
     pub stable_mm: Vec<(f64, f64)>,
+    /// Depths for which the computation could not decide, as intervals in order.
+    pub undecided_mm: Vec<(f64, f64)>,
     /// Where stability is first lost; `None` where nothing is lost up to the last depth.
     pub first_limit: Option<FirstLimit>,
 }
 
-/// What a marked point is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MarkKind {
-    /// A cut that chattered.
-    Chatter,
-    /// A cut that was quiet.
-    Quiet,
+impl Column {
+    /// The columns of one layer of a lobe table, as the device has them.
+    pub fn of_table(table: &LobeTable<'_>, layer: usize) -> Vec<Self> {
+        let speeds = table.speeds().enumerate();
+        speeds
+            .filter_map(|(index, speed)| Some(Self::of_entry(speed, &table.entry(layer, index)?)))
+            .collect()
+    }
+
+    fn of_entry(speed: Rpm, entry: &lobes::Column) -> Self {
+        let pair = |from: Millimeters, to: Millimeters| (f64::from(from.0), f64::from(to.0));
+        let undecided = entry
+            .intervals()
+            .iter()
+            .filter(|interval| interval.kind == lobes::Kind::Undecided);
+        let first_limit = entry.first_limit().and_then(|interval| {
+            let kind = match interval.kind {
+                lobes::Kind::Hopf => LimitKind::Hopf,
+                lobes::Kind::Flip => LimitKind::Flip,
+                lobes::Kind::Fold => LimitKind::Fold,
+                lobes::Kind::Undecided => return None,
+            };
+            Some(FirstLimit {
+                depth_mm: f64::from(interval.from.0),
+                kind,
+            })
+        });
+        Self {
+            rpm: f64::from(speed.0),
+            stable_mm: entry.stable().map(|(from, to)| pair(from, to)).collect(),
+            undecided_mm: undecided
+                .map(|interval| pair(interval.from, interval.to))
+                .collect(),
+            first_limit,
+        }
+    }
 }
 
-/// A point on the chart.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mark {
-    /// Spindle speed.
-    pub rpm: f64,
-    /// Axial depth of cut.
-    pub depth_mm: f64,
-    /// What it is.
-    pub kind: MarkKind,
-    /// A word beside it; empty for none.
-    pub label: String,
-    /// Spindle speed and depth that were advised here: an arrow goes there.
-    pub advice: Option<(f64, f64)>,
+impl From<&SpeedLine> for Column {
+    fn from(line: &SpeedLine) -> Self {
+        Self {
+            rpm: line.rpm,
+            stable_mm: line.stable_mm.iter().map(|&[from, to]| (from, to)).collect(),
+            undecided_mm: Vec::new(),
+            first_limit: line.first_limit.map(|limit| FirstLimit {
+                depth_mm: limit.depth_mm,
+                kind: limit.kind,
+            }),
+        }
+    }
 }
 
 // Paper colours that do not mix where areas lie on one another.
 const STABLE: RGBColor = RGBColor(0xd2, 0xea, 0xdc);
+const UNDECIDED: RGBColor = RGBColor(0xd6, 0xd8, 0xdc);
 const UNSTABLE: RGBColor = RGBColor(0xfa, 0xec, 0xec);
 
 /// Size of the picture in pixels.
@@ -100,11 +123,10 @@ pub fn lobe_chart(
             [(first.rpm, 0.0), (last.rpm, depth_max_mm)],
             UNSTABLE.filled(),
         )])?;
-        chart.draw_series(
-            stable_areas(columns)
-                .into_iter()
-                .map(|area| Polygon::new(area, STABLE)),
-        )?;
+        let stable = areas(columns, |column| &column.stable_mm);
+        chart.draw_series(stable.into_iter().map(|area| Polygon::new(area, STABLE)))?;
+        let undecided = areas(columns, |column| &column.undecided_mm);
+        chart.draw_series(undecided.into_iter().map(|area| Polygon::new(area, UNDECIDED)))?;
         for kind in [LimitKind::Hopf, LimitKind::Flip, LimitKind::Fold] {
             draw_limits(&mut chart, columns, depth_max_mm, kind)?;
         }
@@ -128,18 +150,18 @@ fn limit_look(kind: LimitKind) -> (RGBColor, &'static str) {
     }
 }
 
-/// Between two columns with as many stable intervals, trapezoids; else each column's intervals reach half way.
-fn stable_areas(columns: &[Column]) -> Vec<Vec<(f64, f64)>> {
+/// Between two columns with as many intervals, trapezoids; else each column's intervals reach half way.
+fn areas(columns: &[Column], intervals: impl Fn(&Column) -> &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let mut areas = Vec::new();
     for (left, right) in columns.iter().zip(columns.iter().skip(1)) {
-        if left.stable_mm.len() == right.stable_mm.len() {
-            for (&(a, b), &(c, d)) in left.stable_mm.iter().zip(&right.stable_mm) {
+        if intervals(left).len() == intervals(right).len() {
+            for (&(a, b), &(c, d)) in intervals(left).iter().zip(intervals(right)) {
                 areas.push(vec![(left.rpm, a), (right.rpm, c), (right.rpm, d), (left.rpm, b)]);
             }
         } else {
             let middle = 0.5 * (left.rpm + right.rpm);
             for (column, from, to) in [(left, left.rpm, middle), (right, middle, right.rpm)] {
-                for &(a, b) in &column.stable_mm {
+                for &(a, b) in intervals(column) {
                     areas.push(vec![(from, a), (to, a), (to, b), (from, b)]);
                 }
             }
@@ -200,112 +222,10 @@ fn limit_runs(columns: &[Column], depth_max_mm: f64, kind: LimitKind) -> Vec<Vec
     runs
 }
 
-/// A box on the paper: left, top, right, bottom.
-type Area = (i32, i32, i32, i32);
-
-fn overlap(a: Area, b: Area) -> bool {
-    a.0 < b.2 && b.0 < a.2 && a.1 < b.3 && b.1 < a.3
-}
-
-fn draw_marks(canvas: &Canvas<'_>, chart: &mut Axes<'_, '_>, marks: &[Mark]) -> Result<(), PictureError> {
-    const RADIUS: i32 = 7;
-    let mut taken: Vec<Area> = Vec::new();
-    for mark in marks {
-        let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
-        if let Some(advice) = mark.advice {
-            draw_arrow(canvas, at, chart.backend_coord(&advice))?;
-        }
-        taken.push((at.0 - RADIUS, at.1 - RADIUS, at.0 + RADIUS, at.1 + RADIUS));
-    }
-    for mark in marks {
-        let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
-        let color = match mark.kind {
-            MarkKind::Chatter => CHATTER,
-            MarkKind::Quiet => QUIET,
-        };
-        match mark.kind {
-            MarkKind::Chatter => canvas.draw(&Cross::new(at, RADIUS, color.stroke_width(4)))?,
-            MarkKind::Quiet => {
-                canvas.draw(&Circle::new(at, RADIUS, WHITE.filled()))?;
-                canvas.draw(&Circle::new(at, RADIUS - 1, color.filled()))?;
-            }
-        }
-        if !mark.label.is_empty() {
-            draw_label(canvas, at, &mark.label, color, &mut taken)?;
-        }
-    }
-    Ok(())
-}
-
-/// A label near `at` that covers no other: above, below, then farther away.
-fn draw_label(
-    canvas: &Canvas<'_>,
-    at: (i32, i32),
-    label: &str,
-    color: RGBColor,
-    taken: &mut Vec<Area>,
-) -> Result<(), PictureError> {
-    let style = text(13, color);
-    let (w, h) = canvas.estimate_text_size(label, &style)?;
-    let (w, h) = (w as i32 + 12, h as i32 + 6);
-    let width = canvas.dim_in_pixel().0 as i32;
-    // Moved sideways where it would leave the paper.
-    let left = (at.0 - w / 2).clamp(0, (width - w).max(0));
-    let tops = [
-        at.1 - h - 11,
-        at.1 + 11,
-        at.1 - 2 * h - 13,
-        at.1 + h + 13,
-        at.1 - 3 * h - 15,
-        at.1 + 2 * h + 15,
-    ];
-    let areas = tops.map(|top| (left, top, left + w, top + h));
-    let area = areas
-        .into_iter()
-        .find(|&area| !taken.iter().any(|&other| overlap(area, other)));
-    let area = area.unwrap_or(areas[0]);
-    taken.push(area);
-    canvas.draw(&Rectangle::new(
-        [(area.0, area.1), (area.2, area.3)],
-        WHITE.mix(0.85).filled(),
-    ))?;
-    let middle = (area.0 + w / 2, area.1 + h / 2);
-    canvas.draw(&Text::new(
-        label,
-        middle,
-        style.pos(Pos::new(HPos::Center, VPos::Center)),
-    ))?;
-    Ok(())
-}
-
-/// An arrow that stops a little before the point it shows.
-fn draw_arrow(canvas: &Canvas<'_>, from: (i32, i32), to: (i32, i32)) -> Result<(), PictureError> {
-    const GAP: f64 = 12.0;
-    const HEAD: f64 = 11.0;
-    let (dx, dy) = (f64::from(to.0 - from.0), f64::from(to.1 - from.1));
-    let length = dx.hypot(dy);
-    if length < 2.0 * GAP + HEAD {
-        return Ok(());
-    }
-    let (ux, uy) = (dx / length, dy / length);
-    let along = |distance: f64, aside: f64| {
-        let x = f64::from(from.0) + ux * distance - uy * aside;
-        let y = f64::from(from.1) + uy * distance + ux * aside;
-        (x.round() as i32, y.round() as i32)
-    };
-    let tip = length - GAP;
-    canvas.draw(&PathElement::new(
-        [along(GAP, 0.0), along(tip - HEAD, 0.0)],
-        INK.stroke_width(2),
-    ))?;
-    let head = [along(tip, 0.0), along(tip - HEAD, 5.0), along(tip - HEAD, -5.0)];
-    canvas.draw(&Polygon::new(head, INK))?;
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::marks::MarkKind;
 
     fn column(rpm: f64, stable_mm: &[(f64, f64)], kind: LimitKind) -> Column {
         let first_limit = stable_mm
@@ -314,6 +234,7 @@ mod tests {
         Column {
             rpm,
             stable_mm: stable_mm.to_vec(),
+            undecided_mm: Vec::new(),
             first_limit,
         }
     }
@@ -325,7 +246,7 @@ mod tests {
             column(1010.0, &[(0.0, 1.6)], LimitKind::Flip),
             column(1020.0, &[(0.0, 1.5), (2.3, 2.7)], LimitKind::Flip),
         ];
-        let areas = stable_areas(&columns);
+        let areas = areas(&columns, |column| &column.stable_mm);
         assert_eq!(
             areas[0],
             [(1000.0, 0.0), (1010.0, 0.0), (1010.0, 1.6), (1000.0, 2.0)]
@@ -386,5 +307,54 @@ mod tests {
         let one = [column(600.0, &[(0.0, 3.0)], LimitKind::Hopf)];
         assert!(lobe_chart("", &one, 4.0, &[]).is_err());
         assert!(lobe_chart("", &[], 4.0, &[]).is_err());
+    }
+
+    #[test]
+    fn a_table_is_drawn_as_the_device_has_it() {
+        use quietcut_core::lobes::{Content, Interval, Kind, Layer, Validity, encode};
+        use quietcut_core::units::{Degrees, Hertz};
+
+        let interval = |from: f32, to: f32, kind| Interval {
+            from: Millimeters(from),
+            to: Millimeters(to),
+            kind,
+            chatter: Hertz(17.0),
+        };
+        let columns = [
+            &[interval(1.5, 2.25, Kind::Flip), interval(2.75, 4.0, Kind::Hopf)][..],
+            &[interval(0.0, 4.0, Kind::Undecided)][..],
+        ];
+        let validity = Validity {
+            feed_from: Millimeters(0.15),
+            feed_to: Millimeters(0.15),
+            start: Degrees(90.0),
+            exit: Degrees(180.0),
+            posture: 0,
+        };
+        let content = Content {
+            name: "robot",
+            teeth: 2,
+            limits: None,
+            depth_from: Millimeters(0.0),
+            depth_to: Millimeters(4.0),
+            speeds: &[Rpm(1036.0), Rpm(1040.0)],
+            layers: &[Layer {
+                validity,
+                columns: &columns,
+            }],
+        };
+        let mut buffer = [0; 1024];
+        let bytes = encode(&content, &mut buffer).unwrap();
+        let columns = Column::of_table(&LobeTable::parse(bytes).unwrap(), 0);
+        // Entries are rounded to the unstable side by at most a step of the 16-bit grid, 4 mm / 65 535.
+        let step = 4.0 / 65_535.0;
+        let near = |a: f64, b: f64| (a - b).abs() <= step;
+        assert_eq!((columns.len(), columns[0].stable_mm.len()), (2, 2));
+        let (from, to) = columns[0].stable_mm[1];
+        assert!(near(from, 2.25) && near(to, 2.75), "{columns:?}");
+        let limit = columns[0].first_limit.unwrap();
+        assert!(near(limit.depth_mm, 1.5) && limit.kind == LimitKind::Flip);
+        assert!(columns[1].stable_mm.is_empty() && columns[1].first_limit.is_none());
+        assert_eq!(columns[1].undecided_mm.len(), 1);
     }
 }

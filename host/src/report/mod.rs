@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub mod lobe_chart;
+pub mod marks;
 pub mod page;
 mod picture;
 pub mod spectrum;

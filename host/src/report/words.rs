@@ -1,8 +1,11 @@
 //! The words of verdicts and advice, for machinists and for scripts; the only place that has them.
 
-use quietcut_core::advice::{Action, Advice, Source};
+use quietcut_core::advice::{Action, Advice, Obstacle, Source};
 use quietcut_core::detector::{Judgement, Reason, Verdict};
+use quietcut_core::lobes::NotKnown;
+use quietcut_core::monitor::Report;
 use quietcut_core::units::Rpm;
+use quietcut_core::working_point::WorkingPoint;
 
 /// The word for a verdict in JSON and CSV.
 pub fn verdict_key(verdict: Verdict) -> &'static str {
@@ -69,63 +72,148 @@ pub fn reason(reason: Reason) -> &'static str {
     }
 }
 
+/// A report on one line: time, speed, verdict, advice.
+pub fn line(report: &Report) -> String {
+    let speed = report.speed.map_or_else(
+        || "      speed ?".into(),
+        |speed| format!("{:6.0} rev/min", speed.0),
+    );
+    let seconds = report.time.0 as f64 * 1e-9;
+    let said = verdict(&report.judgement);
+    match &report.advice {
+        Some(advice) if advice.action != Action::Keep => format!(
+            "{seconds:9.2} s  {speed}  {said}: {} ({})",
+            action(advice),
+            why(advice, &report.judgement, report.speed)
+        ),
+        _ => format!("{seconds:9.2} s  {speed}  {said}"),
+    }
+}
+
 /// What to do: `go to 1480 rev/min`.
 pub fn action(advice: &Advice) -> String {
     match advice.action {
         Action::Keep => "keep cutting".into(),
         Action::Speed => format!("go to {:.0} rev/min", advice.speed.0),
         Action::Depth => match advice.depth {
-            Some(depth) => format!("reduce the depth to {:.2} mm", depth.0),
+            Some(depth) => format!(
+                "reduce the depth to {:.2} mm at {:.0} rev/min",
+                depth.0, advice.speed.0
+            ),
             None => "reduce the depth".into(),
         },
         Action::NotKnown => "no advice".into(),
     }
 }
 
-/// Why the advice is what it is, with what it assumes; `speed` is the speed the cut had.
+/// Why the advice is what it is: what it rests on, what it assumes, and why it rests on nothing better. `speed` is the
+/// speed the cut had.
 pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
-    let mut why = match (advice.action, advice.source) {
-        (Action::Keep, Source::Table) => "the lobe table calls this cut stable".into(),
-        (Action::Keep, Source::ToothPassingRule) => "no chatter is heard".into(),
+    let mut parts = vec![ground(advice, judgement, speed)];
+    if advice.action != Action::Keep {
+        parts.extend(advice.obstacle.as_ref().map(obstacle));
+        parts.extend(advice.assumed.as_ref().map(assumed));
+    }
+    parts.join("; ")
+}
+
+fn ground(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
+    match (advice.action, advice.source) {
+        (Action::Keep, _) => "no chatter is heard".into(),
         (Action::Speed, Source::Table) => {
-            let depth = advice
+            let deep = advice
                 .depth
                 .map(|depth| format!(" {:.2} mm deep", depth.0))
                 .unwrap_or_default();
             let from = speed
                 .map(|speed| format!(" to {:.0} rev/min", speed.0))
                 .unwrap_or_default();
-            format!("the nearest speed{from} that the lobe table calls stable{depth} with margin")
+            format!("the nearest speed{from} where the lobe table calls a cut{deep} stable with margin")
         }
         (Action::Depth, Source::Table) => {
-            "no speed within the limits of the machine is stable this deep in the lobe table; this depth is"
+            "the lobe table has no speed within the limits of the machine where the present depth is stable; \
+             this depth is the largest that is, with margin"
                 .into()
         }
-        (Action::Speed, Source::ToothPassingRule) => match judgement.chatter {
-            Some(chatter) => format!(
-                "tooth-passing rule: at this speed the chatter frequency {:.1} Hz is a multiple of the tooth passing",
-                chatter.0
-            ),
-            None => "tooth-passing rule: the tooth passing meets the chatter frequency".into(),
-        },
+        (Action::Speed, Source::ToothPassingRule) => {
+            let chatter = judgement
+                .chatter
+                .map(|chatter| format!(" of {:.1} Hz", chatter.0))
+                .unwrap_or_default();
+            format!(
+                "tooth-passing rule: at this speed the chatter frequency{chatter} is a multiple of the tooth passing"
+            )
+        }
         (Action::Depth, Source::ToothPassingRule) => {
-            "no speed by the tooth-passing rule lies within the limits of the machine".into()
+            "the tooth-passing rule knows no depths, only that less is quieter".into()
         }
-        (Action::NotKnown, Source::Table) => "the lobe table does not know this cut".into(),
-        (Action::NotKnown, Source::ToothPassingRule) => {
-            "there is no lobe table, and the chatter frequency or the number of teeth is not known".to_owned()
-        }
-    };
-    if advice.assumed.is_some() && advice.source == Source::Table {
-        why.push_str("; the working point was not told, so the first layer of the table is assumed");
+        (Action::NotKnown, Source::Table) => "the lobe table does not help".into(),
+        (Action::NotKnown, Source::ToothPassingRule) => "the tooth-passing rule does not help".into(),
     }
-    why
+}
+
+/// What kept a better source of advice from being used.
+pub fn obstacle(obstacle: &Obstacle) -> String {
+    match obstacle {
+        Obstacle::NoTable => "the device has no lobe table".into(),
+        Obstacle::Table(why) => format!("the lobe table does not know this cut: {}", not_known(why)),
+        Obstacle::Speed => "the spindle speed is not a positive number".into(),
+        Obstacle::Contradicted => {
+            "the lobe table calls this cut stable, and yet it chatters: the table is not true here".into()
+        }
+        Obstacle::NothingStable => {
+            "the lobe table has no stable depth at any speed within the limits of the machine".into()
+        }
+        Obstacle::ChatterFrequency => "the chatter frequency is not known".into(),
+        Obstacle::NoSpeedWithinLimits => {
+            "the tooth-passing rule has no speed within the limits of the machine".into()
+        }
+    }
+}
+
+/// Why a lobe table has no answer.
+pub fn not_known(why: &NotKnown) -> String {
+    match why {
+        NotKnown::Speed { asked, from, to } => {
+            format!(
+                "{:.0} rev/min is not within its {:.0} to {:.0} rev/min",
+                asked.0, from.0, to.0
+            )
+        }
+        NotKnown::Depth { asked, from, to } => {
+            format!(
+                "{:.2} mm is not within its {:.2} to {:.2} mm",
+                asked.0, from.0, to.0
+            )
+        }
+        NotKnown::Feed { asked, from, to } if from == to => {
+            format!("it is for a feed of {from} per tooth, not {asked}")
+        }
+        NotKnown::Feed { asked, from, to } => {
+            format!("a feed of {asked} per tooth is not within its {from} to {to}")
+        }
+        NotKnown::Immersion { start, exit } => {
+            format!("it has nothing for an immersion from {start} to {exit}")
+        }
+        NotKnown::Posture { asked } => format!("it has nothing for posture {asked}"),
+        NotKnown::Teeth { asked, table } => format!("it is for {table} teeth, the tool has {asked}"),
+        NotKnown::Undecided => "its computation could not decide here".into(),
+        NotKnown::Damaged => "its bytes are damaged".into(),
+    }
+}
+
+/// The cut that advice assumed, where the host told none.
+fn assumed(point: &WorkingPoint) -> String {
+    format!(
+        "the working point was not told: assumed is a cut {:.2} mm deep, immersion from {} to {}, {} per tooth (tell it with \
+         `quietcut work`)",
+        point.axial_depth.0, point.start, point.exit, point.feed_per_tooth
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use quietcut_core::units::{Degrees, Hertz, Millimeters};
-    use quietcut_core::working_point::WorkingPoint;
 
     use super::*;
 
@@ -159,8 +247,20 @@ mod tests {
         assert_eq!(action(&advice), "go to 1480 rev/min");
         assert_eq!(
             why(&advice, &judgement, Some(Rpm(900.2))),
-            "the nearest speed to 900 rev/min that the lobe table calls stable 2.00 mm deep with margin; \
-             the working point was not told, so the first layer of the table is assumed"
+            "the nearest speed to 900 rev/min where the lobe table calls a cut 2.00 mm deep stable with margin; \
+             the working point was not told: assumed is a cut 2.00 mm deep, immersion from 90 ° to 180 °, 0.15 mm per \
+             tooth (tell it with `quietcut work`)"
+        );
+        let by_rule = Advice {
+            source: Source::ToothPassingRule,
+            assumed: None,
+            obstacle: Some(Obstacle::Table(NotKnown::Teeth { asked: 2, table: 4 })),
+            ..advice
+        };
+        assert_eq!(
+            why(&by_rule, &judgement, Some(Rpm(900.2))),
+            "tooth-passing rule: at this speed the chatter frequency of 17.4 Hz is a multiple of the tooth passing; \
+             the lobe table does not know this cut: it is for 4 teeth, the tool has 2"
         );
     }
 }

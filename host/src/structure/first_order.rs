@@ -27,14 +27,20 @@ impl FirstOrder {
         self.a.nrows()
     }
 
-    /// Receptance H(iω) = C (iω − A)⁻¹ B, m/N, rows displacement, columns force; ω in rad/s.
+    /// Receptance H(iω), m/N, rows displacement, columns force; ω in rad/s.
     ///
     /// `None` where iω is a pole.
     pub fn receptance(&self, omega: f64) -> Option<Matrix3<Complex64>> {
-        let n = self.order();
+        self.transfer(Complex64::new(0.0, omega))
+    }
+
+    /// H(s) = C (s − A)⁻¹ B, m/N, rows displacement, columns force; s in rad/s.
+    ///
+    /// `None` where s is a pole.
+    pub fn transfer(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         let mut dynamic = self.a.map(|entry| Complex64::new(-entry, 0.0));
-        for i in 0..n {
-            dynamic[(i, i)] += Complex64::new(0.0, omega);
+        for i in 0..self.order() {
+            dynamic[(i, i)] += s;
         }
         let states = dynamic.lu().solve(&self.b.map(Complex64::from))?;
         let h = self.c.map(Complex64::from) * states;

@@ -216,8 +216,9 @@ fn write_column(
     Ok(())
 }
 
-/// Steps are snapped when they are this close: a decoded depth must come back to the step it came from.
-const SNAP_STEPS: f64 = 0.01;
+/// Steps are snapped when they are this close: a decoded depth must come back to the step it came
+/// from. Decoding in f32 errs by up to 65 535·2⁻²⁴ = 0.004 steps for the size of a step and as much for each of two roundings.
+const SNAP_STEPS: f64 = 0.02;
 
 // f64 and the truncating, saturating cast: exact to far below `SNAP_STEPS`, on the host that makes tables.
 fn depth_steps(shape: &Shape, depth_mm: f32) -> f64 {

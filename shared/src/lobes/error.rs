@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::format::{MAGIC, MAX_INTERVALS, NAME_CAPACITY};
 use crate::units::{Hertz, Millimeters, Rpm};
 
 /// Why bytes are no table, or content cannot become one.
@@ -136,3 +137,93 @@ pub enum TableError {
         found: u64,
     },
 }
+
+impl core::fmt::Display for TableError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::TooShort { needed, found } => {
+                write!(f, "{found} bytes: a lobe table has at least {needed}")
+            }
+            Self::Magic { found } => write!(
+                f,
+                "no lobe table: it begins with {}, a table with {}",
+                found.escape_ascii(),
+                MAGIC.escape_ascii()
+            ),
+            Self::Schema { found, known } => write!(f, "schema {found} of lobe tables: known is {known}"),
+            Self::Length { header, found } => {
+                write!(f, "{found} bytes where the header of the table says {header}")
+            }
+            Self::Crc { header, computed } => write!(
+                f,
+                "the bytes have changed: their CRC-32 is {computed:08x}, the header says {header:08x}"
+            ),
+            Self::Arrays { needed, found } => {
+                write!(f, "the table announces {needed} bytes of entries and has {found}")
+            }
+            Self::Name { length } => write!(
+                f,
+                "a name of {length} bytes that is too long or no UTF-8: at most {NAME_CAPACITY} are possible"
+            ),
+            Self::Teeth => f.write_str("a tool without teeth"),
+            Self::Limits { from, to } => {
+                write!(
+                    f,
+                    "a spindle from {from} to {to}: the slowest speed must be below the fastest"
+                )
+            }
+            Self::Depths { from, to } => {
+                write!(
+                    f,
+                    "depths from {from} to {to}: they must begin at 0 or above and ascend"
+                )
+            }
+            Self::Chatter { found } => {
+                write!(
+                    f,
+                    "a chatter frequency of {found}: it must be a number of at least 0"
+                )
+            }
+            Self::Count { speeds, layers } => {
+                write!(
+                    f,
+                    "{speeds} speeds and {layers} layers: 1 to 65535 of each are possible"
+                )
+            }
+            Self::SpeedOrder { index, found } => {
+                write!(
+                    f,
+                    "speed number {index} is {found}: speeds must be positive and ascend"
+                )
+            }
+            Self::Layer { layer } => write!(
+                f,
+                "layer number {layer} holds for no cut, or for one that another layer has too"
+            ),
+            Self::Columns { layer, found, speeds } => {
+                write!(f, "layer number {layer} has {found} columns for {speeds} speeds")
+            }
+            Self::TooManyIntervals { layer, speed, found } => write!(
+                f,
+                "{found} intervals at speed number {speed} of layer number {layer}: a column holds {MAX_INTERVALS}, a \
+                 layer 65535"
+            ),
+            Self::ColumnOrder { layer, speed } => write!(
+                f,
+                "the intervals of speed number {speed} of layer number {layer} are not behind those before"
+            ),
+            Self::IntervalOrder {
+                layer,
+                speed,
+                interval,
+            } => write!(
+                f,
+                "interval number {interval} of speed number {speed} of layer number {layer} is empty, outside of the \
+                 depths of the table, not behind the one before, or of unknown kind"
+            ),
+            Self::Buffer { needed, found } => write!(f, "{found} bytes of memory: the table needs {needed}"),
+        }
+    }
+}
+
+impl core::error::Error for TableError {}

@@ -1,0 +1,176 @@
+//! Counts the instructions of pieces of the signal chain on the emulated Cortex-M4F.
+//!
+//! Run with `-icount shift=6`: the emulator then advances its clock by 64 ns per instruction, and
+//! SysTick, at 25 MHz, by 1.6 ticks. Every count is printed as one line `NAME COUNT`; an empty
+//! piece is subtracted. Instructions are not cycles; compare only counts of one compiler version.
+//!
+//! Lines `bits-of-NAME NUMBER` say what the chain computes, for comparison with the host.
+#![no_std]
+#![no_main]
+#![deny(clippy::undocumented_unsafe_blocks)]
+
+use core::hint::black_box;
+
+use cortex_m::peripheral::SYST;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::singleton;
+use cortex_m_rt::entry;
+use cortex_m_semihosting::{debug, hprintln};
+use quietcut_core::decimation::{Decimation, State};
+use quietcut_core::units::Hertz;
+use quietcut_core::{fft, math};
+
+// The tests that compare its numbers are another crate.
+#[allow(unreachable_pub)]
+#[path = "../../tests/support/chain_bits.rs"]
+mod chain_bits;
+
+#[entry]
+fn main() -> ! {
+    let Some(peripherals) = cortex_m::Peripherals::take() else {
+        fail()
+    };
+    let mut counter = Counter::start(peripherals.SYST);
+
+    let mut sum = 0_u32;
+    counter.print("loop-of-1000-additions", || {
+        for i in 0..1000_u32 {
+            sum = black_box(sum.wrapping_add(i));
+        }
+    });
+    black_box(sum);
+
+    transforms(&mut counter);
+    spectra(&mut counter);
+    decimation(&mut counter);
+    counter.print("sqrt-1000", || {
+        (1..=1000_u16).for_each(|x| keep(math::sqrt(black_box(f32::from(x)))))
+    });
+    counter.print("libm-sqrt-1000", || {
+        (1..=1000_u16).for_each(|x| keep(libm::sqrtf(black_box(f32::from(x)))))
+    });
+    hprintln!("bits-of-math {}", chain_bits::of_math());
+    hprintln!("bits-of-decimation {}", chain_bits::of_decimation());
+
+    loop {
+        debug::exit(debug::EXIT_SUCCESS);
+    }
+}
+
+/// The fixed-point transforms beside microfft's in single precision, on the same samples.
+fn transforms(counter: &mut Counter) {
+    let (Some(fixed), Some(float)) = (
+        singleton!(FIXED: [i32; 4096] = [0; 4096]),
+        singleton!(FLOAT: [f32; 4096] = [0.0; 4096]),
+    ) else {
+        fail()
+    };
+    macro_rules! both {
+        ($points:literal, $fixed:path, $float:path) => {
+            let (Some(fixed), Some(float)) = (fixed.first_chunk_mut(), float.first_chunk_mut()) else {
+                fail()
+            };
+            let mut noise = 1_u32;
+            for (fixed, float) in fixed.iter_mut().zip(float.iter_mut()) {
+                noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                *fixed = noise as i32 >> 16;
+                *float = *fixed as f32;
+            }
+            let (fixed, float) = (black_box(fixed), black_box(float));
+            counter.print(concat!("rfft-", $points), || keep($fixed(fixed)));
+            counter.print(concat!("microfft-", $points), || keep($float(float)));
+        };
+    }
+    both!(256, fft::rfft_256, microfft::real::rfft_256);
+    both!(512, fft::rfft_512, microfft::real::rfft_512);
+    both!(1024, fft::rfft_1024, microfft::real::rfft_1024);
+    both!(2048, fft::rfft_2048, microfft::real::rfft_2048);
+    both!(4096, fft::rfft_4096, microfft::real::rfft_4096);
+}
+
+/// The spectra over three axes and the search in them.
+fn spectra(counter: &mut Counter) {
+    let Some(memory) = singleton!(MEMORY: chain_bits::Memory = chain_bits::Memory::new()) else {
+        fail()
+    };
+    hprintln!("bits-of-spectra {}", chain_bits::of_spectra(memory));
+    counter.print("tool-spectrum", || keep(memory.tool_spectrum()));
+    let spectrum = memory.tool_spectrum();
+    counter.print("tool-search", || keep(chain_bits::search(spectrum)));
+    counter.print("structure-spectrum", || keep(memory.structure_spectrum()));
+    let spectrum = memory.structure_spectrum();
+    counter.print("structure-search", || keep(chain_bits::search(spectrum)));
+}
+
+/// 4000 samples at the sensor's rate through both bands.
+fn decimation(counter: &mut Counter) {
+    let Ok(decimation) = Decimation::new(Hertz(26_667.0)) else {
+        fail()
+    };
+    let mut state = State::new();
+    let counts = black_box([1234, -567, 2048]);
+    counter.print("decimation-4000", || {
+        for _ in 0..4000 {
+            keep(decimation.step(&mut state, black_box(counts)));
+        }
+    });
+}
+
+/// Keeps the compiler from leaving out what nobody looks at.
+fn keep<T>(value: T) {
+    black_box(value);
+}
+
+/// Counts instructions by SysTick.
+struct Counter {
+    timer: SYST,
+    empty_ticks: u32,
+}
+
+impl Counter {
+    /// SysTick counts down 24 bits: 10.4 million instructions at most.
+    const MAX_TICKS: u32 = 0x00ff_ffff;
+
+    fn start(mut timer: SYST) -> Self {
+        timer.set_clock_source(SystClkSource::Core);
+        timer.set_reload(Self::MAX_TICKS);
+        timer.clear_current();
+        timer.enable_counter();
+        let mut counter = Self {
+            timer,
+            empty_ticks: 0,
+        };
+        counter.empty_ticks = counter.ticks(|| ());
+        counter
+    }
+
+    fn ticks(&mut self, piece: impl FnOnce()) -> u32 {
+        self.timer.clear_current();
+        let before = SYST::get_current();
+        piece();
+        let after = SYST::get_current();
+        if self.timer.has_wrapped() {
+            fail()
+        }
+        before.wrapping_sub(after) & Self::MAX_TICKS
+    }
+
+    /// Prints how many instructions `piece` took.
+    fn print(&mut self, name: &str, piece: impl FnOnce()) {
+        let ticks = self.ticks(piece).saturating_sub(self.empty_ticks);
+        // 1.6 ticks per instruction.
+        hprintln!("{} {}", name, (u64::from(ticks) * 5 + 4) / 8);
+    }
+}
+
+fn fail() -> ! {
+    loop {
+        debug::exit(debug::EXIT_FAILURE);
+    }
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo) -> ! {
+    hprintln!("{}", info);
+    fail()
+}

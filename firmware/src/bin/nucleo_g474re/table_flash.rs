@@ -1,0 +1,77 @@
+//! The two table slots: the second bank of the internal flash, as `memory.x` says.
+//!
+//! The program runs from the first bank. Interrupts go on while a page is erased; only the caller waits.
+
+use embassy_stm32::flash::{Blocking, Error, FLASH_BASE, Flash};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+
+unsafe extern "C" {
+    /// Start of the first slot; only its address means anything.
+    static __table_slots_start: u8;
+    /// End of the second slot; only its address means anything.
+    static __table_slots_end: u8;
+}
+
+/// The flash from the start of the first slot to the end of the second.
+pub(crate) struct TableFlash {
+    flash: Flash<'static, Blocking>,
+    /// Offset of the first slot in the flash.
+    start: u32,
+    bytes: u32,
+}
+
+impl TableFlash {
+    pub(crate) fn new(flash: Flash<'static, Blocking>) -> Self {
+        let start = (&raw const __table_slots_start).addr();
+        let end = (&raw const __table_slots_end).addr();
+        Self {
+            flash,
+            start: (start - FLASH_BASE) as u32,
+            bytes: (end - start) as u32,
+        }
+    }
+
+    /// Offset in the flash of the range that begins at `offset` in the slots.
+    fn place(&self, offset: u32, length: usize) -> Result<u32, Error> {
+        let end = u32::try_from(length)
+            .ok()
+            .and_then(|length| offset.checked_add(length));
+        match end {
+            Some(end) if end <= self.bytes => Ok(self.start + offset),
+            _ => Err(Error::Size),
+        }
+    }
+}
+
+impl ErrorType for TableFlash {
+    type Error = Error;
+}
+
+impl ReadNorFlash for TableFlash {
+    const READ_SIZE: usize = <Flash<'static, Blocking> as ReadNorFlash>::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        let place = self.place(offset, bytes.len())?;
+        self.flash.blocking_read(place, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes as usize
+    }
+}
+
+impl NorFlash for TableFlash {
+    const WRITE_SIZE: usize = <Flash<'static, Blocking> as NorFlash>::WRITE_SIZE;
+    const ERASE_SIZE: usize = <Flash<'static, Blocking> as NorFlash>::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
+        let length = to.checked_sub(from).ok_or(Error::Size)?;
+        let place = self.place(from, length as usize)?;
+        self.flash.blocking_erase(place, place + length)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        let place = self.place(offset, bytes.len())?;
+        self.flash.blocking_write(place, bytes)
+    }
+}

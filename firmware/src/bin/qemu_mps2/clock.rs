@@ -1,0 +1,52 @@
+//! The board's timer 0, which counts 25 MHz down from 2³² − 1, and how often it came round.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+const CONTROL: usize = 0x4000_0000;
+const VALUE: usize = CONTROL + 4;
+const RELOAD: usize = CONTROL + 8;
+const INTERRUPT: usize = CONTROL + 12;
+const TICKS_PER_MICROSECOND: u32 = 25;
+
+static WRAPS: AtomicU32 = AtomicU32::new(0);
+
+pub(crate) fn start() {
+    // SAFETY: registers of timer 0, which nothing else uses.
+    unsafe {
+        (RELOAD as *mut u32).write_volatile(u32::MAX);
+        (VALUE as *mut u32).write_volatile(u32::MAX);
+        // Count, and interrupt on zero.
+        (CONTROL as *mut u32).write_volatile(0b1001);
+    }
+}
+
+/// Serves the interrupt of the timer.
+pub(crate) fn wrap() {
+    // SAFETY: clears the interrupt flag of timer 0.
+    unsafe { (INTERRUPT as *mut u32).write_volatile(1) };
+    WRAPS.store(WRAPS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+}
+
+fn ticks() -> u32 {
+    // SAFETY: reads the value of timer 0.
+    u32::MAX - unsafe { (VALUE as *const u32).read_volatile() }
+}
+
+/// Time since the start.
+pub(crate) fn microseconds() -> u64 {
+    loop {
+        let wraps = WRAPS.load(Ordering::Relaxed);
+        let ticks = ticks();
+        if WRAPS.load(Ordering::Relaxed) == wraps {
+            return (u64::from(wraps) << 32 | u64::from(ticks)) / u64::from(TICKS_PER_MICROSECOND);
+        }
+    }
+}
+
+/// Waits, doing nothing else.
+pub(crate) fn wait_microseconds(microseconds: u32) {
+    let start = ticks();
+    while ticks().wrapping_sub(start) < microseconds * TICKS_PER_MICROSECOND {}
+}
+
+defmt::timestamp!("{=u64:us}", microseconds());

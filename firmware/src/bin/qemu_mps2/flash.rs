@@ -1,0 +1,92 @@
+//! Flash for the lobe tables in the board's lasting memory, as slow and as strict as the real board's.
+//!
+//! Pages of 2 KB are erased to ones, double words of 8 bytes are written once. The times are those of
+//! the STM32G474: a power cut falls where it would fall on the real board.
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
+};
+use quietcut_firmware::stimulus::FLASH_BYTES;
+
+use crate::clock;
+
+/// Where the emulator maps the file that lasts.
+pub(crate) const PSRAM_BASE: usize = 0x2100_0000;
+
+const PAGE_BYTES: usize = 2048;
+const DOUBLE_WORD_BYTES: usize = 8;
+const ERASE_PAGE_MICROSECONDS: u32 = 22_000;
+const WRITE_DOUBLE_WORD_MICROSECONDS: u32 = 82;
+
+/// The only handle of the flash: [`Flash::take`] makes one.
+pub(crate) struct Flash(());
+
+impl Flash {
+    /// # Safety
+    /// Must be called once.
+    pub(crate) unsafe fn take() -> Self {
+        Self(())
+    }
+
+    fn word(offset: usize) -> *mut u64 {
+        (PSRAM_BASE + offset) as *mut u64
+    }
+}
+
+impl ErrorType for Flash {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for Flash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        check_read(self, offset, bytes.len())?;
+        let first = (PSRAM_BASE + offset as usize) as *const u8;
+        // SAFETY: the range was checked to lie in the flash, which is written through `self` only.
+        bytes.copy_from_slice(unsafe { core::slice::from_raw_parts(first, bytes.len()) });
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        FLASH_BYTES
+    }
+}
+
+impl NorFlash for Flash {
+    const WRITE_SIZE: usize = DOUBLE_WORD_BYTES;
+    const ERASE_SIZE: usize = PAGE_BYTES;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        check_erase(self, from, to)?;
+        for page in (from as usize..to as usize).step_by(PAGE_BYTES) {
+            clock::wait_microseconds(ERASE_PAGE_MICROSECONDS);
+            for offset in (page..page + PAGE_BYTES).step_by(DOUBLE_WORD_BYTES) {
+                // SAFETY: the range was checked to lie in the flash; volatile, so that the writes reach the
+                // file in this order.
+                unsafe { Self::word(offset).write_volatile(u64::MAX) };
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        check_write(self, offset, bytes.len())?;
+        for (offset, word) in (offset as usize..)
+            .step_by(DOUBLE_WORD_BYTES)
+            .zip(bytes.chunks_exact(DOUBLE_WORD_BYTES))
+        {
+            let word = word.try_into().map_or(0, u64::from_le_bytes);
+            // SAFETY: as in `erase`.
+            let erased = unsafe { Self::word(offset).read_volatile() } == u64::MAX;
+            // The real flash refuses to write over what is written, except to clear it.
+            if !erased && word != 0 {
+                return Err(NorFlashErrorKind::Other);
+            }
+            clock::wait_microseconds(WRITE_DOUBLE_WORD_MICROSECONDS);
+            // SAFETY: as in `erase`.
+            unsafe { Self::word(offset).write_volatile(word) };
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! defmt frames on the log port.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use crate::uart::LOG;
+
+#[defmt::global_logger]
+struct Logger;
+
+struct State {
+    encoder: UnsafeCell<defmt::Encoder>,
+    restore: UnsafeCell<critical_section::RestoreState>,
+}
+
+// SAFETY: both cells are touched between `acquire` and `release` only, with interrupts off on a
+// single core; `TAKEN` stops a second taker.
+unsafe impl Sync for State {}
+
+static TAKEN: AtomicBool = AtomicBool::new(false);
+static STATE: State = State {
+    encoder: UnsafeCell::new(defmt::Encoder::new()),
+    restore: UnsafeCell::new(critical_section::RestoreState::invalid()),
+};
+
+fn send(bytes: &[u8]) {
+    LOG.send(bytes);
+}
+
+// SAFETY: `acquire` turns interrupts off and refuses a second taker; `release` undoes it.
+unsafe impl defmt::Logger for Logger {
+    fn acquire() {
+        // SAFETY: released by `release`, which defmt calls once after each `acquire`.
+        let restore = unsafe { critical_section::acquire() };
+        // A log statement inside a log statement: the log cannot tell.
+        assert!(!TAKEN.swap(true, Ordering::Relaxed));
+        // SAFETY: interrupts are off and nobody else holds the logger.
+        unsafe {
+            *STATE.restore.get() = restore;
+            (*STATE.encoder.get()).start_frame(send);
+        }
+    }
+
+    unsafe fn flush() {}
+
+    unsafe fn release() {
+        // SAFETY: the logger is held, see `acquire`.
+        unsafe {
+            (*STATE.encoder.get()).end_frame(send);
+            TAKEN.store(false, Ordering::Relaxed);
+            critical_section::release(*STATE.restore.get());
+        }
+    }
+
+    unsafe fn write(bytes: &[u8]) {
+        // SAFETY: the logger is held, see `acquire`.
+        unsafe { (*STATE.encoder.get()).write(bytes, send) };
+    }
+}

@@ -1,0 +1,367 @@
+//! Table slots: uploads, resumption, and a loss of power at every operation.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod support;
+
+use proptest::prelude::*;
+use quietcut_core::lobes::{Header, TableError};
+use quietcut_core::protocol::{Refusal, Slot, Upload};
+use quietcut_firmware::flash_model::FlashModel;
+use quietcut_firmware::storage::{Storage, TableMemory};
+use support::{content_of, table};
+
+const HEADER: usize = 32;
+
+/// Flash like the board's, but small: 16 pages of 256 bytes, words of 8.
+type Flash = FlashModel<Vec<u8>, 8, 256>;
+const BYTES: usize = 16 * 256;
+
+fn empty() -> Flash {
+    Flash::new(vec![0xFF; BYTES])
+}
+
+/// Sends a table from where the device says in pieces of this size, as a host does.
+fn send<M: TableMemory>(storage: &mut Storage<M>, file: &[u8], piece: usize) -> Result<(), Refusal> {
+    let mut upload = storage.begin(Header::read(file).unwrap())?;
+    while (upload.received as usize) < file.len() {
+        let rest = &file[upload.received as usize..];
+        upload = storage.chunk(upload.received, &rest[..piece.min(rest.len())])?;
+    }
+    storage.commit()
+}
+
+fn assert_holds<M: TableMemory>(storage: &Storage<M>, file: &[u8]) {
+    let table = storage.table().unwrap();
+    assert_eq!(content_of(&table), file[HEADER..]);
+}
+
+fn name_in_use<M: TableMemory>(storage: &Storage<M>) -> Option<String> {
+    storage.table().map(|table| table.name().to_owned())
+}
+
+#[test]
+fn new_flash_holds_nothing() {
+    let mut storage = Storage::new(empty());
+    assert!(storage.table().is_none());
+    assert_eq!(storage.slots(), [Slot::Empty; 2]);
+    assert_eq!(storage.slot_capacity(), 7 * 256);
+    assert_eq!(storage.upload(), Err(Refusal::NoUpload));
+    assert_eq!(storage.chunk(32, &[1]), Err(Refusal::NoUpload));
+    assert_eq!(storage.commit(), Err(Refusal::NoUpload));
+    assert_eq!(storage.abort(), Err(Refusal::NoUpload));
+}
+
+#[test]
+fn uploads_change_slots_and_the_newest_is_found_again() {
+    let mut storage = Storage::new(empty());
+    let files: Vec<Vec<u8>> = (0..5_u8)
+        .map(|k| table(&format!("case-{k}"), 1.0 + f32::from(k), 60 + u16::from(k)))
+        .collect();
+    for (index, file) in files.iter().enumerate() {
+        send(&mut storage, file, 100).unwrap();
+        assert_holds(&storage, file);
+        let generation = index as u32 + 1;
+        let in_use = storage.slots()[index % 2];
+        assert!(
+            matches!(in_use, Slot::InUse(header) if header.generation == generation),
+            "{in_use:?}"
+        );
+        if index > 0 {
+            assert!(
+                matches!(storage.slots()[1 - index % 2], Slot::Valid(header) if header.generation == generation - 1)
+            );
+        }
+        storage = Storage::new(Flash::new(storage.into_memory().into_bytes()));
+        assert_holds(&storage, file);
+    }
+}
+
+#[test]
+fn every_word_and_page_size_works() {
+    fn check<const WRITE: usize, const ERASE: usize>() {
+        let mut storage = Storage::new(FlashModel::<_, WRITE, ERASE>::new(vec![0xFF; 8 * 4096]));
+        for piece in [1, 7, 64, 255, 256] {
+            for (name, speeds) in [("a", 40), ("b", 41), ("c", 200)] {
+                let file = table(name, 2.0, speeds);
+                send(&mut storage, &file, piece).unwrap();
+                assert_holds(&storage, &file);
+            }
+        }
+        let bytes = storage.into_memory().into_bytes();
+        let storage = Storage::new(FlashModel::<_, WRITE, ERASE>::new(bytes));
+        assert_eq!(name_in_use(&storage).as_deref(), Some("c"));
+    }
+    check::<1, 4096>();
+    check::<2, 1024>();
+    check::<4, 256>();
+    check::<8, 2048>();
+    check::<16, 512>();
+    // More pages than the journal has room for marks.
+    check::<32, 96>();
+    check::<8, 96>();
+}
+
+#[test]
+fn generations_come_round() {
+    let mut bytes = vec![0xFF; BYTES];
+    for (slot, generation) in [(0, u32::MAX), (1, 0)] {
+        let file = table(&format!("generation-{generation}"), 2.0, 60);
+        let header = Header::read(&file)
+            .unwrap()
+            .with_generation(generation, &file[HEADER..]);
+        let start = slot * BYTES / 2;
+        bytes[start..start + file.len()].copy_from_slice(&file);
+        bytes[start..start + HEADER].copy_from_slice(&header.to_bytes());
+    }
+    let mut storage = Storage::new(Flash::new(bytes));
+    assert_eq!(name_in_use(&storage).as_deref(), Some("generation-0"));
+    let file = table("next", 2.0, 60);
+    send(&mut storage, &file, 256).unwrap();
+    assert!(matches!(storage.slots()[0], Slot::InUse(header) if header.generation == 1));
+}
+
+#[test]
+fn what_is_refused_leaves_the_table_in_use() {
+    let old = table("old", 1.0, 60);
+    let mut storage = Storage::new(empty());
+    send(&mut storage, &old, 100).unwrap();
+    let new = table("new", 2.0, 70);
+    let header = Header::read(&new).unwrap();
+    let length = header.length;
+
+    let too_long = Header {
+        length: 7 * 256 + 1,
+        ..header
+    };
+    let refusal = Refusal::TableTooLong {
+        length: 7 * 256 + 1,
+        capacity: 7 * 256,
+    };
+    assert_eq!(storage.begin(too_long), Err(refusal));
+    let schema = TableError::Schema { found: 9, known: 1 };
+    assert_eq!(
+        storage.begin(Header { schema: 9, ..header }),
+        Err(Refusal::Table(schema))
+    );
+    let short = TableError::TooShort {
+        needed: 33,
+        found: 32,
+    };
+    assert_eq!(
+        storage.begin(Header { length: 32, ..header }),
+        Err(Refusal::Table(short))
+    );
+
+    assert_eq!(storage.begin(header), Ok(Upload { header, received: 32 }));
+    let offset = |expected, found| {
+        Err(Refusal::ChunkOffset {
+            expected,
+            found,
+            length,
+        })
+    };
+    assert_eq!(storage.chunk(0, &new[..100]), offset(32, 0));
+    assert_eq!(storage.chunk(40, &new[40..100]), offset(32, 40));
+    assert_eq!(
+        storage.chunk(32, &new[32..100]),
+        Ok(Upload {
+            header,
+            received: 100
+        })
+    );
+    assert_eq!(storage.chunk(32, &new[32..100]), offset(100, 32));
+    assert_eq!(storage.chunk(100, &vec![0; new.len()]), offset(100, 100));
+    assert_eq!(
+        storage.commit(),
+        Err(Refusal::Incomplete {
+            received: 100,
+            length
+        })
+    );
+    // Asked and begun again it goes on.
+    assert_eq!(
+        storage.upload(),
+        Ok(Upload {
+            header,
+            received: 100
+        })
+    );
+    assert_eq!(
+        storage.begin(header),
+        Ok(Upload {
+            header,
+            received: 100
+        })
+    );
+    assert_eq!(storage.abort(), Ok(()));
+    assert_eq!(storage.upload(), Err(Refusal::NoUpload));
+    assert_eq!(storage.slots()[1], Slot::Empty);
+    assert_holds(&storage, &old);
+
+    // A byte that changed on the way.
+    let mut damaged = new.clone();
+    damaged[200] ^= 1;
+    let Err(Refusal::Table(TableError::Crc { .. })) = send(&mut storage, &damaged, 256) else {
+        panic!("a CRC error")
+    };
+    assert_holds(&storage, &old);
+    assert_eq!(storage.slots()[1], Slot::Empty);
+
+    // A table that is none, with a right CRC: no teeth.
+    let mut toothless = new.clone();
+    toothless[HEADER] = 0;
+    let crc = Header::read(&toothless)
+        .unwrap()
+        .with_generation(0, &toothless[HEADER..]);
+    toothless[..HEADER].copy_from_slice(&crc.to_bytes());
+    assert_eq!(
+        send(&mut storage, &toothless, 256),
+        Err(Refusal::Table(TableError::Teeth))
+    );
+    assert_holds(&storage, &old);
+    let storage = Storage::new(Flash::new(storage.into_memory().into_bytes()));
+    assert_holds(&storage, &old);
+}
+
+#[test]
+fn another_table_replaces_an_unfinished_one() {
+    let mut storage = Storage::new(empty());
+    let (first, second) = (table("first", 1.0, 70), table("second", 1.0, 71));
+    storage.begin(Header::read(&first).unwrap()).unwrap();
+    storage.chunk(32, &first[32..700]).unwrap();
+    let header = Header::read(&second).unwrap();
+    assert_eq!(storage.begin(header), Ok(Upload { header, received: 32 }));
+    send(&mut storage, &second, 256).unwrap();
+    assert_holds(&storage, &second);
+}
+
+#[test]
+fn a_damaged_slot_is_seen_and_the_other_is_used() {
+    let mut storage = Storage::new(empty());
+    send(&mut storage, &table("old", 1.0, 60), 100).unwrap();
+    send(&mut storage, &table("new", 2.0, 60), 100).unwrap();
+    let mut bytes = storage.into_memory().into_bytes();
+    bytes[BYTES / 2 + 300] ^= 4;
+    let storage = Storage::new(Flash::new(bytes));
+    assert_eq!(name_in_use(&storage).as_deref(), Some("old"));
+    assert!(matches!(
+        storage.slots()[1],
+        Slot::Damaged(TableError::Crc { .. })
+    ));
+}
+
+#[test]
+fn a_memory_too_small_holds_nothing() {
+    let mut storage = Storage::new(Flash::new(vec![0xFF; 2 * 256]));
+    let header = Header::read(&table("a", 1.0, 60)).unwrap();
+    let refusal = Refusal::TableTooLong {
+        length: header.length,
+        capacity: 0,
+    };
+    assert_eq!(storage.begin(header), Err(refusal));
+    assert!(storage.table().is_none());
+}
+
+/// Cuts power within every write and erase of an upload in pieces of this size, with many leftovers each.
+fn cut_power_everywhere(piece: usize) {
+    let (old, new) = (table("old", 1.0, 60), table("new", 2.0, 90));
+    let mut with_old = Storage::new(empty());
+    send(&mut with_old, &table("older", 1.5, 50), 100).unwrap();
+    send(&mut with_old, &old, 100).unwrap();
+    let before = with_old.into_memory().into_bytes();
+    let slot_in_use = BYTES / 2..BYTES / 2 + old.len();
+
+    let (mut cuts, mut resumed, mut new_in_use) = (0, 0, 0);
+    for operation in 0.. {
+        let mut is_done = false;
+        for noise in 1..=64_u64 {
+            let mut flash = Flash::new(before.clone());
+            flash.fail_after(operation, noise.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+            let mut storage = Storage::new(flash);
+            let sent = send(&mut storage, &new, piece);
+            let flash = storage.into_memory();
+            if !flash.is_off() {
+                assert_eq!(sent, Ok(()));
+                is_done = true;
+                break;
+            }
+            cuts += 1;
+            let bytes = flash.into_bytes();
+            assert_eq!(
+                bytes[slot_in_use.clone()],
+                before[slot_in_use.clone()],
+                "operation {operation}"
+            );
+
+            let mut storage = Storage::new(Flash::new(bytes));
+            match name_in_use(&storage).as_deref() {
+                Some("old") => assert_holds(&storage, &old),
+                Some("new") => {
+                    assert_holds(&storage, &new);
+                    new_in_use += 1;
+                }
+                other => panic!("operation {operation}, noise {noise}: {other:?} is in use"),
+            }
+            if let Ok(upload) = storage.upload() {
+                assert_eq!(upload.header, Header::read(&new).unwrap());
+                resumed += u32::from(upload.received > HEADER as u32);
+            }
+            // Whatever was left: the upload goes through now.
+            send(&mut storage, &new, piece).unwrap();
+            assert_holds(&storage, &new);
+        }
+        if is_done {
+            assert!(operation > 15, "{operation} operations");
+            break;
+        }
+    }
+    println!("pieces of {piece}: {cuts} cuts, {resumed} resumed, new table in use after {new_in_use}");
+    // Most cuts fall behind the first page; only the very last, in the header, may come too late to hurt.
+    assert!(resumed > cuts / 2 && new_in_use < 64);
+}
+
+#[test]
+fn power_may_fail_at_every_operation() {
+    // Pieces that end within words, at words, and at pages.
+    for piece in [45, 100, 128, 256] {
+        cut_power_everywhere(piece);
+    }
+}
+
+proptest! {
+    #[test]
+    fn power_may_fail_again_and_again(
+        cuts in prop::collection::vec((0_u32..40, any::<u64>(), 1_usize..300), 1..12),
+        sizes in prop::collection::vec(20_u16..90, 3),
+    ) {
+        let files: Vec<Vec<u8>> =
+            sizes.iter().enumerate().map(|(k, &speeds)| table(&format!("case-{k}"), 1.0, speeds)).collect();
+        let mut bytes = vec![0xFF; BYTES];
+        let mut in_use: Option<usize> = None;
+        for (index, (operations, noise, piece)) in cuts.into_iter().enumerate() {
+            // Sometimes the same table again, sometimes another.
+            let which = (index / 2) % files.len();
+            let mut flash = Flash::new(bytes);
+            flash.fail_after(operations, noise);
+            let mut storage = Storage::new(flash);
+            prop_assert_eq!(name_in_use(&storage), in_use.map(|which| format!("case-{which}")));
+            let sent = send(&mut storage, &files[which], piece);
+            bytes = storage.into_memory().into_bytes();
+            let storage = Storage::new(Flash::new(bytes.clone()));
+            let found = name_in_use(&storage);
+            let new = Some(format!("case-{which}"));
+            if sent.is_ok() || found == new {
+                prop_assert_eq!(&found, &new);
+                in_use = Some(which);
+            } else {
+                prop_assert_eq!(&found, &in_use.map(|which| format!("case-{which}")));
+            }
+            if let Some(which) = in_use {
+                assert_holds(&storage, &files[which]);
+            }
+        }
+        let mut storage = Storage::new(Flash::new(bytes));
+        send(&mut storage, &files[2], 128).unwrap();
+        assert_holds(&storage, &files[2]);
+    }
+}

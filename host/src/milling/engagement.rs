@@ -1,0 +1,135 @@
+//! When which tooth cuts.
+
+use std::f64::consts::PI;
+
+use super::{Cut, Tool};
+
+/// Share of a pitch below which an interval is taken for rounding of angles given in degrees.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// The teeth that cut during one tooth period of a tool with equal pitch.
+///
+/// The period starts when a tooth enters. At phase ψ from 0 to the pitch θ, tooth k stands at the immersion angle
+/// start + kθ + ψ, and cuts while that is below the exit angle. Two intervals follow: in the first one more tooth
+/// cuts than in the second; either may be empty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Engagement {
+    /// Immersion angle of entry, rad.
+    pub start: f64,
+    /// Immersion angle of exit, rad.
+    pub exit: f64,
+    /// Angle from tooth to tooth θ, rad.
+    pub pitch: f64,
+}
+
+/// A part of the tooth period during which the same teeth cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Phase where it begins, rad.
+    pub from: f64,
+    /// Phase where it ends, rad.
+    pub to: f64,
+    /// Number of teeth that cut; 0 is free flight.
+    pub teeth: usize,
+}
+
+impl Engagement {
+    /// The engagement of a tool with equal pitch.
+    pub fn new(tool: &Tool, cut: &Cut) -> Self {
+        Self {
+            start: cut.start_deg.to_radians(),
+            exit: cut.exit_deg.to_radians(),
+            pitch: 2.0 * PI / tool.teeth as f64,
+        }
+    }
+
+    /// The intervals of one tooth period, in order, together [0, θ].
+    pub fn intervals(&self) -> Vec<Interval> {
+        let pitches = (self.exit - self.start) / self.pitch;
+        let mut always = pitches.floor();
+        let mut rest = pitches - always;
+        if rest < NEGLIGIBLE {
+            rest = 0.0;
+        } else if rest > 1.0 - NEGLIGIBLE {
+            always += 1.0;
+            rest = 0.0;
+        }
+        let switch = rest * self.pitch;
+        // The number of teeth in the cut is small and not negative.
+        let always = always as usize;
+        let mut intervals = Vec::with_capacity(2);
+        if switch > 0.0 {
+            intervals.push(Interval {
+                from: 0.0,
+                to: switch,
+                teeth: always + 1,
+            });
+        }
+        intervals.push(Interval {
+            from: switch,
+            to: self.pitch,
+            teeth: always,
+        });
+        intervals
+    }
+
+    /// Immersion angle, rad, of the k-th cutting tooth at a phase: the one that entered k periods ago.
+    pub fn angle(&self, tooth: usize, phase: f64) -> f64 {
+        self.start + tooth as f64 * self.pitch + phase
+    }
+
+    /// Share of a revolution that a tooth cuts, times the number of teeth: the mean number of cutting teeth.
+    pub fn mean_teeth(&self) -> f64 {
+        (self.exit - self.start) / self.pitch
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn engagement(teeth: usize, start_deg: f64, exit_deg: f64) -> Engagement {
+        Engagement {
+            start: start_deg.to_radians(),
+            exit: exit_deg.to_radians(),
+            pitch: 2.0 * PI / teeth as f64,
+        }
+    }
+
+    #[test]
+    fn intervals_fill_the_period_and_hold_the_mean_number_of_teeth() {
+        for teeth in 1..=12 {
+            for (start, exit) in [
+                (0.0, 180.0),
+                (90.0, 180.0),
+                (0.0, 37.0),
+                (154.2, 180.0),
+                (60.0, 120.0),
+            ] {
+                let engagement = engagement(teeth, start, exit);
+                let intervals = engagement.intervals();
+                let mut end = 0.0;
+                let mut sum = 0.0;
+                for interval in &intervals {
+                    assert_eq!(interval.from, end);
+                    assert!(interval.to > interval.from);
+                    end = interval.to;
+                    sum += interval.teeth as f64 * (interval.to - interval.from);
+                }
+                assert_eq!(end, engagement.pitch);
+                // Rounding of a few operations on angles below 2π.
+                assert!((sum / engagement.pitch - engagement.mean_teeth()).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn two_teeth_at_full_immersion_cut_all_the_time_one_by_one() {
+        let intervals = engagement(2, 0.0, 180.0).intervals();
+        assert_eq!(intervals.len(), 1);
+        assert_eq!(intervals[0].teeth, 1);
+        let half = engagement(2, 90.0, 180.0).intervals();
+        assert_eq!((half[0].teeth, half[1].teeth), (1, 0));
+        assert!((half[0].to - PI / 2.0).abs() < 1e-15);
+    }
+}

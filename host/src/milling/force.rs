@@ -1,0 +1,237 @@
+//! The force on a tooth, and its average over the cut (thesis eqs 3.1–3.8, 7.1–7.2).
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Engagement, Material, Tool};
+
+/// A vector that turns with the tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal, axial direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TurningVector {
+    /// Part that does not turn.
+    pub constant: Vector3<f64>,
+    /// Coefficient of cos φ.
+    pub cosine: Vector3<f64>,
+    /// Coefficient of sin φ.
+    pub sine: Vector3<f64>,
+}
+
+impl TurningVector {
+    /// The vector at immersion angle φ, rad.
+    pub fn at(&self, angle: f64) -> Vector3<f64> {
+        let (sin, cos) = angle.sin_cos();
+        self.constant + self.cosine * cos + self.sine * sin
+    }
+
+    /// ∫ v(φ) uᵀ(φ) dφ from `start` to `exit`, rad, in closed form.
+    fn product_integral(&self, other: &Self, start: f64, exit: f64) -> Matrix3<f64> {
+        let ((s0, c0), (s1, c1)) = (start.sin_cos(), exit.sin_cos());
+        let length = exit - start;
+        let (cos, sin) = (s1 - s0, c0 - c1);
+        let half_sin_2 = 0.5 * (s1 * c1 - s0 * c0);
+        let (cos_cos, sin_sin) = (0.5 * length + half_sin_2, 0.5 * length - half_sin_2);
+        let sin_cos = 0.5 * (s1 * s1 - s0 * s0);
+        let (v, u) = (self, other);
+        v.constant * u.constant.transpose() * length
+            + (v.constant * u.cosine.transpose() + v.cosine * u.constant.transpose()) * cos
+            + (v.constant * u.sine.transpose() + v.sine * u.constant.transpose()) * sin
+            + v.cosine * u.cosine.transpose() * cos_cos
+            + v.sine * u.sine.transpose() * sin_sin
+            + (v.cosine * u.sine.transpose() + v.sine * u.cosine.transpose()) * sin_cos
+    }
+
+    /// ∫ v(φ) dφ from `start` to `exit`, rad.
+    fn integral(&self, start: f64, exit: f64) -> Vector3<f64> {
+        self.constant * (exit - start)
+            + self.cosine * (exit.sin() - start.sin())
+            + self.sine * (start.cos() - exit.cos())
+    }
+}
+
+/// The force on one tooth of axial depth a with chip thickness h at immersion angle φ:
+/// F = a·(cutting(φ)·h + edge(φ)), on the tool, in feed, normal and axial direction.
+///
+/// The chip thickness is h = normal(φ)ᵀ(f_t e_x + u − u_τ) with u the displacement of the tool and u_τ that of the
+/// tooth before at the same angle. Per unit of depth: SI units, N/m² and N/m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToothForce {
+    /// K_tc times the direction of the cutting force, Pa: eq. 7.2 with +k_rc cos γ in row 3.
+    pub cutting: TurningVector,
+    /// Direction in which displacement makes the chip thicker, without unit (eq. 3.1).
+    pub normal: TurningVector,
+    /// Edge force per depth, N/m (eq. 3.6).
+    pub edge: TurningVector,
+}
+
+impl ToothForce {
+    /// The force of a tool in a material.
+    pub fn new(tool: &Tool, material: &Material) -> Self {
+        let (sin, cos) = tool.edge_angle_deg.to_radians().sin_cos();
+        const PA_PER_MPA: f64 = 1e6;
+        const N_PER_M: f64 = 1e3;
+        let cutting = projected(material.ktc_mpa, material.krc_mpa, material.kac_mpa, sin, cos);
+        let edge = projected(
+            material.kte_n_per_mm,
+            material.kre_n_per_mm,
+            material.kae_n_per_mm,
+            sin,
+            cos,
+        );
+        Self {
+            cutting: scaled(cutting, PA_PER_MPA),
+            normal: TurningVector {
+                constant: Vector3::new(0.0, 0.0, -cos),
+                cosine: Vector3::new(0.0, sin, 0.0),
+                sine: Vector3::new(sin, 0.0, 0.0),
+            },
+            edge: scaled(edge, N_PER_M / sin),
+        }
+    }
+
+    /// Force per depth and displacement α(φ) = cutting·normalᵀ, Pa, of one tooth.
+    pub fn directional(&self, angle: f64) -> Matrix3<f64> {
+        self.cutting.at(angle) * self.normal.at(angle).transpose()
+    }
+
+    /// Force per depth of a chip that the feed alone makes, N/m: cutting·normalᵀ f_t e_x + edge.
+    pub fn forced(&self, angle: f64, feed_per_tooth_m: f64) -> Vector3<f64> {
+        self.cutting.at(angle) * (self.normal.at(angle).x * feed_per_tooth_m) + self.edge.at(angle)
+    }
+
+    /// The averages over a tooth period that averaged methods use.
+    pub fn averaged(&self, engagement: &Engagement, feed_per_tooth_m: f64) -> Averaged {
+        let Engagement { start, exit, pitch } = *engagement;
+        let directional = self.cutting.product_integral(&self.normal, start, exit) / pitch;
+        let forced = directional.column(0) * feed_per_tooth_m + self.edge.integral(start, exit) / pitch;
+        Averaged { directional, forced }
+    }
+}
+
+/// Averages of all cutting teeth over one tooth period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Averaged {
+    /// K_tc [α₀], Pa.
+    pub directional: Matrix3<f64>,
+    /// Force per depth from feed and edges, N/m: the z column of β_e + β_f, and the mean of the forced force.
+    pub forced: Vector3<f64>,
+}
+
+/// Tangential, radial and axial force in feed, normal and axial direction (eq. 3.4).
+fn projected(tangential: f64, radial: f64, axial: f64, sin: f64, cos: f64) -> TurningVector {
+    let inward = radial * sin + axial * cos;
+    TurningVector {
+        constant: Vector3::new(0.0, 0.0, radial * cos - axial * sin),
+        cosine: Vector3::new(-tangential, -inward, 0.0),
+        sine: Vector3::new(-inward, tangential, 0.0),
+    }
+}
+
+fn scaled(vector: TurningVector, factor: f64) -> TurningVector {
+    TurningVector {
+        constant: vector.constant * factor,
+        cosine: vector.cosine * factor,
+        sine: vector.sine * factor,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::milling::Cut;
+
+    fn tool(teeth: usize, edge_angle_deg: f64) -> Tool {
+        Tool {
+            teeth,
+            edge_angle_deg,
+            diameter_mm: None,
+            pitch_deg: vec![360.0 / teeth as f64; teeth],
+            runout: None,
+        }
+    }
+
+    const MATERIAL: Material = Material {
+        ktc_mpa: 1835.0,
+        krc_mpa: 1132.0,
+        kac_mpa: 280.0,
+        kte_n_per_mm: 25.0,
+        kre_n_per_mm: 45.0,
+        kae_n_per_mm: 10.0,
+    };
+
+    /// R(φ) of eq. 3.4 as printed, times the three forces.
+    fn by_rotation(forces: Vector3<f64>, angle: f64, gamma: f64) -> Vector3<f64> {
+        let ((sp, cp), (sg, cg)) = (angle.sin_cos(), gamma.sin_cos());
+        Matrix3::new(-cp, -sp * sg, -sp * cg, sp, -cp * sg, -cp * cg, 0.0, cg, -sg) * forces
+    }
+
+    #[test]
+    fn tooth_force_is_that_of_equations_3_2_and_3_4() {
+        let force = ToothForce::new(&tool(4, 50.0), &MATERIAL);
+        let gamma = 50.0_f64.to_radians();
+        let (depth, feed) = (0.67e-3, 0.05e-3);
+        for step in 0..=36 {
+            let angle = f64::from(step) * 5.0_f64.to_radians();
+            let chip = feed * angle.sin() * gamma.sin();
+            let width = depth / gamma.sin();
+            let direct = by_rotation(
+                Vector3::new(
+                    25e3 * width + 1835e6 * chip * depth,
+                    45e3 * width + 1132e6 * chip * depth,
+                    10e3 * width + 280e6 * chip * depth,
+                ),
+                angle,
+                gamma,
+            );
+            let ours = force.forced(angle, feed) * depth;
+            assert!((ours - direct).norm() < 1e-12 * direct.norm(), "{angle}");
+        }
+    }
+
+    #[test]
+    fn directional_coefficients_are_those_of_equation_6_7() {
+        let force = ToothForce::new(&tool(2, 90.0), &MATERIAL);
+        let kr = 1132.0 / 1835.0;
+        for step in 0..=36 {
+            let angle = f64::from(step) * 5.0_f64.to_radians();
+            let (s, c) = angle.sin_cos();
+            let printed = [
+                [-s * (c + kr * s), -c * (c + kr * s)],
+                [s * (s - kr * c), c * (s - kr * c)],
+            ];
+            let ours = force.directional(angle) / 1835e6;
+            for i in 0..2 {
+                for j in 0..2 {
+                    assert!((ours[(i, j)] - printed[i][j]).abs() < 1e-14);
+                }
+            }
+            // z leaves the chip thickness at a right edge angle, but F_z still acts.
+            assert!(ours[(0, 2)].abs() < 1e-15 && (ours[(2, 0)] + s * 280.0 / 1835.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn averages_in_closed_form_are_those_of_quadrature() {
+        let force = ToothForce::new(&tool(4, 50.0), &MATERIAL);
+        for (start, exit) in [(0.0, 180.0), (126.87, 180.0), (0.0, 60.0), (70.0, 110.0)] {
+            let cut = Cut {
+                start_deg: start,
+                exit_deg: exit,
+                feed_per_tooth_mm: 0.05,
+                feed_direction_deg: 0.0,
+            };
+            let engagement = Engagement::new(&tool(4, 50.0), &cut);
+            let averaged = force.averaged(&engagement, 0.05e-3);
+            // Midpoint rule: its error is (Δφ)²/24 times a second derivative of a few times the size.
+            const STEPS: u32 = 20_000;
+            let step = (engagement.exit - engagement.start) / f64::from(STEPS);
+            let mut directional = Matrix3::zeros();
+            let mut forced = Vector3::zeros();
+            for i in 0..STEPS {
+                let angle = engagement.start + (f64::from(i) + 0.5) * step;
+                directional += force.directional(angle) * (step / engagement.pitch);
+                forced += force.forced(angle, 0.05e-3) * (step / engagement.pitch);
+            }
+            assert!((averaged.directional - directional).norm() < 1e-7 * directional.norm());
+            assert!((averaged.forced - forced).norm() < 1e-7 * forced.norm());
+        }
+    }
+}

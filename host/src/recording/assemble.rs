@@ -1,0 +1,150 @@
+//! From the columns of a file and its sidecar to a recording in SI units.
+
+use std::path::Path;
+
+use super::{Channel, Quantity, Raw, RawColumn, Recording, RecordingError, Sensitivity, Sidecar, Unit};
+
+/// How far a time stamp may be from even sampling, in sample intervals: stamps are often printed with few digits.
+const UNEVEN: f64 = 0.25;
+
+pub(super) fn recording(path: &Path, raw: Raw, sidecar: Sidecar) -> Result<Recording, RecordingError> {
+    let mut time = None;
+    let mut channels: Vec<Channel> = Vec::with_capacity(raw.columns.len());
+    let columns: Vec<String> = raw.columns.iter().map(|column| column.name.clone()).collect();
+    if let Some(stranger) = sidecar.channels.keys().find(|name| !columns.contains(name)) {
+        return Err(RecordingError::Content {
+            path: Sidecar::path_of(path),
+            what: format!(
+                "channels.{stranger}: the recording has no such channel, but {}",
+                columns.join(", ")
+            ),
+        });
+    }
+    for column in raw.columns {
+        let channel = channel(path, column, &sidecar)?;
+        if channel.name == "t" {
+            time = Some(channel.samples);
+        } else if channels.iter().any(|other| other.name == channel.name) {
+            return Err(RecordingError::Content {
+                path: path.into(),
+                what: format!("two channels are called \"{}\"", channel.name),
+            });
+        } else {
+            channels.push(channel);
+        }
+    }
+    let (sample_rate_hz, start_s) = match (&time, raw.sample_rate_hz.or(sidecar.sample_rate_hz)) {
+        (Some(time), _) => even_rate(path, time)?,
+        (None, Some(rate)) => (rate, 0.0),
+        (None, None) => {
+            return Err(RecordingError::NoSampleRate {
+                path: path.into(),
+                sidecar: Sidecar::path_of(path),
+            });
+        }
+    };
+    if channels.is_empty() {
+        return Err(RecordingError::Content {
+            path: path.into(),
+            what: "there is no channel beside time".into(),
+        });
+    }
+    Ok(Recording {
+        path: path.into(),
+        sample_rate_hz,
+        start_s,
+        channels,
+        sidecar,
+    })
+}
+
+/// A column under its conventional name, in SI units.
+fn channel(path: &Path, column: RawColumn, sidecar: &Sidecar) -> Result<Channel, RecordingError> {
+    let RawColumn {
+        name,
+        mut unit,
+        mut samples,
+    } = column;
+    let said = sidecar.channels.get(&name).cloned().unwrap_or_default();
+    let in_sidecar = |what: String| RecordingError::Content {
+        path: Sidecar::path_of(path),
+        what: format!("channels.{name}.{what}"),
+    };
+    if let Some(text) = &said.unit {
+        let stated: Unit = text
+            .parse()
+            .map_err(|error| in_sidecar(format!("unit: {error}")))?;
+        unit = Some(stated);
+    }
+    let (mut quantity, mut factor) =
+        unit.map_or((Quantity::Unknown, 1.0), |unit| (unit.quantity, unit.factor));
+    if let Some(text) = &said.sensitivity {
+        let sensitivity: Sensitivity = text
+            .parse()
+            .map_err(|error| in_sidecar(format!("sensitivity: {error}")))?;
+        if quantity != Quantity::Voltage {
+            return Err(in_sidecar(format!(
+                "sensitivity: only a voltage has one, and the channel is {quantity} ({})",
+                quantity.unit()
+            )));
+        }
+        quantity = sensitivity.quantity;
+        factor /= sensitivity.volts_per_unit;
+    }
+    let name = said.name.unwrap_or_else(|| conventional(&name));
+    // A voltage may be anything: what it is, its sensitivity would say.
+    if let Some(expected) = Quantity::of_name(&name)
+        && ![expected, Quantity::Voltage, Quantity::Unknown].contains(&quantity)
+    {
+        return Err(RecordingError::Quantity {
+            path: path.into(),
+            column: name,
+            found: quantity,
+            expected,
+        });
+    }
+    if factor != 1.0 {
+        for sample in &mut samples {
+            *sample *= factor;
+        }
+    }
+    Ok(Channel {
+        name,
+        quantity,
+        samples,
+    })
+}
+
+/// Names are lower case; time is called t.
+fn conventional(name: &str) -> String {
+    let name = name.to_lowercase();
+    if name == "time" { "t".into() } else { name }
+}
+
+/// Rate and first time of evenly spaced stamps.
+fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
+    let wrong = |what: String| RecordingError::Content {
+        path: path.into(),
+        what,
+    };
+    let (Some(first), Some(last)) = (time.first(), time.last()) else {
+        return Err(wrong("there are no samples".into()));
+    };
+    if time.len() < 2 || last <= first {
+        return Err(wrong(format!(
+            "time goes from {first} to {last} s in {} samples; it must grow",
+            time.len()
+        )));
+    }
+    let step = (last - first) / (time.len() - 1) as f64;
+    for (index, stamp) in time.iter().enumerate() {
+        let expected = first + step * index as f64;
+        if (stamp - expected).abs() > UNEVEN * step {
+            return Err(wrong(format!(
+                "time is not even: sample {} stands at {stamp} s, {expected} s was expected; resample it first",
+                index + 1
+            )));
+        }
+    }
+    Ok((1.0 / step, *first))
+}

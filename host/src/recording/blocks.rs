@@ -1,0 +1,257 @@
+//! A recording as the device would have sensed it: counts in blocks, tachometer edges, settings.
+
+use quietcut_core::acceleration::{Block, Counts, MAX_BLOCK_SAMPLES, Sensor, is_clipped};
+use quietcut_core::monitor::Settings;
+use quietcut_core::tachometer::{Edge, LevelDetector, LevelDetectorState, Wheel};
+use quietcut_core::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
+use quietcut_core::working_point::{Tool, WorkingPoint};
+
+use super::{Channel, Quantity, Recording, RecordingError};
+
+/// m/s² per count of the IIS3DWB in its four ranges, ±2 g to ±16 g.
+const COUNT: [f64; 4] = [
+    0.061e-3 * 9.806_65,
+    0.122e-3 * 9.806_65,
+    0.244e-3 * 9.806_65,
+    0.488e-3 * 9.806_65,
+];
+
+/// Counts at the end of the range: one below, so that a sample which just fits is not taken for a clipped one.
+const FULL_SCALE: f64 = 32_766.0;
+
+/// A tachometer level that swings less than this part of its whole range has no edge there.
+const LEAST_SWING: f64 = 0.02;
+
+/// What the device would have sensed.
+#[derive(Clone, Debug)]
+pub struct Sensed {
+    /// How the pipeline must be set up.
+    pub settings: Settings,
+    /// The cut, where the recording says all of it.
+    pub working_point: Option<WorkingPoint>,
+    /// The samples.
+    pub blocks: Vec<Block>,
+    /// The tachometer edges, in order.
+    pub edges: Vec<Edge>,
+    /// False where the unit of the channels is not known: then amplitudes mean nothing in m/s².
+    pub is_calibrated: bool,
+}
+
+/// What the user says of the spindle and the tool where the recording does not.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Speed {
+    /// Spindle speed, rev/min; for a recording without a tachometer.
+    pub rpm: Option<f64>,
+    /// Number of teeth; goes before what the recording says.
+    pub teeth: Option<u8>,
+}
+
+impl Sensed {
+    /// Turns a recording into what the device would have sensed.
+    ///
+    /// Acceleration channels ax, ay, az become counts of the smallest range of the sensor that holds them. A recording
+    /// of a single channel of unknown unit is scaled by its own maximum.
+    ///
+    /// # Errors
+    /// No acceleration, neither tachometer nor speed, unknown number of teeth.
+    pub fn new(recording: &Recording, speed: Speed) -> Result<Self, RecordingError> {
+        let (axes, is_calibrated) = axes(recording)?;
+        let largest = axes
+            .iter()
+            .flatten()
+            .flat_map(|channel| &channel.samples)
+            .fold(0.0_f64, |largest, sample| largest.max(sample.abs()));
+        let count = count(largest, is_calibrated);
+        let teeth = teeth(recording, speed)?;
+        let wheel = wheel(recording);
+        let cut = recording.sidecar.cut.unwrap_or_default();
+        let rpm = speed.rpm.or(cut.spindle_rpm);
+        if wheel.is_none() && rpm.is_none() {
+            return Err(recording.lacks(
+                "tacho channel; without one the spindle speed must be given (--rpm, or cut.spindle_rpm beside the recording)",
+            ));
+        }
+        let rate = recording.sample_rate_hz;
+        let settings = Settings {
+            sensor: Sensor {
+                nominal_rate: Hertz(rate as f32),
+                meters_per_second2_per_count: count as f32,
+                // Without a unit nothing is known of the sensor but the rounding of counts.
+                noise_meters_per_second2_per_root_hertz: if is_calibrated {
+                    Sensor::IIS3DWB_16G.noise_meters_per_second2_per_root_hertz
+                } else {
+                    (count / 12f64.sqrt() / (0.5 * rate).sqrt()) as f32
+                },
+            },
+            tool: Tool { teeth },
+            wheel,
+            assumed_speed: rpm.filter(|_| wheel.is_none()).map(|rpm| Rpm(rpm as f32)),
+            limits: None,
+        };
+        Ok(Self {
+            settings,
+            working_point: working_point(recording),
+            blocks: blocks(&axes, count, rate),
+            edges: edges(recording),
+            is_calibrated,
+        })
+    }
+
+    /// For each block the edges that belong to it: those before the next block begins.
+    pub fn steps(&self) -> impl Iterator<Item = (&Block, &[Edge])> {
+        let mut rest = self.edges.as_slice();
+        let ends = self
+            .blocks
+            .iter()
+            .skip(1)
+            .map(|block| block.time)
+            .chain(std::iter::once(Nanoseconds(u64::MAX)));
+        self.blocks.iter().zip(ends).map(move |(block, end)| {
+            let (mine, later) = rest.split_at(rest.partition_point(|edge| edge.time < end));
+            rest = later;
+            (block, mine)
+        })
+    }
+}
+
+/// The channels of the three axes, and whether their unit is known.
+fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), RecordingError> {
+    let axes = ["ax", "ay", "az"].map(|name| recording.channel(name));
+    if axes.iter().any(Option::is_some) {
+        let calibrated = axes
+            .iter()
+            .flatten()
+            .all(|channel| channel.quantity == Quantity::Acceleration);
+        return Ok((axes, calibrated));
+    }
+    let unknown: Vec<&Channel> = recording
+        .channels
+        .iter()
+        .filter(|channel| {
+            channel.name != "tacho" && matches!(channel.quantity, Quantity::Unknown | Quantity::Voltage)
+        })
+        .collect();
+    match unknown.as_slice() {
+        [only] => Ok(([Some(*only), None, None], false)),
+        [] => Err(recording.lacks("acceleration channel ax, ay or az")),
+        _ => Err(recording.lacks(
+            "acceleration channel ax, ay or az, and it has several of unknown quantity; \
+             [channels.NAME] name = \"ax\" beside the recording says which",
+        )),
+    }
+}
+
+/// m/s² (or the recording's unit) per count.
+fn count(largest: f64, is_calibrated: bool) -> f64 {
+    let needed = largest / FULL_SCALE;
+    if needed <= 0.0 {
+        return COUNT[0];
+    }
+    if is_calibrated {
+        // A larger sensor than the device's: scaled by what it measured.
+        COUNT.into_iter().find(|&count| count >= needed).unwrap_or(needed)
+    } else {
+        needed
+    }
+}
+
+fn teeth(recording: &Recording, speed: Speed) -> Result<u8, RecordingError> {
+    let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
+    match (speed.teeth, recorded) {
+        (Some(teeth), _) => Ok(teeth),
+        (None, Some(teeth)) => u8::try_from(teeth).map_err(|_| RecordingError::Content {
+            path: super::Sidecar::path_of(&recording.path),
+            what: format!("cut.teeth = {teeth}: at most 255 is possible"),
+        }),
+        (None, None) => Err(recording.lacks("number of teeth (--teeth, or cut.teeth beside the recording)")),
+    }
+}
+
+fn wheel(recording: &Recording) -> Option<Wheel> {
+    recording.channel("tacho")?;
+    let said = recording
+        .sidecar
+        .channels
+        .values()
+        .find(|channel| channel.name.as_deref() == Some("tacho"))
+        .or_else(|| recording.sidecar.channels.get("tacho"));
+    Some(Wheel {
+        positions: said.and_then(|channel| channel.pulses_per_rev).unwrap_or(1),
+        missing: said.and_then(|channel| channel.missing).unwrap_or(0),
+    })
+}
+
+fn working_point(recording: &Recording) -> Option<WorkingPoint> {
+    let cut = recording.sidecar.cut?;
+    Some(WorkingPoint {
+        axial_depth: Millimeters(cut.axial_depth_mm? as f32),
+        start: Degrees(cut.start_deg? as f32),
+        exit: Degrees(cut.exit_deg? as f32),
+        feed_per_tooth: Millimeters(cut.feed_per_tooth_mm? as f32),
+        posture: 0,
+    })
+}
+
+/// Time of a sample on the clock of the device, which starts with the recording.
+fn stamp(sample: f64, rate: f64) -> Nanoseconds {
+    Nanoseconds((sample / rate * 1e9).round().max(0.0) as u64)
+}
+
+fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
+    let length = axes
+        .iter()
+        .flatten()
+        .map(|channel| channel.samples.len())
+        .max()
+        .unwrap_or(0);
+    let sample = |index: usize| -> Counts {
+        axes.map(|channel| {
+            let value = channel.map_or(0.0, |channel| channel.samples[index]);
+            // The cast saturates.
+            (value / count).round() as i16
+        })
+    };
+    (0..length)
+        .step_by(MAX_BLOCK_SAMPLES)
+        .enumerate()
+        .map(|(sequence, first)| {
+            let mut block = Block {
+                sequence: sequence as u32,
+                time: stamp(first as f64, rate),
+                counts: (first..length.min(first + MAX_BLOCK_SAMPLES))
+                    .map(sample)
+                    .collect(),
+                ..Block::default()
+            };
+            block.clipped = block.counts.iter().filter(|&&counts| is_clipped(counts)).count() as u16;
+            block
+        })
+        .collect()
+}
+
+fn edges(recording: &Recording) -> Vec<Edge> {
+    let Some(tacho) = recording.channel("tacho") else {
+        return Vec::new();
+    };
+    let (low, high) = tacho
+        .samples
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &level| {
+            (low.min(level), high.max(level))
+        });
+    let detector = LevelDetector {
+        least_swing: (LEAST_SWING * (high - low)).max(f64::from(f32::MIN_POSITIVE)) as f32,
+    };
+    let mut state = LevelDetectorState::default();
+    tacho
+        .samples
+        .iter()
+        .enumerate()
+        .filter_map(|(index, &level)| {
+            let part = detector.step(&mut state, level as f32)?;
+            Some(Edge {
+                time: stamp(index as f64 - f64::from(part), recording.sample_rate_hz),
+            })
+        })
+        .collect()
+}

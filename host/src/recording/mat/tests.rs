@@ -1,0 +1,103 @@
+use std::io::Write;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use proptest::prelude::*;
+
+use super::*;
+
+/// An element of the format, padded.
+fn element(kind: u32, data: &[u8]) -> Vec<u8> {
+    let mut bytes = kind.to_le_bytes().to_vec();
+    bytes.extend((data.len() as u32).to_le_bytes());
+    bytes.extend(data);
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    bytes
+}
+
+fn matrix_element(name: &str, class: u32, rows: i32, columns: i32, kind: u32, data: &[u8]) -> Vec<u8> {
+    let mut inner = element(6, &[class.to_le_bytes(), [0; 4]].concat());
+    inner.extend(element(5, &[rows.to_le_bytes(), columns.to_le_bytes()].concat()));
+    inner.extend(element(1, name.as_bytes()));
+    inner.extend(element(kind, data));
+    element(MATRIX, &inner)
+}
+
+fn compressed(data: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(data).unwrap();
+    let data = encoder.finish().unwrap();
+    let mut bytes = COMPRESSED.to_le_bytes().to_vec();
+    bytes.extend((data.len() as u32).to_le_bytes());
+    bytes.extend(data);
+    bytes
+}
+
+fn file(elements: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = vec![b' '; 124];
+    bytes.extend([0, 1, b'I', b'M']);
+    bytes.extend(elements.concat());
+    bytes
+}
+
+fn doubles(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+#[test]
+fn vectors_plain_and_compressed_and_stored_small_are_read() {
+    let bytes = file(&[
+        matrix_element("ax", 6, 3, 1, 9, &doubles(&[1.0, -2.5, 3.0])),
+        // A matrix of doubles whose values fit into one byte each, in the tag.
+        compressed(&matrix_element("small", 6, 1, 3, 2, &[7, 8, 9])),
+        matrix_element("both", 6, 3, 2, 9, &doubles(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
+        // Text (class 4) is passed over.
+        matrix_element("text", 4, 1, 3, 4, &[b'a', 0, b'b', 0, b'c', 0]),
+    ]);
+    let read: Vec<(String, Vec<f64>)> = variables(&bytes)
+        .unwrap()
+        .into_iter()
+        .flat_map(Variable::into_columns)
+        .map(|column| (column.name, column.samples))
+        .collect();
+    assert_eq!(
+        read,
+        [
+            ("ax".into(), vec![1.0, -2.5, 3.0]),
+            ("small".into(), vec![7.0, 8.0, 9.0]),
+            ("both1".into(), vec![1.0, 2.0, 3.0]),
+            ("both2".into(), vec![4.0, 5.0, 6.0]),
+        ]
+    );
+}
+
+#[test]
+fn what_is_no_such_file_is_refused_with_the_reason() {
+    let whole = file(&[matrix_element("ax", 6, 3, 1, 9, &doubles(&[1.0, 2.0, 3.0]))]);
+    let said = |bytes: &[u8]| variables(bytes).map(|_| ()).unwrap_err();
+    assert!(said(b"hello").contains("5 bytes"));
+    assert!(said(&whole[..whole.len() - 9]).contains("cut off"));
+    assert!(said(&[b'x'; 200]).contains("IM or MI"));
+    let mut newer = whole.clone();
+    newer[..10].copy_from_slice(b"MATLAB 7.3");
+    assert!(said(&newer).contains("-v7"));
+    let wrong = file(&[matrix_element("ax", 6, 4, 1, 9, &doubles(&[1.0, 2.0, 3.0]))]);
+    assert!(said(&wrong).contains("4 by 1, but has 3 values"));
+}
+
+proptest! {
+    /// Whatever the bytes, there is an answer.
+    #[test]
+    fn damaged_files_never_stop_the_program(flips in prop::collection::vec((0usize..400, any::<u8>()), 1..8), cut in 0usize..400) {
+        let mut bytes = file(&[
+            matrix_element("ax", 6, 3, 1, 9, &doubles(&[1.0, 2.0, 3.0])),
+            compressed(&matrix_element("ay", 6, 3, 1, 9, &doubles(&[1.0, 2.0, 3.0]))),
+        ]);
+        for (at, value) in flips {
+            let length = bytes.len();
+            bytes[at % length] = value;
+        }
+        bytes.truncate(bytes.len().saturating_sub(cut % 60));
+        let _ = variables(&bytes);
+    }
+}

@@ -1,0 +1,134 @@
+//! Recordings: channels with name, unit and rate, and what the file beside them says.
+//!
+//! Forces act on the structure. A rising edge of `tacho` is immersion angle 0 of tooth 1. Samples are in SI units.
+
+mod assemble;
+mod blocks;
+mod csv;
+mod error;
+mod mat;
+mod sidecar;
+mod unit;
+mod wav;
+
+use std::path::{Path, PathBuf};
+
+pub use blocks::{Sensed, Speed};
+pub use error::RecordingError;
+pub use sidecar::{Kind, RecordedChannel, RecordedCut, Sidecar};
+pub use unit::{Quantity, Sensitivity, Unit, UnknownUnit};
+
+/// Channels that were sampled together, evenly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Where it was read from, or will be written to.
+    pub path: PathBuf,
+    /// Samples per second.
+    pub sample_rate_hz: f64,
+    /// Time of the first sample, s.
+    pub start_s: f64,
+    /// The channels, all of one length. Time is not among them.
+    pub channels: Vec<Channel>,
+    /// What the file beside it says.
+    pub sidecar: Sidecar,
+}
+
+/// One channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// Its name: `fx`, `x`, `vx`, `ax`, `tacho` …
+    pub name: String,
+    /// What it measures; samples are in the SI unit of it.
+    pub quantity: Quantity,
+    /// The samples.
+    pub samples: Vec<f64>,
+}
+
+/// What a file says before the sidecar is consulted.
+struct Raw {
+    columns: Vec<RawColumn>,
+    /// Samples per second, where the format carries it.
+    sample_rate_hz: Option<f64>,
+}
+
+/// A column of a file.
+struct RawColumn {
+    name: String,
+    /// `None` where the file does not say.
+    unit: Option<Unit>,
+    samples: Vec<f64>,
+}
+
+impl Recording {
+    /// Reads a recording, with the sidecar beside it.
+    ///
+    /// # Errors
+    /// Missing or malformed file, unknown or contradicting units, uneven time, no sample rate.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
+        let path = path.as_ref();
+        let ending = path
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
+        let raw = match ending.as_str() {
+            "csv" => csv::read(path)?,
+            "wav" => wav::read(path)?,
+            "mat" => mat::read(path)?,
+            _ => {
+                // A file that is not there is the first thing to mend.
+                crate::file::read(path)?;
+                return Err(RecordingError::Format {
+                    path: path.into(),
+                    found: ending,
+                });
+            }
+        };
+        assemble::recording(path, raw, Sidecar::beside(path)?)
+    }
+
+    /// Writes it to `path` as CSV, with its sidecar: both whole, or as they were before.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write_csv(&self, path: &Path) -> Result<(), RecordingError> {
+        csv::write(path, self)?;
+        self.sidecar.write_beside(path)
+    }
+
+    /// The channel of a name.
+    pub fn channel(&self, name: &str) -> Option<&Channel> {
+        self.channels.iter().find(|channel| channel.name == name)
+    }
+
+    /// Number of samples of each channel.
+    pub fn len(&self) -> usize {
+        self.channels.first().map_or(0, |channel| channel.samples.len())
+    }
+
+    /// True where there are no samples.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Time of a sample, s.
+    pub fn time_s(&self, sample: usize) -> f64 {
+        self.start_s + sample as f64 / self.sample_rate_hz
+    }
+
+    /// The error that it has no channel that is needed.
+    pub fn lacks(&self, needed: impl Into<String>) -> RecordingError {
+        RecordingError::NoChannel {
+            path: self.path.clone(),
+            needed: needed.into(),
+            found: self
+                .channels
+                .iter()
+                .map(|channel| format!("{} [{}]", channel.name, channel.quantity.unit()))
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,216 @@
+use std::path::PathBuf;
+
+use proptest::prelude::*;
+
+use super::*;
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn file(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    }
+
+    fn refusal(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        Recording::read(self.file(name, bytes)).unwrap_err().to_string()
+    }
+}
+
+#[test]
+fn units_are_converted_and_time_gives_the_rate() {
+    let folder = Folder::new();
+    let path = folder.file(
+        "a.csv",
+        "t [ms],fx [kN],x [um],ax [g],tacho [1]\n0,1,2,1,0\n0.5,-1,4,0,1\n1,0,6,-1,0\n",
+    );
+    let recording = Recording::read(path).unwrap();
+    assert!((recording.sample_rate_hz - 2000.0).abs() < 1e-9);
+    assert_eq!(recording.channel("fx").unwrap().samples, [1000.0, -1000.0, 0.0]);
+    assert_eq!(recording.channel("x").unwrap().quantity, Quantity::Displacement);
+    assert!((recording.channel("x").unwrap().samples[2] - 6e-6).abs() < 1e-18);
+    assert_eq!(recording.channel("ax").unwrap().samples[0], 9.806_65);
+    assert!(recording.channel("t").is_none());
+}
+
+#[test]
+fn what_is_wrong_is_said_with_file_line_and_remedy() {
+    let folder = Folder::new();
+    let good = "t [s],ax [m/s^2]\n0,1\n0.1,2\n";
+    for (bytes, words) in [
+        (
+            "t [s],ax [m/s^2]\n0,1\n0.1,abc\n",
+            vec!["line 3", "\"abc\"", "\"ax\"", "number"],
+        ),
+        ("t [s],ax [m/s^2]\n0,1\n0.1,nan\n", vec!["line 3", "nan"]),
+        (
+            "t [s],ax [m/s^2]\n0,1\n0.1\n",
+            vec!["line 3", "1 values", "2 columns"],
+        ),
+        ("t [s],ax [parsec]\n0,1\n", vec!["\"ax [parsec]\"", "m/s^2"]),
+        (
+            "t [s],ax [N]\n0,1\n1,1\n",
+            vec!["\"ax\"", "force", "acceleration"],
+        ),
+        ("t [s],ax [m/s^2]\n0,1\n1,1\n1.1,1\n3,1\n", vec!["not even"]),
+        ("t [s],ax [m/s^2]\n1,1\n0,1\n", vec!["must grow"]),
+        ("t [s],ax [m/s^2]\n", vec!["no samples"]),
+        ("0,1\n0.1,2\n", vec!["line 1", "row of names"]),
+        ("ax [m/s^2]\n1\n2\n", vec!["a.toml", "sample_rate_hz"]),
+        (
+            "t [s],ax [g],ax [g]\n0,1,1\n1,1,1\n",
+            vec!["two channels", "\"ax\""],
+        ),
+    ] {
+        let message = folder.refusal("a.csv", bytes);
+        for word in words.into_iter().chain(["a."]) {
+            assert!(message.contains(word), "{word}: {message}");
+        }
+    }
+    for name in ["a.uff", "a.xyz"] {
+        assert!(folder.refusal(name, good).contains("csv, wav and mat"));
+    }
+    let missing = Recording::read(folder.0.path().join("no.csv")).unwrap_err();
+    assert!(missing.to_string().contains("no.csv"));
+}
+
+#[test]
+fn the_sidecar_names_and_scales_channels() {
+    let folder = Folder::new();
+    folder.file(
+        "a.toml",
+        "kind = \"cutting\"\nsample_rate_hz = 1000.0\n[cut]\nteeth = 4\nspindle_rpm = 5000.0\n\
+         [channels.data]\nname = \"ay\"\nunit = \"mV\"\nsensitivity = \"10 mV/g\"\nat = \"spindle-housing\"\n",
+    );
+    let recording = Recording::read(folder.file("a.csv", "data\n20\n-10\n")).unwrap();
+    assert_eq!(recording.sample_rate_hz, 1000.0);
+    let channel = recording.channel("ay").unwrap();
+    assert_eq!(channel.quantity, Quantity::Acceleration);
+    // 20 mV at 10 mV/g; a few roundings.
+    assert!((channel.samples[0] - 2.0 * 9.806_65).abs() < 1e-12);
+    assert_eq!(recording.sidecar.kind, Some(Kind::Cutting));
+
+    for (text, words) in [
+        ("sample_rate = 3.0\n", vec!["line 1", "sample_rate"]),
+        (
+            "sample_rate_hz = -3.0\n",
+            vec!["sample_rate_hz = -3", "greater than 0"],
+        ),
+        ("sample_rate_hz = 10.0\n[cut]\nteeth = 0\n", vec!["cut.teeth = 0"]),
+        (
+            "sample_rate_hz = 10.0\n[channels.nose]\nat = \"x\"\n",
+            vec!["channels.nose", "data"],
+        ),
+        (
+            "sample_rate_hz = 10.0\n[channels.data]\nunit = \"N\"\nsensitivity = \"1 mV/g\"\n",
+            vec!["sensitivity", "force"],
+        ),
+    ] {
+        folder.file("a.toml", text);
+        let message = folder.refusal("a.csv", "data\n20\n-10\n");
+        for word in words.into_iter().chain(["a.toml"]) {
+            assert!(message.contains(word), "{word}: {message}");
+        }
+    }
+}
+
+#[test]
+fn wav_has_its_rate_and_full_scale_one() {
+    let folder = Folder::new();
+    let path = folder.0.path().join("a.wav");
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: 48_000,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut writer = hound::WavWriter::create(&path, spec).unwrap();
+    for sample in [16_384_i16, -32_768, 0, 8192] {
+        writer.write_sample(sample).unwrap();
+    }
+    writer.finalize().unwrap();
+    let recording = Recording::read(&path).unwrap();
+    assert_eq!(recording.sample_rate_hz, 48_000.0);
+    assert_eq!(recording.channel("ch1").unwrap().samples, [0.5, 0.0]);
+    assert_eq!(recording.channel("ch2").unwrap().samples, [-1.0, 0.25]);
+    assert!(folder.refusal("b.wav", "RIFFxxxx").contains("WAV"));
+}
+
+#[test]
+fn blocks_and_edges_are_those_of_the_recording() {
+    let folder = Folder::new();
+    let mut text = String::from("t [s],ax [m/s^2],az [g],tacho [1]\n");
+    for index in 0..1000 {
+        let tacho = u8::from(index % 100 < 20);
+        text += &format!(
+            "{},{},{},{tacho}\n",
+            f64::from(index) * 1e-3,
+            10.0 * (f64::from(index) * 0.3).sin(),
+            0.5
+        );
+    }
+    let recording = Recording::read(folder.file("a.csv", &text)).unwrap();
+    assert!(
+        Sensed::new(&recording, Speed::default())
+            .unwrap_err()
+            .to_string()
+            .contains("teeth")
+    );
+    let sensed = Sensed::new(
+        &recording,
+        Speed {
+            rpm: None,
+            teeth: Some(2),
+        },
+    )
+    .unwrap();
+    assert_eq!(sensed.blocks.len(), 16);
+    assert_eq!(sensed.blocks[15].counts.len(), 1000 - 15 * 64);
+    let scale = f64::from(sensed.settings.sensor.meters_per_second2_per_count);
+    // 10 m/s² fit into ±2 g; half a count of rounding.
+    assert!((scale / COUNT_2G - 1.0).abs() < 1e-6);
+    assert!((f64::from(sensed.blocks[0].counts[5][0]) * scale - 10.0 * 1.5_f64.sin()).abs() <= 0.51 * scale);
+    // The first pulse has no rise; nine more follow 0.1 s apart, found between the samples 99 and 100.
+    assert_eq!(sensed.edges.len(), 9);
+    // The first edge is taken before the usual swing is known, up to a sample early.
+    for pair in sensed.edges[1..].windows(2) {
+        // Stamps are whole nanoseconds.
+        assert!(
+            (pair[1].time.0 - pair[0].time.0).abs_diff(100_000_000) <= 2,
+            "{pair:?}"
+        );
+    }
+    let spread: usize = sensed.steps().map(|(_, edges)| edges.len()).sum();
+    assert_eq!(spread, 9);
+}
+
+/// m/s² per count at ±2 g.
+const COUNT_2G: f64 = 0.061e-3 * 9.806_65;
+
+proptest! {
+    #[test]
+    fn what_is_written_is_read_back(samples in prop::collection::vec(-1e6..1e6f64, 2..50), rate in 1.0..1e5f64) {
+        let folder = Folder::new();
+        let path = folder.0.path().join("a.csv");
+        let recording = Recording {
+            path: path.clone(),
+            sample_rate_hz: rate,
+            start_s: 0.25,
+            channels: vec![Channel { name: "fx".into(), quantity: Quantity::Force, samples }],
+            sidecar: Sidecar { kind: Some(Kind::Sweep), ..Sidecar::default() },
+        };
+        recording.write_csv(&path).unwrap();
+        let back = Recording::read(&path).unwrap();
+        prop_assert_eq!(&back.sidecar, &recording.sidecar);
+        // Rounding of the time stamps, and nine digits of the samples.
+        prop_assert!((back.sample_rate_hz / rate - 1.0).abs() < 1e-9);
+        for (a, b) in back.channels[0].samples.iter().zip(&recording.channels[0].samples) {
+            prop_assert!((a - b).abs() <= 1e-8 * b.abs());
+        }
+    }
+}

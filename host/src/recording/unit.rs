@@ -1,0 +1,220 @@
+//! Units in the headers of recordings, and what they measure.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Standard gravity, m/s².
+const G: f64 = 9.806_65;
+
+/// What a channel measures. Samples of a recording are in the SI unit of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Time, s.
+    Time,
+    /// Force, N.
+    Force,
+    /// Displacement, m.
+    Displacement,
+    /// Velocity, m/s.
+    Velocity,
+    /// Acceleration, m/s².
+    Acceleration,
+    /// Angle, rad.
+    Angle,
+    /// Electric potential, V: not yet what the sensor measured; the channel's sensitivity says how to convert.
+    Voltage,
+    /// A number without a unit, such as the level of a tachometer.
+    Level,
+    /// The file does not say.
+    Unknown,
+}
+
+impl Quantity {
+    /// The SI unit that samples are in.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Time => "s",
+            Self::Force => "N",
+            Self::Displacement => "m",
+            Self::Velocity => "m/s",
+            Self::Acceleration => "m/s^2",
+            Self::Angle => "rad",
+            Self::Voltage => "V",
+            Self::Level => "1",
+            Self::Unknown => "unknown",
+        }
+    }
+
+    /// What a channel of this name measures, by the conventions of recordings: `fx`, `x`, `vx`, `ax`, `tacho`.
+    pub fn of_name(name: &str) -> Option<Self> {
+        match name {
+            "t" => Some(Self::Time),
+            "fx" | "fy" | "fz" => Some(Self::Force),
+            "x" | "y" | "z" => Some(Self::Displacement),
+            "vx" | "vy" | "vz" => Some(Self::Velocity),
+            "ax" | "ay" | "az" => Some(Self::Acceleration),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Time => "time",
+            Self::Force => "force",
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+            Self::Angle => "angle",
+            Self::Voltage => "voltage",
+            Self::Level => "a number",
+            Self::Unknown => "an unknown quantity",
+        })
+    }
+}
+
+/// A unit: what it measures, and how much of the SI unit it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// What it measures.
+    pub quantity: Quantity,
+    /// SI units in one of it.
+    pub factor: f64,
+}
+
+/// All units that are known, with their names. The first of a quantity is the SI unit.
+const UNITS: &[(&str, Quantity, f64)] = &[
+    ("s", Quantity::Time, 1.0),
+    ("ms", Quantity::Time, 1e-3),
+    ("us", Quantity::Time, 1e-6),
+    ("min", Quantity::Time, 60.0),
+    ("N", Quantity::Force, 1.0),
+    ("kN", Quantity::Force, 1e3),
+    ("mN", Quantity::Force, 1e-3),
+    ("m", Quantity::Displacement, 1.0),
+    ("mm", Quantity::Displacement, 1e-3),
+    ("um", Quantity::Displacement, 1e-6),
+    ("nm", Quantity::Displacement, 1e-9),
+    ("m/s", Quantity::Velocity, 1.0),
+    ("mm/s", Quantity::Velocity, 1e-3),
+    ("um/s", Quantity::Velocity, 1e-6),
+    ("m/s^2", Quantity::Acceleration, 1.0),
+    ("m/s2", Quantity::Acceleration, 1.0),
+    ("mm/s^2", Quantity::Acceleration, 1e-3),
+    ("mm/s2", Quantity::Acceleration, 1e-3),
+    ("g", Quantity::Acceleration, G),
+    ("mg", Quantity::Acceleration, 1e-3 * G),
+    ("rad", Quantity::Angle, 1.0),
+    ("deg", Quantity::Angle, std::f64::consts::PI / 180.0),
+    ("V", Quantity::Voltage, 1.0),
+    ("mV", Quantity::Voltage, 1e-3),
+    ("1", Quantity::Level, 1.0),
+    ("", Quantity::Level, 1.0),
+];
+
+/// A unit that is not known.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unit \"{found}\"; known are {}", known())]
+pub struct UnknownUnit {
+    /// The text.
+    pub found: String,
+}
+
+fn known() -> String {
+    let names: Vec<&str> = UNITS
+        .iter()
+        .map(|unit| unit.0)
+        .filter(|name| !name.is_empty())
+        .collect();
+    names.join(", ")
+}
+
+impl FromStr for Unit {
+    type Err = UnknownUnit;
+
+    /// Reads a unit as it stands in a header. Superscripts and the two letters for micro are read as they are meant.
+    fn from_str(text: &str) -> Result<Self, UnknownUnit> {
+        let plain = text
+            .trim()
+            .replace('²', "^2")
+            .replace(['µ', 'μ'], "u")
+            .replace("**", "^");
+        UNITS
+            .iter()
+            .find(|(name, ..)| *name == plain)
+            .map(|&(_, quantity, factor)| Self { quantity, factor })
+            .ok_or_else(|| UnknownUnit { found: text.into() })
+    }
+}
+
+/// Volts per unit of what a sensor measures, such as "10.2 mV/g".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensitivity {
+    /// What is measured.
+    pub quantity: Quantity,
+    /// V per SI unit of it.
+    pub volts_per_unit: f64,
+}
+
+impl FromStr for Sensitivity {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("\"{text}\"; a sensitivity such as \"10.2 mV/g\" or \"2.2 mV/N\" is needed");
+        let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
+        let number: f64 = number.parse().map_err(|_| wrong())?;
+        let (volts, measured) = units.trim().split_once('/').ok_or_else(wrong)?;
+        let volts: Unit = volts.parse().map_err(|_| wrong())?;
+        // "mV/(m/s^2)" has a slash of its own.
+        let measured = measured
+            .trim()
+            .strip_prefix('(')
+            .and_then(|inner| inner.strip_suffix(')'))
+            .unwrap_or(measured);
+        let measured: Unit = measured.parse().map_err(|_| wrong())?;
+        let is_measurable = !matches!(
+            measured.quantity,
+            Quantity::Voltage | Quantity::Level | Quantity::Time
+        );
+        if volts.quantity != Quantity::Voltage || !is_measurable || !(number.is_finite() && number != 0.0) {
+            return Err(wrong());
+        }
+        Ok(Self {
+            quantity: measured.quantity,
+            volts_per_unit: number * volts.factor / measured.factor,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_convert_to_si() {
+        for (text, quantity, factor) in [
+            ("mm", Quantity::Displacement, 1e-3),
+            ("µm", Quantity::Displacement, 1e-6),
+            ("m/s²", Quantity::Acceleration, 1.0),
+            ("g", Quantity::Acceleration, 9.806_65),
+            ("kN", Quantity::Force, 1e3),
+            ("1", Quantity::Level, 1.0),
+        ] {
+            assert_eq!(text.parse(), Ok(Unit { quantity, factor }), "{text}");
+        }
+        let error = "furlong".parse::<Unit>().unwrap_err().to_string();
+        assert!(error.contains("furlong") && error.contains("um"), "{error}");
+    }
+
+    #[test]
+    fn sensitivities_have_two_units() {
+        let sensitivity: Sensitivity = "10.2 mV/g".parse().unwrap();
+        assert_eq!(sensitivity.quantity, Quantity::Acceleration);
+        assert!((sensitivity.volts_per_unit - 10.2e-3 / 9.806_65).abs() < 1e-15);
+        assert_eq!("2 V/(m/s^2)".parse::<Sensitivity>().unwrap().volts_per_unit, 2.0);
+        for wrong in ["10.2", "10 mV", "x mV/g", "10 g/mV", "0 mV/g", "10 mV/s"] {
+            assert!(wrong.parse::<Sensitivity>().is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Points of interest on a chart: what was cut there, and an arrow to what was advised.
+
+use plotters::prelude::{Circle, Cross, PathElement, Polygon, Rectangle, Text, WHITE};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color, RGBColor};
+
+use super::picture::{Axes, CHATTER, Canvas, INK, PictureError, QUIET, text};
+
+/// What a marked point is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MarkKind {
+    /// A cut that chattered.
+    Chatter,
+    /// A cut that was quiet.
+    Quiet,
+}
+
+/// A point on the chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// Spindle speed.
+    pub rpm: f64,
+    /// Axial depth of cut.
+    pub depth_mm: f64,
+    /// What it is.
+    pub kind: MarkKind,
+    /// A word beside it; empty for none.
+    pub label: String,
+    /// Spindle speed and depth that were advised here: an arrow goes there.
+    pub advice: Option<(f64, f64)>,
+}
+
+/// A box on the paper: left, top, right, bottom.
+type Area = (i32, i32, i32, i32);
+
+fn overlap(a: Area, b: Area) -> bool {
+    a.0 < b.2 && b.0 < a.2 && a.1 < b.3 && b.1 < a.3
+}
+
+/// Draws the points with their labels and arrows.
+pub(super) fn draw_marks(
+    canvas: &Canvas<'_>,
+    chart: &mut Axes<'_, '_>,
+    marks: &[Mark],
+) -> Result<(), PictureError> {
+    const RADIUS: i32 = 7;
+    let mut taken: Vec<Area> = Vec::new();
+    for mark in marks {
+        let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
+        if let Some(advice) = mark.advice {
+            draw_arrow(canvas, at, chart.backend_coord(&advice))?;
+        }
+        taken.push((at.0 - RADIUS, at.1 - RADIUS, at.0 + RADIUS, at.1 + RADIUS));
+    }
+    for mark in marks {
+        let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
+        let color = match mark.kind {
+            MarkKind::Chatter => CHATTER,
+            MarkKind::Quiet => QUIET,
+        };
+        match mark.kind {
+            MarkKind::Chatter => canvas.draw(&Cross::new(at, RADIUS, color.stroke_width(4)))?,
+            MarkKind::Quiet => {
+                canvas.draw(&Circle::new(at, RADIUS, WHITE.filled()))?;
+                canvas.draw(&Circle::new(at, RADIUS - 1, color.filled()))?;
+            }
+        }
+        if !mark.label.is_empty() {
+            draw_label(canvas, at, &mark.label, color, &mut taken)?;
+        }
+    }
+    Ok(())
+}
+
+/// A label near `at` that covers no other: above, below, then farther away.
+fn draw_label(
+    canvas: &Canvas<'_>,
+    at: (i32, i32),
+    label: &str,
+    color: RGBColor,
+    taken: &mut Vec<Area>,
+) -> Result<(), PictureError> {
+    let style = text(13, color);
+    let (w, h) = canvas.estimate_text_size(label, &style)?;
+    let (w, h) = (w as i32 + 12, h as i32 + 6);
+    let width = canvas.dim_in_pixel().0 as i32;
+    // Moved sideways where it would leave the paper.
+    let left = (at.0 - w / 2).clamp(0, (width - w).max(0));
+    let tops = [
+        at.1 - h - 11,
+        at.1 + 11,
+        at.1 - 2 * h - 13,
+        at.1 + h + 13,
+        at.1 - 3 * h - 15,
+        at.1 + 2 * h + 15,
+    ];
+    let areas = tops.map(|top| (left, top, left + w, top + h));
+    let area = areas
+        .into_iter()
+        .find(|&area| !taken.iter().any(|&other| overlap(area, other)));
+    let area = area.unwrap_or(areas[0]);
+    taken.push(area);
+    canvas.draw(&Rectangle::new(
+        [(area.0, area.1), (area.2, area.3)],
+        WHITE.mix(0.85).filled(),
+    ))?;
+    let middle = (area.0 + w / 2, area.1 + h / 2);
+    canvas.draw(&Text::new(
+        label,
+        middle,
+        style.pos(Pos::new(HPos::Center, VPos::Center)),
+    ))?;
+    Ok(())
+}
+
+/// An arrow that stops a little before the point it shows.
+fn draw_arrow(canvas: &Canvas<'_>, from: (i32, i32), to: (i32, i32)) -> Result<(), PictureError> {
+    const GAP: f64 = 12.0;
+    const HEAD: f64 = 11.0;
+    let (dx, dy) = (f64::from(to.0 - from.0), f64::from(to.1 - from.1));
+    let length = dx.hypot(dy);
+    if length < 2.0 * GAP + HEAD {
+        return Ok(());
+    }
+    let (ux, uy) = (dx / length, dy / length);
+    let along = |distance: f64, aside: f64| {
+        let x = f64::from(from.0) + ux * distance - uy * aside;
+        let y = f64::from(from.1) + uy * distance + ux * aside;
+        (x.round() as i32, y.round() as i32)
+    };
+    let tip = length - GAP;
+    canvas.draw(&PathElement::new(
+        [along(GAP, 0.0), along(tip - HEAD, 0.0)],
+        INK.stroke_width(2),
+    ))?;
+    let head = [along(tip, 0.0), along(tip - HEAD, 5.0), along(tip - HEAD, -5.0)];
+    canvas.draw(&Polygon::new(head, INK))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::picture::draw;
+
+    #[test]
+    fn labels_of_near_points_do_not_cover_one_another() {
+        let mut taken = Vec::new();
+        draw((400, 300), |canvas| {
+            for at in [(100, 100), (110, 100), (120, 102), (130, 98)] {
+                draw_label(canvas, at, "a cut", CHATTER, &mut taken)?;
+            }
+            Ok(())
+        })
+        .unwrap();
+        for (index, &a) in taken.iter().enumerate() {
+            assert!(taken.iter().skip(index + 1).all(|&b| !overlap(a, b)), "{taken:?}");
+        }
+    }
+}

@@ -1,0 +1,349 @@
+//! The characteristic matrix: multipliers and limits to rounding, one at a time.
+//!
+//! On a motion that one period multiplies by μ, u_τ = u/μ: the delay equation becomes
+//! ẋ = (A + B[κ K α(t) − β(t)] C) x with the complex depth κ = w (1 − 1/μ). Its transition matrix Φ over the period
+//! depends on κ alone, is entire in κ, and
+//!
+//!   det(Φ(w (1 − 1/μ)) − μ I) = 0
+//!
+//! holds for every multiplier μ and no other number. Φ is a product over elements of real polynomials in κ.
+
+use num_complex::Complex64;
+
+use super::period::{Element, Period};
+
+/// Coefficients are dropped once a whole term is below this share of the largest: rounding level.
+const TERM: f64 = 1e-17;
+
+/// The most terms of a polynomial: elements are so short that far fewer are needed.
+const TERMS_MAX: usize = 60;
+
+/// Φ(κ) at one speed.
+#[derive(Clone, Debug)]
+pub(super) struct Characteristic {
+    order: usize,
+    /// The depth, m, by which κ is divided before powers are taken.
+    scale: f64,
+    /// For each element the coefficients of its polynomial in κ/scale, n × n by rows.
+    elements: Vec<Vec<f64>>,
+    /// Free flight, n × n by rows.
+    flight: Vec<f64>,
+}
+
+/// Room for an evaluation, to be used again and again.
+#[derive(Clone, Debug)]
+pub(super) struct Workspace {
+    value: Vec<Complex64>,
+    slope: Vec<Complex64>,
+    factor: Vec<Complex64>,
+    factor_slope: Vec<Complex64>,
+    product: Vec<Complex64>,
+}
+
+/// What is known of F = det(Φ − μI) at a point: derivatives of ln F.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Logarithmic {
+    /// ∂ ln F/∂μ.
+    pub(super) by_multiplier: Complex64,
+    /// ∂ ln F/∂w, 1/m.
+    pub(super) by_depth: Complex64,
+}
+
+/// A point where a multiplier crosses the unit circle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing {
+    /// Depth, m.
+    pub(super) depth_m: f64,
+    /// The multiplier e^{iθ}, with θ in (0, π].
+    pub(super) multiplier: Complex64,
+}
+
+impl Characteristic {
+    /// Φ of a period, for |κ| up to about `depth_m`.
+    pub(super) fn new(period: &Period, depth_m: f64) -> Self {
+        Self {
+            order: period.order(),
+            scale: depth_m,
+            elements: period
+                .elements
+                .iter()
+                .map(|element| polynomial(element, depth_m))
+                .collect(),
+            flight: by_rows(&period.flight),
+        }
+    }
+
+    /// Room for evaluations.
+    pub(super) fn workspace(&self) -> Workspace {
+        let zero = vec![Complex64::ZERO; self.order * self.order];
+        Workspace {
+            value: zero.clone(),
+            slope: zero.clone(),
+            factor: zero.clone(),
+            factor_slope: zero.clone(),
+            product: zero,
+        }
+    }
+
+    /// Φ and dΦ/dκ into `work.value` and `work.slope`.
+    fn evaluate(&self, kappa: Complex64, work: &mut Workspace) {
+        let n = self.order;
+        let xi = kappa / self.scale;
+        let Some((first, rest)) = self.elements.split_first() else {
+            for (value, entry) in work.value.iter_mut().zip(&self.flight) {
+                *value = Complex64::from(*entry);
+            }
+            work.slope.fill(Complex64::ZERO);
+            return;
+        };
+        horner(first, n, xi, &mut work.value, &mut work.slope);
+        for element in rest {
+            horner(element, n, xi, &mut work.factor, &mut work.factor_slope);
+            // (P T)' = P' T + P T'
+            multiply(&work.factor, &work.slope, n, &mut work.product);
+            multiply_add(&work.factor_slope, &work.value, n, &mut work.product);
+            std::mem::swap(&mut work.slope, &mut work.product);
+            multiply(&work.factor, &work.value, n, &mut work.product);
+            std::mem::swap(&mut work.value, &mut work.product);
+        }
+        multiply_real(&self.flight, &work.value, n, &mut work.product);
+        std::mem::swap(&mut work.value, &mut work.product);
+        multiply_real(&self.flight, &work.slope, n, &mut work.product);
+        std::mem::swap(&mut work.slope, &mut work.product);
+        for entry in &mut work.slope {
+            *entry /= self.scale;
+        }
+    }
+
+    /// Derivatives of ln F at (μ, w); `None` where F vanishes to rounding or nothing finite comes out.
+    pub(super) fn logarithmic(
+        &self,
+        multiplier: Complex64,
+        depth_m: f64,
+        work: &mut Workspace,
+    ) -> Option<Logarithmic> {
+        let n = self.order;
+        let inverse = multiplier.inv();
+        self.evaluate((Complex64::ONE - inverse) * depth_m, work);
+        for i in 0..n {
+            work.value[i * n + i] -= multiplier;
+        }
+        let (trace, trace_slope) = traces(&mut work.value, &mut work.slope, &mut work.factor, n)?;
+        let logarithmic = Logarithmic {
+            by_multiplier: trace_slope * depth_m * inverse * inverse - trace,
+            by_depth: trace_slope * (Complex64::ONE - inverse),
+        };
+        (logarithmic.by_multiplier.is_finite() && logarithmic.by_depth.is_finite()).then_some(logarithmic)
+    }
+
+    /// The multiplier at a depth near a guess, by Newton; real guesses stay real.
+    ///
+    /// `None` where the iteration leaves the neighbourhood of the guess, |Δ| < `reach`, or does not settle.
+    pub(super) fn multiplier_near(
+        &self,
+        guess: Complex64,
+        depth_m: f64,
+        reach: f64,
+        work: &mut Workspace,
+    ) -> Option<Complex64> {
+        let mut multiplier = guess;
+        for _ in 0..20 {
+            let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
+                // F is zero to the last bit, or the range was left.
+                return multiplier.is_finite().then_some(multiplier);
+            };
+            let step = -logarithmic.by_multiplier.inv();
+            multiplier += step;
+            if !multiplier.is_finite() || (multiplier - guess).norm() > reach {
+                return None;
+            }
+            // Quadratic convergence: the step after this one would be below rounding.
+            if step.norm() < 1e-9 * multiplier.norm() {
+                return Some(multiplier);
+            }
+        }
+        None
+    }
+
+    /// dμ/dw, 1/m, along the branch of multipliers through (μ, w).
+    pub(super) fn sensitivity(
+        &self,
+        multiplier: Complex64,
+        depth_m: f64,
+        work: &mut Workspace,
+    ) -> Option<Complex64> {
+        // At the root itself both logarithmic derivatives are infinite; their ratio is smooth.
+        let beside = multiplier + Complex64::new(1e-7, 1e-7) * multiplier.norm();
+        let logarithmic = self.logarithmic(beside, depth_m, work)?;
+        let ratio = -logarithmic.by_depth / logarithmic.by_multiplier;
+        ratio.is_finite().then_some(ratio)
+    }
+
+    /// The depth between `low_m` and `high_m` where a multiplier crosses the unit circle, by Newton in depth and angle.
+    pub(super) fn crossing_near(
+        &self,
+        guess: Crossing,
+        low_m: f64,
+        high_m: f64,
+        work: &mut Workspace,
+    ) -> Option<Crossing> {
+        let real = guess.multiplier.im == 0.0;
+        let mut depth_m = guess.depth_m;
+        let mut angle = guess.multiplier.arg();
+        let mut multiplier = guess.multiplier / guess.multiplier.norm();
+        for _ in 0..30 {
+            let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
+                break;
+            };
+            let by_angle = logarithmic.by_multiplier * multiplier * Complex64::I;
+            let (by_depth, one) = (logarithmic.by_depth, Complex64::ONE);
+            let (step, turn) = if real {
+                (-by_depth.re.recip(), 0.0)
+            } else {
+                // 1 + (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 0, real and imaginary part.
+                let determinant = by_depth.re * by_angle.im - by_depth.im * by_angle.re;
+                (
+                    -(one.re * by_angle.im - one.im * by_angle.re) / determinant,
+                    -(by_depth.re * one.im - by_depth.im * one.re) / determinant,
+                )
+            };
+            depth_m += step;
+            angle += turn;
+            if !real {
+                multiplier = Complex64::cis(angle);
+            }
+            let margin = 0.5 * (high_m - low_m);
+            if !(low_m - margin..=high_m + margin).contains(&depth_m) {
+                return None;
+            }
+            if step.abs() < 1e-9 * high_m && turn.abs() < 1e-9 {
+                break;
+            }
+        }
+        (low_m..=high_m).contains(&depth_m).then_some(Crossing {
+            depth_m,
+            multiplier: Complex64::new(multiplier.re, multiplier.im.abs()),
+        })
+    }
+
+    /// Φ(κ), n × n by rows.
+    #[cfg(test)]
+    pub(super) fn transition(&self, kappa: Complex64) -> Vec<Complex64> {
+        let mut work = self.workspace();
+        self.evaluate(kappa, &mut work);
+        work.value
+    }
+}
+
+/// The polynomial G + κ T E + κ² T Q E + … of an element in κ/scale.
+fn polynomial(element: &Element, scale: f64) -> Vec<f64> {
+    let mut coefficients = by_rows(&element.flow);
+    let mut largest = element.flow.amax();
+    let mut seen = element.observe.clone();
+    let drive = &element.drive * scale;
+    let kernel = &element.kernel * scale;
+    for _ in 1..TERMS_MAX {
+        let term = &drive * &seen;
+        coefficients.extend(by_rows(&term));
+        let size = term.amax();
+        largest = largest.max(size);
+        if size < TERM * largest {
+            break;
+        }
+        seen = &kernel * &seen;
+    }
+    coefficients
+}
+
+fn by_rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<f64> {
+    matrix.transpose().as_slice().to_vec()
+}
+
+/// Value and derivative of a matrix polynomial.
+fn horner(coefficients: &[f64], n: usize, xi: Complex64, value: &mut [Complex64], slope: &mut [Complex64]) {
+    value.fill(Complex64::ZERO);
+    slope.fill(Complex64::ZERO);
+    for term in coefficients.chunks_exact(n * n).rev() {
+        for ((value, slope), coefficient) in value.iter_mut().zip(slope.iter_mut()).zip(term) {
+            *slope = *slope * xi + *value;
+            *value = *value * xi + coefficient;
+        }
+    }
+}
+
+fn multiply(a: &[Complex64], b: &[Complex64], n: usize, out: &mut [Complex64]) {
+    out.fill(Complex64::ZERO);
+    multiply_add(a, b, n, out);
+}
+
+fn multiply_add(a: &[Complex64], b: &[Complex64], n: usize, out: &mut [Complex64]) {
+    for (row, out) in a.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
+        for (factor, b) in row.iter().zip(b.chunks_exact(n)) {
+            for (out, entry) in out.iter_mut().zip(b) {
+                *out += factor * entry;
+            }
+        }
+    }
+}
+
+fn multiply_real(a: &[f64], b: &[Complex64], n: usize, out: &mut [Complex64]) {
+    out.fill(Complex64::ZERO);
+    for (row, out) in a.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
+        for (factor, b) in row.iter().zip(b.chunks_exact(n)) {
+            for (out, entry) in out.iter_mut().zip(b) {
+                *out += entry * *factor;
+            }
+        }
+    }
+}
+
+/// tr(M⁻¹) and tr(M⁻¹ S) by elimination with row exchange; M and S are overwritten. `None` where M is singular.
+fn traces(
+    m: &mut [Complex64],
+    s: &mut [Complex64],
+    identity: &mut [Complex64],
+    n: usize,
+) -> Option<(Complex64, Complex64)> {
+    identity.fill(Complex64::ZERO);
+    for i in 0..n {
+        identity[i * n + i] = Complex64::ONE;
+    }
+    for column in 0..n {
+        let pivot = (column..n).max_by(|&a, &b| {
+            m[a * n + column]
+                .norm_sqr()
+                .total_cmp(&m[b * n + column].norm_sqr())
+        })?;
+        if pivot != column {
+            for j in 0..n {
+                m.swap(pivot * n + j, column * n + j);
+                s.swap(pivot * n + j, column * n + j);
+                identity.swap(pivot * n + j, column * n + j);
+            }
+        }
+        let inverse = m[column * n + column].inv();
+        if !inverse.is_finite() {
+            return None;
+        }
+        for j in 0..n {
+            m[column * n + j] *= inverse;
+            s[column * n + j] *= inverse;
+            identity[column * n + j] *= inverse;
+        }
+        for i in 0..n {
+            if i == column {
+                continue;
+            }
+            let factor = m[i * n + column];
+            for j in 0..n {
+                let (a, b, c) = (m[column * n + j], s[column * n + j], identity[column * n + j]);
+                m[i * n + j] -= factor * a;
+                s[i * n + j] -= factor * b;
+                identity[i * n + j] -= factor * c;
+            }
+        }
+    }
+    let trace = (0..n).map(|i| identity[i * n + i]).sum();
+    let trace_s = (0..n).map(|i| s[i * n + i]).sum();
+    Some((trace, trace_s))
+}

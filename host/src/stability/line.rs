@@ -1,0 +1,379 @@
+//! One speed: every depth at which a multiplier crosses the unit circle.
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+use super::characteristic::{Characteristic, Crossing, Workspace};
+use super::collocation;
+use super::multiplier::{Kind, chatter_hz};
+use super::period::{Period, Resolution};
+use super::point::{check_depth, check_speed};
+use super::{Problem, StabilityError};
+
+/// How often an interval of depths is halved where its multipliers cannot be followed from end to end.
+const LEVELS: u32 = 12;
+
+/// Multipliers below this size are not followed: from one sampled depth to the next none of them reaches the circle
+/// unseen, since the number outside is compared at every depth.
+const FOLLOWED: f64 = 0.3;
+
+/// Distance from the circle beyond which multipliers are only counted: with the steps of a chart none comes from there to
+/// the circle and back unseen.
+const FAR: f64 = 0.5;
+
+/// Distance from the circle within which multipliers are polished: far above the error of the scan.
+const POLISHED: f64 = 1e-3;
+
+/// A crossing of the unit circle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Switch {
+    /// Axial depth, mm.
+    pub depth_mm: f64,
+    /// How the multiplier crosses.
+    pub kind: Kind,
+    /// True where it goes inside: stability is gained (if no other is outside).
+    pub gain: bool,
+    /// Frequency of the vibration that is born or dies there, Hz.
+    pub chatter_hz: Option<f64>,
+}
+
+/// Where stability is first lost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Limit {
+    /// Axial depth, mm.
+    pub depth_mm: f64,
+    /// How.
+    pub kind: Kind,
+    /// Chatter frequency, Hz.
+    pub chatter_hz: Option<f64>,
+}
+
+/// What is known of all depths at one speed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpeedLine {
+    /// Spindle speed, rev/min.
+    pub rpm: f64,
+    /// Depths that are stable, mm, as intervals in order, from 0 to the last depth.
+    pub stable_mm: Vec<[f64; 2]>,
+    /// Where stability is first lost; `None` where nothing is lost up to the last depth.
+    pub first_limit: Option<Limit>,
+    /// Every crossing of the unit circle, also while another multiplier is outside, by depth.
+    pub switches: Vec<Switch>,
+}
+
+/// All crossings from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where needed.
+///
+/// Crossings are solved for with the characteristic matrix, to about 1e-9 relative. Between samples each multiplier
+/// near the circle is followed with its derivative; where a cubic through both ends says that it may reach the
+/// circle and return, or where it cannot be followed, the interval is halved, up to 12 times. The number of
+/// multipliers outside must agree with the crossings found, at every sample.
+///
+/// # Errors
+/// Speed or depth out of range, or a computation that leaves the range of numbers.
+pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+    check_speed(rpm)?;
+    check_depth(depth_mm)?;
+    let depth_m = depth_mm * 1e-3;
+    // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
+    let period = Period::new(problem, rpm, 2.0 * depth_m, Resolution::WORKING);
+    let characteristic = Characteristic::new(&period, 2.0 * depth_m);
+    let workspace = characteristic.workspace();
+    let mut scan = Scan {
+        problem,
+        rpm,
+        coarse: Period::new(problem, rpm, depth_m, Resolution::SCAN),
+        period,
+        characteristic,
+        workspace,
+        crossings: Vec::new(),
+    };
+    let samples = samples.max(1);
+    let mut low = scan.sample(0.0)?;
+    let start = low.outside();
+    for index in 1..=samples {
+        let high = scan.sample(depth_m * index as f64 / samples as f64)?;
+        let found = scan.between(&low, &high, 0)?;
+        scan.crossings.extend(found);
+        low = high;
+    }
+    Ok(scan.finish(start, depth_mm))
+}
+
+/// One multiplier at one depth, in the upper half plane or on the real axis.
+#[derive(Clone, Copy, Debug)]
+struct Root {
+    multiplier: Complex64,
+    /// dμ/dw, 1/m.
+    slope: Complex64,
+}
+
+impl Root {
+    /// Distance from the unit circle, positive outside.
+    fn excess(&self) -> f64 {
+        self.multiplier.norm() - 1.0
+    }
+
+    /// d|μ|/dw.
+    fn excess_slope(&self) -> f64 {
+        (self.multiplier.conj() * self.slope).re / self.multiplier.norm()
+    }
+
+    /// True where the circle may be reached within a step.
+    fn is_near(&self, step_m: f64) -> bool {
+        self.excess().abs() < (3.0 * self.slope.norm() * step_m + 0.02).min(FAR)
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Sample {
+    depth_m: f64,
+    roots: Vec<Root>,
+}
+
+impl Sample {
+    /// Number of multipliers outside the unit circle.
+    fn outside(&self) -> i32 {
+        self.roots
+            .iter()
+            .filter(|root| root.excess() > 0.0)
+            .map(|root| Kind::of(root.multiplier).count())
+            .sum()
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    crossing: Crossing,
+    outward: bool,
+}
+
+struct Scan<'a> {
+    problem: &'a Problem,
+    rpm: f64,
+    /// For all multipliers at once.
+    coarse: Period,
+    /// For limits.
+    period: Period,
+    characteristic: Characteristic,
+    workspace: Workspace,
+    crossings: Vec<Found>,
+}
+
+impl Scan<'_> {
+    fn broke_down(&self, depth_m: f64, what: &'static str) -> StabilityError {
+        StabilityError::BrokeDown {
+            rpm: self.rpm,
+            depth_mm: depth_m * 1e3,
+            what,
+        }
+    }
+
+    fn sample(&mut self, depth_m: f64) -> Result<Sample, StabilityError> {
+        let all = collocation::multipliers(&self.coarse, depth_m)
+            .ok_or_else(|| self.broke_down(depth_m, "the collocation equations have no finite solution"))?;
+        let roots = all
+            .into_iter()
+            .take_while(|multiplier| multiplier.norm() > FOLLOWED)
+            .filter(|multiplier| multiplier.im >= 0.0)
+            .map(|multiplier| self.root(multiplier, depth_m))
+            .collect();
+        Ok(Sample { depth_m, roots })
+    }
+
+    /// A multiplier with its derivative; near the circle it is polished first, so that its side is right.
+    fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
+        let (characteristic, workspace) = (&self.characteristic, &mut self.workspace);
+        let multiplier = if (coarse.norm() - 1.0).abs() < POLISHED {
+            characteristic
+                .multiplier_near(coarse, depth_m, POLISHED, workspace)
+                .unwrap_or(coarse)
+        } else {
+            coarse
+        };
+        let slope = if (multiplier.norm() - 1.0).abs() < FAR {
+            characteristic.sensitivity(multiplier, depth_m, workspace)
+        } else {
+            None
+        };
+        Root {
+            multiplier,
+            slope: slope.unwrap_or(Complex64::ZERO),
+        }
+    }
+
+    /// The crossings between two samples, by depth.
+    fn between(&mut self, low: &Sample, high: &Sample, level: u32) -> Result<Vec<Found>, StabilityError> {
+        if let Some(found) = self.follow(low, high)
+            && balance(&found) == high.outside() - low.outside()
+        {
+            return Ok(found);
+        }
+        if level == LEVELS {
+            return self.by_halving(low, high);
+        }
+        let middle = self.sample(0.5 * (low.depth_m + high.depth_m))?;
+        let mut found = self.between(low, &middle, level + 1)?;
+        found.extend(self.between(&middle, high, level + 1)?);
+        Ok(found)
+    }
+
+    /// Follows each multiplier near the circle from end to end; `None` where one cannot be followed or may touch the
+    /// circle in between.
+    fn follow(&mut self, low: &Sample, high: &Sample) -> Option<Vec<Found>> {
+        let step_m = high.depth_m - low.depth_m;
+        let mut free: Vec<Root> = high.roots.clone();
+        let mut found = Vec::new();
+        for from in low.roots.iter().filter(|root| root.is_near(step_m)) {
+            let middle = from.multiplier + from.slope * (0.5 * step_m);
+            let miss = |to: &Root| (middle - (to.multiplier - to.slope * (0.5 * step_m))).norm();
+            let (index, to) = free
+                .iter()
+                .copied()
+                .enumerate()
+                .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))?;
+            let travel = 0.5 * step_m * (from.slope.norm() + to.slope.norm());
+            // Both tangents meet half way to within a quarter of the way: the same branch.
+            if miss(&to) > 0.25 * travel + 1e-6 || Kind::of(from.multiplier) != Kind::of(to.multiplier) {
+                return None;
+            }
+            free.swap_remove(index);
+            if (from.excess() > 0.0) != (to.excess() > 0.0) {
+                found.push(self.cross(low, high, from, &to)?);
+            } else if may_touch(from, &to, step_m) {
+                return None;
+            }
+        }
+        // What is left over must be far from the circle.
+        if free.iter().any(|root| root.is_near(step_m)) {
+            return None;
+        }
+        found.sort_by(|a, b| a.crossing.depth_m.total_cmp(&b.crossing.depth_m));
+        Some(found)
+    }
+
+    fn cross(&mut self, low: &Sample, high: &Sample, from: &Root, to: &Root) -> Option<Found> {
+        let share = from.excess() / (from.excess() - to.excess());
+        let guess = Crossing {
+            depth_m: low.depth_m + share * (high.depth_m - low.depth_m),
+            multiplier: from.multiplier + (to.multiplier - from.multiplier) * share,
+        };
+        let crossing =
+            self.characteristic
+                .crossing_near(guess, low.depth_m, high.depth_m, &mut self.workspace)?;
+        // The multiplier found must lie on this branch, not on another that crosses nearby.
+        let distance = (crossing.multiplier - guess.multiplier).norm();
+        (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(Found {
+            crossing,
+            outward: to.excess() > 0.0,
+        })
+    }
+
+    /// Halves on the number outside: for an interval so short that nothing else is worth while.
+    fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<Found>, StabilityError> {
+        let (mut low, mut high) = (low.clone(), high.clone());
+        if low.outside() == high.outside() {
+            return Ok(Vec::new());
+        }
+        while high.depth_m - low.depth_m > 1e-10 * high.depth_m {
+            let middle = self.sample(0.5 * (low.depth_m + high.depth_m))?;
+            if middle.outside() == low.outside() {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let outward = high.outside() > low.outside();
+        let outer = if outward { &high } else { &low };
+        let crossed = outer
+            .roots
+            .iter()
+            .filter(|root| root.excess() > 0.0)
+            .min_by(|a, b| a.excess().total_cmp(&b.excess()))
+            .ok_or_else(|| self.broke_down(high.depth_m, "a multiplier was lost while halving"))?;
+        Ok(vec![Found {
+            crossing: Crossing {
+                depth_m: 0.5 * (low.depth_m + high.depth_m),
+                multiplier: crossed.multiplier / crossed.multiplier.norm(),
+            },
+            outward,
+        }])
+    }
+
+    fn finish(self, start: i32, depth_mm: f64) -> SpeedLine {
+        let mut outside = start;
+        let mut stable_from = (start == 0).then_some(0.0);
+        let mut stable_mm = Vec::new();
+        let mut first_limit = None;
+        let mut switches = Vec::with_capacity(self.crossings.len());
+        for Found { crossing, outward } in &self.crossings {
+            let switch = Switch {
+                depth_mm: crossing.depth_m * 1e3,
+                kind: Kind::of(crossing.multiplier),
+                gain: !outward,
+                chatter_hz: chatter_hz(
+                    self.problem,
+                    self.rpm,
+                    &self.period,
+                    crossing.multiplier,
+                    crossing.depth_m,
+                ),
+            };
+            let count = switch.kind.count();
+            outside += if *outward { count } else { -count };
+            match (stable_from, outside) {
+                (Some(from), 1..) => {
+                    stable_mm.push([from, switch.depth_mm]);
+                    stable_from = None;
+                    first_limit = first_limit.or(Some(Limit {
+                        depth_mm: switch.depth_mm,
+                        kind: switch.kind,
+                        chatter_hz: switch.chatter_hz,
+                    }));
+                }
+                (None, ..=0) => stable_from = Some(switch.depth_mm),
+                _ => {}
+            }
+            switches.push(switch);
+        }
+        if let Some(from) = stable_from {
+            stable_mm.push([from, depth_mm]);
+        }
+        SpeedLine {
+            rpm: self.rpm,
+            stable_mm,
+            first_limit,
+            switches,
+        }
+    }
+}
+
+/// By how many the number outside changes.
+fn balance(found: &[Found]) -> i32 {
+    found
+        .iter()
+        .map(|found| {
+            let count = Kind::of(found.crossing.multiplier).count();
+            if found.outward { count } else { -count }
+        })
+        .sum()
+}
+
+/// True where the cubic through both ends of |μ| − 1 comes near zero in between, though both ends are on one side.
+fn may_touch(from: &Root, to: &Root, step_m: f64) -> bool {
+    let (a, b) = (from.excess(), to.excess());
+    let (da, db) = (from.excess_slope() * step_m, to.excess_slope() * step_m);
+    // Only an end that heads for the circle can reach it and return.
+    if a.signum() * da >= 0.0 || b.signum() * db <= 0.0 {
+        return false;
+    }
+    let side = a.signum();
+    // Nine points of the cubic: its extremum is missed by a few percent of its height at most.
+    let nearest = (1..10)
+        .map(|i| {
+            let t = f64::from(i) * 0.1;
+            let (u, t2) = (1.0 - t, t * t);
+            side * (u * u * ((1.0 + 2.0 * t) * a + t * da) + t2 * ((3.0 - 2.0 * t) * b - u * db))
+        })
+        .fold(f64::INFINITY, f64::min);
+    nearest < 0.3 * a.abs().min(b.abs())
+}

@@ -1,0 +1,24 @@
+//! Stability of the cut: multipliers, limits, charts, lobe tables.
+//!
+//! Sign of the regenerative force: F = w K_tc [α](u − u_τ), with α as in eq. 6.7, is stable at small depth w.
+
+mod characteristic;
+mod chart;
+mod collocation;
+mod gauss;
+mod line;
+mod lobe_table;
+mod multiplier;
+mod period;
+mod point;
+mod problem;
+
+pub use chart::{Chart, Refinement, chart};
+pub use line::{Limit, SpeedLine, Switch, line};
+pub use lobe_table::{BuildError, TableRequest, build_table};
+pub use multiplier::{Kind, Verdict};
+pub use point::{LEAST_ERROR, Point, point};
+pub use problem::{CubicTerms, Problem, StabilityError};
+
+#[cfg(test)]
+mod tests;

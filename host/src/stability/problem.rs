@@ -1,0 +1,136 @@
+//! The linear milling problem: a structure and a cutting process.
+
+use std::path::PathBuf;
+
+use crate::case::{AXIAL_DEPTH_MODULATION, Case, CaseError};
+use crate::milling::Process;
+use crate::structure::{FirstOrder, StructureError};
+
+/// ẋ = A x + B F, u = C x, F = w K α(φ)(u − u_τ) − [β_e + β_f](φ) u (eqs 3.7, 7.1), about the forced motion.
+///
+/// Everything in feed, normal and axial direction. The delay τ is the tooth period.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// The structure, turned into the feed direction.
+    pub structure: FirstOrder,
+    /// The cutting process.
+    pub process: Process,
+    /// Number of teeth.
+    pub teeth: usize,
+}
+
+/// How cubic terms of a structure are treated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CubicTerms {
+    /// A case that has them is refused: limits then depend on the forced motion.
+    Refuse,
+    /// They are left out: the limits for vanishing feed.
+    LeaveOut,
+}
+
+/// Why stability cannot be computed.
+#[derive(Debug, thiserror::Error)]
+pub enum StabilityError {
+    /// The case lacks a section, or has an extension that linear stability cannot treat.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// The structure is none.
+    #[error("{}: {cause}", path.display())]
+    Structure {
+        /// The case file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: StructureError,
+    },
+    /// The method does not cover the case.
+    #[error("{}: {what}", path.display())]
+    NotCovered {
+        /// The case file.
+        path: PathBuf,
+        /// What is not covered, and what can be done instead.
+        what: &'static str,
+    },
+    /// A speed or depth that no cut has.
+    #[error("{quantity} {value}: {expected} is needed")]
+    Argument {
+        /// Which quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// The numbers left the range in which they mean something.
+    #[error("at {rpm} rev/min and {depth_mm} mm the computation broke down: {what}")]
+    BrokeDown {
+        /// Spindle speed, rev/min.
+        rpm: f64,
+        /// Axial depth, mm.
+        depth_mm: f64,
+        /// Where.
+        what: &'static str,
+    },
+}
+
+impl Problem {
+    /// The problem that a case poses.
+    ///
+    /// # Errors
+    /// A section is missing, the structure is indefinite, or the case has what the equation above has not:
+    /// variable pitch, cubic terms (see `cubic`), extensions other than axial-depth-modulation.
+    pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
+        let (structure, tool) = (case.structure()?, case.tool()?);
+        let (material, cut) = (case.material()?, case.cut()?);
+        case.refuse_extensions_but(
+            &[AXIAL_DEPTH_MODULATION],
+            "linear stability has no term for it; remove the table to see the limits without it",
+        )?;
+        let not_covered = |what| StabilityError::NotCovered {
+            path: case.path.clone(),
+            what,
+        };
+        if tool.has_variable_pitch() {
+            return Err(not_covered(
+                "tool.pitch_deg: teeth at unequal distances have several delays; equal pitch is needed here",
+            ));
+        }
+        if structure.is_nonlinear() && cubic == CubicTerms::Refuse {
+            return Err(not_covered(
+                "structure.cubic_stiffness, structure.cubic_damping: with cubic terms the limit depends on the \
+                 forced motion; ask for the linear part (--linear) or leave them out",
+            ));
+        }
+        let modulated = case.axial_depth_modulation();
+        if modulated && tool.runout.is_some_and(|runout| runout.offset_um > 0.0) {
+            return Err(not_covered(
+                "tool.runout_um: with axial-depth-modulation the feed force would differ from tooth to tooth; \
+                 leave out one of them",
+            ));
+        }
+        let first_order = structure
+            .first_order()
+            .map_err(|cause| StabilityError::Structure {
+                path: case.path.clone(),
+                cause,
+            })?;
+        Ok(Self {
+            structure: first_order.turned(cut.feed_direction_deg),
+            process: Process::new(tool, material, cut, modulated),
+            teeth: tool.teeth,
+        })
+    }
+
+    /// Tooth period, s.
+    pub fn tooth_period_s(&self, rpm: f64) -> f64 {
+        60.0 / (rpm * self.teeth as f64)
+    }
+
+    /// The largest decay rate −Re λ of the structure, 1/s; 0 where nothing decays.
+    pub(super) fn fastest_decay(&self) -> f64 {
+        self.structure
+            .poles()
+            .iter()
+            .map(|pole| -pole.re)
+            .fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,332 @@
+//! QEMU with the emulated board: start, talk, feed, kill.
+//!
+//! The harness listens on sockets of its own and QEMU connects to them, so that no port number can
+//! be taken by another test. Every wait has a limit; the process ends with the [`Emulator`].
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::FileExt;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use quietcut_firmware::stimulus::{
+    FLASH_BYTES, MAX_FRAME_BYTES, MEMORY_BYTES, REFUSED, STORE_OFFSET, Stimulus, TAKEN,
+};
+use tempfile::TempDir;
+
+use crate::device_log;
+use crate::firmware_image;
+use crate::pty::Pty;
+
+/// The most that a read from the link or an answer of the virtual sensor may take: a loaded
+/// machine needs some tenths of a second at worst, a stored recording some seconds.
+pub const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Frames sent ahead of their answers: more make nothing faster, the emulator takes byte by byte.
+const FRAMES_AHEAD: usize = 16;
+
+/// The lasting memory of an emulated board: a file that survives the emulator.
+pub struct Memory {
+    directory: TempDir,
+}
+
+impl Memory {
+    /// The memory of a new board: the flash is erased.
+    pub fn erased() -> Self {
+        let directory = TempDir::with_prefix("quietcut-memory-").expect("a temporary folder");
+        let memory = Self { directory };
+        fs::write(memory.path(), vec![0xff; FLASH_BYTES]).expect("a file for the board's memory");
+        memory
+            .open()
+            .set_len(MEMORY_BYTES as u64)
+            .expect("room for the board's memory");
+        memory
+    }
+
+    /// What stands in the flash.
+    pub fn flash(&self) -> Vec<u8> {
+        let mut flash = vec![0; FLASH_BYTES];
+        self.open()
+            .read_exact_at(&mut flash, 0)
+            .expect("the board's memory");
+        flash
+    }
+
+    /// Writes over the flash behind the device's back.
+    pub fn damage(&self, offset: usize, bytes: &[u8]) {
+        assert!(offset + bytes.len() <= FLASH_BYTES, "damage outside of the flash");
+        self.open()
+            .write_all_at(bytes, offset as u64)
+            .expect("the board's memory");
+    }
+
+    fn store(&self, stimuli: &[u8]) {
+        self.open()
+            .write_all_at(stimuli, STORE_OFFSET as u64)
+            .expect("the board's memory");
+    }
+
+    fn path(&self) -> PathBuf {
+        self.directory.path().join("memory.bin")
+    }
+
+    fn open(&self) -> File {
+        OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(self.path())
+            .expect("the board's memory")
+    }
+}
+
+/// A running emulator.
+pub struct Emulator<'m> {
+    memory: &'m Memory,
+    process: Child,
+    directory: TempDir,
+    link: UnixStream,
+    spindle: UnixStream,
+}
+
+impl<'m> Emulator<'m> {
+    /// Starts the emulated board with this memory.
+    pub fn start(memory: &'m Memory) -> Self {
+        let image = firmware_image::qemu_mps2();
+        let directory = TempDir::with_prefix("quietcut-emulator-").expect("a temporary folder");
+        let listen = |name| UnixListener::bind(directory.path().join(name)).expect("a socket");
+        let (link, spindle) = (listen("link"), listen("spindle"));
+        let path = |name| directory.path().join(name).display().to_string();
+        let mut command = qemu(&image);
+        command
+            .args(["-M", "mps2-an386,memory-backend=psram", "-object"])
+            .arg(format!(
+                "memory-backend-file,id=psram,size={MEMORY_BYTES},mem-path={},share=on",
+                memory.path().display()
+            ))
+            .args([
+                "-chardev",
+                &format!("socket,id=link,path={}", path("link")),
+                "-serial",
+                "chardev:link",
+            ])
+            .args(["-serial", &format!("file:{}", path("log"))])
+            .args(["-chardev", &format!("socket,id=spindle,path={}", path("spindle"))])
+            .args(["-serial", "chardev:spindle"])
+            .stdout(Stdio::null());
+        let mut process = spawn(command);
+        let link = accept(&link, &mut process);
+        let spindle = accept(&spindle, &mut process);
+        let mut emulator = Self {
+            memory,
+            process,
+            directory,
+            link,
+            spindle,
+        };
+        emulator.wait_for_start();
+        emulator
+    }
+
+    /// Waits for the first entry of the log, which the device writes when its ports are open.
+    fn wait_for_start(&mut self) {
+        let began = Instant::now();
+        while fs::metadata(self.log_path()).map_or(0, |log| log.len()) == 0 {
+            let end = self.end();
+            assert!(
+                end.is_empty() && began.elapsed() < PATIENCE,
+                "the device does not start{end}"
+            );
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// The link to the device, as a stream of bytes with a limit on every wait.
+    pub fn link(&self) -> UnixStream {
+        self.link.try_clone().expect("a second handle of the link")
+    }
+
+    /// The link as a serial device, for programs that open one; not to be used beside [`Self::link`].
+    pub fn serial_device(&self) -> Pty {
+        Pty::to_socket(self.link())
+    }
+
+    /// Sends stimuli over the board's serial port; returns once all of them went through the pipeline.
+    pub fn feed(&mut self, stimuli: &[Stimulus]) {
+        let mut frame = [0; MAX_FRAME_BYTES];
+        for ahead in stimuli.chunks(FRAMES_AHEAD) {
+            for stimulus in ahead {
+                let frame = postcard::to_slice_cobs(stimulus, &mut frame).expect("room for a stimulus");
+                self.spindle.write_all(frame).expect("the emulator takes stimuli");
+            }
+            self.expect_taken(ahead.len());
+        }
+    }
+
+    /// Passes stimuli through the board's memory, for long recordings.
+    pub fn feed_stored(&mut self, stimuli: &[Stimulus]) {
+        let mut store = Vec::new();
+        for stimulus in stimuli {
+            let mut bytes = [0; MAX_FRAME_BYTES];
+            let bytes = postcard::to_slice(stimulus, &mut bytes).expect("room for a stimulus");
+            if store.len() + bytes.len() > MEMORY_BYTES - STORE_OFFSET {
+                self.pass_store(&store);
+                store.clear();
+            }
+            store.extend_from_slice(bytes);
+        }
+        self.pass_store(&store);
+    }
+
+    fn pass_store(&mut self, store: &[u8]) {
+        self.memory.store(store);
+        let bytes = store.len() as u32;
+        self.feed(&[Stimulus::Stored { bytes }]);
+    }
+
+    fn expect_taken(&mut self, count: usize) {
+        let mut answers = [0; FRAMES_AHEAD];
+        let answers = &mut answers[..count];
+        if let Err(error) = self.spindle.read_exact(answers) {
+            panic!("no answer to a stimulus: {error}{}", self.end());
+        }
+        for &answer in &*answers {
+            assert_ne!(answer, REFUSED, "the board refused a stimulus");
+            assert_eq!(answer, TAKEN, "unknown answer to a stimulus");
+        }
+    }
+
+    /// Cuts the power.
+    pub fn kill(mut self) {
+        self.stop();
+    }
+
+    /// What the device logged so far, one line per entry.
+    pub fn log(&self) -> String {
+        let frames = fs::read(self.log_path()).unwrap_or_default();
+        device_log::decode(&firmware_image::qemu_mps2(), &frames)
+    }
+
+    fn log_path(&self) -> PathBuf {
+        self.directory.path().join("log")
+    }
+
+    /// How the emulator ended, where it has.
+    fn end(&mut self) -> String {
+        match self.process.try_wait() {
+            Ok(Some(status)) => format!("; the emulator has ended: {status}"),
+            _ => String::new(),
+        }
+    }
+
+    fn stop(&mut self) {
+        // Fails where the process has ended by itself.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Drop for Emulator<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let end = self.end();
+            eprintln!("--- log of the emulated device{end}\n{}---", self.log());
+        }
+        self.stop();
+    }
+}
+
+/// Runs an image that prints lines `NAME COUNT` and ends, counting instructions.
+pub fn count_instructions() -> BTreeMap<String, u64> {
+    let mut command = qemu(&firmware_image::count_instructions());
+    // One instruction takes 2⁶ ns.
+    command
+        .args(["-M", "mps2-an386", "-serial", "null", "-icount", "shift=6"])
+        .stdout(Stdio::piped());
+    let mut process = spawn(command);
+    let began = Instant::now();
+    let status = loop {
+        match process.try_wait().expect("the emulator's state") {
+            Some(status) => break status,
+            None if began.elapsed() > PATIENCE => {
+                let _ = process.kill();
+                let _ = process.wait();
+                panic!("the counting image did not end within {PATIENCE:?}");
+            }
+            None => std::thread::sleep(Duration::from_millis(5)),
+        }
+    };
+    let mut printed = String::new();
+    if let Some(mut output) = process.stdout.take() {
+        output
+            .read_to_string(&mut printed)
+            .expect("what the image printed");
+    }
+    assert!(status.success(), "the counting image failed: {status}\n{printed}");
+    let count = |line: &str| -> Option<(String, u64)> {
+        let (name, count) = line.rsplit_once(' ')?;
+        Some((name.to_owned(), count.parse().ok()?))
+    };
+    printed
+        .lines()
+        .map(|line| count(line).unwrap_or_else(|| panic!("not a count: {line}")))
+        .collect()
+}
+
+fn qemu(image: &Path) -> Command {
+    let mut command = Command::new("qemu-system-arm");
+    command
+        .args(["-display", "none", "-monitor", "none"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(image)
+        .stdin(Stdio::null())
+        .stderr(Stdio::piped());
+    command
+}
+
+fn spawn(mut command: Command) -> Child {
+    match command.spawn() {
+        Ok(process) => process,
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            panic!("qemu-system-arm was not found: install the package qemu-system-arm, or run tests/run")
+        }
+        Err(error) => panic!("qemu-system-arm does not start: {error}"),
+    }
+}
+
+/// Waits until QEMU connects, or says why it does not.
+fn accept(listener: &UnixListener, process: &mut Child) -> UnixStream {
+    listener.set_nonblocking(true).expect("a socket without waiting");
+    let began = Instant::now();
+    loop {
+        match listener.accept() {
+            Ok((stream, _)) => {
+                stream.set_nonblocking(false).expect("a socket with waiting");
+                stream
+                    .set_read_timeout(Some(PATIENCE))
+                    .expect("a limit on reading");
+                stream
+                    .set_write_timeout(Some(PATIENCE))
+                    .expect("a limit on writing");
+                return stream;
+            }
+            Err(error) if error.kind() != ErrorKind::WouldBlock => panic!("the emulator's socket: {error}"),
+            Err(_) => {}
+        }
+        if let Ok(Some(status)) = process.try_wait() {
+            let mut said = String::new();
+            if let Some(mut output) = process.stderr.take() {
+                let _ = output.read_to_string(&mut said);
+            }
+            panic!("qemu-system-arm ended at once: {status}\n{said}");
+        }
+        if began.elapsed() > PATIENCE {
+            let _ = process.kill();
+            let _ = process.wait();
+            panic!("qemu-system-arm did not open its serial ports within {PATIENCE:?}");
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}

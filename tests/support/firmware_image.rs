@@ -1,0 +1,48 @@
+//! The firmware images that `tests/build-firmware` makes.
+
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+/// The image of the emulated board.
+pub fn qemu_mps2() -> PathBuf {
+    image("qemu_mps2")
+}
+
+/// The image of the real board.
+pub fn nucleo_g474re() -> PathBuf {
+    image("nucleo_g474re")
+}
+
+/// The image that counts instructions in the emulator.
+pub fn count_instructions() -> PathBuf {
+    image("examples/count_instructions")
+}
+
+/// Path of an image; fails the test where it is missing or older than a source it was built from.
+fn image(name: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+    let image = target.join("thumbv7em-none-eabihf/firmware").join(name);
+    let Ok(built) = fs::metadata(&image).and_then(|m| m.modified()) else {
+        panic!(
+            "the firmware image {} is missing: run tests/build-firmware",
+            image.display()
+        );
+    };
+    // Cargo lists beside the image what went into it.
+    let sources = fs::read_to_string(image.with_extension("d")).unwrap_or_default();
+    for source in sources
+        .split_once(':')
+        .map_or("", |(_, list)| list)
+        .split_whitespace()
+    {
+        let changed = fs::metadata(source).and_then(|m| m.modified());
+        if changed.is_ok_and(|changed| changed > built) {
+            panic!(
+                "the firmware image {} is older than {source}: run tests/build-firmware",
+                image.display()
+            );
+        }
+    }
+    image
+}

@@ -1,0 +1,73 @@
+//! A real tachometer: a 60−2 wheel on a crank, recorded with an oscilloscope at 10 kHz, base line swinging once a turn.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use quietcut_core::tachometer::{
+    Edge, LevelDetector, LevelDetectorState, Tachometer, TachometerState, Wheel,
+};
+use quietcut_core::units::Nanoseconds;
+
+/// Levels of the recording, or `None` (and one line that says so) where the measured data is not there.
+fn levels() -> Option<Vec<f32>> {
+    let Some(folder) = std::env::var_os("QUIETCUT_DATA") else {
+        println!("QUIETCUT_DATA is not set: the real crank wheel was not run");
+        return None;
+    };
+    let path = std::path::Path::new(&folder).join("tachometer/crank_60-2.csv");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let column = |line: &str| line.split(',').nth(1).and_then(|field| field.trim().parse().ok());
+    Some(
+        text.lines()
+            .skip(1)
+            .map(|line| column(line).unwrap_or_else(|| panic!("{line}")))
+            .collect(),
+    )
+}
+
+/// Speeds of the turns, from levels sampled at 10 kHz.
+fn turn_speeds(levels: impl Iterator<Item = f32>) -> (Vec<f32>, TachometerState) {
+    let tachometer = Tachometer::new(Wheel {
+        positions: 60,
+        missing: 2,
+    })
+    .unwrap();
+    let mut state = TachometerState::default();
+    // A tenth of the volt that a tooth makes.
+    let detector = LevelDetector { least_swing: 0.1 };
+    let mut level_state = LevelDetectorState::default();
+    let mut speeds = Vec::new();
+    for (n, level) in levels.enumerate() {
+        let Some(part) = detector.step(&mut level_state, level) else {
+            continue;
+        };
+        let time = Nanoseconds(((n as f64 - f64::from(part)) * 1e5).round() as u64);
+        let before = state.turns();
+        tachometer.observe(&mut state, Edge { time });
+        if state.turns() > before {
+            speeds.extend(state.turn_speed().map(|speed| speed.0));
+        }
+    }
+    (speeds, state)
+}
+
+#[test]
+fn crank_wheel_turns_at_160_7() {
+    let Some(levels) = levels() else { return };
+    // A variable-reluctance sensor may be wired either way round.
+    for sign in [1.0, -1.0] {
+        let (speeds, state) = turn_speeds(levels.iter().map(|level| sign * level));
+        println!(
+            "{speeds:?}, {} rejected, {} missed",
+            state.rejected(),
+            state.missed()
+        );
+        // The record holds 16 gaps; the first comes before the regular interval is known: 14 whole turns.
+        assert_eq!(speeds.len(), 14);
+        assert_eq!((state.losses(), state.missed()), (0, 0));
+        let mean = speeds.iter().sum::<f32>() / speeds.len() as f32;
+        assert!((mean / 160.7 - 1.0).abs() < 0.003, "mean {mean}");
+        for speed in speeds {
+            assert!((160.0..161.6).contains(&speed), "{speed}");
+        }
+    }
+}
