@@ -3,6 +3,7 @@
 use std::error::Error as StdError;
 use std::io;
 
+use crate::device::DeviceError;
 use crate::file::FileError;
 use crate::stability::{BuildError, StabilityError};
 
@@ -98,6 +99,16 @@ impl From<BuildError> for Error {
     fn from(error: BuildError) -> Self {
         match error {
             BuildError::Stability(error) => error.into(),
+            _ => Self::input(error),
+        }
+    }
+}
+
+impl From<DeviceError> for Error {
+    fn from(error: DeviceError) -> Self {
+        match error {
+            DeviceError::PseudoTerminal { .. } | DeviceError::TooLarge { .. } => Self::other(error),
+            // Port, cable, device or table: all of them the user's to mend.
             _ => Self::input(error),
         }
     }

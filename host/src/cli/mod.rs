@@ -9,6 +9,7 @@ pub mod lobes;
 pub mod monitor;
 mod number;
 mod output;
+pub mod port;
 mod range;
 pub mod replay;
 pub mod simulate;
@@ -23,7 +24,7 @@ use std::process::ExitCode;
 use clap::{ArgAction, Parser, Subcommand};
 
 pub use error::Error;
-pub use number::{count, finite, non_negative, positive};
+pub use number::{angle, count, finite, non_negative, positive};
 pub use output::Output;
 pub use range::Range;
 

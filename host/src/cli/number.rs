@@ -30,6 +30,18 @@ pub fn non_negative(text: &str) -> Result<f64, String> {
     }
 }
 
+/// An angle of immersion in degrees.
+pub fn angle(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if (0.0..=360.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!(
+            "{value} is not possible: it must be from 0 to 360 degrees"
+        ))
+    }
+}
+
 /// A number of things of which there is at least one and at most 255: teeth.
 pub fn count(text: &str) -> Result<NonZeroU8, String> {
     text.parse()
@@ -48,6 +60,7 @@ mod tests {
             assert!(positive(text).is_err(), "{text}");
         }
         assert!(non_negative("-0.1").is_err());
+        assert!(angle("180").is_ok() && angle("-1").is_err() && angle("361").is_err());
         assert_eq!(count("4").map(NonZeroU8::get), Ok(4));
         for text in ["0", "256", "2.0", "-1"] {
             assert!(count(text).is_err(), "{text}");

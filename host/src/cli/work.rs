@@ -1,22 +1,26 @@
 //! `quietcut work`: tells the device its working point.
 
-use super::{Error, Output, finite, positive};
+use quietcut_core::units::{Degrees, Millimeters};
+use quietcut_core::working_point::WorkingPoint;
+use serde::Serialize;
+
+use super::port::{PortArgs, WorkingPointAnswer};
+use super::{Error, Output, angle, positive};
 
 /// Tells the device its working point; without it, advice says what it assumes.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  quietcut work simulated --depth-mm 2 --start 90 --exit 180 --feed 0.15")]
 pub struct Args {
-    /// Serial port of the device, or `simulated`.
-    #[arg(value_name = "PORT")]
-    port: String,
+    #[command(flatten)]
+    port: PortArgs,
     /// Axial depth of cut in mm.
     #[arg(long, value_name = "A", value_parser = positive, allow_negative_numbers = true)]
     depth_mm: f64,
     /// Immersion angle in degrees where a tooth enters, clockwise from the normal to the feed.
-    #[arg(long, value_name = "D", value_parser = finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     start: f64,
     /// Immersion angle in degrees where a tooth leaves.
-    #[arg(long, value_name = "D", value_parser = finite, allow_negative_numbers = true)]
+    #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     exit: f64,
     /// Feed per tooth in mm.
     #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
@@ -28,16 +32,41 @@ pub struct Args {
     output: Output,
 }
 
+#[derive(Serialize)]
+struct Answer<'a> {
+    port: &'a str,
+    working_point: WorkingPointAnswer,
+}
+
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args {
-        port: _,
-        depth_mm: _,
-        start: _,
-        exit: _,
-        feed: _,
-        posture: _,
-        output: _,
-    } = args;
-    Err(Error::not_built("work"))
+    if args.exit <= args.start {
+        return Err(Error::input(format!(
+            "--start {} --exit {}: a tooth must leave after it enters; angles grow clockwise from the normal to the feed",
+            args.start, args.exit
+        )));
+    }
+    let point = WorkingPoint {
+        axial_depth: Millimeters(args.depth_mm as f32),
+        start: Degrees(args.start as f32),
+        exit: Degrees(args.exit as f32),
+        feed_per_tooth: Millimeters(args.feed as f32),
+        posture: args.posture,
+    };
+    let (mut client, _) = args.port.connect()?;
+    client.set_working_point(Some(point))?;
+    // What the device says it was told, not what this command meant to tell.
+    let told = client.status()?.working_point;
+    let told = told.ok_or_else(|| {
+        Error::other(format!(
+            "{}: the device forgot the working point",
+            args.port.name()
+        ))
+    })?;
+    let answer = Answer {
+        port: args.port.name(),
+        working_point: WorkingPointAnswer::new(&told),
+    };
+    let text = format!("{}: {}", answer.port, answer.working_point);
+    args.output.answer(&answer, text)
 }

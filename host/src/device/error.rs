@@ -3,6 +3,9 @@
 use std::io;
 use std::time::Duration;
 
+use quietcut_core::lobes::TableError;
+use quietcut_core::protocol::{FrameError, Refusal};
+
 /// A device that could not be reached, or did not do what it was asked to.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
@@ -53,6 +56,64 @@ pub enum DeviceError {
         waited: Duration,
         /// How often it was asked.
         attempts: u32,
+    },
+    /// What came are not whole frames in their order, and asking again did not help.
+    #[error(
+        "{port}: no usable answer to {request}, asked {attempts} times: {error}; check the cable and that nothing else uses the port"
+    )]
+    Frames {
+        /// The port.
+        port: String,
+        /// What was asked.
+        request: &'static str,
+        /// How often it was asked.
+        attempts: u32,
+        /// What was wrong the last time.
+        error: FrameError,
+    },
+    /// The device speaks another version of the protocol.
+    #[error(
+        "{port}: the device speaks protocol version {theirs}, this command version {ours}; bring both to the same release"
+    )]
+    Version {
+        /// The port.
+        port: String,
+        /// Version of this side.
+        ours: u8,
+        /// Version of the device.
+        theirs: u8,
+    },
+    /// The device understood and does not do it.
+    #[error("{port}: the device refuses the {request}: {refusal}")]
+    Refused {
+        /// The port.
+        port: String,
+        /// What was asked.
+        request: &'static str,
+        /// Why not.
+        refusal: Refusal,
+    },
+    /// The device answers something else than it was asked.
+    #[error("{port}: the device answers `{reply}` to {request}: it does not keep to the protocol")]
+    Unexpected {
+        /// The port.
+        port: String,
+        /// What was asked.
+        request: &'static str,
+        /// The kind of the reply.
+        reply: &'static str,
+    },
+    /// The table is none.
+    #[error("{error}")]
+    Table {
+        /// Why.
+        error: TableError,
+    },
+    /// A request that fits no frame.
+    #[error("the {request} does not fit a frame: a fault in quietcut itself")]
+    TooLarge {
+        /// The request.
+        request: &'static str,
     },
 }
 

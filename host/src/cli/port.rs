@@ -1,0 +1,206 @@
+//! The PORT argument, and what devices say of themselves in answers.
+
+use std::path::PathBuf;
+
+use quietcut_core::protocol::{Info, Slot, TableSummary};
+use quietcut_core::working_point::WorkingPoint;
+use serde::Serialize;
+
+use super::Error;
+use crate::device::{self, Client};
+use crate::report::answer::number;
+
+/// Where the device is; part of the arguments of every verb that talks to one.
+#[derive(Debug, clap::Args)]
+pub struct PortArgs {
+    /// Serial port of the device, or `simulated`.
+    #[arg(value_name = "PORT")]
+    port: String,
+    /// Keep the memory of the simulated device in this file, so that a table outlives the command.
+    #[arg(long, value_name = "FILE")]
+    state: Option<PathBuf>,
+}
+
+impl PortArgs {
+    /// The name of the port.
+    pub fn name(&self) -> &str {
+        &self.port
+    }
+
+    /// Opens the port and says hello to the device.
+    pub fn connect(&self) -> Result<(Client, Info), Error> {
+        if let Some(state) = &self.state
+            && self.port != device::port::SIMULATED
+        {
+            return Err(Error::input(format!(
+                "--state {}: only the simulated device keeps its memory in a file, {} is hardware; leave --state out",
+                state.display(),
+                self.port
+            )));
+        }
+        let port = device::open(&self.port, self.state.as_deref())?;
+        Ok(Client::connect(port)?)
+    }
+}
+
+/// A table of a device, as JSON and as text.
+#[derive(Debug, Serialize)]
+pub struct TableAnswer {
+    name: String,
+    teeth: u8,
+    speeds: u16,
+    rpm: [f64; 2],
+    depth_mm: [f64; 2],
+    layers: u16,
+    limits_rpm: Option<[f64; 2]>,
+}
+
+impl TableAnswer {
+    /// The answer for a table.
+    pub fn new(table: &TableSummary) -> Self {
+        Self {
+            name: table.name.as_str().into(),
+            teeth: table.teeth,
+            speeds: table.speeds,
+            rpm: [number(table.speed_from.0), number(table.speed_to.0)],
+            depth_mm: [number(table.depth_from.0), number(table.depth_to.0)],
+            layers: table.layers,
+            limits_rpm: table
+                .limits
+                .map(|limits| [number(limits.rpm_min.0), number(limits.rpm_max.0)]),
+        }
+    }
+}
+
+impl std::fmt::Display for TableAnswer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let ([rpm_from, rpm_to], [from_mm, to_mm]) = (self.rpm, self.depth_mm);
+        write!(
+            f,
+            "{}: {} teeth, {} speeds from {rpm_from} to {rpm_to} rev/min, {from_mm} to {to_mm} mm deep, {} layer{}",
+            self.name,
+            self.teeth,
+            self.speeds,
+            self.layers,
+            if self.layers == 1 { "" } else { "s" }
+        )?;
+        if let Some([slowest, fastest]) = self.limits_rpm {
+            write!(f, "; spindle from {slowest} to {fastest} rev/min")?;
+        }
+        Ok(())
+    }
+}
+
+/// A slot for a table, as JSON and as text.
+#[derive(Debug, Serialize)]
+#[serde(tag = "state", rename_all = "kebab-case")]
+pub enum SlotAnswer {
+    /// Nothing is in it.
+    Empty,
+    /// An upload that has not ended.
+    Unfinished {
+        /// Bytes that have come.
+        received: u32,
+        /// Bytes of the table.
+        length: u32,
+    },
+    /// Bytes that are no table.
+    Damaged {
+        /// Why.
+        error: String,
+    },
+    /// A table that is not in use.
+    Valid {
+        /// Its bytes.
+        length: u32,
+        /// Counted up with each table.
+        generation: u32,
+    },
+    /// The table in use.
+    InUse {
+        /// Its bytes.
+        length: u32,
+        /// Counted up with each table.
+        generation: u32,
+    },
+}
+
+impl SlotAnswer {
+    /// The answer for a slot.
+    pub fn new(slot: &Slot) -> Self {
+        match slot {
+            Slot::Empty => Self::Empty,
+            Slot::Unfinished(upload) => Self::Unfinished {
+                received: upload.received,
+                length: upload.header.length,
+            },
+            Slot::Damaged(error) => Self::Damaged {
+                error: error.to_string(),
+            },
+            Slot::Valid(header) => Self::Valid {
+                length: header.length,
+                generation: header.generation,
+            },
+            Slot::InUse(header) => Self::InUse {
+                length: header.length,
+                generation: header.generation,
+            },
+        }
+    }
+}
+
+impl std::fmt::Display for SlotAnswer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Empty => f.write_str("empty"),
+            Self::Unfinished { received, length } => {
+                write!(
+                    f,
+                    "{received} of {length} bytes of an upload; `quietcut upload` goes on there"
+                )
+            }
+            Self::Damaged { error } => write!(f, "damaged: {error}"),
+            Self::Valid { length, generation } => write!(f, "table {generation}, {length} bytes"),
+            Self::InUse { length, generation } => write!(f, "table {generation}, {length} bytes, in use"),
+        }
+    }
+}
+
+/// A working point, as JSON and as text.
+#[derive(Debug, Serialize)]
+pub struct WorkingPointAnswer {
+    depth_mm: f64,
+    start_deg: f64,
+    exit_deg: f64,
+    feed_per_tooth_mm: f64,
+    posture: u8,
+}
+
+impl WorkingPointAnswer {
+    /// The answer for a working point.
+    pub fn new(point: &WorkingPoint) -> Self {
+        Self {
+            depth_mm: number(point.axial_depth.0),
+            start_deg: number(point.start.0),
+            exit_deg: number(point.exit.0),
+            feed_per_tooth_mm: number(point.feed_per_tooth.0),
+            posture: point.posture,
+        }
+    }
+}
+
+impl std::fmt::Display for WorkingPointAnswer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            depth_mm,
+            start_deg,
+            exit_deg,
+            feed_per_tooth_mm,
+            posture,
+        } = self;
+        write!(
+            f,
+            "{depth_mm} mm deep, immersion from {start_deg}° to {exit_deg}°, {feed_per_tooth_mm} mm per tooth, posture {posture}"
+        )
+    }
+}

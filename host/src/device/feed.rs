@@ -1,0 +1,27 @@
+//! Recorded or simulated samples through the pipeline of a device, in place of its sensor's.
+
+use heapless::Vec;
+use quietcut_core::acceleration::Block;
+use quietcut_core::protocol::message::{MAX_EDGES, MAX_FEED_EDGES};
+use quietcut_core::protocol::{Feed, Request};
+use quietcut_core::tachometer::Edge;
+
+use super::DeviceError;
+use super::client::Client;
+
+impl Client {
+    /// Feeds one block and the tachometer edges up to its end; returns when it has gone through the pipeline. What the
+    /// pipeline said of it waits in [`next_event`](Self::next_event), where it was subscribed to.
+    ///
+    /// # Errors
+    /// Where the device does not answer or does not take the block.
+    pub fn feed(&mut self, block: &Block, edges: &[Edge]) -> Result<(), DeviceError> {
+        let (before, with) = edges.split_at(edges.len().saturating_sub(MAX_FEED_EDGES));
+        for some in before.chunks(MAX_EDGES) {
+            let some = Vec::try_from(some).map_err(|_| DeviceError::TooLarge { request: "edges" })?;
+            self.tell(&Request::FeedEdges(some), "edges")?;
+        }
+        let with = Vec::try_from(with).map_err(|_| DeviceError::TooLarge { request: "edges" })?;
+        self.tell(&Request::Feed(Feed::new(block, with)), "block")
+    }
+}

@@ -1,0 +1,101 @@
+//! A lobe table to the device, in chunks; goes on where an earlier upload of the same table stopped.
+
+use quietcut_core::lobes::LobeTable;
+use quietcut_core::protocol::message::MAX_CHUNK;
+use quietcut_core::protocol::{Info, Refusal, Reply, Request, Upload};
+
+use super::DeviceError;
+use super::client::{Client, REPLY_AFTER_ERASE};
+
+/// How often an upload is begun again after the device was restarted in the middle.
+const RESTARTS: u32 = 3;
+
+/// What an upload came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Uploaded {
+    /// The device afterwards.
+    pub info: Info,
+    /// Where the upload began: more than 0 where an earlier one had stopped.
+    pub resumed_at: u32,
+}
+
+impl Client {
+    /// Sends the table and lets the device take it into use. Whatever happens, the device keeps a whole table: the
+    /// old one until the new one is checked.
+    ///
+    /// `progress` is told the bytes that the device has and the bytes in all, after each chunk.
+    ///
+    /// # Errors
+    /// Where the device does not answer, refuses the table, or is restarted again and again.
+    pub fn upload(
+        &mut self,
+        table: &LobeTable<'_>,
+        mut progress: impl FnMut(u32, u32),
+    ) -> Result<Uploaded, DeviceError> {
+        let mut resumed_at = None;
+        let mut restarts = 0;
+        loop {
+            match self.send_table(table, &mut resumed_at, &mut progress) {
+                Err(DeviceError::Refused {
+                    refusal: Refusal::HelloFirst | Refusal::NoUpload,
+                    ..
+                }) if restarts < RESTARTS => {
+                    restarts += 1;
+                    tracing::warn!("{}: the device was restarted; the upload goes on", self.port());
+                    self.hello()?;
+                }
+                Err(error) => return Err(error),
+                Ok(()) => {
+                    let info = self.info()?;
+                    return Ok(Uploaded {
+                        info,
+                        resumed_at: resumed_at.unwrap_or(0),
+                    });
+                }
+            }
+        }
+    }
+
+    fn send_table(
+        &mut self,
+        table: &LobeTable<'_>,
+        resumed_at: &mut Option<u32>,
+        progress: &mut impl FnMut(u32, u32),
+    ) -> Result<(), DeviceError> {
+        const BEGIN: &str = "begin of the upload";
+        let header = table.header().map_err(|error| DeviceError::Table { error })?;
+        let bytes = table.bytes();
+        let begin = Request::UploadBegin(header);
+        let mut received = match self.exchange(&begin, BEGIN, REPLY_AFTER_ERASE)? {
+            Reply::Upload(Upload { received, .. }) => received,
+            other => return Err(self.unexpected(BEGIN, &other)),
+        };
+        resumed_at.get_or_insert(received);
+        progress(received, header.length);
+        while received < header.length {
+            received = self.send_chunk(bytes, received)?;
+            progress(received, header.length);
+        }
+        self.tell_within(&Request::UploadCommit, "table", REPLY_AFTER_ERASE)
+    }
+
+    /// Sends the chunk at `offset`; the offset that is due next.
+    fn send_chunk(&mut self, bytes: &[u8], offset: u32) -> Result<u32, DeviceError> {
+        const CHUNK: &str = "piece of the table";
+        let rest = bytes.get(offset as usize..).unwrap_or_default();
+        let piece = rest.get(..MAX_CHUNK).unwrap_or(rest);
+        let data = piece
+            .try_into()
+            .map_err(|_| DeviceError::TooLarge { request: CHUNK })?;
+        match self.exchange(&Request::UploadChunk { offset, data }, CHUNK, REPLY_AFTER_ERASE) {
+            Ok(Reply::Upload(Upload { received, .. })) if received > offset => Ok(received),
+            Ok(other) => Err(self.unexpected(CHUNK, &other)),
+            // The device knows better what it has: a reply was lost, or it was restarted.
+            Err(DeviceError::Refused {
+                refusal: Refusal::ChunkOffset { expected, .. },
+                ..
+            }) if expected != offset && expected as usize <= bytes.len() => Ok(expected),
+            Err(error) => Err(error),
+        }
+    }
+}
