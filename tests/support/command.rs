@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
@@ -112,8 +113,16 @@ impl Running {
     }
 }
 
+/// While this is held no child process is started. What a test opens meanwhile and marks to be closed in children is
+/// in none of them.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Starts the command with `arguments` in `folder`.
 pub fn start<S: AsRef<OsStr>>(folder: &Path, arguments: &[S]) -> Running {
+    let _alone = alone();
     let child = Command::new(binary())
         .args(arguments)
         .current_dir(folder)

@@ -23,6 +23,9 @@ impl PseudoTerminal {
     pub fn new() -> Result<Self, DeviceError> {
         let failed = |cause| DeviceError::PseudoTerminal { cause };
         let (device_end, host_end) = TTYPort::pair().map_err(failed)?;
+        // The copies, other than the originals, are closed in child processes: there they would keep the line up.
+        let device_end = device_end.try_clone_native().map_err(failed)?;
+        let host_end = host_end.try_clone_native().map_err(failed)?;
         let path = host_end.name().unwrap_or_default();
         Ok(Self {
             path,
