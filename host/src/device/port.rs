@@ -8,8 +8,8 @@ use super::DeviceError;
 /// The name of the port that needs no hardware.
 pub const SIMULATED: &str = "simulated";
 
-/// Bits per second on a real serial line; a pseudo-terminal does not care.
-const BAUD_RATE: u32 = 115_200;
+/// Bits per second on a real serial line, as the board has it; a pseudo-terminal does not care.
+const BAUD_RATE: u32 = 921_600;
 
 /// The bytes to and from one device.
 pub trait Port: Send {
