@@ -2,6 +2,7 @@
 
 pub mod case;
 pub mod cli;
+pub mod continuation;
 pub mod device;
 pub mod file;
 pub mod milling;

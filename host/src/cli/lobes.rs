@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::{Error, Output, Range};
 use crate::case::Case;
+use crate::continuation::{self, ForcedProblem};
 use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::page::{figure, page};
-use crate::stability::{Chart, CubicTerms, Point, Problem, SpeedLine, chart, point};
+use crate::stability::{Chart, CubicTerms, Point, Problem, SpeedLine, StabilityError, chart, point};
 
 /// Stability limits over speed, or the dominant multiplier at points.
 #[derive(Debug, clap::Args)]
@@ -60,22 +61,46 @@ struct Points {
 pub fn run(args: Args) -> Result<(), Error> {
     let Method::Collocation = args.method;
     let case = Case::read(&args.case).map_err(Error::input)?;
-    let cubic = if args.linear {
-        CubicTerms::LeaveOut
+    let is_nonlinear = case.structure().map_err(Error::input)?.is_nonlinear();
+    let model = if is_nonlinear && !args.linear {
+        Model::Nonlinear(ForcedProblem::new(&case)?)
     } else {
-        CubicTerms::Refuse
+        Model::Linear(Problem::new(&case, CubicTerms::LeaveOut)?)
     };
-    let problem = Problem::new(&case, cubic)?;
     match (args.rpm, args.depth_mm) {
-        (Some(rpm), Some(depth_mm)) => run_chart(&case, &problem, rpm, depth_mm, args.out, args.output),
-        _ => run_points(&problem, &args.at, args.output),
+        (Some(rpm), Some(depth_mm)) => run_chart(&case, &model, rpm, depth_mm, args.out, args.output),
+        _ => run_points(&model, &args.at, args.output),
     }
 }
 
-fn run_points(problem: &Problem, at: &[(f64, f64)], output: Output) -> Result<(), Error> {
+/// What multipliers are computed about.
+enum Model {
+    /// Rest: the limits do not depend on the forced motion.
+    Linear(Problem),
+    /// The forced orbit at the feed of the case.
+    Nonlinear(ForcedProblem),
+}
+
+impl Model {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        match self {
+            Self::Linear(problem) => point(problem, rpm, depth_mm),
+            Self::Nonlinear(problem) => continuation::point(problem, rpm, depth_mm),
+        }
+    }
+
+    fn chart(&self, speeds_rpm: &[f64], depth_mm: f64, samples: usize) -> Result<Chart, StabilityError> {
+        match self {
+            Self::Linear(problem) => chart(problem, speeds_rpm, depth_mm, samples),
+            Self::Nonlinear(problem) => continuation::chart(problem, speeds_rpm, depth_mm),
+        }
+    }
+}
+
+fn run_points(model: &Model, at: &[(f64, f64)], output: Output) -> Result<(), Error> {
     let points = at
         .iter()
-        .map(|&(rpm, depth_mm)| point(problem, rpm, depth_mm))
+        .map(|&(rpm, depth_mm)| model.point(rpm, depth_mm))
         .collect::<Result<Vec<_>, _>>()?;
     let mut text = String::new();
     for point in &points {
@@ -100,7 +125,7 @@ fn run_points(problem: &Problem, at: &[(f64, f64)], output: Output) -> Result<()
 
 fn run_chart(
     case: &Case,
-    problem: &Problem,
+    model: &Model,
     rpm: Range,
     depth_mm: Range,
     out: Option<PathBuf>,
@@ -113,7 +138,7 @@ fn run_chart(
     } else {
         depth_mm.count()
     };
-    let chart = chart(problem, &rpm.values(), deepest_mm, samples)?;
+    let chart = model.chart(&rpm.values(), deepest_mm, samples)?;
     if let Some(path) = &out {
         write_chart(case, &chart, deepest_mm, path)?;
     }

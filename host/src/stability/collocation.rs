@@ -9,7 +9,7 @@ use super::period::Period;
 ///
 /// p are the displacements along the chip normal at the collocation nodes while teeth cut. `None` where a depth is so
 /// large that the collocation equations are singular.
-pub(super) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
+pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     let order = period.order();
     let history: usize = period.elements.iter().map(|element| element.kernel.nrows()).sum();
     let size = order + history;
@@ -40,7 +40,7 @@ pub(super) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
 
 /// All multipliers of the collocated map, largest first; those of the history that have no physical meaning are near
 /// zero.
-pub(super) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
+pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
     let map = monodromy(period, depth_m)?;
     if map.iter().any(|entry| !entry.is_finite()) {
         return None;
@@ -51,6 +51,6 @@ pub(super) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64
 }
 
 /// The largest multiplier; of a pair the one above the real axis.
-pub(super) fn dominant(period: &Period, depth_m: f64) -> Option<Complex64> {
+pub(crate) fn dominant(period: &Period, depth_m: f64) -> Option<Complex64> {
     multipliers(period, depth_m)?.first().copied()
 }

@@ -9,15 +9,15 @@ use nalgebra::DMatrix;
 /// Quadrature with b is exact for polynomials up to degree 2m − 1, integration with S up to degree m − 1. A
 /// collocation step on these nodes has order 2m (Hairer, Nørsett & Wanner, Solving ODEs I, II.7).
 #[derive(Clone, Debug)]
-pub(super) struct Gauss {
-    pub(super) nodes: Vec<f64>,
-    pub(super) weights: Vec<f64>,
-    pub(super) integrals: DMatrix<f64>,
+pub(crate) struct Gauss {
+    pub(crate) nodes: Vec<f64>,
+    pub(crate) weights: Vec<f64>,
+    pub(crate) integrals: DMatrix<f64>,
 }
 
 impl Gauss {
     /// The rule with `count` nodes, at least 1.
-    pub(super) fn new(count: usize) -> Self {
+    pub(crate) fn new(count: usize) -> Self {
         let (points, weights): (Vec<f64>, Vec<f64>) = (0..count).map(|i| root(count, i)).unzip();
         // ℓ_j(x) = Σ_k (2k + 1)/2 w_j P_k(x_j) P_k(x) for k < m, exact since the rule integrates ℓ_j P_k exactly;
         // ∫_{−1}^x P_k = (P_{k+1} − P_{k−1})/(2k + 1), and x + 1 for k = 0.

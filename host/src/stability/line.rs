@@ -55,6 +55,9 @@ pub struct SpeedLine {
     pub rpm: f64,
     /// Depths that are stable, mm, as intervals in order, from 0 to the last depth.
     pub stable_mm: Vec<[f64; 2]>,
+    /// Depths at which two stable forced orbits exist, mm: only nonlinear structures have them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bistable_mm: Vec<[f64; 2]>,
     /// Where stability is first lost; `None` where nothing is lost up to the last depth.
     pub first_limit: Option<Limit>,
     /// Every crossing of the unit circle, also while another multiplier is outside, by depth.
@@ -341,6 +344,7 @@ impl Scan<'_> {
         SpeedLine {
             rpm: self.rpm,
             stable_mm,
+            bistable_mm: Vec::new(),
             first_limit,
             switches,
         }

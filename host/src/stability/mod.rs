@@ -4,12 +4,12 @@
 
 mod characteristic;
 mod chart;
-mod collocation;
-mod gauss;
+pub(crate) mod collocation;
+pub(crate) mod gauss;
 mod line;
 mod lobe_table;
-mod multiplier;
-mod period;
+pub(crate) mod multiplier;
+pub(crate) mod period;
 mod point;
 mod problem;
 

@@ -43,7 +43,7 @@ impl Kind {
     }
 
     /// How many multipliers cross together.
-    pub(super) fn count(self) -> i32 {
+    pub(crate) fn count(self) -> i32 {
         match self {
             Self::Hopf => 2,
             Self::Flip | Self::Fold => 1,
@@ -89,7 +89,7 @@ impl Verdict {
 ///
 /// The motion has the frequencies |Im ln μ + 2πk|/(2πτ); the one with the largest displacement is given. With
 /// F̂_k the k-th harmonic of the regenerative force along the eigenfunction, displacement is H(s_k) F̂_k.
-pub(super) fn chatter_hz(
+pub(crate) fn chatter_hz(
     problem: &Problem,
     rpm: f64,
     period: &Period,

@@ -19,26 +19,26 @@ use super::gauss::Gauss;
 
 /// How finely a period is cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Resolution {
+pub(crate) struct Resolution {
     /// The largest angle, rad, by which the fastest motion turns within an element.
-    pub(super) angle: f64,
+    pub(crate) angle: f64,
     /// Collocation error per element, relative, that is aimed at.
-    pub(super) tolerance: f64,
+    pub(crate) tolerance: f64,
 }
 
 impl Resolution {
     /// For following all multipliers along a line: few nodes, since all eigenvalues of the map are computed.
-    pub(super) const SCAN: Self = Self {
+    pub(crate) const SCAN: Self = Self {
         angle: 20.0,
         tolerance: 1e-8,
     };
     /// For the characteristic matrix, whose polynomials want short elements: limits are computed with this one.
-    pub(super) const WORKING: Self = Self {
+    pub(crate) const WORKING: Self = Self {
         angle: 5.0,
         tolerance: 1e-13,
     };
     /// A second one: what changes from the working one to this is an estimate of the error of the former.
-    pub(super) const FINE: Self = Self {
+    pub(crate) const FINE: Self = Self {
         angle: 3.0,
         tolerance: 1e-16,
     };
@@ -46,28 +46,28 @@ impl Resolution {
 
 /// One element: p = E x + Q f, x⁺ = G x + T f.
 #[derive(Clone, Debug)]
-pub(super) struct Element {
+pub(crate) struct Element {
     /// G, n × n.
-    pub(super) flow: DMatrix<f64>,
+    pub(crate) flow: DMatrix<f64>,
     /// E, ports × n.
-    pub(super) observe: DMatrix<f64>,
+    pub(crate) observe: DMatrix<f64>,
     /// Q, ports × ports, per meter of depth.
-    pub(super) kernel: DMatrix<f64>,
+    pub(crate) kernel: DMatrix<f64>,
     /// T, n × ports, per meter of depth.
-    pub(super) drive: DMatrix<f64>,
+    pub(crate) drive: DMatrix<f64>,
     /// What each port is, in the order of the rows of E.
-    pub(super) ports: Vec<Port>,
+    pub(crate) ports: Vec<Port>,
 }
 
 /// One cutting tooth at one node.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Port {
+pub(crate) struct Port {
     /// Time from the start of the period, s.
-    pub(super) time_s: f64,
+    pub(crate) time_s: f64,
     /// Quadrature weight, s.
-    pub(super) weight_s: f64,
+    pub(crate) weight_s: f64,
     /// Force on the tool per depth and displacement along the chip normal, Pa.
-    pub(super) force: Vector3<f64>,
+    pub(crate) force: Vector3<f64>,
 }
 
 /// The most e-folds by which a mode may decay within an element: e^{−A t} appears in it, and its size is lost in digits.
@@ -78,16 +78,16 @@ const NODES_MAX: u32 = 40;
 
 /// One tooth period at one speed.
 #[derive(Clone, Debug)]
-pub(super) struct Period {
+pub(crate) struct Period {
     /// The elements while teeth cut, in order.
-    pub(super) elements: Vec<Element>,
+    pub(crate) elements: Vec<Element>,
     /// The flow of free flight after them; the identity where there is none.
-    pub(super) flight: DMatrix<f64>,
+    pub(crate) flight: DMatrix<f64>,
 }
 
 impl Period {
     /// Cuts the period of a problem at a speed; `depth_m` is the largest |w (1 − 1/μ)| that it will be used for.
-    pub(super) fn new(problem: &Problem, rpm: f64, depth_m: f64, resolution: Resolution) -> Self {
+    pub(crate) fn new(problem: &Problem, rpm: f64, depth_m: f64, resolution: Resolution) -> Self {
         let structure = &problem.structure;
         let engagement = &problem.process.engagement;
         let seconds_per_radian = problem.tooth_period_s(rpm) / engagement.pitch;
@@ -117,7 +117,7 @@ impl Period {
     }
 
     /// Number of states.
-    pub(super) fn order(&self) -> usize {
+    pub(crate) fn order(&self) -> usize {
         self.flight.nrows()
     }
 }
