@@ -4,6 +4,8 @@
 
 pub mod accelerometer;
 pub mod acquisition;
+pub mod device;
 pub mod flash_model;
+pub mod link;
 pub mod stimulus;
 pub mod storage;

@@ -7,6 +7,7 @@ use crate::acceleration::{Block, SampleClock, SampleClockState, Sensor};
 use crate::advice::Advice;
 use crate::detector::{Judgement, Reason, Verdict};
 use crate::lobes::LobeTable;
+use crate::spectrum::PowerSpectrum;
 use crate::tachometer::{Edge, Tachometer, TachometerState, Wheel};
 use crate::units::{Hertz, Nanoseconds, Rpm};
 use crate::working_point::{Limits, Tool, WorkingPoint};
@@ -140,6 +141,11 @@ impl State {
     /// The points of the stroboscopic map that the newest block made, oldest first.
     pub fn strobes(&self) -> &[Strobe] {
         &self.strobes
+    }
+
+    /// The newest spectrum of a band, with the sequence number of the block that completed it.
+    pub fn spectrum(&self, _band: Band) -> Option<(u32, PowerSpectrum<'_>)> {
+        None
     }
 
     /// The sample clock: rate, clips, losses.

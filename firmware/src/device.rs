@@ -1,0 +1,377 @@
+//! The device: pipeline, table slots and link to the host, without pins.
+//!
+//! A board, the emulator and the host's simulated port all drive the same [`Device`]:
+//!
+//! ```text
+//! loop {
+//!     if let Some((block, edges)) = the sensor has a block { device.take(block, edges) }
+//!     device.poll(&mut line)?;              // or receive / outgoing / sent, where bytes come from elsewhere
+//! }
+//! ```
+//!
+//! Nothing here waits, but for the flash: a page that is erased during an upload holds the device up for as long as the flash takes.
+//! The requests of the host are done one at a time, in order; see [`quietcut_core::protocol`]. While the host feeds
+//! blocks, those of the sensor are passed over.
+
+mod outbox;
+
+use heapless::Vec;
+use quietcut_core::acceleration::{Block, Sensor};
+use quietcut_core::advice::Advice;
+use quietcut_core::detector::{Reason, Verdict};
+use quietcut_core::monitor::{Monitor, Report, Settings, SettingsError, State};
+use quietcut_core::protocol::message::{MAX_BLOCK_EDGES, TableSummary};
+use quietcut_core::protocol::{
+    Info, Refusal, Reply, Reports, Request, Response, Sequence, Status, Subscription, VERSION,
+};
+use quietcut_core::tachometer::Edge;
+use quietcut_core::units::Nanoseconds;
+use quietcut_core::working_point::WorkingPoint;
+
+use crate::link::{Line, Link};
+use crate::storage::{Storage, TableMemory};
+use outbox::Outbox;
+
+/// The device's clock, the one that stamps samples and edges.
+pub trait Clock {
+    /// Time since the start.
+    fn now(&self) -> Nanoseconds;
+}
+
+/// What a board says of itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity {
+    /// Its name; at most 24 bytes.
+    pub board: &'static str,
+    /// Its accelerometer; `None` where it has none and is fed.
+    pub sensor: Option<Sensor>,
+}
+
+/// A chatter monitor.
+pub struct Device<'a, M, C> {
+    identity: Identity,
+    clock: C,
+    storage: Storage<M>,
+    monitor: Monitor,
+    state: &'a mut State,
+    working_point: Option<WorkingPoint>,
+    link: Link,
+    session: Session,
+    outbox: Outbox,
+    subscription: Subscription,
+    /// What was last told to a subscriber of changes.
+    told: Option<Said>,
+    /// Edges from the host for its next block.
+    edges: Vec<Edge, MAX_BLOCK_EDGES>,
+    is_fed: bool,
+    blocks: u32,
+    clipped: u32,
+    lost: u32,
+    /// Bytes read from the line that could not be taken yet.
+    input: Vec<u8, 64>,
+}
+
+/// What of a report a subscriber of changes wants to hear of.
+type Said = (Verdict, Reason, Option<Advice>);
+
+/// The requests of one host.
+#[derive(Default)]
+struct Session {
+    is_open: bool,
+    requests: Sequence,
+    /// The request done last and its reply: a host that missed the reply sends the request again.
+    last: Option<(u16, Reply)>,
+}
+
+impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
+    /// A device with these settings; `state` is reset.
+    ///
+    /// The state is lent, since it is large: a board has it in its own memory from the start.
+    ///
+    /// # Errors
+    /// Settings that cannot be.
+    pub fn new(
+        identity: Identity,
+        settings: Settings,
+        state: &'a mut State,
+        memory: M,
+        clock: C,
+    ) -> Result<Self, SettingsError> {
+        let mut device = Self {
+            identity,
+            clock,
+            storage: Storage::new(memory),
+            monitor: Monitor::new(settings)?,
+            state,
+            working_point: None,
+            link: Link::new(),
+            session: Session::default(),
+            outbox: Outbox::default(),
+            subscription: Subscription::default(),
+            told: None,
+            edges: Vec::new(),
+            is_fed: false,
+            blocks: 0,
+            clipped: 0,
+            lost: 0,
+            input: Vec::new(),
+        };
+        device.restart();
+        Ok(device)
+    }
+
+    /// Takes a block of the sensor, with the tachometer edges up to its end that were in no block before.
+    ///
+    /// Does nothing while the host feeds.
+    pub fn take(&mut self, block: &Block, edges: &[Edge]) {
+        if !self.is_fed {
+            self.step(block, edges);
+            self.pump();
+        }
+    }
+
+    /// Sends and receives as much as the line has and takes; true where there was something to do.
+    ///
+    /// # Errors
+    /// Those of the line.
+    pub fn poll<IO: Line>(&mut self, line: &mut IO) -> Result<bool, IO::Error> {
+        let mut is_busy = self.link.flush(line)?;
+        loop {
+            if self.input.is_empty() && line.read_ready()? {
+                let mut buffer = [0; 64];
+                let count = line.read(&mut buffer)?;
+                self.input.extend(buffer.into_iter().take(count));
+            }
+            let input = core::mem::take(&mut self.input);
+            let count = self.receive(&input);
+            self.input.extend(input.iter().copied().skip(count));
+            is_busy |= self.link.flush(line)? || count > 0;
+            if count == 0 {
+                return Ok(is_busy);
+            }
+        }
+    }
+
+    /// Takes bytes from the host and does what they ask; how many were taken.
+    ///
+    /// Not all are taken while earlier replies wait to be sent: call it again with the rest.
+    pub fn receive(&mut self, bytes: &[u8]) -> usize {
+        let mut taken = 0;
+        loop {
+            self.pump();
+            // One frame for the reply, one for what is said of a frame that cannot be read.
+            if self.link.room() < 2 || self.outbox.has_reply() {
+                return taken;
+            }
+            let (count, result) = self.link.receive(bytes.get(taken..).unwrap_or_default());
+            taken += count;
+            match result {
+                None => return taken,
+                Some(Ok((sequence, request))) => self.answer(sequence, request),
+                Some(Err(error)) => {
+                    self.link.send(&Response::FrameRefused(error));
+                }
+            }
+        }
+    }
+
+    /// Bytes for the host, or the first part of them.
+    pub fn outgoing(&self) -> &[u8] {
+        self.link.outgoing()
+    }
+
+    /// Takes away the first `count` bytes of [`outgoing`](Self::outgoing): they are sent.
+    pub fn sent(&mut self, count: usize) {
+        self.link.sent(count);
+        self.pump();
+    }
+
+    /// The table slots.
+    pub fn storage(&self) -> &Storage<M> {
+        &self.storage
+    }
+
+    /// The flash memory, when the device is no longer needed.
+    pub fn into_memory(self) -> M {
+        self.storage.into_memory()
+    }
+
+    /// Sends what waits, as far as there is room.
+    fn pump(&mut self) {
+        if let Some(reply) = self.outbox.pump(&mut self.link, self.state) {
+            self.session.last = Some(reply);
+        }
+    }
+
+    /// Forgets what the pipeline has learned.
+    fn restart(&mut self) {
+        *self.state = State::default();
+        self.outbox.clear();
+        self.edges.clear();
+        self.told = None;
+        (self.clipped, self.lost) = (0, 0);
+    }
+
+    fn step(&mut self, block: &Block, edges: &[Edge]) {
+        self.outbox.make_way();
+        let table = self.storage.table();
+        let report = self.monitor.step(
+            self.state,
+            block,
+            edges,
+            table.as_ref(),
+            self.working_point.as_ref(),
+        );
+        self.blocks = self.blocks.saturating_add(1);
+        (self.clipped, self.lost) = (report.clipped, report.lost);
+        let report = self.is_wanted(&report).then_some(report);
+        self.outbox
+            .fill(report, block.sequence, self.state, self.subscription);
+    }
+
+    fn is_wanted(&mut self, report: &Report) -> bool {
+        match self.subscription.reports {
+            Reports::None => false,
+            Reports::All => true,
+            Reports::Changes => {
+                let said = Some((report.judgement.verdict, report.judgement.reason, report.advice));
+                core::mem::replace(&mut self.told, said) != said
+            }
+        }
+    }
+
+    /// Does a request, or says why not.
+    fn answer(&mut self, sequence: u16, request: Request) {
+        if request == Request::Hello {
+            self.begin_session(sequence);
+        } else if !self.session.is_open {
+            return self.outbox.reply(sequence, Reply::Refused(Refusal::HelloFirst));
+        } else if let Some((last, reply)) = &self.session.last
+            && *last == sequence
+        {
+            return self.outbox.reply(sequence, reply.clone());
+        } else if let Err(error) = self.session.requests.check(sequence) {
+            self.link.count(&error);
+            self.link.send(&Response::FrameRefused(error));
+            return;
+        }
+        let is_feed = matches!(request, Request::Feed(_));
+        let reply = self.perform(request).unwrap_or_else(Reply::Refused);
+        if is_feed {
+            self.outbox.reply_last(sequence, reply);
+        } else {
+            self.outbox.reply(sequence, reply);
+        }
+    }
+
+    /// A host says hello: what the one before wanted is over.
+    fn begin_session(&mut self, sequence: u16) {
+        self.session = Session {
+            is_open: true,
+            requests: Sequence::default(),
+            last: None,
+        };
+        self.session.requests.restart_after(sequence);
+        self.subscription = Subscription::default();
+        if self.is_fed {
+            self.is_fed = false;
+            self.restart();
+        }
+    }
+
+    fn perform(&mut self, request: Request) -> Result<Reply, Refusal> {
+        match request {
+            Request::Hello | Request::Info => return Ok(Reply::Info(self.info())),
+            Request::Status => return Ok(Reply::Status(self.status())),
+            Request::Settings => return Ok(Reply::Settings(*self.monitor.settings())),
+            Request::SetSettings(settings) => {
+                self.monitor = Monitor::new(settings).map_err(Refusal::Settings)?;
+                self.restart();
+            }
+            Request::SetWorkingPoint(point) => self.working_point = checked(point)?,
+            Request::Subscribe(subscription) => {
+                self.subscription = subscription;
+                self.told = None;
+            }
+            Request::UploadBegin(header) => return self.storage.begin(header).map(Reply::Upload),
+            Request::UploadChunk { offset, data } => {
+                return self.storage.chunk(offset, &data).map(Reply::Upload);
+            }
+            Request::UploadQuery => return self.storage.upload().map(Reply::Upload),
+            Request::UploadCommit => self.storage.commit()?,
+            Request::UploadAbort => self.storage.abort()?,
+            Request::Feed(feed) => {
+                self.hold(&feed.edges)?;
+                self.feed(&feed.block());
+            }
+            Request::FeedEdges(edges) => self.hold(&edges)?,
+            Request::Reset => {
+                self.is_fed = false;
+                self.restart();
+            }
+        }
+        Ok(Reply::Done)
+    }
+
+    /// Keeps edges for the next block of the host: all of them, or none where they are too many.
+    fn hold(&mut self, edges: &[Edge]) -> Result<(), Refusal> {
+        self.edges
+            .extend_from_slice(edges)
+            .map_err(|_| Refusal::TooManyEdges {
+                limit: MAX_BLOCK_EDGES as u16,
+            })
+    }
+
+    fn feed(&mut self, block: &Block) {
+        let edges = core::mem::take(&mut self.edges);
+        if !self.is_fed {
+            // What the sensor said is another story.
+            self.restart();
+            self.is_fed = true;
+        }
+        self.step(block, &edges);
+    }
+
+    fn info(&self) -> Info {
+        Info {
+            protocol: VERSION,
+            board: self.identity.board.try_into().unwrap_or_default(),
+            firmware: env!("CARGO_PKG_VERSION").try_into().unwrap_or_default(),
+            sensor: self.identity.sensor,
+            slot_capacity: self.storage.slot_capacity(),
+            slots: self.storage.slots(),
+            table: self.storage.table().map(|table| TableSummary::of(&table)),
+        }
+    }
+
+    fn status(&self) -> Status {
+        Status {
+            uptime: self.clock.now(),
+            blocks: self.blocks,
+            clipped: self.clipped,
+            lost: self.lost,
+            is_fed: self.is_fed,
+            working_point: self.working_point,
+            subscription: self.subscription,
+            frames: self.link.frames(),
+            frame_errors: *self.link.errors(),
+            dropped: self.outbox.dropped(),
+        }
+    }
+}
+
+/// Refuses a working point that no cut can have.
+fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal> {
+    let Some(cut) = point else { return Ok(None) };
+    let is_length = |mm: f32| mm >= 0.0 && mm.is_finite();
+    let is_cut = is_length(cut.axial_depth.0)
+        && is_length(cut.feed_per_tooth.0)
+        && cut.start.0.is_finite()
+        && cut.exit.0.is_finite()
+        && cut.start < cut.exit;
+    if is_cut {
+        Ok(point)
+    } else {
+        Err(Refusal::WorkingPoint(cut))
+    }
+}

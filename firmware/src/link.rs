@@ -1,0 +1,136 @@
+//! Frames to and from the host, over bytes that come and go without waiting.
+
+use embedded_io::{Read, ReadReady, Write, WriteReady};
+use heapless::Deque;
+use quietcut_core::protocol::{
+    Decoder, FrameError, FrameErrors, MAX_FRAME, Request, Response, Sequence, encode,
+};
+
+/// Bytes that wait to be sent: a few of the longest frames.
+const OUTGOING: usize = 4 * MAX_FRAME;
+
+/// A request with its sequence number, or why a frame is none.
+pub type Received = Result<(u16, Request), FrameError>;
+
+/// The device's end of the line.
+pub struct Link {
+    decoder: Decoder,
+    sent: Sequence,
+    outgoing: Deque<u8, OUTGOING>,
+    frames: u32,
+    errors: FrameErrors,
+}
+
+impl Default for Link {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Link {
+    /// A line on which nothing was said yet.
+    pub const fn new() -> Self {
+        Self {
+            decoder: Decoder::new(),
+            sent: Sequence::from(0),
+            outgoing: Deque::new(),
+            frames: 0,
+            errors: FrameErrors {
+                too_long: 0,
+                cobs: 0,
+                too_short: 0,
+                crc: 0,
+                version: 0,
+                unknown_message: 0,
+                body: 0,
+                trailing_bytes: 0,
+                out_of_order: 0,
+            },
+        }
+    }
+
+    /// Takes bytes up to the end of the first frame in them: how many were taken, and what came of it.
+    pub fn receive(&mut self, bytes: &[u8]) -> (usize, Option<Received>) {
+        for (index, &byte) in bytes.iter().enumerate() {
+            let Some(result) = self.decoder.push(byte) else {
+                continue;
+            };
+            let result = result.and_then(|frame| Ok((frame.sequence, frame.message()?)));
+            match &result {
+                Ok(_) => self.frames = self.frames.saturating_add(1),
+                Err(error) => self.errors.count(error),
+            }
+            return (index + 1, Some(result));
+        }
+        (bytes.len(), None)
+    }
+
+    /// Counts a frame that was read and cannot be used.
+    pub fn count(&mut self, error: &FrameError) {
+        self.errors.count(error);
+    }
+
+    /// Frames received that could be read.
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// Frames received that could not be used.
+    pub fn errors(&self) -> &FrameErrors {
+        &self.errors
+    }
+
+    /// Number of frames of any length that can be sent now.
+    pub fn room(&self) -> usize {
+        (OUTGOING - self.outgoing.len()) / MAX_FRAME
+    }
+
+    /// Puts a frame behind the bytes that wait to be sent; false where there is no room.
+    pub fn send(&mut self, response: &Response) -> bool {
+        let mut buffer = [0; MAX_FRAME];
+        if self.room() == 0 {
+            return false;
+        }
+        let Ok(frame) = encode(response, self.sent.take(), &mut buffer) else {
+            return false;
+        };
+        frame.iter().all(|&byte| self.outgoing.push_back(byte).is_ok())
+    }
+
+    /// Bytes that wait to be sent, or the first part of them.
+    pub fn outgoing(&self) -> &[u8] {
+        match self.outgoing.as_slices() {
+            ([], second) => second,
+            (first, _) => first,
+        }
+    }
+
+    /// Takes away the first `count` bytes of [`outgoing`](Self::outgoing): they are sent.
+    pub fn sent(&mut self, count: usize) {
+        for _ in 0..count {
+            self.outgoing.pop_front();
+        }
+    }
+
+    /// Sends as much as the line takes without waiting; true where it took something.
+    ///
+    /// # Errors
+    /// Those of the line.
+    pub fn flush<IO: Write + WriteReady>(&mut self, io: &mut IO) -> Result<bool, IO::Error> {
+        let mut is_busy = false;
+        while !self.outgoing().is_empty() && io.write_ready()? {
+            let count = io.write(self.outgoing())?;
+            if count == 0 {
+                break;
+            }
+            self.sent(count);
+            is_busy = true;
+        }
+        Ok(is_busy)
+    }
+}
+
+/// A line of bytes that never makes its user wait.
+pub trait Line: Read + ReadReady + Write + WriteReady {}
+
+impl<T: Read + ReadReady + Write + WriteReady> Line for T {}
