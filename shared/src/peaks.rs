@@ -180,16 +180,17 @@ impl PowerSpectrum<'_> {
         }
         let maxima = self.maxima(from, to);
         for (rank, &k) in maxima.iter().enumerate() {
-            let peak = self.peak(k);
-            let orders = peak.frequency.0 / frequency.0;
+            let hertz = self.interpolate(k).0 * self.bin.0;
+            let orders = hertz / frequency.0;
             let nearest = math::round(orders);
             let tolerance = nearest * uncertainty.0 + width;
-            let harmonic = (peak.frequency.0 - nearest * frequency.0).abs() <= tolerance;
-            if harmonic || peak.snr < MIN_SNR || peak.frequency.0 > resolved_to.0 {
+            let harmonic = (hertz - nearest * frequency.0).abs() <= tolerance;
+            let stronger = maxima.get(..rank).unwrap_or_default();
+            if harmonic || hertz > resolved_to.0 || self.is_side_lobe(k, stronger) {
                 continue;
             }
-            let stronger = maxima.get(..rank).unwrap_or_default();
-            if !self.is_side_lobe(k, stronger) {
+            let peak = self.peak(k);
+            if peak.snr >= MIN_SNR {
                 let orders_off = orders - nearest;
                 return Search::Found(NonHarmonic {
                     peak,

@@ -254,7 +254,7 @@ fn reset_forgets_everything() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(32))]
+    #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// However the stream is cut into blocks, and whatever else runs between them, the same bits come out.
     #[test]

@@ -170,7 +170,7 @@ fn extreme_inputs_neither_overflow_nor_lose_accuracy() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Blocks of random extremes, which have more ways to add up than any list has.
     #[test]

@@ -223,6 +223,114 @@ fn frequency_is_right_to_a_tenth_of_a_bin() {
     }
 }
 
+/// The error that strong neighbours cause without any noise: five times stronger ones four bins away still leave a tenth of a bin.
+#[test]
+fn strong_neighbours_move_a_peak_little() {
+    let mut worst = 0f64;
+    for step in 0..100 {
+        let bin = 100.0 + 0.01 * f64::from(step);
+        for (below, above) in [(0.0, 0.7), (0.3, 0.1), (0.6, 0.9)] {
+            let samples = block(|n| {
+                let t = TAU * n as f64 / TOOL_POINTS as f64;
+                let tone = |bin: f64, turns: f64| (bin * t + TAU * turns).cos();
+                [
+                    tone(bin, 0.2) + 5.0 * tone(bin - 4.0, below) + 5.0 * tone(bin + 4.0, above),
+                    0.0,
+                    0.0,
+                ]
+            });
+            let found = tool(&samples, &[0], |s| {
+                let near = |bins: f64| Hertz(((bin + bins) * f64::from(s.bin.0)) as f32);
+                f64::from(s.dominant(near(-0.6), near(0.6)).expect("a peak").frequency.0 / s.bin.0)
+            });
+            worst = worst.max((found - bin).abs());
+        }
+    }
+    println!("worst {worst:.4} bins");
+    assert!(worst <= 0.1, "{worst} bins");
+}
+
+/// Pure noise, and pure harmonics of a spindle with all their side lobes, hold no tone to be found.
+#[test]
+fn nothing_is_found_where_nothing_is() {
+    let seed = 41;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (from, to) = (Hertz(50.0), Hertz(5_000.0));
+    for trial in 0..200 {
+        let noise: Vec<[f64; 3]> = (0..TOOL_POINTS)
+            .map(|_| [0; 3].map(|_| rng.sample::<f64, _>(StandardNormal)))
+            .collect();
+        let spindle = rng.random_range(150.0..700.0);
+        let rotation = Rotation {
+            frequency: Hertz(spindle as f32),
+            uncertainty: Hertz(0.0),
+        };
+        let phases: Vec<f64> = (0..50).map(|_| rng.random_range(0.0..TAU)).collect();
+        let harmonics = |n: usize| -> f64 {
+            let angle = TAU * spindle * n as f64 / TOOL_RATE;
+            let orders = (1..).take_while(|&order| f64::from(order) * spindle < TOOL_RATE / 2.0);
+            orders
+                .map(|order| {
+                    30.0 * (f64::from(order) * angle + phases[order as usize]).cos() / f64::from(order)
+                })
+                .sum()
+        };
+        let quiet = tool(&block(|n| noise[n]), &[0, 1, 2], |s| s.dominant(from, to));
+        assert_eq!(quiet, None, "noise, trial {trial}, seed {seed}");
+        for loudness in [1e-4, 1.0] {
+            let samples = block(|n| noise[n].map(|x| loudness * x + harmonics(n)));
+            let found = tool(&samples, &[0, 1, 2], |s| {
+                s.dominant_non_harmonic(rotation, from, to)
+            });
+            assert_eq!(
+                found,
+                Search::Nothing { resolved_to: to },
+                "{spindle} Hz, trial {trial}, seed {seed}"
+            );
+        }
+    }
+}
+
+/// Neither tones nor gravity raise the floor, and the power near a tone is the tone's wherever it lies between the bins.
+#[test]
+fn floor_is_the_noise_and_power_near_a_tone_is_the_tone() {
+    let seed = 43;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let noise: Vec<f64> = (0..TOOL_POINTS)
+        .map(|_| 0.1 * rng.sample::<f64, _>(StandardNormal))
+        .collect();
+    let floor_of = |tones: bool| {
+        let samples = block(|n| {
+            let t = TAU * n as f64 / TOOL_POINTS as f64;
+            let comb: f64 = (1..25).map(|i| (20.3 * f64::from(i) * t).sin()).sum();
+            [9.81 + noise[n] + if tones { comb } else { 0.0 }, 0.0, 0.0]
+        });
+        tool(&samples, &[0], |s| s.noise_floor(203))
+    };
+    let (with, without) = (floor_of(true), floor_of(false));
+    // Halfway to its next peak the side lobes of such a comb lie 58 dB below it, well under this noise.
+    assert!(
+        with < 2.0 * without && without < 2.0 * with,
+        "{with} with tones, {without} without (seed {seed})"
+    );
+    // The median of an exponential distribution is ln 2 of its mean, 3σ²/N here.
+    let expected = 2f32.ln() * 3.0 * 1e-2 / TOOL_POINTS as f32;
+    assert!(
+        (without / expected - 1.0).abs() < 0.25,
+        "{without} for {expected} (seed {seed})"
+    );
+
+    for step in 0..20 {
+        let bin = 300.0 + 0.05 * f64::from(step);
+        let samples = block(|n| [2.0 * (TAU * bin * n as f64 / TOOL_POINTS as f64).sin(), 0.0, 0.0]);
+        let found = tool(&samples, &[0], |s| {
+            s.mean_square_near(Hertz(bin as f32 * s.bin.0))
+        });
+        // Five bins hold all but 0.5 % of the main lobe at worst.
+        assert!((found / 2.0 - 1.0).abs() < 0.005, "bin {bin}: {found}");
+    }
+}
+
 /// A comb of spindle harmonics with a weaker tone between two of them, in the structure band.
 #[test]
 fn chatter_is_told_from_harmonics() {
