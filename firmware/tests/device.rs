@@ -192,7 +192,6 @@ fn straight(blocks: &[(quietcut_core::acceleration::Block, Vec<Edge>)], table: O
     let monitor = Monitor::new(SETTINGS).unwrap();
     let mut state = State::default();
     let mut heard = Heard::default();
-    let mut seen = [None, None];
     for (block, edges) in blocks {
         heard
             .reports
@@ -200,17 +199,15 @@ fn straight(blocks: &[(quietcut_core::acceleration::Block, Vec<Edge>)], table: O
         heard
             .strobes
             .extend(state.strobes().iter().map(|strobe| (block.sequence, *strobe)));
-        for (band, seen) in [Band::Structure, Band::Tool].into_iter().zip(&mut seen) {
-            let Some((sequence, spectrum)) = state.spectrum(band) else {
+        for band in [Band::Structure, Band::Tool] {
+            if !state.has_fresh_spectrum(band) {
                 continue;
-            };
-            if *seen != Some(sequence) {
-                *seen = Some(sequence);
-                let power = spectrum.power.iter().map(|power| power.to_bits()).collect();
-                heard
-                    .spectra
-                    .push((band, sequence, spectrum.bin.0.to_bits(), power));
             }
+            let spectrum = state.spectrum(band).unwrap();
+            let power = spectrum.power.iter().map(|power| power.to_bits()).collect();
+            heard
+                .spectra
+                .push((band, block.sequence, spectrum.bin.0.to_bits(), power));
         }
     }
     heard

@@ -143,9 +143,14 @@ impl State {
         &self.strobes
     }
 
-    /// The newest spectrum of a band, with the sequence number of the block that completed it.
-    pub fn spectrum(&self, _band: Band) -> Option<(u32, PowerSpectrum<'_>)> {
+    /// The newest spectrum of a band, summed over the axes; `None` before the first.
+    pub fn spectrum(&self, _band: Band) -> Option<PowerSpectrum<'_>> {
         None
+    }
+
+    /// True where the newest block completed a spectrum of the band.
+    pub fn has_fresh_spectrum(&self, _band: Band) -> bool {
+        false
     }
 
     /// The sample clock: rate, clips, losses.

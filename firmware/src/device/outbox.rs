@@ -15,7 +15,7 @@ const BANDS: [Band; 2] = [Band::Structure, Band::Tool];
 pub(super) struct Outbox {
     report: Option<Report>,
     strobes: Option<Strobes>,
-    spectra: [Spectrum; BANDS.len()],
+    spectra: [Option<Spectrum>; BANDS.len()],
     /// The reply to the request that is being done, with its sequence number.
     reply: Option<(u16, Reply)>,
     /// True where the reply comes behind all that the request has made, false where it goes first.
@@ -28,13 +28,12 @@ struct Strobes {
     next: usize,
 }
 
-/// Where the sending of a band's spectra stands.
-#[derive(Default)]
+/// A spectrum that is being sent.
 struct Spectrum {
-    /// Sequence number of the newest one that was begun or passed over.
-    seen: Option<u32>,
-    /// The first bin that was not sent, while one is being sent.
-    next: Option<usize>,
+    /// Sequence number of the block that completed it.
+    sequence: u32,
+    /// The first bin that was not sent.
+    next: usize,
 }
 
 impl Outbox {
@@ -78,14 +77,10 @@ impl Outbox {
             self.strobes = Some(Strobes { sequence, next: 0 });
         }
         for (band, sending) in BANDS.into_iter().zip(&mut self.spectra) {
-            let newest = state.spectrum(band).map(|(sequence, _)| sequence);
-            if newest != sending.seen {
-                // The one before was not finished: its memory now holds this one.
-                self.dropped = self
-                    .dropped
-                    .saturating_add(u32::from(sending.next.take().is_some()));
-                sending.seen = newest;
-                sending.next = (subscription.spectra && newest.is_some()).then_some(0);
+            if state.has_fresh_spectrum(band) {
+                // One that was not finished is gone: its memory now holds this one.
+                self.dropped = self.dropped.saturating_add(u32::from(sending.is_some()));
+                *sending = subscription.spectra.then_some(Spectrum { sequence, next: 0 });
             }
         }
     }
@@ -112,8 +107,8 @@ impl Outbox {
                 link.send(&Response::Report(report));
             } else if let Some(strobes) = self.strobes.take() {
                 self.strobes = send_strobes(link, state, strobes);
-            } else if let Some((band, sending)) = self.next_spectrum() {
-                sending.next = send_spectrum(link, state, band, sending);
+            } else if let Some((band, slot, spectrum)) = self.next_spectrum() {
+                *slot = send_spectrum(link, state, band, spectrum);
             } else if self.reply.is_some() {
                 sent = self.send_reply(link);
             } else {
@@ -132,11 +127,12 @@ impl Outbox {
         Some((request, reply))
     }
 
-    fn next_spectrum(&mut self) -> Option<(Band, &mut Spectrum)> {
-        BANDS
-            .into_iter()
-            .zip(&mut self.spectra)
-            .find(|(_, spectrum)| spectrum.next.is_some())
+    /// The band whose spectrum is being sent, where to put what is left of it, and the spectrum.
+    fn next_spectrum(&mut self) -> Option<(Band, &mut Option<Spectrum>, Spectrum)> {
+        BANDS.into_iter().zip(&mut self.spectra).find_map(|(band, slot)| {
+            let spectrum = slot.take()?;
+            Some((band, slot, spectrum))
+        })
     }
 }
 
@@ -157,21 +153,20 @@ fn send_strobes(link: &mut Link, state: &State, strobes: Strobes) -> Option<Stro
     (next < state.strobes().len()).then_some(Strobes { next, ..strobes })
 }
 
-/// Sends the next piece of a spectrum; the first bin that is left.
-fn send_spectrum(link: &mut Link, state: &State, band: Band, sending: &Spectrum) -> Option<usize> {
-    let (sequence, spectrum) = state.spectrum(band)?;
-    let first = sending.next?;
+/// Sends the next piece of a spectrum; what is left of it.
+fn send_spectrum(link: &mut Link, state: &State, band: Band, sending: Spectrum) -> Option<Spectrum> {
+    let spectrum = state.spectrum(band)?;
     let mut power = Vec::new();
-    let rest = spectrum.power.get(first..)?;
+    let rest = spectrum.power.get(sending.next..)?;
     power.extend(rest.iter().copied().take(power.capacity()));
-    let next = first + power.len();
+    let next = sending.next + power.len();
     link.send(&Response::Spectrum(SpectrumChunk {
         band,
-        sequence,
+        sequence: sending.sequence,
         bin: spectrum.bin,
         bins: spectrum.power.len() as u16,
-        first: first as u16,
+        first: sending.next as u16,
         power,
     }));
-    (next < spectrum.power.len()).then_some(next)
+    (next < spectrum.power.len()).then_some(Spectrum { next, ..sending })
 }
