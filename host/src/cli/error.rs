@@ -107,7 +107,9 @@ impl From<BuildError> for Error {
 impl From<DeviceError> for Error {
     fn from(error: DeviceError) -> Self {
         match error {
-            DeviceError::PseudoTerminal { .. } | DeviceError::TooLarge { .. } => Self::other(error),
+            DeviceError::PseudoTerminal { .. } | DeviceError::TooLarge { .. } | DeviceError::Cell(_) => {
+                Self::other(error)
+            }
             // Port, cable, device or table: all of them the user's to mend.
             _ => Self::input(error),
         }

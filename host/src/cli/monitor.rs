@@ -4,13 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use quietcut_core::monitor::Report;
 use quietcut_core::protocol::{Reports, Subscription};
 
 use super::port::PortArgs;
 use super::{Error, Output, positive};
 use crate::device::{Client, Event};
-use crate::report::answer::{VerdictLog, seconds};
+use crate::report::answer::VerdictLog;
 use crate::report::words;
 
 /// What the device hears, live: speed, verdict, chatter frequency, advice.
@@ -43,9 +42,10 @@ pub fn run(args: Args) -> Result<(), Error> {
         reports: Reports::All,
         ..Subscription::default()
     })?;
+    // A time too far to count is no end.
     let end = args
         .seconds
-        .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
+        .and_then(|seconds| Instant::now().checked_add(Duration::try_from_secs_f64(seconds).ok()?));
     let log = listen(&mut client, args.output, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     })?;
@@ -56,13 +56,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             client.lost_frames()
         );
     }
-    let summary = &log.summary;
-    let verdict = summary.verdict.unwrap_or("no verdict");
-    let text = format!(
-        "{} blocks, {} samples clipped, {} gaps; last: {verdict}",
-        summary.blocks, summary.clipped, summary.gaps
-    );
-    args.output.answer(&log, text)
+    args.output.answer(&log, &log.summary)
 }
 
 /// Prints news, and now and then a sign of life, until `is_over`.
@@ -75,25 +69,9 @@ fn listen(client: &mut Client, output: Output, is_over: impl Fn() -> bool) -> Re
         };
         let is_news = log.take(&report).is_some();
         if is_news || said.elapsed() >= QUIET_LINES {
-            output.line(line(&report))?;
+            output.line(words::line(&report))?;
             said = Instant::now();
         }
     }
     Ok(log)
-}
-
-/// `   12.3 s   900 rev/min  CHATTER at 17.4 Hz …: go to 1480 rev/min (…)`.
-fn line(report: &Report) -> String {
-    let speed = report
-        .speed
-        .map_or("     no speed".into(), |speed| format!("{:5.0} rev/min", speed.0));
-    let verdict = words::verdict(&report.judgement);
-    let advice = match &report.advice {
-        Some(advice) if report.judgement.verdict.is_chatter() => {
-            let why = words::why(advice, &report.judgement, report.speed);
-            format!(": {} ({why})", words::action(advice))
-        }
-        _ => String::new(),
-    };
-    format!("{:7.1} s  {speed}  {verdict}{advice}", seconds(report))
 }

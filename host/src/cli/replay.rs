@@ -2,11 +2,14 @@
 
 use std::num::NonZeroU8;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::monitor::{Monitor, State};
+use quietcut_core::protocol::{Reports, Subscription};
 
 use super::{Error, Output, count, positive};
+use crate::device::{self, Client, Event};
 use crate::recording::{Recording, RecordingError, Sensed, Speed};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
@@ -52,7 +55,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     }
     let table = args.table.as_deref().map(crate::file::read).transpose()?;
     let log = match &args.port {
-        Some(_) => return Err(Error::not_built("replay --port")),
+        Some(port) => on_device(&args, port, &sensed, table.as_deref())?,
         None => here(&args, &sensed, table.as_deref())?,
     };
     args.output.answer(&log, format_args!("{}", log.summary))
@@ -80,6 +83,38 @@ fn here(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog
             args.output.line(words::line(&report))?;
         }
     }
+    Ok(log)
+}
+
+/// Through the pipeline of a device, which afterwards is set up as it was before and listens to its sensor again.
+fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
+    let (mut client, _) = Client::connect(device::open(port, None)?)?;
+    if let (Some(bytes), Some(path)) = (table, &args.table) {
+        client.upload(&parse(path, bytes)?, |_, _| {})?;
+    }
+    let (settings, status) = (client.settings()?, client.status()?);
+    client.set_settings(sensed.settings)?;
+    client.set_working_point(sensed.working_point)?;
+    client.subscribe(Subscription {
+        reports: Reports::All,
+        ..Subscription::default()
+    })?;
+    let mut log = VerdictLog::default();
+    for (block, edges) in sensed.steps() {
+        client.feed(block, edges)?;
+        // The report of a block comes before the answer to it.
+        while let Some(event) = client.next_event(Duration::ZERO)? {
+            if let Event::Report(report) = event
+                && log.take(&report).is_some()
+            {
+                args.output.line(words::line(&report))?;
+            }
+        }
+    }
+    client.subscribe(Subscription::default())?;
+    client.set_working_point(status.working_point)?;
+    client.set_settings(settings)?;
+    client.reset()?;
     Ok(log)
 }
 

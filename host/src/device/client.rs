@@ -72,6 +72,9 @@ impl Client {
         // A zero ends what noise may have begun.
         client.port.send(&[0], SEND)?;
         let info = client.hello()?;
+        // What was on the line before belongs to another session.
+        client.events.clear();
+        client.lost_frames = 0;
         Ok((client, info))
     }
 

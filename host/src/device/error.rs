@@ -4,7 +4,11 @@ use std::io;
 use std::time::Duration;
 
 use quietcut_core::lobes::TableError;
+use quietcut_core::monitor::SettingsError;
 use quietcut_core::protocol::{FrameError, Refusal};
+
+use super::FlashFileError;
+use crate::case::CaseError;
 
 /// A device that could not be reached, or did not do what it was asked to.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +49,18 @@ pub enum DeviceError {
         /// What the system says.
         cause: serialport::Error,
     },
+    /// The memory of the simulated device cannot be had.
+    #[error(transparent)]
+    FlashFile(#[from] FlashFileError),
+    /// The simulated device cannot be set up like this.
+    #[error("the simulated device cannot have {error}")]
+    Settings {
+        /// Why not.
+        error: SettingsError,
+    },
+    /// The case of the virtual cell is wrong: a fault in quietcut itself.
+    #[error(transparent)]
+    Cell(#[from] CaseError),
     /// Nothing came in time.
     #[error("{port}: no answer to {request} within {:.1} s, asked {attempts} times; is it a quietcut device?", waited.as_secs_f64())]
     NoAnswer {

@@ -1,6 +1,7 @@
 //! A lobe table to the device, in chunks; goes on where an earlier upload of the same table stopped.
 
 use quietcut_core::lobes::LobeTable;
+use quietcut_core::lobes::format::HEADER_LENGTH;
 use quietcut_core::protocol::message::MAX_CHUNK;
 use quietcut_core::protocol::{Info, Refusal, Reply, Request, Upload};
 
@@ -70,7 +71,12 @@ impl Client {
             Reply::Upload(Upload { received, .. }) => received,
             other => return Err(self.unexpected(BEGIN, &other)),
         };
-        resumed_at.get_or_insert(received);
+        // The device has the header from the request itself.
+        resumed_at.get_or_insert(if received > HEADER_LENGTH as u32 {
+            received
+        } else {
+            0
+        });
         progress(received, header.length);
         while received < header.length {
             received = self.send_chunk(bytes, received)?;

@@ -78,7 +78,7 @@ pub fn line(report: &Report) -> String {
         || "      speed ?".into(),
         |speed| format!("{:6.0} rev/min", speed.0),
     );
-    let seconds = report.time.0 as f64 * 1e-9;
+    let seconds = super::answer::seconds(report);
     let said = verdict(&report.judgement);
     match &report.advice {
         Some(advice) if advice.action != Action::Keep => format!(

@@ -1,0 +1,177 @@
+//! The flash of the simulated device: in memory, and in a file where its tables shall outlive it.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
+use quietcut_firmware::flash_model::FlashModel;
+use quietcut_firmware::storage::TableMemory;
+
+/// Bytes of the flash for tables: the second bank of the NUCLEO-G474RE.
+const FLASH_BYTES: usize = 256 * 1024;
+/// Bytes that are written at once, on that board.
+const WORD: usize = 8;
+/// Bytes that are erased at once, on that board.
+const PAGE: usize = 2048;
+/// What erased flash reads as.
+const ERASED: u8 = 0xff;
+
+/// A state file that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FlashFileError {
+    /// It cannot be opened, read or made.
+    #[error("{}: cannot use it as the memory of the simulated device: {cause}", path.display())]
+    Access {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: std::io::Error,
+    },
+    /// It is something else.
+    #[error("{}: {found} bytes; a memory of the simulated device has {FLASH_BYTES}; name a new file to begin with an empty one", path.display())]
+    Length {
+        /// The file.
+        path: PathBuf,
+        /// Its bytes.
+        found: u64,
+    },
+}
+
+/// Flash that obeys the rules of the real one; every change goes to the file at once, so that whatever ends the
+/// command leaves what a power cut leaves.
+pub(super) struct FlashFile {
+    flash: FlashModel<Vec<u8>, WORD, PAGE>,
+    file: Option<File>,
+}
+
+impl FlashFile {
+    /// Empty flash that is gone with the device.
+    pub(super) fn in_memory() -> Self {
+        Self {
+            flash: FlashModel::new(vec![ERASED; FLASH_BYTES]),
+            file: None,
+        }
+    }
+
+    /// The flash in the file at `path`; a file that is not there yet is made, with empty flash.
+    ///
+    /// # Errors
+    /// Where the file cannot be used, or has another length than the flash.
+    pub(super) fn open(path: &Path) -> Result<Self, FlashFileError> {
+        let access = |cause| FlashFileError::Access {
+            path: path.into(),
+            cause,
+        };
+        let opened = File::options().read(true).write(true).open(path);
+        let mut file = match opened {
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                crate::file::write(path, &[ERASED; FLASH_BYTES])
+                    .map_err(|error| access(std::io::Error::other(error.to_string())))?;
+                File::options()
+                    .read(true)
+                    .write(true)
+                    .open(path)
+                    .map_err(access)?
+            }
+            other => other.map_err(access)?,
+        };
+        let found = file.metadata().map_err(access)?.len();
+        if found != FLASH_BYTES as u64 {
+            return Err(FlashFileError::Length {
+                path: path.into(),
+                found,
+            });
+        }
+        let mut bytes = vec![0; FLASH_BYTES];
+        file.read_exact(&mut bytes).map_err(access)?;
+        Ok(Self {
+            flash: FlashModel::new(bytes),
+            file: Some(file),
+        })
+    }
+
+    /// Brings the file up to date between two offsets.
+    fn store(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        let Some(file) = &mut self.file else { return Ok(()) };
+        let changed = self.flash.mapped().get(from as usize..to as usize);
+        let changed = changed.ok_or(NorFlashErrorKind::OutOfBounds)?;
+        file.seek(SeekFrom::Start(from.into()))
+            .and_then(|_| file.write_all(changed))
+            .map_err(|_| NorFlashErrorKind::Other)
+    }
+}
+
+impl ErrorType for FlashFile {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for FlashFile {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.flash.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.flash.capacity()
+    }
+}
+
+impl NorFlash for FlashFile {
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = PAGE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        self.flash.erase(from, to)?;
+        self.store(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.flash.write(offset, bytes)?;
+        self.store(offset, offset + bytes.len() as u32)
+    }
+}
+
+impl TableMemory for FlashFile {
+    fn mapped(&self) -> &[u8] {
+        self.flash.mapped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_in_the_file_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("flash.bin");
+        let mut flash = FlashFile::open(&path).unwrap();
+        flash.write(4096, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
+        flash.write(8192, &[0; 8]).unwrap();
+        flash.erase(8192, 8192 + PAGE as u32).unwrap();
+        // A word may be written once after an erase.
+        assert!(flash.write(4096, &[0; 8]).is_err());
+        let mut again = FlashFile::open(&path).unwrap();
+        let mut bytes = [0; 10];
+        again.read(4096, &mut bytes).unwrap();
+        assert_eq!(bytes, [1, 2, 3, 4, 5, 6, 7, 8, ERASED, ERASED]);
+        assert_eq!(again.mapped(), flash.mapped());
+        assert_eq!(again.mapped()[8192], ERASED);
+    }
+
+    #[test]
+    fn a_file_that_is_none_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("case.toml");
+        std::fs::write(&path, "name = 1").unwrap();
+        assert!(matches!(
+            FlashFile::open(&path),
+            Err(FlashFileError::Length { found: 8, .. })
+        ));
+        assert_eq!(std::fs::read(&path).unwrap(), b"name = 1");
+        let missing = FlashFile::open(&folder.path().join("no/such.bin"));
+        assert!(matches!(missing, Err(FlashFileError::Access { .. })));
+    }
+}

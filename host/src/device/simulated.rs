@@ -1,0 +1,229 @@
+//! The simulated device: the firmware's device logic in a thread of this process, behind a pseudo-terminal, with a
+//! virtual spindle for a sensor.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::Receiver;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use quietcut_core::acceleration::Sensor;
+use quietcut_core::monitor::{Settings, State};
+use quietcut_core::tachometer::Wheel;
+use quietcut_core::units::Nanoseconds;
+use quietcut_core::working_point::Tool;
+use quietcut_firmware::device::{Clock, Device, Identity};
+
+use super::DeviceError;
+use super::flash_file::FlashFile;
+use super::port::{Port, SIMULATED, SerialLine};
+use super::pseudo_terminal::PseudoTerminal;
+use super::virtual_spindle::VirtualSpindle;
+use crate::simulate::Heard;
+
+/// How fast the virtual spindle turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// A second takes a second.
+    RealTime,
+    /// As fast as the host takes what the device says.
+    AsFastAsPossible,
+}
+
+/// How the simulated device is set up.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup<'a> {
+    /// The file that keeps its flash; without one it is gone with the device.
+    pub state: Option<&'a Path>,
+    /// Number of teeth of the tool.
+    pub teeth: u8,
+    /// How fast the virtual spindle turns.
+    pub pace: Pace,
+}
+
+/// A device without hardware. It runs until this is dropped.
+pub struct SimulatedDevice {
+    path: String,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl SimulatedDevice {
+    /// Switches a device on, in front of a virtual spindle that makes these cuts as they come.
+    ///
+    /// # Errors
+    /// Where there is no pseudo-terminal left, the state file cannot be used, or the teeth are too many.
+    pub fn start(setup: Setup<'_>, cuts: Receiver<Heard>) -> Result<Self, DeviceError> {
+        let terminal = PseudoTerminal::new()?;
+        let flash = match setup.state {
+            Some(path) => FlashFile::open(path)?,
+            None => FlashFile::in_memory(),
+        };
+        let settings = settings(setup.teeth);
+        quietcut_core::monitor::Monitor::new(settings).map_err(|error| DeviceError::Settings { error })?;
+        let path = terminal.path().to_owned();
+        let stop = Arc::new(AtomicBool::new(false));
+        let machine = Machine {
+            terminal,
+            spindle: VirtualSpindle::new(cuts),
+            pace: setup.pace,
+            stop: stop.clone(),
+        };
+        let thread = std::thread::spawn(move || machine.run(settings, flash));
+        Ok(Self {
+            path,
+            stop,
+            thread: Some(thread),
+        })
+    }
+
+    /// The path of its serial port.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+}
+
+impl Drop for SimulatedDevice {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A panic in there has been reported where it happened.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The port of a simulated device that belongs to this port alone.
+pub struct SimulatedPort {
+    line: SerialLine,
+    _device: SimulatedDevice,
+}
+
+impl SimulatedPort {
+    /// Opens the serial port of a device by its path, as that of any other.
+    ///
+    /// # Errors
+    /// Where it cannot be opened.
+    pub fn open(device: SimulatedDevice) -> Result<Self, DeviceError> {
+        Ok(Self {
+            line: SerialLine::open(device.path())?,
+            _device: device,
+        })
+    }
+}
+
+impl Port for SimulatedPort {
+    fn name(&self) -> &str {
+        SIMULATED
+    }
+
+    fn send(&mut self, bytes: &[u8], timeout: Duration) -> Result<(), DeviceError> {
+        self.line.send(bytes, timeout)
+    }
+
+    fn receive(&mut self, into: &mut [u8], timeout: Duration) -> Result<usize, DeviceError> {
+        self.line.receive(into, timeout)
+    }
+}
+
+/// What the pipeline of the simulated device is set up for: the board's sensor, one tachometer mark per turn.
+fn settings(teeth: u8) -> Settings {
+    Settings {
+        sensor: Sensor::IIS3DWB_16G,
+        tool: Tool { teeth },
+        wheel: Some(Wheel {
+            positions: 1,
+            missing: 0,
+        }),
+        assumed_speed: None,
+        limits: None,
+    }
+}
+
+/// What the thread of the device works with.
+struct Machine {
+    terminal: PseudoTerminal,
+    spindle: VirtualSpindle,
+    pace: Pace,
+    stop: Arc<AtomicBool>,
+}
+
+/// The device's clock: that of its samples where they come faster than real time, else that of this computer.
+#[derive(Clone)]
+struct SharedClock(Arc<AtomicU64>);
+
+impl Clock for SharedClock {
+    fn now(&self) -> Nanoseconds {
+        Nanoseconds(self.0.load(Ordering::Relaxed))
+    }
+}
+
+/// The longest that the loop waits for bytes while the spindle stands.
+const IDLE: Duration = Duration::from_millis(5);
+
+impl Machine {
+    fn run(mut self, settings: Settings, flash: FlashFile) {
+        let identity = Identity {
+            board: SIMULATED,
+            sensor: Some(settings.sensor),
+        };
+        let clock = SharedClock(Arc::default());
+        let mut state = Box::<State>::default();
+        let Ok(mut device) = Device::new(identity, settings, &mut state, flash, clock.clone()) else {
+            // The settings were checked before the thread began.
+            return;
+        };
+        let began = Instant::now();
+        let mut pending = Vec::new();
+        let mut bytes = [0; 512];
+        while !self.stop.load(Ordering::Relaxed) {
+            let due = self.step_due(&clock, began);
+            let patience = if due || !pending.is_empty() {
+                Duration::ZERO
+            } else {
+                self.patience(&clock, began)
+            };
+            let Ok(count) = self.terminal.receive(&mut bytes, patience) else {
+                return;
+            };
+            pending.extend_from_slice(bytes.get(..count).unwrap_or_default());
+            let taken = device.receive(&pending);
+            pending.drain(..taken);
+            // Where the line is full the spindle waits: nothing is dropped.
+            while !device.outgoing().is_empty() && !self.stop.load(Ordering::Relaxed) {
+                match self.terminal.send(device.outgoing(), IDLE) {
+                    Ok(count) => device.sent(count),
+                    Err(_) => return,
+                }
+            }
+            if due && let Some((block, edges)) = self.spindle.take() {
+                clock.0.fetch_max(block.time.0, Ordering::Relaxed);
+                device.take(&block, &edges);
+            }
+        }
+    }
+
+    /// True where the next block is there and its time has come.
+    fn step_due(&mut self, clock: &SharedClock, began: Instant) -> bool {
+        let now = clock.now();
+        let Some((block, _)) = self.spindle.peek(now) else {
+            return false;
+        };
+        match self.pace {
+            Pace::AsFastAsPossible => true,
+            Pace::RealTime => block.time.0 <= began.elapsed().as_nanos() as u64,
+        }
+    }
+
+    fn patience(&mut self, clock: &SharedClock, began: Instant) -> Duration {
+        let elapsed = began.elapsed().as_nanos() as u64;
+        if self.pace == Pace::RealTime {
+            clock.0.fetch_max(elapsed, Ordering::Relaxed);
+        }
+        match self.spindle.peek(clock.now()) {
+            Some((block, _)) => Duration::from_nanos(block.time.0.saturating_sub(elapsed)).min(IDLE),
+            None => IDLE,
+        }
+    }
+}
