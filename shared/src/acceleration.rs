@@ -174,6 +174,18 @@ impl SampleClock {
 }
 
 impl SampleClockState {
+    /// Before the first block.
+    pub const fn new() -> Self {
+        Self {
+            line: None,
+            next_sequence: 0,
+            block_samples: 0,
+            clipped: 0,
+            lost: 0,
+            gaps: 0,
+        }
+    }
+
     /// Fitted time of sample number `n` of the newest block; 0 is its first.
     pub fn time_of(&self, n: u32) -> Option<Nanoseconds> {
         self.time_at(n as f32)

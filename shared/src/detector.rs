@@ -1,5 +1,9 @@
 //! The verdict: what the machine is doing.
 
+pub mod growth;
+pub mod judge;
+pub mod tone;
+
 use serde::{Deserialize, Serialize};
 
 use crate::units::Hertz;

@@ -3,12 +3,24 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::acceleration::{Block, SampleClock, SampleClockState, Sensor};
-use crate::advice::Advice;
-use crate::detector::{Judgement, Reason, Verdict};
+use crate::acceleration::{Block, Continuity, SampleClock, SampleClockState, Sensor};
+use crate::advice::{self, Advice};
+use crate::decimation::{
+    self, Decimation, FRACTION_BITS, MAX_RATE, MIN_RATE, STRUCTURE_BAND, Sample, TOOL_BAND,
+};
+use crate::detector::growth::{Finding, Growth};
+use crate::detector::judge::{Detector, Evidence};
+use crate::detector::tone::{Background, Tone};
+use crate::detector::{Judgement, Verdict};
 use crate::lobes::LobeTable;
-use crate::spectrum::PowerSpectrum;
-use crate::tachometer::{Edge, Tachometer, TachometerState, Wheel};
+use crate::math;
+use crate::peaks::Rotation;
+use crate::spectrum::{
+    Overlap, PowerSpectrum, STRUCTURE_BINS, STRUCTURE_POINTS, TOOL_BINS, TOOL_POINTS, structure_spectrum,
+    tool_spectrum,
+};
+use crate::synchronous::{Method, Passed, SLOTS, Sampler, SamplerState};
+use crate::tachometer::{Edge, Tachometer, TachometerState, Turns, Wheel};
 use crate::units::{Hertz, Nanoseconds, Rpm};
 use crate::working_point::{Limits, Tool, WorkingPoint};
 
@@ -37,7 +49,7 @@ pub enum SettingsError {
     Teeth(u8),
     /// The wheel has no positions, or less than four teeth beside its gap.
     Wheel(Wheel),
-    /// The sample rate is not within 1 to 100 kHz.
+    /// The sample rate is not one that the filters are made for.
     SampleRate(Hertz),
     /// The value of one count is not a positive number.
     CountScale(f32),
@@ -58,7 +70,10 @@ impl core::fmt::Display for SettingsError {
                 "a wheel with {} positions of which {} are missing: at least 1 position, and 4 teeth beside a gap, are needed",
                 wheel.positions, wheel.missing
             ),
-            Self::SampleRate(rate) => write!(f, "a sample rate of {rate}: 1000 to 100000 Hz are possible"),
+            Self::SampleRate(rate) => write!(
+                f,
+                "a sample rate of {rate}: {MIN_RATE} to {MAX_RATE} are possible"
+            ),
             Self::CountScale(scale) => write!(f, "a count of {scale} m/s²: it must be a number above 0"),
             Self::Noise(noise) => write!(
                 f,
@@ -127,30 +142,154 @@ pub struct Monitor {
     settings: Settings,
     sample_clock: SampleClock,
     tachometer: Option<Tachometer>,
+    decimation: Decimation,
 }
 
-/// What the pipeline knows from the blocks so far. `State::default()` knows nothing.
-#[derive(Clone, Debug, Default)]
+/// What the pipeline knows from the blocks so far. [`State::new`] knows nothing.
+#[derive(Clone, Debug)]
 pub struct State {
     sample_clock: SampleClockState,
     tachometer: TachometerState,
+    /// Times the tachometer had lost its lock when the angles were last taken from it.
+    losses: u32,
+    decimation: decimation::State,
+    structure: Path<STRUCTURE_POINTS, STRUCTURE_BINS>,
+    tool: Path<TOOL_POINTS, TOOL_BINS>,
+    tool_work: [i32; TOOL_POINTS],
+    work: [f32; STRUCTURE_POINTS],
+    /// Part of the samples that were clipped or lost lately.
+    damage: f32,
+    /// Speed read from the spectrum, where there is no tachometer.
+    heard_speed: Option<Hertz>,
+    detector: Detector,
+    advice: Option<Advised>,
     strobes: Vec<Strobe, MAX_BLOCK_STROBES>,
 }
 
+/// Advice, with what it was given for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Advised {
+    advice: Advice,
+    verdict: Verdict,
+    chatter: Option<Hertz>,
+    speed: Rpm,
+    working_point: Option<WorkingPoint>,
+    with_table: bool,
+}
+
+/// One band on its way from samples to findings.
+#[derive(Clone, Debug)]
+struct Path<const POINTS: usize, const BINS: usize> {
+    overlap: Overlap<POINTS>,
+    power: [f32; BINS],
+    /// Width of a bin of the newest spectrum; 0 before the first.
+    bin: Hertz,
+    /// The newest block completed a spectrum.
+    fresh: bool,
+    background: Background<BINS>,
+    tone: Option<Tone>,
+    sampler: SamplerState,
+    growth: Growth,
+    /// The newest block completed a passing.
+    passed: bool,
+    /// Root mean square of the sensor's noise in one channel of a passing, in m/s².
+    floor: f32,
+    /// Samples of the band since the growth was last looked at.
+    since_look: u32,
+}
+
+impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
+    const fn new() -> Self {
+        Self {
+            overlap: Overlap::new(),
+            power: [0.0; BINS],
+            bin: Hertz(0.0),
+            fresh: false,
+            background: Background::new(),
+            tone: None,
+            sampler: SamplerState::new(),
+            growth: Growth::new(1),
+            passed: false,
+            floor: 0.0,
+            since_look: 0,
+        }
+    }
+
+    /// Forgets the signal, but not what is usual.
+    fn interrupt(&mut self) {
+        self.overlap.reset();
+        self.tone = None;
+        self.interrupt_angles();
+    }
+
+    /// Forgets what was sampled at angles.
+    fn interrupt_angles(&mut self) {
+        self.sampler = SamplerState::new();
+        self.growth.reset();
+    }
+
+    fn spectrum(&self) -> Option<PowerSpectrum<'_>> {
+        (self.bin.0 > 0.0).then_some(PowerSpectrum {
+            power: &self.power,
+            bin: self.bin,
+        })
+    }
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl State {
-    /// The points of the stroboscopic map that the newest block made, oldest first.
+    /// Knows nothing.
+    pub const fn new() -> Self {
+        Self {
+            sample_clock: SampleClockState::new(),
+            tachometer: TachometerState::new(),
+            losses: 0,
+            decimation: decimation::State::new(),
+            structure: Path::new(),
+            tool: Path::new(),
+            tool_work: [0; TOOL_POINTS],
+            work: [0.0; STRUCTURE_POINTS],
+            damage: 0.0,
+            heard_speed: None,
+            detector: Detector::new(),
+            advice: None,
+            strobes: Vec::new(),
+        }
+    }
+
+    /// The points of the stroboscopic map that the newest block made, oldest first: of the structure band where it holds tooth
+    /// periods long enough, else of the tool band.
     pub fn strobes(&self) -> &[Strobe] {
         &self.strobes
     }
 
     /// The newest spectrum of a band, summed over the axes; `None` before the first.
-    pub fn spectrum(&self, _band: Band) -> Option<PowerSpectrum<'_>> {
-        None
+    pub fn spectrum(&self, band: Band) -> Option<PowerSpectrum<'_>> {
+        match band {
+            Band::Structure => self.structure.spectrum(),
+            Band::Tool => self.tool.spectrum(),
+        }
     }
 
     /// True where the newest block completed a spectrum of the band.
-    pub fn has_fresh_spectrum(&self, _band: Band) -> bool {
-        false
+    pub fn has_fresh_spectrum(&self, band: Band) -> bool {
+        match band {
+            Band::Structure => self.structure.fresh,
+            Band::Tool => self.tool.fresh,
+        }
+    }
+
+    /// What the samples at fixed angles of a band say.
+    pub fn finding(&self, band: Band) -> &Finding {
+        match band {
+            Band::Structure => self.structure.growth.finding(),
+            Band::Tool => self.tool.growth.finding(),
+        }
     }
 
     /// The sample clock: rate, clips, losses.
@@ -161,6 +300,56 @@ impl State {
     /// The tachometer: speed per turn, rejected and missing edges.
     pub fn tachometer(&self) -> &TachometerState {
         &self.tachometer
+    }
+}
+
+/// Samples of a band from one spectrum to the next.
+const TOOL_HOP: usize = TOOL_POINTS / 2;
+const STRUCTURE_HOP: usize = STRUCTURE_POINTS / 4;
+/// A tooth period must have so many samples of a band to be sampled at fixed angles.
+const STRUCTURE_SAMPLES_PER_TOOTH: f32 = 8.0;
+const TOOL_SAMPLES_PER_TOOTH: f32 = 2.5;
+/// The angle must be known to this part of a tooth period.
+const LARGEST_ANGLE_DEVIATION: f32 = 0.03;
+/// Growth is looked at with each passing, but not more often than after so many samples of the tool band: 4 ms.
+const LOOK_SAMPLES: u32 = 53;
+/// A speed that changes by more than this part per turn makes passings that cannot be compared.
+const LARGEST_CHANGE_PER_TURN: f32 = 0.02;
+/// So many clipped or lost samples, as a part of all, and nothing else can be said.
+const LARGEST_DAMAGE: f32 = 0.05;
+/// Blocks over which that is counted.
+const DAMAGE_MEMORY: f32 = 64.0;
+/// An assumed speed is believed to this part,
+const ASSUMED_UNCERTAINTY: f32 = 0.005;
+/// one that was measured to this,
+const MEASURED_UNCERTAINTY: f32 = 5e-4;
+/// and one that was heard at the tooth passing to this part of a bin.
+const HEARD_BINS: f32 = 0.2;
+/// A tooth-passing tone stands out of the noise by this factor of power at least to be believed.
+const HEARD_SNR: f32 = 100.0;
+/// Advice is given anew where the speed has moved by this part.
+const ADVICE_SPEED_STEP: f32 = 0.002;
+/// Or the chatter frequency by this part.
+const ADVICE_FREQUENCY_STEP: f32 = 0.005;
+
+/// The angle at the first sample of a block, and how it goes on.
+#[derive(Clone, Copy, Debug)]
+struct Angles {
+    first: Turns,
+    /// 2⁻³² turns per sample of the sensor.
+    per_sample: u64,
+    /// Standard deviation, in tooth periods.
+    deviation: f32,
+    /// Samples of the sensor per tooth period.
+    samples_per_tooth: f32,
+}
+
+impl Angles {
+    /// The angle at sample `n` of the block, less a group delay in samples.
+    fn at(&self, n: usize, delay: u32) -> Turns {
+        let forward = self.per_sample.wrapping_mul(n as u64);
+        let back = self.per_sample.wrapping_mul(u64::from(delay));
+        Turns(self.first.0.saturating_add(forward).saturating_sub(back))
     }
 }
 
@@ -175,10 +364,13 @@ impl Monitor {
             None => None,
             Some(wheel) => Some(Tachometer::new(wheel).ok_or(SettingsError::Wheel(wheel))?),
         };
+        let rate = settings.sensor.nominal_rate;
+        let decimation = Decimation::new(rate).map_err(|_| SettingsError::SampleRate(rate))?;
         Ok(Self {
             settings,
             sample_clock: settings.sensor.clock(),
             tachometer,
+            decimation,
         })
     }
 
@@ -187,9 +379,9 @@ impl Monitor {
         &self.settings
     }
 
-    /// Takes the next block, and the tachometer edges up to the end of the block that no step has seen yet.
+    /// Takes the next block, and the tachometer edges that no step has seen yet, up to the end of the block.
     ///
-    /// Edges may come in any block that is not later than one turn; they must be in the order of their time.
+    /// Edges may come with a later block than the one they belong to, by a turn at most; they must be in the order of their time.
     pub fn step(
         &self,
         state: &mut State,
@@ -198,36 +390,367 @@ impl Monitor {
         table: Option<&LobeTable<'_>>,
         working_point: Option<&WorkingPoint>,
     ) -> Report {
-        let _ = (table, working_point);
-        state.strobes.clear();
-        self.sample_clock.observe(&mut state.sample_clock, block);
+        self.take_block(state, block);
         let last = (block.counts.len() as u32).saturating_sub(1);
         let time = state.sample_clock.time_of(last).unwrap_or(block.time);
-        if let Some(tachometer) = &self.tachometer {
-            for &edge in edges {
-                tachometer.observe(&mut state.tachometer, edge);
+        let measured = self.take_edges(state, edges, time);
+        let angles = self.angles(state);
+        state.strobes.clear();
+        (state.structure.passed, state.structure.fresh) = (false, false);
+        (state.tool.passed, state.tool.fresh) = (false, false);
+        for (n, &counts) in block.counts.iter().enumerate() {
+            let output = self.decimation.step(&mut state.decimation, counts);
+            if let Some(sample) = output.tool {
+                self.take_tool(state, sample, n, angles.as_ref());
             }
-            tachometer.expire(&mut state.tachometer, time);
+            if let Some(sample) = output.structure {
+                self.take_structure(state, sample, n, angles.as_ref());
+            }
         }
-        let measured = self
-            .tachometer
-            .and_then(|tachometer| tachometer.speed(&state.tachometer));
+        let speed = measured
+            .or_else(|| state.heard_speed.map(Hertz::to_rpm))
+            .or(self.settings.assumed_speed);
+        self.take_spectra(state, measured.map(Rpm::to_hertz));
+        let judgement = self.judge(state, speed);
+        let advice = speed.and_then(|speed| self.advise(state, &judgement, speed, table, working_point));
         Report {
             sequence: block.sequence,
             time,
-            speed: measured.or(self.settings.assumed_speed),
-            judgement: Judgement {
-                verdict: Verdict::Indeterminate,
-                reason: Reason::TooShort,
-                chatter: None,
-                multiplier_abs: None,
-                confidence: 0.0,
-            },
-            advice: None,
+            speed,
+            judgement,
+            advice,
             clipped: state.sample_clock.clipped(),
             lost: state.sample_clock.lost(),
         }
     }
+
+    /// Numbers the samples of the block and deals with what is missing before them.
+    fn take_block(&self, state: &mut State, block: &Block) {
+        let lost = match self.sample_clock.observe(&mut state.sample_clock, block) {
+            Continuity::Contiguous => 0,
+            Continuity::Gap(samples) => samples,
+            Continuity::Restarted => block.lost.max(1),
+        };
+        if lost > 0 {
+            state.decimation.reset();
+            state.structure.interrupt();
+            state.tool.interrupt();
+            state.detector.interrupt();
+        }
+        let bad = f32::from(block.clipped) + lost as f32;
+        let all = block.counts.len() as f32 + lost as f32;
+        if all > 0.0 {
+            state.damage += (bad / all - state.damage) / DAMAGE_MEMORY;
+        }
+    }
+
+    /// Speed as measured, after all edges up to `now`.
+    fn take_edges(&self, state: &mut State, edges: &[Edge], now: Nanoseconds) -> Option<Rpm> {
+        let tachometer = self.tachometer.as_ref()?;
+        for &edge in edges {
+            tachometer.observe(&mut state.tachometer, edge);
+        }
+        tachometer.expire(&mut state.tachometer, now);
+        if state.tachometer.losses() != state.losses {
+            state.losses = state.tachometer.losses();
+            state.structure.interrupt_angles();
+            state.tool.interrupt_angles();
+        }
+        tachometer.speed(&state.tachometer)
+    }
+
+    /// The angles of the samples of the newest block.
+    fn angles(&self, state: &State) -> Option<Angles> {
+        let tachometer = self.tachometer.as_ref()?;
+        let phase = tachometer.phase(&state.tachometer, state.sample_clock.time_of(0)?)?;
+        let rate = state.sample_clock.rate()?;
+        let turns = phase.turns_per_second / rate.0;
+        let teeth = f32::from(self.settings.tool.teeth);
+        Some(Angles {
+            first: phase.angle,
+            per_sample: (turns * 4_294_967_296.0) as u64,
+            deviation: phase.deviation_turns * teeth,
+            samples_per_tooth: 1.0 / (turns * teeth),
+        })
+    }
+
+    /// White noise of the sensor and of its rounding, in (m/s²)² per Hz.
+    fn noise_density(&self) -> f32 {
+        let sensor = &self.settings.sensor;
+        let density = sensor.noise_meters_per_second2_per_root_hertz;
+        let step = sensor.meters_per_second2_per_count;
+        density * density + step * step / 6.0 / sensor.nominal_rate.0
+    }
+
+    fn unit(&self) -> f32 {
+        self.settings.sensor.meters_per_second2_per_count / (1 << FRACTION_BITS) as f32
+    }
+
+    /// Whether samples of a band can be taken at fixed angles.
+    fn can_sample(&self, angles: &Angles, divisor: u32, least: f32) -> bool {
+        angles.samples_per_tooth >= least * divisor as f32 && angles.deviation < LARGEST_ANGLE_DEVIATION
+    }
+
+    fn take_tool(&self, state: &mut State, sample: Sample, n: usize, angles: Option<&Angles>) {
+        let path = &mut state.tool;
+        path.fresh |= path.overlap.push(sample, TOOL_HOP);
+        path.since_look = path.since_look.saturating_add(1);
+        let Some(angles) =
+            angles.filter(|a| self.can_sample(a, self.decimation.tool_divisor(), TOOL_SAMPLES_PER_TOOTH))
+        else {
+            return;
+        };
+        let sampler = Sampler {
+            teeth: self.settings.tool.teeth,
+            method: Method::Value,
+        };
+        let angle = angles.at(n, self.decimation.tool_delay());
+        let unit = self.unit();
+        let Some(passed) = sampler.step(&mut path.sampler, sample.map(|x| x as f32 * unit), angle) else {
+            return;
+        };
+        let rate = self.settings.sensor.nominal_rate.0 / self.decimation.tool_divisor() as f32;
+        let noise = self.noise_density() * 0.5 * rate;
+        let look = path.since_look >= LOOK_SAMPLES;
+        self.take_passing(path, &passed, noise, look);
+        // Slower teeth than the structure band needs are shown from there.
+        if !self.can_sample(
+            angles,
+            self.decimation.structure_divisor(),
+            STRUCTURE_SAMPLES_PER_TOOTH,
+        ) {
+            show(&mut state.strobes, Band::Tool, &passed);
+        }
+    }
+
+    fn take_structure(&self, state: &mut State, sample: Sample, n: usize, angles: Option<&Angles>) {
+        let path = &mut state.structure;
+        path.fresh |= path.overlap.push(sample, STRUCTURE_HOP);
+        let divisor = self.decimation.structure_divisor();
+        let Some(angles) = angles.filter(|a| self.can_sample(a, divisor, STRUCTURE_SAMPLES_PER_TOOTH)) else {
+            return;
+        };
+        let sampler = Sampler {
+            teeth: self.settings.tool.teeth,
+            method: Method::Mean,
+        };
+        let angle = angles.at(n, self.decimation.structure_delay());
+        let unit = self.unit();
+        let Some(passed) = sampler.step(&mut path.sampler, sample.map(|x| x as f32 * unit), angle) else {
+            return;
+        };
+        // A mean over w seconds lets 1/(2w) Hz of the noise through.
+        let rate = self.settings.sensor.nominal_rate.0;
+        let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
+        let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
+        self.take_passing(path, &passed, noise, true);
+        show(&mut state.strobes, Band::Structure, &passed);
+    }
+
+    fn take_passing<const POINTS: usize, const BINS: usize>(
+        &self,
+        path: &mut Path<POINTS, BINS>,
+        passed: &Passed,
+        noise: f32,
+        look: bool,
+    ) {
+        path.floor = math::sqrt(noise);
+        path.growth.push(
+            passed.tooth,
+            &passed.passing,
+            noise,
+            self.settings.tool.teeth,
+            look,
+        );
+        // Without a look there is nothing new to judge.
+        path.passed |= look;
+        if look {
+            path.since_look = 0;
+        }
+    }
+
+    /// Spectra that are due, the background, and the tones in them.
+    fn take_spectra(&self, state: &mut State, measured: Option<Hertz>) {
+        let rate = state
+            .sample_clock
+            .rate()
+            .unwrap_or(self.settings.sensor.nominal_rate);
+        let unit = self.unit();
+        let chatter = state.detector.is_chatter();
+        if state.tool.fresh {
+            let band_rate = Hertz(rate.0 / self.decimation.tool_divisor() as f32);
+            let path = &mut state.tool;
+            let spectrum = tool_spectrum(
+                &path.overlap,
+                &AXES,
+                band_rate,
+                unit,
+                &mut state.tool_work,
+                &mut path.power,
+            );
+            path.bin = spectrum.bin;
+            if measured.is_none() {
+                state.heard_speed = self.hear_speed(&spectrum);
+            }
+        }
+        if state.structure.fresh {
+            let band_rate = Hertz(rate.0 / self.decimation.structure_divisor() as f32);
+            let path = &mut state.structure;
+            let spectrum = structure_spectrum(
+                &path.overlap,
+                &AXES,
+                band_rate,
+                unit,
+                &mut state.work,
+                &mut path.power,
+            );
+            path.bin = spectrum.bin;
+        }
+        if measured.is_some() {
+            state.heard_speed = None;
+        }
+        let rotation = self.rotation(state, measured);
+        if state.tool.fresh {
+            follow_tone(&mut state.tool, rotation, TOOL_TONES, chatter, &mut state.work);
+        }
+        if state.structure.fresh {
+            follow_tone(
+                &mut state.structure,
+                rotation,
+                STRUCTURE_TONES,
+                chatter,
+                &mut state.work,
+            );
+        }
+    }
+
+    /// Revolutions per second read from a tone at the tooth passing near the assumed one.
+    fn hear_speed(&self, spectrum: &PowerSpectrum<'_>) -> Option<Hertz> {
+        let assumed = self.settings.assumed_speed?.to_hertz().0 * f32::from(self.settings.tool.teeth);
+        let reach = ASSUMED_UNCERTAINTY * assumed + spectrum.bin.0;
+        let peak = spectrum.dominant(Hertz(assumed - reach), Hertz(assumed + reach))?;
+        let near = (peak.frequency.0 - assumed).abs() < reach;
+        (near && peak.snr > HEARD_SNR)
+            .then_some(Hertz(peak.frequency.0 / f32::from(self.settings.tool.teeth)))
+    }
+
+    /// What the spindle does, with its uncertainty.
+    fn rotation(&self, state: &State, measured: Option<Hertz>) -> Option<Rotation> {
+        let with = |frequency: Hertz, uncertainty: f32| Rotation {
+            frequency,
+            uncertainty: Hertz(uncertainty),
+        };
+        if let Some(measured) = measured {
+            return Some(with(measured, MEASURED_UNCERTAINTY * measured.0));
+        }
+        if let Some(heard) = state.heard_speed {
+            return Some(with(
+                heard,
+                HEARD_BINS * state.tool.bin.0 / f32::from(self.settings.tool.teeth),
+            ));
+        }
+        let assumed = self.settings.assumed_speed?.to_hertz();
+        Some(with(assumed, ASSUMED_UNCERTAINTY * assumed.0))
+    }
+
+    fn judge(&self, state: &mut State, speed: Option<Rpm>) -> Judgement {
+        let change = state.tachometer.change_per_turn().unwrap_or(0.0);
+        let sampled = self.tachometer.is_some();
+        let finding = |growth: &Growth| -> Option<Finding> {
+            Some(*growth.finding()).filter(|finding| sampled && finding.passings > 0)
+        };
+        let (structure, tool) = (finding(&state.structure.growth), finding(&state.tool.growth));
+        let evidence = Evidence {
+            speed: speed.map(Rpm::to_hertz),
+            changing: change.abs() > LARGEST_CHANGE_PER_TURN,
+            damaged: state.damage > LARGEST_DAMAGE,
+            teeth: self.settings.tool.teeth,
+            findings: [structure.as_ref(), tool.as_ref()],
+            new_passings: [state.structure.passed, state.tool.passed],
+            floors: [state.structure.floor, state.tool.floor],
+            tones: [state.structure.tone.as_ref(), state.tool.tone.as_ref()],
+            new_spectra: [state.structure.fresh, state.tool.fresh],
+        };
+        state.detector.step(&evidence)
+    }
+
+    /// Advice, given anew where something has changed.
+    fn advise(
+        &self,
+        state: &mut State,
+        judgement: &Judgement,
+        speed: Rpm,
+        table: Option<&LobeTable<'_>>,
+        working_point: Option<&WorkingPoint>,
+    ) -> Option<Advice> {
+        let moved = |a: f32, b: f32, step: f32| (a - b).abs() > step * b.abs();
+        let same = state.advice.as_ref().filter(|advised| {
+            let chatter = match (advised.chatter, judgement.chatter) {
+                (Some(a), Some(b)) => !moved(a.0, b.0, ADVICE_FREQUENCY_STEP),
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            advised.verdict == judgement.verdict
+                && chatter
+                && !moved(advised.speed.0, speed.0, ADVICE_SPEED_STEP)
+                && advised.working_point.as_ref() == working_point
+                && advised.with_table == table.is_some()
+        });
+        if let Some(advised) = same {
+            return Some(advised.advice);
+        }
+        let Settings { limits, tool, .. } = &self.settings;
+        let advice = advice::advise(judgement, speed, table, working_point, limits.as_ref(), tool);
+        state.advice = Some(Advised {
+            advice,
+            verdict: judgement.verdict,
+            chatter: judgement.chatter,
+            speed,
+            working_point: working_point.copied(),
+            with_table: table.is_some(),
+        });
+        Some(advice)
+    }
+}
+
+/// Spectra are summed over all axes.
+const AXES: [usize; 3] = [0, 1, 2];
+/// Where tones are looked for.
+const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
+const TOOL_TONES: (Hertz, Hertz) = (Hertz(150.0), TOOL_BAND);
+
+/// Goes on with the tone of a fresh spectrum, and with the background where there is no chatter.
+fn follow_tone<const POINTS: usize, const BINS: usize>(
+    path: &mut Path<POINTS, BINS>,
+    rotation: Option<Rotation>,
+    (from, to): (Hertz, Hertz),
+    chatter: bool,
+    work: &mut [f32],
+) {
+    let spectrum = PowerSpectrum {
+        power: &path.power,
+        bin: path.bin,
+    };
+    let found = if path.background.is_learnt() {
+        path.background.new_tone(&spectrum, rotation, from, to, work)
+    } else {
+        None
+    };
+    path.tone = Tone::follow(path.tone, found, &spectrum);
+    if !chatter {
+        path.background.learn(&path.power);
+    }
+}
+
+/// Adds a point of the stroboscopic map: what was felt at the first slot.
+fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, passed: &Passed) {
+    let [x, y, z, ..] = passed.passing;
+    let strobe = Strobe {
+        band,
+        tooth: passed.tooth as u32,
+        meters_per_second2: [x, y, z],
+    };
+    // More than the capacity cannot come in one block; if they did, the last would be left out.
+    let _ = strobes.push(strobe);
 }
 
 /// Refuses settings that cannot be. Not-a-number fails every comparison, so each test is for what must hold.
@@ -241,9 +764,6 @@ fn check(settings: &Settings) -> Result<(), SettingsError> {
     } = settings;
     if !(1..=MAX_TEETH).contains(&tool.teeth) {
         return Err(SettingsError::Teeth(tool.teeth));
-    }
-    if !(1e3..=1e5).contains(&sensor.nominal_rate.0) {
-        return Err(SettingsError::SampleRate(sensor.nominal_rate));
     }
     let scale = sensor.meters_per_second2_per_count;
     if !(scale > 0.0 && scale.is_finite()) {

@@ -119,6 +119,8 @@ struct Lock {
     misfits: u8,
 }
 
+/// Angle of the edge at which the tachometer locked, in turns: so that angles before it are none below 0.
+const FIRST_TURN: u64 = 1024;
 /// Accepted edges lie within this many pitches of where they are expected. A wheel's teeth are off by
 /// much less; the teeth beside the gap of a variable-reluctance sensor by 0.4.
 const TOLERANCE_PITCHES: f32 = 0.45;
@@ -327,6 +329,22 @@ struct Steps {
 }
 
 impl TachometerState {
+    /// Before the first edge.
+    pub const fn new() -> Self {
+        Self {
+            newest: None,
+            intervals_ns: [0.0; REMEMBERED],
+            remembered: 0,
+            lock: None,
+            turn_speed: None,
+            previous_turn_speed: None,
+            turns: 0,
+            rejected: 0,
+            missed: 0,
+            losses: 0,
+        }
+    }
+
     fn lose(&mut self) {
         self.lock = None;
         self.remembered = 0;
@@ -347,7 +365,7 @@ impl Tachometer {
         let events = lock.line.events_to(time);
         let turns = u64::from(self.wheel.positions);
         let index = lock.line.index();
-        let whole = (index / turns) << 32;
+        let whole = (index / turns + FIRST_TURN) << 32;
         let part = ((index % turns) << 32) / turns;
         let beyond = events / positions * 4_294_967_296.0;
         let angle = if beyond >= 0.0 {

@@ -1,0 +1,193 @@
+//! What the spectrum of one band says: a tone that the spindle does not explain, that was not there before, and that lasts.
+//!
+//! A machine hums: fans, drives, pumps and bearings make tones that are no harmonics of the spindle either. So each bin is
+//! compared with its own past ([`Background`]), and only what stands out of that is looked at.
+
+use crate::peaks::{Peak, Rotation, Search};
+use crate::spectrum::PowerSpectrum;
+use crate::units::Hertz;
+
+/// The usual power of each bin: its median over some seconds, by steps of 1/64 up or down.
+#[derive(Clone, Debug)]
+pub struct Background<const BINS: usize> {
+    /// The upper halves of single precision numbers: 8 bits of precision.
+    power: [u16; BINS],
+    /// Spectra taken, up to [`LEARNING`].
+    learnt: u8,
+}
+
+/// Spectra whose plain mean is the first background.
+const LEARNING: u8 = 6;
+/// Relative step of the background per spectrum.
+const FOLLOWS: f32 = 1.0 / 64.0;
+
+impl<const BINS: usize> Default for Background<BINS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const BINS: usize> Background<BINS> {
+    /// Knows nothing.
+    pub const fn new() -> Self {
+        Self {
+            power: [0; BINS],
+            learnt: 0,
+        }
+    }
+
+    /// True once there is a background to compare with.
+    pub fn is_learnt(&self) -> bool {
+        self.learnt >= LEARNING
+    }
+
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        *self = Self::new();
+    }
+
+    /// Takes a spectrum of ordinary operation.
+    pub fn learn(&mut self, power: &[f32]) {
+        let weight = 1.0 / (f32::from(self.learnt) + 1.0);
+        let learning = !self.is_learnt();
+        for (slot, &new) in self.power.iter_mut().zip(power) {
+            let old = widen(*slot);
+            *slot = narrow(if learning {
+                old + weight * (new - old)
+            } else if new > old {
+                old + FOLLOWS * old
+            } else {
+                old - FOLLOWS * old
+            });
+        }
+        self.learnt = (self.learnt + 1).min(LEARNING);
+    }
+
+    /// Power over the largest background within two bins: 1 where nothing is new.
+    fn compare(&self, power: &[f32], ratio: &mut [f32]) {
+        for (k, (slot, power)) in ratio.iter_mut().zip(power).enumerate() {
+            let around = self
+                .power
+                .get(k.saturating_sub(2)..(k + 3).min(BINS))
+                .unwrap_or_default();
+            let usual = around.iter().map(|&p| widen(p)).fold(f32::MIN_POSITIVE, f32::max);
+            *slot = (power / usual).min(1e30);
+        }
+    }
+
+    /// The strongest tone between two frequencies that is no harmonic of the spindle (where its speed is known) and stands out of the background.
+    /// `work` is scratch memory for as many bins.
+    pub fn new_tone(
+        &self,
+        spectrum: &PowerSpectrum<'_>,
+        rotation: Option<Rotation>,
+        from: Hertz,
+        to: Hertz,
+        work: &mut [f32],
+    ) -> Option<Peak> {
+        let work = work.get_mut(..spectrum.power.len())?;
+        self.compare(spectrum.power, work);
+        let ratio = PowerSpectrum {
+            power: work,
+            bin: spectrum.bin,
+        };
+        let found = match rotation {
+            None => ratio.dominant(from, to)?,
+            Some(rotation) => match ratio.dominant_non_harmonic(rotation, from, to) {
+                Search::Found(tone) => tone.peak,
+                Search::Nothing { .. } | Search::Unresolved => return None,
+            },
+        };
+        // Frequency and amplitude are those of the spectrum itself.
+        let reach = 1.5 * spectrum.bin.0;
+        spectrum.dominant(Hertz(found.frequency.0 - reach), Hertz(found.frequency.0 + reach))
+    }
+}
+
+fn widen(half: u16) -> f32 {
+    f32::from_bits(u32::from(half) << 16)
+}
+
+/// Rounds to the nearest; never up from below the smallest step, so that a median can fall to any level.
+fn narrow(power: f32) -> u16 {
+    (power.max(0.0).to_bits().saturating_add(0x7FFF) >> 16) as u16
+}
+
+/// A tone followed from spectrum to spectrum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tone {
+    /// Its frequency, in the newest spectrum.
+    pub frequency: Hertz,
+    /// Its amplitude, in m/s², in the last spectra, newest first.
+    amplitudes: [f32; Tone::HISTORY],
+    /// Spectra in which it was seen one after another.
+    pub spectra: u16,
+    /// Its part of the power of the band.
+    pub share: f32,
+    /// The largest amplitude it had, in m/s².
+    pub largest: f32,
+}
+
+/// A tone may move by this fraction of its frequency from one spectrum to the next,
+const MOVES: f32 = 0.03;
+/// or by so many bins.
+const MOVES_BINS: f32 = 2.0;
+
+impl Tone {
+    /// Spectra that are compared with each other.
+    pub const HISTORY: usize = 6;
+
+    /// Goes on with the tone found in the next spectrum.
+    pub fn follow(before: Option<Self>, found: Option<Peak>, spectrum: &PowerSpectrum<'_>) -> Option<Self> {
+        let peak = found?;
+        let total: f32 = spectrum.power.iter().skip(2).sum::<f32>() / crate::spectrum::HANN_NOISE_BINS;
+        let amplitude = peak.amplitude.0;
+        let share = if total > 0.0 {
+            0.5 * amplitude * amplitude / total
+        } else {
+            0.0
+        };
+        let reach = (MOVES * peak.frequency.0).max(MOVES_BINS * spectrum.bin.0);
+        let mut tone = before
+            .filter(|tone| (tone.frequency.0 - peak.frequency.0).abs() <= reach)
+            .unwrap_or(Self {
+                frequency: peak.frequency,
+                amplitudes: [0.0; Self::HISTORY],
+                spectra: 0,
+                share,
+                largest: 0.0,
+            });
+        tone.amplitudes.rotate_right(1);
+        tone.amplitudes[0] = amplitude;
+        tone.largest = tone.largest.max(amplitude);
+        (tone.frequency, tone.share) = (peak.frequency, share);
+        tone.spectra = tone.spectra.saturating_add(1);
+        Some(tone)
+    }
+
+    /// Its amplitude in the newest spectrum, in m/s².
+    pub fn amplitude(&self) -> f32 {
+        self.amplitudes[0]
+    }
+
+    /// True where it has grown in every one of the last spectra but one, and by half or more over all of them.
+    pub fn grows(&self) -> bool {
+        let seen = usize::from(self.spectra).min(Self::HISTORY);
+        let seen = self.amplitudes.get(..seen).unwrap_or_default();
+        let falls = seen.windows(2).filter(|pair| pair[0] <= pair[1]).count();
+        let first = seen.last().copied().unwrap_or(0.0);
+        seen.len() >= 4 && falls <= 1 && self.amplitude() > 1.5 * first
+    }
+
+    /// True where it neither dies out nor comes and goes: in the last spectra the smallest is more than 0.6 of the largest, and the newest not the smallest of all.
+    ///
+    /// The amplitude of a mode that noise drives is that of Rayleigh: it falls below 0.6 of its largest within a few independent spectra.
+    pub fn lasts(&self) -> bool {
+        if usize::from(self.spectra) < Self::HISTORY {
+            return false;
+        }
+        let largest = self.amplitudes.iter().copied().fold(0.0, f32::max);
+        let smallest = self.amplitudes.iter().copied().fold(f32::INFINITY, f32::min);
+        smallest > 0.6 * largest && self.amplitude() > 0.7 * self.largest
+    }
+}
