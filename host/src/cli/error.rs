@@ -3,6 +3,7 @@
 use std::error::Error as StdError;
 use std::io;
 
+use crate::case::CaseError;
 use crate::device::DeviceError;
 use crate::file::FileError;
 use crate::stability::{BuildError, StabilityError};
@@ -82,6 +83,15 @@ impl From<FileError> for Error {
                 | io::ErrorKind::IsADirectory => Self::input(error),
                 _ => Self::other(error),
             },
+        }
+    }
+}
+
+impl From<CaseError> for Error {
+    fn from(error: CaseError) -> Self {
+        match error {
+            CaseError::File(cause) => cause.into(),
+            other => Self::input(other),
         }
     }
 }

@@ -2,7 +2,17 @@
 
 use std::path::PathBuf;
 
-use super::{Error, Output, positive};
+use clap::ValueEnum;
+use quietcut_core::tachometer::Wheel;
+use serde::Serialize;
+
+use super::{Error, Output, finite, non_negative, positive};
+use crate::case::Case;
+use crate::recording::Sidecar;
+use crate::simulate::{
+    Accelerometer, Effect, Entry, Recorder, SimulateError, Statistics, TachometerModel, VirtualCut,
+    VirtualCutError,
+};
 
 /// A virtual cut: exact switching of the teeth, loss of contact, runout, and the sensor that hears it.
 #[derive(Debug, clap::Args)]
@@ -22,26 +32,228 @@ pub struct Args {
     /// Duration in s.
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     seconds: f64,
+    /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated.
+    #[arg(long, value_name = "NAME=VALUE")]
+    effect: Vec<String>,
+    /// How the tool comes into the workpiece and out: through its faces, with a depth that grows, or in full cut all
+    /// the time. Without it: feed, or ramp where the tool's diameter is not known or the time too short for feed.
+    #[arg(long, value_name = "KIND")]
+    entry: Option<EntryKind>,
+    /// How long the depth grows with --entry ramp, in s; a tenth of the duration where it is not given.
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
+    ramp_s: Option<f64>,
+    /// Air before and after the cut in s; a twentieth of the duration, at most 0.2 s, where it is not given.
+    #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
+    air_s: Option<f64>,
+    /// Record the motion itself, without a sensor's faults.
+    #[arg(long, conflicts_with_all = ["range_g", "noise_ug", "clock_error_percent", "tacho_jitter_us", "seed"])]
+    ideal: bool,
+    /// Samples per second: nominal, where a sensor samples.
+    #[arg(long, value_name = "N", default_value_t = 26_667.0, value_parser = positive, allow_negative_numbers = true)]
+    sample_rate_hz: f64,
+    /// Range of the accelerometer in g: 2, 4, 8 or 16.
+    #[arg(long, value_name = "G", default_value_t = 16.0, value_parser = range_g, allow_negative_numbers = true)]
+    range_g: f64,
+    /// Noise of the accelerometer in µg per √Hz.
+    #[arg(long, value_name = "N", default_value_t = 75.0, value_parser = non_negative, allow_negative_numbers = true)]
+    noise_ug: f64,
+    /// How much too fast the clock of the accelerometer runs, in percent: −3 to 3.
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = clock_error, allow_negative_numbers = true)]
+    clock_error_percent: f64,
+    /// Positions on the tachometer's wheel.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    tacho_positions: u16,
+    /// Of these, how many in a row are missing.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    tacho_missing: u16,
+    /// Jitter of the tachometer's edges in µs.
+    #[arg(long, value_name = "N", default_value_t = 2.0, value_parser = non_negative, allow_negative_numbers = true)]
+    tacho_jitter_us: f64,
     /// Seed of the sensor's noise; the same seed gives the same file.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The recording to write.
+    /// The recording to write; what its columns cannot say goes into the .toml beside it.
     #[arg(long, value_name = "REC.csv")]
     out: PathBuf,
     #[command(flatten)]
     output: Output,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum EntryKind {
+    /// Through the faces of the workpiece: immersion grows and shrinks as the tool feeds.
+    Feed,
+    /// The axial depth grows and shrinks.
+    Ramp,
+    /// In full cut from the start to the end.
+    None,
+}
+
+/// What was cut.
+#[derive(Debug, Serialize)]
+struct Answer {
+    recording: PathBuf,
+    sample_rate_hz: f64,
+    samples: usize,
+    entry: &'static str,
+    full_cut_s: [f64; 2],
+    largest_displacement_mm: f64,
+    steps: u64,
+    contact_changes: u64,
+}
+
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Args {
-        case: _,
-        rpm: _,
-        depth_mm: _,
-        seconds: _,
-        seed: _,
-        out: _,
-        output: _,
-    } = args;
-    Err(Error::not_built("simulate"))
+    let case = Case::read(&args.case)?;
+    let sidecar = Sidecar::path_of(&args.out);
+    if let (Ok(sidecar), Ok(case)) = (sidecar.canonicalize(), args.case.canonicalize())
+        && sidecar == case
+    {
+        return Err(Error::input(format!(
+            "--out {}: what belongs to the recording would go to {}, which is the case; choose another name",
+            args.out.display(),
+            sidecar.display()
+        )));
+    }
+    let effects = Effect::parse(args.effect.iter().map(String::as_str)).map_err(Error::input)?;
+    let tachometer = tachometer(&args)?;
+    let cut = cut(&args, &case, effects)?;
+    let recorder = if args.ideal {
+        Recorder::Ideal {
+            rate_hz: args.sample_rate_hz,
+        }
+    } else {
+        Recorder::Sensor {
+            accelerometer: Accelerometer {
+                range_g: args.range_g,
+                noise_g_per_root_hertz: 1e-6 * args.noise_ug,
+                nominal_rate_hz: args.sample_rate_hz,
+                clock_error: 0.01 * args.clock_error_percent,
+                ..Accelerometer::IIS3DWB_16G
+            },
+            seed: args.seed,
+        }
+    };
+    let named = |error| named(&args, error);
+    let full_cut_s = cut.full_cut_s(&case).map_err(named)?;
+    let (
+        recording,
+        Statistics {
+            steps,
+            contact_changes,
+            ..
+        },
+    ) = cut
+        .record(&case, recorder, tachometer, &args.out)
+        .map_err(named)?;
+    recording.write_csv(&args.out)?;
+    let displacements = recording
+        .channels
+        .iter()
+        .filter(|channel| ["x", "y", "z"].contains(&channel.name.as_str()))
+        .flat_map(|channel| &channel.samples);
+    let answer = Answer {
+        recording: args.out.clone(),
+        sample_rate_hz: recording.sample_rate_hz,
+        samples: recording.len(),
+        entry: match cut.entry {
+            Entry::None => "none",
+            Entry::Ramp { .. } => "ramp",
+            Entry::Feed => "feed",
+        },
+        full_cut_s,
+        largest_displacement_mm: 1e3 * displacements.fold(0.0_f64, |a, b| a.max(b.abs())),
+        steps,
+        contact_changes,
+    };
+    let text = text(&answer);
+    args.output.answer(&answer, text)
+}
+
+fn text(answer: &Answer) -> String {
+    let [from, to] = answer.full_cut_s;
+    let entry = match answer.entry {
+        "feed" => "in and out through the faces of the workpiece, ",
+        "ramp" => "in and out with a depth that grows and shrinks, ",
+        _ => "",
+    };
+    format!(
+        "{}: {} samples at {:.1} Hz\n{entry}in full cut from {from:.2} to {to:.2} s; the tool moves by up to {:.3} mm\n{} steps, contact lost or found {} times",
+        answer.recording.display(),
+        answer.samples,
+        answer.sample_rate_hz,
+        answer.largest_displacement_mm,
+        answer.steps,
+        answer.contact_changes
+    )
+}
+
+fn tachometer(args: &Args) -> Result<TachometerModel, Error> {
+    if args.tacho_missing >= args.tacho_positions {
+        return Err(Error::input(format!(
+            "--tacho-missing {}: fewer than the {} positions of the wheel are needed",
+            args.tacho_missing, args.tacho_positions
+        )));
+    }
+    Ok(TachometerModel {
+        wheel: Wheel {
+            positions: args.tacho_positions,
+            missing: args.tacho_missing,
+        },
+        jitter_s: 1e-6 * args.tacho_jitter_us,
+    })
+}
+
+/// The cut that was asked for, with an entry that the case and the time allow.
+fn cut(args: &Args, case: &Case, effects: Vec<Effect>) -> Result<VirtualCut, Error> {
+    let mut cut = VirtualCut {
+        effects,
+        entry: Entry::None,
+        air_s: args.air_s.unwrap_or((0.05 * args.seconds).min(0.2)),
+        ..VirtualCut::new(args.rpm, args.depth_mm, args.seconds)
+    };
+    let ramp = Entry::Ramp {
+        seconds: args.ramp_s.unwrap_or(0.1 * args.seconds),
+    };
+    cut.entry = match args.entry {
+        Some(EntryKind::None) => Entry::None,
+        Some(EntryKind::Ramp) => ramp,
+        Some(EntryKind::Feed) => Entry::Feed,
+        None => {
+            cut.entry = Entry::Feed;
+            match cut.full_cut_s(case) {
+                Ok(_) => Entry::Feed,
+                Err(
+                    VirtualCutError::TooShort { .. } | VirtualCutError::Simulate(SimulateError::NoDiameter),
+                ) => ramp,
+                Err(error) => return Err(named(args, error)),
+            }
+        }
+    };
+    Ok(cut)
+}
+
+/// The error with the name of the case, where it does not say it itself.
+fn named(args: &Args, error: VirtualCutError) -> Error {
+    let case = args.case.display();
+    match error {
+        VirtualCutError::Case(error) => error.into(),
+        VirtualCutError::TooShort { .. } => Error::input(format!("--seconds {}: {error}", args.seconds)),
+        VirtualCutError::WheelTooFine { .. } => Error::input(format!("--tacho-positions: {error}")),
+        other => Error::input(format!("{case}: {other}")),
+    }
+}
+
+fn range_g(text: &str) -> Result<f64, String> {
+    match finite(text)? {
+        value if [2.0, 4.0, 8.0, 16.0].contains(&value) => Ok(value),
+        value => Err(format!("{value} is not possible: it must be 2, 4, 8 or 16")),
+    }
+}
+
+fn clock_error(text: &str) -> Result<f64, String> {
+    match finite(text)? {
+        value if value.abs() <= 3.0 => Ok(value),
+        value => Err(format!("{value} is not possible: it must be −3 to 3")),
+    }
 }

@@ -3,12 +3,12 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use super::Cutting;
 use super::crossing::first_below_zero;
 use super::cutter::{Immersion, Tooth};
 use super::dormand_prince::{Quartic, at};
 use super::passage::Spans;
 use super::surface::{Surface, TAKEN_AT};
+use super::{Cutting, Regeneration};
 
 /// A kink of the surface in a derivative above this leaves the order of the integrator as it is.
 const SMOOTH_FROM: u8 = 5;
@@ -149,10 +149,15 @@ impl<'a> Contact<'a> {
 
     fn chip(&self, tooth: &Tooth, t: f64, x: [f64; 3]) -> Chip {
         let place = self.place(tooth, t);
-        Chip {
-            thickness_m: self.cutting.cutter.reach_m(tooth, place, x) - self.in_front_m(tooth, place, t),
-            place,
-        }
+        let cutter = &self.cutting.cutter;
+        let thickness_m = if self.cutting.regeneration == Regeneration::None {
+            let ahead = &cutter.teeth[tooth.ahead];
+            let at_rest = cutter.reach_m(tooth, place, [0.0; 3]) - cutter.reach_m(ahead, place, [0.0; 3]);
+            at_rest + cutter.recession_m(place, tooth.feed_m)
+        } else {
+            cutter.reach_m(tooth, place, x) - self.in_front_m(tooth, place, t)
+        };
+        Chip { thickness_m, place }
     }
 
     fn place(&self, tooth: &Tooth, t: f64) -> Immersion {
@@ -258,7 +263,7 @@ impl<'a> Contact<'a> {
 
     /// Teeth that have just entered: at the surface, or off it already?
     fn touch(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
-        if !self.cutting.remembers {
+        if self.cutting.regeneration != Regeneration::AllPasses {
             return;
         }
         // Far enough for the slow growth of a chip from nothing to be seen, close enough for it to be linear.
@@ -275,7 +280,7 @@ impl<'a> Contact<'a> {
 
     /// The first change of contact in the step from `t` to `t + h` with the tool moving along `displacement`.
     pub(super) fn first_change(&self, t: f64, h: f64, displacement: &[Quartic; 3]) -> Option<Change> {
-        if !self.cutting.remembers
+        if self.cutting.regeneration != Regeneration::AllPasses
             || self
                 .cutting
                 .passage

@@ -13,6 +13,7 @@ mod effect;
 mod error;
 mod integrator;
 mod passage;
+mod record;
 mod sensor;
 mod spindle;
 mod surface;
@@ -27,6 +28,7 @@ pub use effect::{Effect, EffectError};
 pub use error::SimulateError;
 pub use integrator::{Motion, Room, Segment, Statistics};
 pub use passage::Passage;
+pub use record::Recorder;
 pub use sensor::{Accelerometer, Sampler, TachometerModel};
 pub use spindle::Spindle;
 pub use virtual_cut::{Entry, Heard, VirtualCut, VirtualCutError};
@@ -53,9 +55,20 @@ pub struct Cutting {
     pub spindle: Spindle,
     /// How it comes into the workpiece and out.
     pub passage: Passage,
-    /// True where the surface left by all earlier passes counts and a tooth can lose contact; false for the linear
-    /// model, in which only the last pass counts and a chip of negative thickness pulls.
-    pub remembers: bool,
+    /// What a tooth finds in front of it.
+    pub regeneration: Regeneration,
+}
+
+/// Which earlier vibration a chip feels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Regeneration {
+    /// That of all earlier passes: the surface is what they left, and a tooth that does not reach it feels no force.
+    AllPasses,
+    /// That of the last pass alone, and a chip of negative thickness pulls: the linear model of stability charts.
+    LastPass,
+    /// None, nor that of the tooth itself: the chip is that of the feed (and of runout), and the motion is the forced one
+    /// that every stable cut comes to.
+    None,
 }
 
 /// A force from outside on the tool: a shaker.

@@ -3,9 +3,10 @@
 use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 
+use super::Statistics;
 use super::effect::{Effect, EffectError};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
-use super::{Cutter, Cutting, Dynamics, Model, Passage, Settings, SimulateError, Spindle, Statistics};
+use super::{Cutter, Cutting, Dynamics, Model, Passage, Regeneration, Settings, SimulateError, Spindle};
 use crate::case::{Case, CaseError};
 
 /// A cut of a case.
@@ -51,6 +52,20 @@ pub enum VirtualCutError {
     /// The simulation cannot be made or go on.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// Pulses of the tachometer that run into each other.
+    #[error(
+        "a tachometer wheel with {positions} positions at {spindle_rpm} rev/min is too fine for {rate_hz:.0} samples per second: at least {needed_hz:.0} Hz are needed"
+    )]
+    WheelTooFine {
+        /// Positions on the wheel.
+        positions: u16,
+        /// Spindle speed, rev/min.
+        spindle_rpm: f64,
+        /// Samples per second.
+        rate_hz: f64,
+        /// Samples per second needed.
+        needed_hz: f64,
+    },
     /// The time is over before the cut is whole.
     #[error(
         "{seconds} s are too short: with {air_s} s of air at both ends, way in and way out take {needed_s:.2} s, so give more than that"
@@ -111,7 +126,7 @@ impl VirtualCut {
                 cutter,
                 spindle,
                 passage,
-                remembers: true,
+                regeneration: Regeneration::AllPasses,
             }),
             drive: None,
         })

@@ -9,7 +9,7 @@ mod sensors;
 use super::*;
 use crate::case::Case;
 
-fn case(name: &str) -> Case {
+pub(super) fn case(name: &str) -> Case {
     Case::read(format!(
         "{}/../tests/cases/{name}.toml",
         env!("CARGO_MANIFEST_DIR")
@@ -46,7 +46,7 @@ fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
             cutter: cutter(case, depth_mm),
             spindle: Spindle::new(spindle_rpm),
             passage: Passage::Steady,
-            remembers: true,
+            regeneration: Regeneration::AllPasses,
         }),
         drive: None,
     }

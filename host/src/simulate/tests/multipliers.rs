@@ -45,7 +45,7 @@ impl Drive for Counterforce {
 fn multiplier(case: &Case, spindle_rpm: f64, depth_mm: f64, periods: usize, order: usize) -> f64 {
     let mut model = steady(case, spindle_rpm, depth_mm);
     let cutting = model.cutting.as_mut().unwrap();
-    cutting.remembers = false;
+    cutting.regeneration = Regeneration::LastPass;
     if case.axial_depth_modulation() {
         // The feed acts on the growth: it must stay, and be balanced.
         model.drive = Some(Box::new(Counterforce {
