@@ -4,6 +4,7 @@ pub mod case;
 pub mod cli;
 pub mod continuation;
 pub mod device;
+mod eigenvalues;
 pub mod file;
 pub mod milling;
 pub mod recording;

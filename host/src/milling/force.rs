@@ -109,7 +109,7 @@ impl ToothForce {
 /// Averages of all cutting teeth over one tooth period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Averaged {
-    /// K_tc [α₀], Pa.
+    /// K_tc α₀, Pa.
     pub directional: Matrix3<f64>,
     /// Force per depth from feed and edges, N/m: the z column of β_e + β_f, and the mean of the forced force.
     pub forced: Vector3<f64>,

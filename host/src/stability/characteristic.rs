@@ -61,6 +61,8 @@ pub(super) struct Crossing {
 impl Characteristic {
     /// Φ of a period, for |κ| up to about `depth_m`.
     pub(super) fn new(period: &Period, depth_m: f64) -> Self {
+        // No cut is that shallow; with a depth of 0 the polynomials are constants.
+        let depth_m = depth_m.max(1e-12);
         Self {
             order: period.order(),
             scale: depth_m,

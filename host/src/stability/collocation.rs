@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::period::Period;
+use crate::eigenvalues::eigenvalues;
 
 /// The matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at a depth, m.
 ///
@@ -42,10 +43,7 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
 /// zero.
 pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
     let map = monodromy(period, depth_m)?;
-    if map.iter().any(|entry| !entry.is_finite()) {
-        return None;
-    }
-    let mut multipliers: Vec<Complex64> = map.complex_eigenvalues().iter().copied().collect();
+    let mut multipliers = eigenvalues(map)?;
     multipliers.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
     Some(multipliers)
 }

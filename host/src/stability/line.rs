@@ -17,6 +17,9 @@ const LEVELS: u32 = 12;
 /// unseen, since the number outside is compared at every depth.
 const FOLLOWED: f64 = 0.3;
 
+/// Share of the depth range that is scanned first; then ranges double.
+const FIRST_PART: f64 = 0.125;
+
 /// Distance from the circle beyond which multipliers are only counted: with the steps of a chart none comes from there to
 /// the circle and back unseen.
 const FAR: f64 = 0.5;
@@ -77,24 +80,18 @@ pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Resul
     check_speed(rpm)?;
     check_depth(depth_mm)?;
     let depth_m = depth_mm * 1e-3;
-    // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
-    let period = Period::new(problem, rpm, 2.0 * depth_m, Resolution::WORKING);
-    let characteristic = Characteristic::new(&period, 2.0 * depth_m);
-    let workspace = characteristic.workspace();
-    let mut scan = Scan {
-        problem,
-        rpm,
-        coarse: Period::new(problem, rpm, depth_m, Resolution::SCAN),
-        period,
-        characteristic,
-        workspace,
-        crossings: Vec::new(),
-    };
     let samples = samples.max(1);
+    let mut scan = Scan::new(problem, rpm, depth_m * FIRST_PART);
     let mut low = scan.sample(0.0)?;
     let start = low.outside();
     for index in 1..=samples {
-        let high = scan.sample(depth_m * index as f64 / samples as f64)?;
+        let share = index as f64 / samples as f64;
+        if share * depth_m > scan.deepest_m {
+            // The deeper, the finer must a period be cut: shallow depths need not pay for deep ones.
+            let deepest_m = (2.0 * scan.deepest_m).max(share * depth_m).min(depth_m);
+            scan = scan.deeper(deepest_m);
+        }
+        let high = scan.sample(depth_m * share)?;
         let found = scan.between(&low, &high, 0)?;
         scan.crossings.extend(found);
         low = high;
@@ -153,6 +150,8 @@ struct Found {
 struct Scan<'a> {
     problem: &'a Problem,
     rpm: f64,
+    /// The depth up to which both periods are fine enough, m.
+    deepest_m: f64,
     /// For all multipliers at once.
     coarse: Period,
     /// For limits.
@@ -162,7 +161,31 @@ struct Scan<'a> {
     crossings: Vec<Found>,
 }
 
-impl Scan<'_> {
+impl<'a> Scan<'a> {
+    fn new(problem: &'a Problem, rpm: f64, deepest_m: f64) -> Self {
+        // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
+        let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::WORKING);
+        let characteristic = Characteristic::new(&period, 2.0 * deepest_m);
+        Scan {
+            problem,
+            rpm,
+            deepest_m,
+            coarse: Period::new(problem, rpm, deepest_m, Resolution::SCAN),
+            period,
+            workspace: characteristic.workspace(),
+            characteristic,
+            crossings: Vec::new(),
+        }
+    }
+
+    /// The same scan with periods cut for larger depths.
+    fn deeper(self, deepest_m: f64) -> Self {
+        Scan {
+            crossings: self.crossings,
+            ..Self::new(self.problem, self.rpm, deepest_m)
+        }
+    }
+
     fn broke_down(&self, depth_m: f64, what: &'static str) -> StabilityError {
         StabilityError::BrokeDown {
             rpm: self.rpm,

@@ -1,6 +1,6 @@
 //! Stability of the cut: multipliers, limits, charts, lobe tables.
 //!
-//! Sign of the regenerative force: F = w K_tc [α](u − u_τ), with α as in eq. 6.7, is stable at small depth w.
+//! Sign of the regenerative force: F = w K_tc α (u − u_τ), with α as in eq. 6.7, is stable at small depth w.
 
 mod characteristic;
 mod chart;

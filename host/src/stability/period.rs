@@ -126,9 +126,9 @@ impl Period {
 struct Rates {
     /// Fastest pole, rad/s.
     poles: f64,
-    /// ‖C B‖ times the cutting coefficient, 1/s per meter of depth: velocity that a force makes at once.
+    /// nᵀ C B D, 1/s per meter of depth: velocity along the chip normal that the chip's own force makes at once.
     direct: f64,
-    /// ‖C A B‖ times the cutting coefficient, 1/s² per meter of depth: acceleration that a force makes at once.
+    /// nᵀ C A B D, 1/s² per meter of depth: acceleration along the chip normal that the chip's own force makes at once.
     inertial: f64,
     /// The depth, m, to which edge and feed forces amount.
     modulation_m: f64,
@@ -138,34 +138,38 @@ impl Rates {
     fn new(problem: &Problem) -> Self {
         let structure = &problem.structure;
         let process = &problem.process;
-        let coefficient = |angle: f64| process.force.directional(angle).norm();
         let engagement = &process.engagement;
-        // Both vary slowly with the angle; nine angles find the largest to a few percent.
-        let angles =
-            (0..=8).map(|i| engagement.start + (engagement.exit - engagement.start) * f64::from(i) / 8.0);
+        let response = &structure.c * &structure.b;
+        let response_rate = &structure.c * &structure.a * &structure.b;
+        let (mut direct, mut inertial, mut force, mut forced) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+        // All of it varies slowly with the angle; seventeen angles find the largest to a percent or so.
+        for i in 0..=16 {
+            let share = f64::from(i) / 16.0;
+            let angle = engagement.start + (engagement.exit - engagement.start) * share;
+            let (normal, cutting) = (process.force.normal.at(angle), process.force.cutting.at(angle));
+            direct = direct.max(normal.dot(&(response * cutting)).abs());
+            inertial = inertial.max(normal.dot(&(response_rate * cutting)).abs());
+            force = force.max(process.force.directional(angle).norm());
+            forced = forced.max(process.force.forced(angle, process.feed_per_tooth_m).norm());
+        }
         let teeth = engagement.mean_teeth().ceil();
-        let largest = angles.clone().map(coefficient).fold(0.0, f64::max) * teeth;
-        let forced = angles
-            .map(|angle| process.force.forced(angle, process.feed_per_tooth_m).norm())
-            .fold(0.0, f64::max)
-            * teeth;
         Self {
             poles: structure
                 .poles()
                 .iter()
                 .map(|pole| pole.norm())
                 .fold(0.0, f64::max),
-            direct: (&structure.c * &structure.b).norm() * largest,
-            inertial: (&structure.c * &structure.a * &structure.b).norm() * largest,
-            modulation_m: if process.axial_depth_modulation && largest > 0.0 {
-                forced / largest
+            direct: direct * teeth,
+            inertial: inertial * teeth,
+            modulation_m: if process.axial_depth_modulation && force > 0.0 {
+                forced / force
             } else {
                 0.0
             },
         }
     }
 
-    /// A bound, rad/s, of how fast the solution turns or grows at a depth.
+    /// An estimate, rad/s, of how fast the solution turns or grows at a depth.
     fn at(&self, depth_m: f64) -> f64 {
         let depth_m = depth_m + self.modulation_m;
         self.poles + (self.inertial * depth_m).sqrt() + self.direct * depth_m

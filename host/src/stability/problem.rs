@@ -6,7 +6,7 @@ use crate::case::{AXIAL_DEPTH_MODULATION, Case, CaseError};
 use crate::milling::Process;
 use crate::structure::{FirstOrder, StructureError};
 
-/// ẋ = A x + B F, u = C x, F = w K α(φ)(u − u_τ) − [β_e + β_f](φ) u (eqs 3.7, 7.1), about the forced motion.
+/// ẋ = A x + B F, u = C x, F = w K α(φ)(u − u_τ) − (β_e + β_f)(φ) u (eqs 3.7, 7.1), about the forced motion.
 ///
 /// Everything in feed, normal and axial direction. The delay τ is the tooth period.
 #[derive(Clone, Debug, PartialEq)]

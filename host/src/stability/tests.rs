@@ -429,3 +429,109 @@ fn the_dominant_multiplier_is_the_growth_rate_of_the_map() {
         );
     }
 }
+
+/// A random machine, tool, material and cut: 1 to 4 modes, 1 to 8 teeth, any immersion.
+fn random_case(rng: &mut impl rand::Rng) -> Case {
+    use crate::milling::{Cut, Material, Tool};
+    use crate::structure::{Direction, Form, Mode, Structure};
+    use rand::RngExt;
+
+    let mut case = case("kuka-kr90-acetal");
+    let modes = (0..rng.random_range(1..=4))
+        .map(|_| {
+            let frequency_hz = 10.0_f64.powf(rng.random_range(1.0..3.0));
+            let omega = std::f64::consts::TAU * frequency_hz;
+            let stiffness = 10.0_f64.powf(rng.random_range(5.5..7.5));
+            // ψψᵀ ω/(2ik) is a mode of stiffness k; a random phase makes it complex.
+            let size = (omega / (2.0 * stiffness)).sqrt();
+            let shape: Vec<Complex64> = (0..3)
+                .map(|_| {
+                    Complex64::from_polar(size * rng.random_range(-1.0..1.0), rng.random_range(-0.2..0.2))
+                })
+                .collect();
+            Mode {
+                frequency_hz,
+                damping_ratio: 10.0_f64.powf(rng.random_range(-2.5..-0.7)),
+                left: shape.iter().map(|entry| entry * -Complex64::I).collect(),
+                right: shape,
+            }
+        })
+        .collect();
+    case.structure = Some(Structure {
+        directions: vec![Direction::X, Direction::Y, Direction::Z],
+        form: Form::Modes(modes),
+    });
+    let teeth = rng.random_range(1..=8);
+    let start_deg: f64 = rng.random_range(0.0..170.0);
+    case.tool = Some(Tool {
+        teeth,
+        edge_angle_deg: rng.random_range(30.0..90.0),
+        diameter_mm: None,
+        pitch_deg: vec![360.0 / teeth as f64; teeth],
+        runout: None,
+    });
+    let ktc_mpa = 10.0_f64.powf(rng.random_range(1.8..3.3));
+    case.material = Some(Material {
+        ktc_mpa,
+        krc_mpa: ktc_mpa * rng.random_range(0.0..0.8),
+        kac_mpa: ktc_mpa * rng.random_range(0.0..0.4),
+        kte_n_per_mm: 20.0,
+        kre_n_per_mm: 20.0,
+        kae_n_per_mm: 5.0,
+    });
+    case.cut = Some(Cut {
+        start_deg,
+        exit_deg: rng.random_range(start_deg + 1.0..180.0),
+        feed_per_tooth_mm: 0.1,
+        feed_direction_deg: rng.random_range(0.0..360.0),
+    });
+    if rng.random_bool(0.7) {
+        case.extensions.clear();
+    }
+    case
+}
+
+#[test]
+fn lines_of_random_machines_agree_with_multipliers_at_single_depths() {
+    use rand::{RngExt, SeedableRng};
+
+    let seed = 20_261_121;
+    println!("seed {seed}");
+    let cases: usize = std::env::var("QUIETCUT_RANDOM_CASES")
+        .ok()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(40);
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut switches = 0;
+    for index in 0..cases {
+        let case = random_case(&mut rng);
+        let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
+        let fastest = problem
+            .structure
+            .poles()
+            .iter()
+            .map(|pole| pole.im)
+            .fold(0.0, f64::max);
+        // 0.3 to 4 vibrations of the fastest mode in a tooth period.
+        let vibrations = 10.0_f64.powf(rng.random_range(-0.5..0.6));
+        let rpm = 60.0 / problem.teeth as f64 * fastest / std::f64::consts::TAU / vibrations;
+        let depth_mm = 10.0_f64.powf(rng.random_range(-1.5..0.5));
+        let line = line(&problem, rpm, depth_mm, 40).unwrap();
+        switches += line.switches.len();
+        for _ in 0..8 {
+            let depth = rng.random_range(0.0..depth_mm);
+            let period = Period::new(&problem, rpm, depth * 2e-3, Resolution::WORKING);
+            let dominant = collocation::dominant(&period, depth * 1e-3).unwrap().norm();
+            let stable = line
+                .stable_mm
+                .iter()
+                .any(|[from, to]| (*from..=*to).contains(&depth));
+            // Limits are good to 1e-9: closer to the circle both may be right.
+            assert!(
+                (dominant - 1.0).abs() < 1e-6 || stable == (dominant < 1.0),
+                "case {index}: {rpm} rev/min, {depth} mm: |μ| = {dominant}, {line:?}"
+            );
+        }
+    }
+    println!("{cases} cases, {switches} switches");
+}

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3};
 use num_complex::Complex64;
 
 use super::{Direction, Form, Matrices, Mode, Structure, StructureError};
+use crate::eigenvalues::eigenvalues;
 
 /// ẋ = A x + B F, u = C x with F and u the force on and the displacement of the tool centre point in x, y, z.
 ///
@@ -62,7 +63,8 @@ impl FirstOrder {
 
     /// Poles of the structure, rad/s, sorted by imaginary part.
     pub fn poles(&self) -> Vec<Complex64> {
-        let mut poles: Vec<Complex64> = self.a.complex_eigenvalues().iter().copied().collect();
+        let mut poles = eigenvalues(self.a.clone())
+            .unwrap_or_else(|| self.a.complex_eigenvalues().iter().copied().collect());
         poles.sort_by(|p, q| p.im.total_cmp(&q.im).then(p.re.total_cmp(&q.re)));
         poles
     }
