@@ -669,6 +669,7 @@ impl Monitor {
             new_passings: [state.structure.passed, state.tool.passed],
             floors: [state.structure.floor, state.tool.floor],
             tones: [state.structure.tone.as_ref(), state.tool.tone.as_ref()],
+            heard: state.tool.background.is_learnt(),
             new_spectra: [state.structure.fresh, state.tool.fresh],
         };
         state.detector.step(&evidence)

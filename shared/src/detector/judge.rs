@@ -37,6 +37,8 @@ pub struct Evidence<'a> {
     pub floors: [f32; BANDS],
     /// The tones that stand out of the background.
     pub tones: [Option<&'a Tone>; BANDS],
+    /// A spectrum has a background to stand out of.
+    pub heard: bool,
     /// New spectra since the step before.
     pub new_spectra: [bool; BANDS],
 }
@@ -127,6 +129,8 @@ const OVER_IDLE: f32 = 3.0;
 const LAST_GROWTH: u8 = 16;
 /// An angle within this of the held one, in turns, is the same multiplier.
 const SAME_ANGLE: f32 = 0.03;
+/// A tone within this part of the held frequency is the same, moved on.
+const SAME_TONE: f32 = 0.05;
 /// What persists must be this part of the forced vibration at least to be called chatter.
 const PERSISTENT_SHARE: f32 = 0.3;
 /// A tone of less than this part of the power of its band is no chatter.
@@ -248,7 +252,7 @@ impl Detector {
     fn release(&mut self, evidence: &Evidence<'_>, air: Option<bool>) {
         let Some(held) = &mut self.held else { return };
         let level = if held.by_tone {
-            evidence.tones[held.band].map_or(0.0, Tone::amplitude)
+            held.tone(evidence).map_or(0.0, Tone::amplitude)
         } else {
             match evidence.findings[held.band] {
                 Some(finding) if is_valid(finding, evidence.teeth) => {
@@ -346,7 +350,13 @@ impl Detector {
             return unknown(Reason::SpeedChanging);
         }
         let Some(air) = air else {
-            return unknown(Reason::TooShort);
+            // Without samples at fixed angles the spectrum alone speaks, and it has nothing to say.
+            let by_spectrum = evidence.findings.iter().all(Option::is_none) && evidence.heard;
+            return unknown(if by_spectrum {
+                Reason::NoSignal
+            } else {
+                Reason::TooShort
+            });
         };
         if air {
             self.runout_seen = false;
@@ -429,13 +439,17 @@ impl Held {
         multiplier.kind != self.kind && reason == Reason::Growing && larger
     }
 
+    /// The tone that is held, where it is still the strongest.
+    fn tone<'a>(&self, evidence: &Evidence<'a>) -> Option<&'a Tone> {
+        let held = self.frequency?.0;
+        evidence.tones[self.band].filter(|tone| (tone.frequency.0 - held).abs() < SAME_TONE * held)
+    }
+
     /// Keeps multiplier, frequency and reason up to date.
     fn follow(&mut self, evidence: &Evidence<'_>) {
         self.since_growing = self.since_growing.saturating_add(1);
         if self.by_tone {
-            let Some(tone) = evidence.tones[self.band] else {
-                return;
-            };
+            let Some(tone) = self.tone(evidence) else { return };
             self.frequency = Some(tone.frequency);
             if tone.grows() {
                 self.since_growing = 0;

@@ -18,6 +18,8 @@ pub struct Background<const BINS: usize> {
 
 /// Spectra whose plain mean is the first background.
 const LEARNING: u8 = 6;
+/// What has more than this many times the usual power is new.
+const NEW: f32 = 10.0;
 /// Relative step of the background per spectrum.
 const FOLLOWS: f32 = 1.0 / 64.0;
 
@@ -63,15 +65,25 @@ impl<const BINS: usize> Background<BINS> {
         self.learnt = (self.learnt + 1).min(LEARNING);
     }
 
-    /// Power over the largest background within two bins: 1 where nothing is new.
-    fn compare(&self, power: &[f32], ratio: &mut [f32]) {
-        for (k, (slot, power)) in ratio.iter_mut().zip(power).enumerate() {
-            let around = self
+    /// The power of the bins that stand out of the background around by [`NEW`], and in all others no more than the floor of the
+    /// background, so that only what is new is left.
+    fn keep_new(&self, power: &[f32], kept: &mut [f32]) {
+        for (k, (slot, &power)) in kept.iter_mut().zip(power).enumerate() {
+            let near = self
                 .power
                 .get(k.saturating_sub(2)..(k + 3).min(BINS))
                 .unwrap_or_default();
-            let usual = around.iter().map(|&p| widen(p)).fold(f32::MIN_POSITIVE, f32::max);
-            *slot = (power / usual).min(1e30);
+            let usual = near.iter().copied().max().map_or(0.0, widen);
+            *slot = if power > NEW * usual {
+                power
+            } else {
+                // Tones are narrow: the least of the bins around is none.
+                let around = self
+                    .power
+                    .get(k.saturating_sub(8)..(k + 9).min(BINS))
+                    .unwrap_or_default();
+                around.iter().copied().min().map_or(0.0, widen).min(power)
+            };
         }
     }
 
@@ -86,14 +98,14 @@ impl<const BINS: usize> Background<BINS> {
         work: &mut [f32],
     ) -> Option<Peak> {
         let work = work.get_mut(..spectrum.power.len())?;
-        self.compare(spectrum.power, work);
-        let ratio = PowerSpectrum {
+        self.keep_new(spectrum.power, work);
+        let new = PowerSpectrum {
             power: work,
             bin: spectrum.bin,
         };
         let found = match rotation {
-            None => ratio.dominant(from, to)?,
-            Some(rotation) => match ratio.dominant_non_harmonic(rotation, from, to) {
+            None => new.dominant(from, to)?,
+            Some(rotation) => match new.dominant_non_harmonic(rotation, from, to) {
                 Search::Found(tone) => tone.peak,
                 Search::Nothing { .. } | Search::Unresolved => return None,
             },
