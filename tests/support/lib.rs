@@ -9,3 +9,4 @@ pub mod device_log;
 pub mod emulator;
 pub mod firmware_image;
 pub mod pty;
+pub mod virtual_cut;
