@@ -2,7 +2,7 @@
 
 #![allow(clippy::expect_used)]
 
-use quietcut_tests::command::{folder, quietcut};
+use quietcut_tests::command::{cases, folder, quietcut};
 
 const VERBS: [&str; 9] = [
     "demo", "simulate", "lobes", "table", "upload", "info", "work", "monitor", "replay",
@@ -54,4 +54,69 @@ fn bad_usage_has_status_2() {
     work("2", "0").refused(&["--feed", "greater than 0"]);
     work("two", "0.15").refused(&["--depth-mm", "two", "not a number"]);
     run(&["replay", "a.csv", "--teeth", "0"]).refused(&["--teeth", "0", "from 1 to 255"]);
+}
+
+#[test]
+fn a_virtual_cut_that_cannot_be_is_refused_and_leaves_no_file() {
+    let folder = folder();
+    let acetal = cases().join("kuka-kr90-acetal.toml");
+    let cut = |more: &[&str]| {
+        let case = acetal.to_str().expect("a path");
+        let plain = ["simulate", case, "--rpm", "900", "--out", "cut.csv"];
+        quietcut(folder.path(), &[&plain[..], more].concat())
+    };
+    let long = ["--depth-mm", "1", "--seconds", "3"];
+    let with = |more: &[&str]| cut(&[&long[..], more].concat());
+    cut(&["--depth-mm", "-1", "--seconds", "3"]).refused(&["--depth-mm", "-1", "greater than 0"]);
+    cut(&["--depth-mm", "1", "--seconds", "1", "--entry", "feed"]).refused(&["--seconds 1", "too short"]);
+    with(&["--effect", "weather=1"]).refused(&["weather", "runout, axial-depth-modulation"]);
+    with(&["--effect", "wear=0.1"]).refused(&["wear", "not simulated yet"]);
+    with(&["--effect", "runout=much"]).refused(&["runout", "much", "number"]);
+    with(&["--clock-error-percent", "4"]).refused(&["--clock-error-percent", "4", "−3 to 3"]);
+    with(&["--tacho-positions", "60", "--tacho-missing", "60"])
+        .refused(&["--tacho-missing 60", "60 positions"]);
+    let left: Vec<_> = std::fs::read_dir(folder.path()).expect("the folder").collect();
+    assert!(left.is_empty(), "{left:?}");
+
+    // The sidecar must not be written over a case of the same name.
+    std::fs::copy(&acetal, folder.path().join("cut.toml")).expect("a copy of the case");
+    let own = ["simulate", "cut.toml", "--rpm", "900", "--out", "cut.csv"];
+    quietcut(folder.path(), &[&own[..], &long[..]].concat()).refused(&["cut.toml", "is the case"]);
+}
+
+#[test]
+fn the_same_seed_cuts_the_same_file_and_it_replays() {
+    let folder = folder();
+    let acetal = cases().join("kuka-kr90-acetal.toml");
+    let cut = |seed: &str, out: &str| {
+        let case = acetal.to_str().expect("a path");
+        let arguments = [
+            "simulate",
+            case,
+            "--rpm",
+            "900",
+            "--depth-mm",
+            "1",
+            "--seconds",
+            "1.5",
+            "--seed",
+            seed,
+            "--out",
+            out,
+            "--effect",
+            "runout=10",
+            "--json",
+        ];
+        let answer = quietcut(folder.path(), &arguments).json();
+        assert_eq!(answer["entry"], "ramp", "{answer}");
+        std::fs::read(folder.path().join(out)).expect("a recording")
+    };
+    let (a, b, c) = (cut("5", "a.csv"), cut("5", "b.csv"), cut("6", "c.csv"));
+    assert!(a == b && a != c);
+    let replayed = quietcut(folder.path(), &["replay", "a.csv", "--json"]).json();
+    assert!(
+        replayed["summary"]["blocks"].as_u64().expect("blocks") > 600,
+        "{replayed}"
+    );
+    assert_eq!(replayed["summary"]["clipped"], 0);
 }
