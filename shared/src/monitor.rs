@@ -668,6 +668,7 @@ impl Monitor {
             findings: [structure.as_ref(), tool.as_ref()],
             new_passings: [state.structure.passed, state.tool.passed],
             floors: [state.structure.floor, state.tool.floor],
+            spectra: [state.structure.spectrum(), state.tool.spectrum()],
             tones: [state.structure.tone.as_ref(), state.tool.tone.as_ref()],
             heard: state.tool.background.is_learnt(),
             new_spectra: [state.structure.fresh, state.tool.fresh],

@@ -85,6 +85,11 @@ impl Stroboscope {
         self.since_reset = self.since_reset.saturating_add(1);
     }
 
+    /// Number of classes.
+    pub fn classes(&self) -> usize {
+        usize::from(self.classes)
+    }
+
     /// Passings since the reset.
     pub fn since_reset(&self) -> u32 {
         self.since_reset

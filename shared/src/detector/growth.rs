@@ -101,6 +101,8 @@ const PLANS: [Plan; 9] = [
 
 /// Standard deviations between an estimate and the unit circle that make growth sure (together with a second look).
 const SURE: f32 = 3.5;
+/// The same for the alternating part, which is looked at over two windows.
+const ALTERNATION_SURE: f32 = 4.0;
 /// Standard deviations for what is no alarm.
 const LIKELY: f32 = 2.0;
 /// No |μ| is stated sharper than this: the cut itself does not stay the same to more.
@@ -116,6 +118,11 @@ const WORST_FIT: f32 = 0.5;
 /// The forced orbit may move by this part of itself within a window, or by this part of the deviation.
 const STEADY: f32 = 0.15;
 const STEADY_AGAINST_DEVIATION: f32 = 0.3;
+/// Nearer than this to the angle of a class, in turns after one revolution, a multiplier is taken for one only while the forced orbit
+/// stands still.
+const CLASS_ANGLE: f32 = 0.1;
+/// and only over a window of so many passings.
+const CLASS_WINDOW: usize = 32;
 /// Nearer than this to a half turn the angle of a flip and of a Hopf pair cannot be told.
 const FLIP_ANGLE: f32 = 0.006;
 /// Passings that differ from those of the turn before by so many times the usual mean an entry, an exit, a blow.
@@ -165,6 +172,8 @@ struct Predictions {
     best: Option<Prediction>,
     /// The one over the longest window that surely grows.
     growing: Option<Prediction>,
+    /// The same, where the forced orbit does not move at all.
+    growing_steadily: Option<Prediction>,
     /// The one over all that is remembered, where it surely does not die.
     persistent: Option<Prediction>,
 }
@@ -302,7 +311,12 @@ impl Growth {
         let predictions = self.predictions(noise);
         let multiplier = |prediction: Prediction| self.multiplier(&prediction);
         let moves = |m: &Multiplier| m.angle_turns > LEAST_ANGLE;
-        let mut seen = predictions.growing.map(multiplier).filter(moves);
+        // A forced orbit that still moves has the angles of the classes in it, runout included.
+        let loose = |m: &Multiplier| {
+            moves(m) && from_classes(m.angle_turns, self.stroboscope.classes()) > CLASS_ANGLE
+        };
+        let strictly = predictions.growing_steadily.map(multiplier).filter(moves);
+        let mut seen = strictly.or(predictions.growing.map(multiplier).filter(loose));
         let persistent = predictions.persistent.map(multiplier).filter(moves);
         let best = predictions.best.map(multiplier);
         let alternation = self.alternation(noise);
@@ -321,7 +335,7 @@ impl Growth {
                 if self.alternation_looks >= ALTERNATION_LOOKS {
                     seen = Some(Multiplier {
                         abs: a.multiplier_abs,
-                        deviation: ((a.multiplier_abs - a.least) / SURE).max(LEAST_DEVIATION),
+                        deviation: ((a.multiplier_abs - a.least) / ALTERNATION_SURE).max(LEAST_DEVIATION),
                         angle_turns: 0.5,
                         kind: Kind::Flip,
                     });
@@ -366,8 +380,12 @@ impl Growth {
                 found.best = Some(prediction);
             }
             let surely = prediction.multiplier_abs - SURE * prediction.deviation;
-            if surely > 1.0 && is_steady(&window, self.finding.levels.forced, prediction.level, noise) {
+            let forced = self.finding.levels.forced;
+            if surely > 1.0 && is_steady(&window, forced, prediction.level, noise) {
                 found.growing = Some(prediction);
+                if plan.window >= CLASS_WINDOW && is_steady(&window, forced, 0.0, noise) {
+                    found.growing_steadily = Some(prediction);
+                }
             }
             let likely = prediction.multiplier_abs - LIKELY * prediction.deviation;
             if plan.window == CAPACITY && likely > PERSISTENT {
@@ -424,7 +442,7 @@ impl Growth {
                 .stroboscope
                 .window(length)
                 .filter(|_| length >= ALTERNATION_LEAST)?;
-            let alternation = window.alternation(noise, SURE)?;
+            let alternation = window.alternation(noise, ALTERNATION_SURE)?;
             (alternation.correlation < 0.5
                 && alternation.change * alternation.change > noise / CHANNELS as f32
                 && is_steady(&window, self.finding.levels.forced, 0.0, noise)
@@ -441,6 +459,12 @@ impl Growth {
             (long, short) => long.or(short.filter(|short| short.least > 1.0)),
         }
     }
+}
+
+/// Distance in turns, after one revolution, of an angle from those of what comes back with each revolution.
+fn from_classes(angle_turns: f32, classes: usize) -> f32 {
+    let turns = angle_turns * classes as f32;
+    (turns - crate::math::round(turns)).abs()
 }
 
 /// Whether the forced orbit stays where it is within a window.

@@ -12,7 +12,8 @@
 use crate::detector::growth::{Finding, Kind, Multiplier};
 use crate::detector::tone::Tone;
 use crate::detector::{Judgement, Reason, Verdict};
-use crate::synchronous::Levels;
+use crate::spectrum::PowerSpectrum;
+use crate::synchronous::{Levels, SLOTS};
 use crate::units::Hertz;
 
 /// Number of bands: structure, tool.
@@ -35,6 +36,8 @@ pub struct Evidence<'a> {
     pub new_passings: [bool; BANDS],
     /// Noise of the sensor in one channel of a passing, in m/s².
     pub floors: [f32; BANDS],
+    /// The newest spectra.
+    pub spectra: [Option<PowerSpectrum<'a>>; BANDS],
     /// The tones that stand out of the background.
     pub tones: [Option<&'a Tone>; BANDS],
     /// A spectrum has a background to stand out of.
@@ -132,7 +135,9 @@ const SAME_ANGLE: f32 = 0.03;
 /// A tone within this part of the held frequency is the same, moved on.
 const SAME_TONE: f32 = 0.05;
 /// What persists must be this part of the forced vibration at least to be called chatter.
-const PERSISTENT_SHARE: f32 = 0.3;
+const PERSISTENT_SHARE: f32 = 0.7;
+/// A residual of this part of the forced vibration that nothing explains is chatter, where a tone is in it.
+const WILD_SHARE: f32 = 0.5;
 /// A tone of less than this part of the power of its band is no chatter.
 const TONE_SHARE: f32 = 0.1;
 /// Forced vibration of more than this, root mean square over a tooth period, is worth a word, in m/s².
@@ -297,7 +302,7 @@ impl Detector {
                         band,
                         by_tone: false,
                         multiplier: Some(multiplier),
-                        frequency: frequency(&multiplier, finding, evidence),
+                        frequency: frequency(&multiplier, finding, band, evidence),
                         largest: level_of(multiplier.kind, finding, evidence.teeth),
                         since_growing: 0,
                         below: 0,
@@ -471,7 +476,7 @@ impl Held {
         if let Some(growing) = finding.growing.filter(same) {
             self.multiplier = Some(growing);
             self.since_growing = 0;
-            self.frequency = frequency(&growing, finding, evidence).or(self.frequency);
+            self.frequency = frequency(&growing, finding, self.band, evidence).or(self.frequency);
             self.confidence = confidence(growing.abs - 1.0, growing.deviation).max(self.confidence);
         } else if let Some(multiplier) = finding.multiplier.filter(same) {
             self.multiplier = Some(multiplier);
@@ -521,7 +526,12 @@ fn confidence(distance: f32, deviation: f32) -> f32 {
 }
 
 /// Chatter frequency: (±arg μ/2π + k)/T, with k from a tone of the spectrum where one fits, else from the shape within the tooth period.
-fn frequency(multiplier: &Multiplier, finding: &Finding, evidence: &Evidence<'_>) -> Option<Hertz> {
+fn frequency(
+    multiplier: &Multiplier,
+    finding: &Finding,
+    band: usize,
+    evidence: &Evidence<'_>,
+) -> Option<Hertz> {
     let passing_hz = evidence.speed?.0 * f32::from(evidence.teeth);
     for tone in evidence.tones.iter().flatten() {
         let cycles = tone.frequency.0 / passing_hz;
@@ -530,20 +540,41 @@ fn frequency(multiplier: &Multiplier, finding: &Finding, evidence: &Evidence<'_>
             return Some(tone.frequency);
         }
     }
-    finding.cycles.map(|cycles| Hertz(cycles * passing_hz))
+    let cycles = finding.cycles?;
+    // Samples at the slots cannot tell cycles that differ by the number of slots: the spectrum can.
+    let slots = SLOTS as f32;
+    let Some(spectrum) = evidence.spectra[band] else {
+        return Some(Hertz(cycles * passing_hz));
+    };
+    let mut best = (cycles, spectrum.mean_square_near(Hertz(cycles * passing_hz)));
+    for turn in [1.0, 2.0] {
+        for candidate in [turn * slots - cycles, turn * slots + cycles] {
+            let power = spectrum.mean_square_near(Hertz(candidate * passing_hz));
+            if band == BANDS - 1 && power > best.1 {
+                best = (candidate, power);
+            }
+        }
+    }
+    Some(Hertz(best.0 * passing_hz))
 }
 
-/// Chatter as the spectrum alone tells it: where nothing can be sampled at fixed angles, or where that neither sees it die nor contradicts.
+/// Chatter as the spectrum tells it: where nothing can be sampled at fixed angles, or where that sees a residual that no few multipliers
+/// explain, as of a cut that is far over the limit.
 fn tone_alone(evidence: &Evidence<'_>) -> Option<Held> {
     evidence.speed?;
     for band in 0..BANDS {
-        let Some(tone) = evidence.tones[band] else {
+        let Some(tone) = evidence.tones[band].filter(|tone| tone.share >= TONE_SHARE) else {
             continue;
         };
-        let contradicted = evidence.findings.iter().flatten().any(|finding| {
-            finding.passings < 64 || finding.multiplier.is_some_and(|m| m.abs + m.deviation < 1.0)
-        });
-        if tone.share < TONE_SHARE || contradicted || !(tone.grows() || tone.lasts()) {
+        let heard = match evidence.findings[band] {
+            None => evidence.findings.iter().all(Option::is_none) && (tone.grows() || tone.lasts()),
+            Some(finding) => {
+                tone.spectra >= 2
+                    && is_wild(finding, WILD_SHARE)
+                    && finding.levels.residual > 0.2 * tone.amplitude()
+            }
+        };
+        if !heard {
             continue;
         }
         return Some(Held {
@@ -553,7 +584,7 @@ fn tone_alone(evidence: &Evidence<'_>) -> Option<Held> {
             multiplier: None,
             frequency: Some(tone.frequency),
             largest: tone.largest,
-            since_growing: 0,
+            since_growing: if tone.grows() { 0 } else { LAST_GROWTH },
             below: 0,
             confidence: 0.8,
             reason: if tone.grows() {
@@ -564,6 +595,16 @@ fn tone_alone(evidence: &Evidence<'_>) -> Option<Held> {
         });
     }
     None
+}
+
+/// Whether the passings have a residual of this part of the forced vibration that neither dies nor can be predicted.
+fn is_wild(finding: &Finding, share: f32) -> bool {
+    let residual = finding.levels.residual;
+    // The residual is a mean over some turns: the activity tells whether it is still there.
+    finding.passings >= SETTLED
+        && finding.multiplier.is_none()
+        && residual > share * finding.levels.forced
+        && finding.activity > residual
 }
 
 /// With an odd number of teeth the frequencies of a flip, odd multiples of half the tooth passing, are no harmonics of the spindle.

@@ -111,7 +111,7 @@ impl<const BINS: usize> Background<BINS> {
             },
         };
         // Frequency and amplitude are those of the spectrum itself.
-        let reach = 1.5 * spectrum.bin.0;
+        let reach = 0.5 * spectrum.bin.0;
         spectrum.dominant(Hertz(found.frequency.0 - reach), Hertz(found.frequency.0 + reach))
     }
 }
