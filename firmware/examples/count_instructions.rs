@@ -17,13 +17,17 @@ use cortex_m::singleton;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
 use quietcut_core::decimation::{Decimation, State};
-use quietcut_core::units::Hertz;
+use quietcut_core::lobes::LobeTable;
+use quietcut_core::units::{Hertz, Rpm};
 use quietcut_core::{fft, math};
 
 // The tests that compare its numbers are another crate.
 #[allow(unreachable_pub)]
 #[path = "../../tests/support/chain_bits.rs"]
 mod chain_bits;
+#[allow(unreachable_pub)]
+#[path = "../../tests/support/table_bits.rs"]
+mod table_bits;
 
 #[entry]
 fn main() -> ! {
@@ -43,6 +47,7 @@ fn main() -> ! {
     transforms(&mut counter);
     spectra(&mut counter);
     decimation(&mut counter);
+    lobe_table(&mut counter);
     counter.print("sqrt-1000", || {
         (1..=1000_u16).for_each(|x| keep(math::sqrt(black_box(f32::from(x)))))
     });
@@ -113,6 +118,26 @@ fn decimation(counter: &mut Counter) {
         for _ in 0..4000 {
             keep(decimation.step(&mut state, black_box(counts)));
         }
+    });
+}
+
+/// Lookup and advice in a table of 96 KB.
+fn lobe_table(counter: &mut Counter) {
+    let Some(memory) = singleton!(TABLE: table_bits::Memory = table_bits::Memory::new()) else {
+        fail()
+    };
+    let Some(table) = memory.table() else { fail() };
+    hprintln!("bits-of-table {}", table_bits::of_table(&table));
+    counter.print("table-parse", || keep(LobeTable::parse(black_box(table.bytes()))));
+    let cut = table_bits::cut(1.1);
+    counter.print("table-lookup", || {
+        keep(table.lookup(black_box(Rpm(1000.5)), &cut))
+    });
+    counter.print("advice-speed", || {
+        keep(table_bits::advice(&table, black_box(1000.0), 1.1))
+    });
+    counter.print("advice-depth", || {
+        keep(table_bits::advice(&table, black_box(1000.0), 3.0))
     });
 }
 

@@ -10,6 +10,8 @@
 //! Without a working point the first layer of the table is assumed, and the least depth at which the table has the
 //! chatter that is heard: a cut that chatters is at least that deep. Deeper cuts take a second step.
 
+mod cell;
+mod depth;
 mod quiet;
 mod rule;
 
@@ -103,8 +105,9 @@ pub struct Advice {
 /// `speed` is the present spindle speed; `limits` are joined with those of the table, if it has any. Where no chatter is
 /// heard the answer is [`Action::Keep`]. The advised point is never one that the table calls unstable.
 ///
-/// Cost: up to two columns of the table per speed of its grid and per quarter of a percent of speed; nearest speeds come
-/// first, so that most calls are far cheaper. Call it when something has changed, not for every block.
+/// Cost: one pass over the entries of the table for this cut, and the interpolation of some columns where stability
+/// changes; nearest speeds come first, so that most calls are far cheaper. Call it when something has changed, not for
+/// every block.
 pub fn advise(
     judgement: &Judgement,
     speed: Rpm,
@@ -239,7 +242,7 @@ fn speed_range(limits: Option<&Limits>, table: Option<&LobeTable<'_>>) -> (f32, 
 }
 
 fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Result<Advice, Obstacle> {
-    let quiet = Quiet::new(cut.table, cut.at, range);
+    let quiet = Quiet::new(cut.table, &cut.at, range).map_err(Obstacle::Table)?;
     if let Some(quiet_speed) = quiet.nearest_speed(speed) {
         if quiet_speed == speed {
             return Err(Obstacle::Contradicted);

@@ -29,6 +29,7 @@
 mod answer;
 mod check;
 mod column;
+mod cut;
 mod encode;
 mod error;
 pub mod format;
@@ -37,6 +38,8 @@ use serde::{Deserialize, Serialize};
 
 pub use answer::{Answer, NotKnown};
 pub use column::Column;
+pub use cut::CutLobes;
+pub(crate) use cut::FEW;
 pub use encode::{Content, Layer, encode, encoded_length};
 pub use error::TableError;
 pub use format::Header;
@@ -216,17 +219,19 @@ impl<'a> LobeTable<'a> {
 
     /// The entries of one layer at one speed of the grid.
     pub fn entry(&self, layer: usize, speed_index: usize) -> Option<Column> {
-        self.read_column(layer, speed_index).ok()
+        let mut column = self.empty_column();
+        self.read_column(layer, speed_index, &mut column).ok()?;
+        Some(column)
+    }
+
+    /// The columns of one cut; its axial depth is not used.
+    pub fn cut(&self, working_point: &WorkingPoint) -> Result<CutLobes<'a>, NotKnown> {
+        CutLobes::new(*self, working_point)
     }
 
     /// The column at any speed and working point; its axial depth is not used.
     pub fn column(&self, speed: Rpm, working_point: &WorkingPoint) -> Result<Column, NotKnown> {
-        let (near, far, weight) = self.bracket_feed(working_point)?;
-        let column = self.column_of_layer(near, speed)?;
-        if near == far {
-            return Ok(column);
-        }
-        Ok(Column::blend(&column, &self.column_of_layer(far, speed)?, weight))
+        self.cut(working_point)?.column(speed)
     }
 
     /// What the table says of the cut at `speed`.
@@ -242,87 +247,29 @@ impl<'a> LobeTable<'a> {
         self.shape.speed_rpm(self.bytes, index).unwrap_or(f32::NAN)
     }
 
-    fn read_column(&self, layer: usize, speed_index: usize) -> Result<Column, NotKnown> {
-        let range = self
-            .shape
-            .column_range(self.bytes, layer, speed_index)
-            .ok_or(NotKnown::Damaged)?;
-        let mut column = Column::new(self.shape.depth_from_mm, self.shape.depth_to_mm);
-        for index in range.take(format::MAX_INTERVALS) {
-            column.push(self.shape.interval(self.bytes, index).ok_or(NotKnown::Damaged)?);
-        }
-        Ok(column)
+    /// The intervals of one layer at one speed of the grid, as they are stored.
+    fn intervals(
+        &self,
+        layer: usize,
+        speed_index: usize,
+    ) -> Result<impl Iterator<Item = Result<Interval, NotKnown>> + use<'a>, NotKnown> {
+        let column = self.shape.column(self.bytes, layer, speed_index);
+        let intervals = column.ok_or(NotKnown::Damaged)?.take(format::MAX_INTERVALS);
+        Ok(intervals.map(|interval| interval.ok_or(NotKnown::Damaged)))
     }
 
-    fn column_of_layer(&self, layer: usize, speed: Rpm) -> Result<Column, NotKnown> {
-        let outside = || NotKnown::Speed {
-            asked: speed,
-            from: Rpm(self.speed_rpm(0)),
-            to: Rpm(self.speed_rpm(self.shape.speeds.saturating_sub(1))),
-        };
-        let above = self.speeds_up_to(speed);
-        let below = above.checked_sub(1).ok_or_else(outside)?;
-        let below_rpm = self.speed_rpm(below);
-        let column = self.read_column(layer, below)?;
-        if below_rpm == speed.0 {
-            return Ok(column);
+    /// Reads the intervals of one layer at one speed of the grid into an empty column.
+    ///
+    /// Columns are large: they are filled where they lie, not moved.
+    fn read_column(&self, layer: usize, speed_index: usize, column: &mut Column) -> Result<(), NotKnown> {
+        for interval in self.intervals(layer, speed_index)? {
+            column.push(interval?);
         }
-        if above >= self.shape.speeds {
-            return Err(outside());
-        }
-        let weight = (speed.0 - below_rpm) / (self.speed_rpm(above) - below_rpm);
-        if !(0.0..=1.0).contains(&weight) {
-            return Err(NotKnown::Damaged);
-        }
-        Ok(Column::blend(&column, &self.read_column(layer, above)?, weight))
+        Ok(())
     }
 
-    /// The two layers whose feeds are around that of the working point, and the weight of the second; the same
-    /// layer twice where one holds for it.
-    fn bracket_feed(&self, working_point: &WorkingPoint) -> Result<(usize, usize, f32), NotKnown> {
-        let feed_mm = working_point.feed_per_tooth.0;
-        let mut posture_known = false;
-        let mut range: Option<(f32, f32)> = None;
-        let mut below: Option<(usize, f32)> = None;
-        let mut above: Option<(usize, f32)> = None;
-        for (index, layer) in self.layers().enumerate() {
-            if layer.posture != working_point.posture {
-                continue;
-            }
-            posture_known = true;
-            if !is_close(layer.start, working_point.start) || !is_close(layer.exit, working_point.exit) {
-                continue;
-            }
-            let (from_mm, to_mm) = (layer.feed_from.0, layer.feed_to.0);
-            if feed_mm >= from_mm * (1.0 - FEED_TOLERANCE) && feed_mm <= to_mm * (1.0 + FEED_TOLERANCE) {
-                return Ok((index, index, 0.0));
-            }
-            let (low, high) = range.unwrap_or((from_mm, to_mm));
-            range = Some((f32::min(low, from_mm), f32::max(high, to_mm)));
-            if to_mm < feed_mm && below.is_none_or(|(_, best)| to_mm > best) {
-                below = Some((index, to_mm));
-            }
-            if from_mm > feed_mm && above.is_none_or(|(_, best)| from_mm < best) {
-                above = Some((index, from_mm));
-            }
-        }
-        match (below, above, range) {
-            (Some((low, low_mm)), Some((high, high_mm)), _) => {
-                Ok((low, high, (feed_mm - low_mm) / (high_mm - low_mm)))
-            }
-            (_, _, Some((from, to))) => Err(NotKnown::Feed {
-                asked: Millimeters(feed_mm),
-                from: Millimeters(from),
-                to: Millimeters(to),
-            }),
-            (_, _, None) if posture_known => Err(NotKnown::Immersion {
-                start: working_point.start,
-                exit: working_point.exit,
-            }),
-            (_, _, None) => Err(NotKnown::Posture {
-                asked: working_point.posture,
-            }),
-        }
+    fn empty_column(&self) -> Column {
+        Column::new(self.shape.depth_from_mm, self.shape.depth_to_mm)
     }
 }
 
@@ -334,7 +281,3 @@ const NOWHERE: Validity = Validity {
     exit: Degrees(f32::NAN),
     posture: 0,
 };
-
-fn is_close(a: Degrees, b: Degrees) -> bool {
-    (a.0 - b.0).abs() <= IMMERSION_TOLERANCE.0
-}

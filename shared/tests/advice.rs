@@ -20,6 +20,9 @@ const TOOL: Tool = Tool { teeth: 2 };
 /// The speed that is found is at most a step of the search away from the nearest one: 1/4 of the band.
 const SEARCH_STEP: f32 = SPEED_BAND / 4.0;
 
+/// Smaller depths are looked for in steps of half the band, and at one speed of a band.
+const DEPTH_SEARCH_STEP: f32 = SPEED_BAND;
+
 fn heard(verdict: Verdict, chatter_hz: f32) -> Judgement {
     Judgement {
         verdict,
@@ -187,7 +190,7 @@ fn a_pocket_above_a_flip_island_is_used() {
     assert_eq!(advice.action, Action::Depth);
     // Below the island: 1.5/1.1 mm there are more than 1.0/1.1 mm at 950.
     assert_near(advice.depth.unwrap().0, 1.5 / (1.0 + DEPTH_MARGIN), 1e-3);
-    assert_near(advice.speed.0, 1001.0 / (1.0 - SPEED_BAND), SEARCH_STEP);
+    assert_near(advice.speed.0, 1001.0 / (1.0 - SPEED_BAND), DEPTH_SEARCH_STEP);
 }
 
 #[test]
@@ -203,7 +206,7 @@ fn a_smaller_depth_elsewhere_must_earn_the_change() {
     assert_near(kept.depth.unwrap().0, 1.0 / (1.0 + DEPTH_MARGIN), 1e-3);
     let moved = far_limit(1.15);
     assert_eq!(moved.action, Action::Depth);
-    assert_near(moved.speed.0, 1060.0 / (1.0 - SPEED_BAND), SEARCH_STEP);
+    assert_near(moved.speed.0, 1060.0 / (1.0 - SPEED_BAND), DEPTH_SEARCH_STEP);
     assert_near(moved.depth.unwrap().0, 1.15 / (1.0 + DEPTH_MARGIN), 1e-3);
 }
 
@@ -484,6 +487,54 @@ proptest! {
                     prop_assert!(matches!(answer, Answer::Stable { .. }), "{rpm} {near:?}: {advice:?} {answer:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn no_nearer_speed_is_quiet(content in table(), rpm in 500.0_f32..2500.0, depth in 0.05_f32..0.9) {
+        let content = Owned { limits: None, ..content };
+        let bytes = content.encode().unwrap();
+        let table = LobeTable::parse(&bytes).unwrap();
+        let depth_mm = content.depth_from_mm + depth * (content.depth_to_mm - content.depth_from_mm);
+        let at = working_point(&validity(0.05), depth_mm);
+        let advice = advise(&hopf(17.0), Rpm(rpm), Some(&table), Some(&at), None, &TOOL);
+        // By brute force, with half as much margin again: what that calls quiet the search must not have missed.
+        let is_quiet = |centre: f32, factor: f32| {
+            (-12_i8..=12).all(|step| {
+                let speed = Rpm(centre * (1.0 + factor * SPEED_BAND * f32::from(step) / 12.0));
+                table.column(speed, &at).is_ok_and(|column| {
+                    let margin = factor * DEPTH_MARGIN;
+                    column.is_stable_within(Millimeters(depth_mm * (1.0 - margin)), Millimeters(depth_mm * (1.0 + margin)))
+                })
+            })
+        };
+        // A cut that is quiet as it is contradicts the table: nothing is looked for then.
+        if is_quiet(rpm, 0.99) { return Ok(()) }
+        let found = match (advice.action, advice.source) {
+            (Action::Speed, Source::Table) => f32::max(advice.speed.0 / rpm, rpm / advice.speed.0),
+            _ => f32::INFINITY,
+        };
+        for step in 1..=600_u16 {
+            let ratio = 1.0 + 0.005 * f32::from(step);
+            if ratio >= found { break }
+            prop_assert!(!is_quiet(rpm * ratio, 1.5) && !is_quiet(rpm / ratio, 1.5), "{ratio} {advice:?}");
+        }
+    }
+
+    #[test]
+    fn a_table_damaged_after_it_was_checked_holds_nothing_up(
+        content in table(), damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..30),
+        rpm in 400.0_f32..2500.0, depth_mm in 0.0_f32..10.0, is_told in any::<bool>(),
+    ) {
+        let mut bytes = content.encode().unwrap();
+        for (position, byte) in damage {
+            let position = position.index(bytes.len());
+            bytes[position] = byte;
+        }
+        if let Ok(table) = LobeTable::reopen(&bytes) {
+            let at = working_point(&validity(0.05), depth_mm);
+            let tool = Tool { teeth: table.teeth() };
+            let _ = advise(&hopf(17.0), Rpm(rpm), Some(&table), is_told.then_some(&at), None, &tool);
         }
     }
 }

@@ -1,23 +1,18 @@
 //! Where the table is quiet: stable with margin in depth over a band of speed.
 
-use heapless::Vec;
-
+use super::cell::{Cell, Node};
 use super::rule::ratio;
-use super::{BETTER, DEPTH_MARGIN, SPEED_BAND};
-use crate::lobes::LobeTable;
+use super::{DEPTH_MARGIN, SPEED_BAND};
+use crate::lobes::{CutLobes, LobeTable, NotKnown};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Besides the speeds of the grid and the middles between them, columns are looked at in steps of this, relative: four to
-/// each half of the speed band.
+/// Where columns must be interpolated they are looked at in steps of this, relative: four to each half of the speed band.
 const STEP: f32 = SPEED_BAND / 4.0;
-
-/// Ranges of quiet depths at one speed; what does not fit is left out, which is on the safe side.
-type Ranges = Vec<(f32, f32), 24>;
 
 /// Up or down in speed.
 #[derive(Clone, Copy)]
-enum Direction {
+pub(super) enum Direction {
     Faster,
     Slower,
 }
@@ -42,29 +37,44 @@ impl Direction {
 
 /// A search for quiet points of one cut.
 pub(super) struct Quiet<'t> {
-    table: &'t LobeTable<'t>,
-    at: WorkingPoint,
+    pub(super) table: &'t LobeTable<'t>,
+    pub(super) cut: CutLobes<'t>,
+    pub(super) depth_mm: f32,
+    pub(super) depth_to_mm: f32,
     /// What the spindle can do: the band around a speed is cut off here, since the spindle cannot go there.
-    machine_rpm: (f32, f32),
+    pub(super) machine_rpm: (f32, f32),
     /// What the spindle can do and the table knows.
-    known_rpm: (f32, f32),
+    pub(super) known_rpm: (f32, f32),
 }
 
 impl<'t> Quiet<'t> {
     /// A search within the range of speeds of the machine.
-    pub(super) fn new(table: &'t LobeTable<'t>, at: WorkingPoint, machine_rpm: (f32, f32)) -> Self {
+    ///
+    /// # Errors
+    /// The table knows nothing of this cut.
+    pub(super) fn new(
+        table: &'t LobeTable<'t>,
+        at: &WorkingPoint,
+        machine_rpm: (f32, f32),
+    ) -> Result<Self, NotKnown> {
         let first_rpm = table.speeds().next().map_or(f32::NAN, |speed| speed.0);
         let last_rpm = table.speeds().next_back().map_or(f32::NAN, |speed| speed.0);
+        // Written so that NaN, of a table that was damaged after it was checked, ends here.
+        if !(first_rpm > 0.0 && first_rpm <= last_rpm && last_rpm.is_finite()) {
+            return Err(NotKnown::Damaged);
+        }
         let known_rpm = (
             f32::max(machine_rpm.0, first_rpm),
             f32::min(machine_rpm.1, last_rpm),
         );
-        Self {
+        Ok(Self {
             table,
-            at,
+            cut: table.cut(at)?,
+            depth_mm: at.axial_depth.0,
+            depth_to_mm: table.depths().1.0,
             machine_rpm,
             known_rpm,
-        }
+        })
     }
 
     /// The quiet speed that is nearest to `speed` in relative change; it may be `speed` itself.
@@ -74,175 +84,186 @@ impl<'t> Quiet<'t> {
         self.walk(Direction::Slower, speed, limit).or(faster)
     }
 
-    /// The largest quiet depth up to that of the cut, and the speed for it: the present one unless another is better.
-    pub(super) fn largest_depth(&self, speed: Rpm) -> Option<(Rpm, Millimeters)> {
-        let present_mm = self.largest_depth_mm(speed.0, 0.0);
-        let mut best = present_mm.map(|depth_mm| (speed.0, depth_mm));
-        let mut to_beat_mm = present_mm.map_or(0.0, |depth_mm| BETTER * depth_mm);
-        let (low_rpm, high_rpm) = self.known_rpm;
-        if low_rpm.is_nan() || high_rpm.is_nan() || low_rpm > high_rpm {
-            return None;
-        }
-        // Outwards, so that of equal depths the nearest speed of each side comes first.
-        for (direction, end_rpm) in [(Direction::Faster, high_rpm), (Direction::Slower, low_rpm)] {
-            let mut rpm = speed.0.clamp(low_rpm, high_rpm);
-            loop {
-                // Most speeds are out by their own column, before the band around them is looked at.
-                if let Some(depth_mm) = self.largest_depth_mm(rpm, to_beat_mm) {
-                    best = Some((rpm, depth_mm));
-                    to_beat_mm = depth_mm;
-                }
-                if rpm == end_rpm {
-                    break;
-                }
-                rpm = self.next_rpm(direction, rpm, end_rpm);
-            }
-        }
-        best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
-    }
-
     /// The first quiet speed from `speed` on, if its relative change is below `limit`.
     ///
-    /// Walks over columns and remembers where the present run of stable ones began: as soon as a run is as wide as the
-    /// band around a speed, that speed is quiet. No column is read twice.
+    /// Walks from cell to cell. Only cells that are neither all stable nor all unstable are looked into, in steps.
     fn walk(&self, direction: Direction, speed: Rpm, limit: f32) -> Option<Rpm> {
         let (low_rpm, high_rpm) = self.known_rpm;
-        let sign = direction.sign();
-        let (machine_near, end) = match direction {
-            Direction::Faster => (self.machine_rpm.0, high_rpm),
-            Direction::Slower => (self.machine_rpm.1, low_rpm),
+        let end_rpm = match direction {
+            Direction::Faster => high_rpm,
+            Direction::Slower => low_rpm,
         };
-        // Written so that an empty range and NaN end here.
-        if !(low_rpm <= high_rpm && speed.0 > 0.0) {
+        if low_rpm > high_rpm {
             return None;
         }
-        let mut rpm = (speed.0 * (1.0 - sign * SPEED_BAND)).clamp(low_rpm, high_rpm);
-        let mut run: Option<f32> = None;
+        let near_end_rpm = speed.0 * (1.0 - direction.sign() * SPEED_BAND);
+        let mut rpm = near_end_rpm.clamp(low_rpm, high_rpm);
+        let mut run = Run {
+            quiet: self,
+            direction,
+            speed,
+            start_rpm: None,
+        };
+        let mut known: Option<(usize, Option<Node>)> = None;
         loop {
-            run = if self.is_stable(rpm) {
-                run.or(Some(rpm))
-            } else {
-                None
+            let (index, cell_end_rpm) = self.cell_at(direction, rpm, end_rpm);
+            let node = |index| match known {
+                // The end of one cell is the beginning of the next.
+                Some((known_index, node)) if known_index == index => node,
+                _ => Node::at(&self.cut, index, self.depth_mm, self.depth_to_mm),
             };
-            if let Some(start) = run {
-                // The speed whose band begins where the run begins.
-                let at_limit = direction.is_beyond(machine_near, start);
-                let centre = if at_limit {
-                    start
-                } else {
-                    start / (1.0 - sign * SPEED_BAND)
-                };
-                let centre = direction.further(centre, speed.0);
-                if ratio(Rpm(centre), speed) >= limit {
-                    return None;
-                }
-                let band_end =
-                    (centre * (1.0 + sign * SPEED_BAND)).clamp(self.machine_rpm.0, self.machine_rpm.1);
-                let is_inside = (low_rpm..=high_rpm).contains(&centre);
-                if is_inside && direction.is_beyond(rpm, band_end) && self.is_stable(centre) {
-                    return Some(Rpm(centre));
-                }
+            let (low, high) = (node(index), node(index + 1));
+            known = match direction {
+                Direction::Faster => Some((index + 1, high)),
+                Direction::Slower => Some((index, low)),
+            };
+            let found = match Cell::between(low, high) {
+                Cell::Unstable => run.end(),
+                Cell::Stable => run.go_on(rpm, cell_end_rpm),
+                Cell::Mixed => run.look_into(rpm, index, cell_end_rpm),
+            };
+            if found.is_some() {
+                return found.filter(|&found| ratio(found, speed) < limit);
             }
+            rpm = cell_end_rpm;
             let is_past =
                 direction.is_beyond(rpm, speed.0) && ratio(Rpm(rpm), speed) > limit * (1.0 + SPEED_BAND);
-            if rpm == end || is_past {
+            if rpm == end_rpm || is_past {
                 return None;
             }
-            rpm = self.next_rpm(direction, rpm, end);
         }
     }
 
-    /// The next speed to look at: the next of the grid, the middle between two, a step, or the end.
-    fn next_rpm(&self, direction: Direction, rpm: f32, end_rpm: f32) -> f32 {
+    /// Index of the speed of the grid below the cell that lies ahead of a speed, and where that cell ends, or the way.
+    pub(super) fn cell_at(&self, direction: Direction, rpm: f32, end_rpm: f32) -> (usize, f32) {
         let up_to = self.table.speeds_up_to(Rpm(rpm));
-        let speed = |index: Option<usize>| {
-            index
-                .and_then(|index| self.table.speed(index))
-                .map(|speed| speed.0)
+        let speed = |index: usize| self.table.speed(index).map_or(end_rpm, |speed| speed.0);
+        let below = up_to.saturating_sub(1);
+        let (index, ahead_rpm) = match direction {
+            Direction::Faster => (below, speed(up_to)),
+            // Standing on a speed of the grid, the cell below it is ahead.
+            Direction::Slower if speed(below) == rpm => {
+                (below.saturating_sub(1), speed(below.saturating_sub(1)))
+            }
+            Direction::Slower => (below, speed(below)),
         };
-        let below = speed(up_to.checked_sub(1));
-        let (behind, ahead) = match direction {
-            Direction::Faster => (below, speed(Some(up_to))),
-            // Standing on a speed of the grid, the one before it is ahead.
-            Direction::Slower if below == Some(rpm) => (below, speed(up_to.checked_sub(2))),
-            Direction::Slower => (speed(Some(up_to)), below),
-        };
-        let middle = behind.zip(ahead).map(|(behind, ahead)| 0.5 * (behind + ahead));
+        // A speed that is no number, of a damaged table, must not hold the walk up.
+        let is_ahead = ahead_rpm != rpm && direction.is_beyond(ahead_rpm, rpm);
+        let is_before_end = direction.is_beyond(end_rpm, ahead_rpm);
+        (
+            index,
+            if is_ahead && is_before_end {
+                ahead_rpm
+            } else {
+                end_rpm
+            },
+        )
+    }
+
+    /// The next speed to look at within a cell: its middle or its end, or a step on if that is nearer.
+    pub(super) fn next_rpm(&self, direction: Direction, rpm: f32, index: usize, cell_end_rpm: f32) -> f32 {
         let step = rpm * (1.0 + direction.sign() * STEP);
-        [ahead, middle, Some(end_rpm)]
+        let ends = self.table.speed(index).zip(self.table.speed(index + 1));
+        let middle = ends.map_or(cell_end_rpm, |(low, high)| 0.5 * (low.0 + high.0));
+        let is_within = |candidate: &f32| {
+            direction.is_beyond(cell_end_rpm, *candidate) && !direction.is_beyond(rpm, *candidate)
+        };
+        let nearer = |a: f32, b: f32| if direction.is_beyond(a, b) { b } else { a };
+        [middle, step]
             .into_iter()
-            .flatten()
-            .filter(|&candidate| candidate != rpm && direction.is_beyond(candidate, rpm))
-            .fold(step, |nearest, candidate| {
-                if direction.is_beyond(nearest, candidate) {
-                    candidate
-                } else {
-                    nearest
-                }
-            })
+            .filter(is_within)
+            .fold(cell_end_rpm, nearer)
     }
 
     /// True where the depth of the cut is stable with margin at exactly this speed.
     fn is_stable(&self, rpm: f32) -> bool {
-        let depth_mm = self.at.axial_depth.0;
         let [from, to] =
-            [1.0 - DEPTH_MARGIN, 1.0 + DEPTH_MARGIN].map(|factor| Millimeters(factor * depth_mm));
-        self.table
-            .column(Rpm(rpm), &self.at)
-            .is_ok_and(|column| column.is_stable_within(from, to))
-    }
-
-    /// The largest quiet depth at a speed, if it is more than `at_least_mm`.
-    fn largest_depth_mm(&self, rpm: f32, at_least_mm: f32) -> Option<f32> {
-        let mut quiet = self.quiet_depths(rpm)?;
-        let (low_rpm, high_rpm) = self.known_rpm;
-        let from_rpm = f32::max(rpm * (1.0 - SPEED_BAND), self.machine_rpm.0);
-        let to_rpm = f32::min(rpm * (1.0 + SPEED_BAND), self.machine_rpm.1);
-        if from_rpm < low_rpm || to_rpm > high_rpm {
-            return None;
-        }
-        let mut rpm = from_rpm;
-        loop {
-            let largest_mm = quiet.iter().map(|&(_, to_mm)| to_mm).fold(0.0, f32::max);
-            if largest_mm <= at_least_mm {
-                return None;
-            }
-            quiet = intersection(&quiet, &self.quiet_depths(rpm)?);
-            if rpm >= to_rpm {
-                break;
-            }
-            rpm = self.next_rpm(Direction::Faster, rpm, to_rpm);
-        }
-        let largest_mm = quiet.iter().map(|&(_, to_mm)| to_mm).fold(0.0, f32::max);
-        (largest_mm > at_least_mm).then_some(largest_mm)
-    }
-
-    /// The depths up to that of the cut that are stable with margin at exactly this speed.
-    fn quiet_depths(&self, rpm: f32) -> Option<Ranges> {
-        let column = self.table.column(Rpm(rpm), &self.at).ok()?;
-        let depth_mm = self.at.axial_depth.0;
-        let mut ranges = Ranges::new();
-        for (from, to) in column.stable() {
-            let from_mm = from.0 / (1.0 - DEPTH_MARGIN);
-            let to_mm = f32::min(to.0 / (1.0 + DEPTH_MARGIN), depth_mm);
-            if from_mm < to_mm && ranges.push((from_mm, to_mm)).is_err() {
-                break;
-            }
-        }
-        Some(ranges)
+            [1.0 - DEPTH_MARGIN, 1.0 + DEPTH_MARGIN].map(|factor| Millimeters(factor * self.depth_mm));
+        let column = self.cut.column(Rpm(rpm));
+        column.is_ok_and(|column| column.is_stable_within(from, to))
     }
 }
 
-/// What two ascending lists of ranges have in common.
-fn intersection(a: &Ranges, b: &Ranges) -> Ranges {
-    let mut common = Ranges::new();
-    for &(a_from, a_to) in a {
-        for &(b_from, b_to) in b {
-            let (from, to) = (f32::max(a_from, b_from), f32::min(a_to, b_to));
-            if from < to && common.push((from, to)).is_err() {
-                return common;
+/// A run of stable speeds on a walk: as soon as it is as wide as the band around a speed, that speed is quiet.
+struct Run<'q, 't> {
+    quiet: &'q Quiet<'t>,
+    direction: Direction,
+    /// Where the walk is for: no speed before it is looked for.
+    speed: Rpm,
+    /// Where the run began, if there is one.
+    start_rpm: Option<f32>,
+}
+
+impl Run<'_, '_> {
+    fn end(&mut self) -> Option<Rpm> {
+        self.start_rpm = None;
+        None
+    }
+
+    /// All is stable from one speed to another: the quiet speed, if that makes one.
+    fn go_on(&mut self, from_rpm: f32, to_rpm: f32) -> Option<Rpm> {
+        let start_rpm = *self.start_rpm.get_or_insert(from_rpm);
+        let centre_rpm = self.centre_rpm(start_rpm);
+        let Quiet {
+            machine_rpm,
+            known_rpm,
+            ..
+        } = self.quiet;
+        let band_end_rpm = centre_rpm * (1.0 + self.direction.sign() * SPEED_BAND);
+        let is_wide = self
+            .direction
+            .is_beyond(to_rpm, band_end_rpm.clamp(machine_rpm.0, machine_rpm.1));
+        let is_known = (known_rpm.0..=known_rpm.1).contains(&centre_rpm);
+        (is_wide && is_known && self.quiet.is_stable(centre_rpm)).then_some(Rpm(centre_rpm))
+    }
+
+    /// Steps through a cell in which stability changes.
+    fn look_into(&mut self, from_rpm: f32, index: usize, cell_end_rpm: f32) -> Option<Rpm> {
+        let mut rpm = from_rpm;
+        let mut unstable_rpm: Option<f32> = None;
+        loop {
+            if self.quiet.is_stable(rpm) {
+                let onset_rpm = unstable_rpm.map_or(rpm, |unstable_rpm| self.onset_rpm(unstable_rpm, rpm));
+                unstable_rpm = None;
+                let found = self.go_on(onset_rpm, rpm);
+                if found.is_some() {
+                    return found;
+                }
+            } else {
+                self.end();
+                unstable_rpm = Some(rpm);
             }
+            if rpm == cell_end_rpm {
+                return None;
+            }
+            rpm = self.quiet.next_rpm(self.direction, rpm, index, cell_end_rpm);
         }
     }
-    common
+
+    /// Where stability begins between a speed that is not stable and one that is: within 1/32 of the way.
+    fn onset_rpm(&self, mut unstable_rpm: f32, mut stable_rpm: f32) -> f32 {
+        for _ in 0..5 {
+            let middle_rpm = 0.5 * (unstable_rpm + stable_rpm);
+            if self.quiet.is_stable(middle_rpm) {
+                stable_rpm = middle_rpm;
+            } else {
+                unstable_rpm = middle_rpm;
+            }
+        }
+        stable_rpm
+    }
+
+    /// The speed whose band begins where the run does, but none before the one the walk is for.
+    fn centre_rpm(&self, start_rpm: f32) -> f32 {
+        let machine_rpm = match self.direction {
+            Direction::Faster => self.quiet.machine_rpm.0,
+            Direction::Slower => self.quiet.machine_rpm.1,
+        };
+        let centre_rpm = if self.direction.is_beyond(machine_rpm, start_rpm) {
+            start_rpm
+        } else {
+            start_rpm / (1.0 - self.direction.sign() * SPEED_BAND)
+        };
+        self.direction.further(centre_rpm, self.speed.0)
+    }
 }

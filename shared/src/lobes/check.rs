@@ -12,33 +12,7 @@ pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
     let mut expected = 0;
     for layer in 0..shape.layers {
         for speed in 0..shape.speeds {
-            let range = shape
-                .column_range(bytes, layer, speed)
-                .unwrap_or(usize::MAX..usize::MAX);
-            let (layer_index, speed_index) = (saturate(layer), saturate(speed));
-            if range.start != expected || range.end < range.start {
-                return Err(TableError::ColumnOrder {
-                    layer: layer_index,
-                    speed: speed_index,
-                });
-            }
-            if range.len() > MAX_INTERVALS {
-                let found = saturate(range.len());
-                return Err(TableError::TooManyIntervals {
-                    layer: layer_index,
-                    speed: speed_index,
-                    found,
-                });
-            }
-            expected = range.end;
-            let mut end_mm = shape.depth_from_mm;
-            for (position, index) in range.enumerate() {
-                let interval = shape
-                    .interval(bytes, index)
-                    .filter(|i| i.from.0 >= end_mm && i.from < i.to && i.to.0 <= shape.depth_to_mm)
-                    .ok_or(interval_order(layer, speed, position))?;
-                end_mm = interval.to.0;
-            }
+            expected = check_column(table, layer, speed, expected)?;
         }
     }
     if expected != shape.intervals {
@@ -48,6 +22,39 @@ pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
         });
     }
     Ok(())
+}
+
+/// Checks a column whose intervals must begin at index `expected`; the index behind them.
+fn check_column(
+    LobeTable { bytes, shape }: &LobeTable<'_>,
+    layer: usize,
+    speed: usize,
+    expected: usize,
+) -> Result<usize, TableError> {
+    let (layer_index, speed_index) = (saturate(layer), saturate(speed));
+    let misplaced = TableError::ColumnOrder {
+        layer: layer_index,
+        speed: speed_index,
+    };
+    let range = shape.column_range(bytes, layer, speed).ok_or(misplaced)?;
+    if range.start != expected || range.end < range.start {
+        return Err(misplaced);
+    }
+    if range.len() > MAX_INTERVALS {
+        return Err(TableError::TooManyIntervals {
+            layer: layer_index,
+            speed: speed_index,
+            found: saturate(range.len()),
+        });
+    }
+    let mut end_mm = shape.depth_from_mm;
+    for (position, interval) in shape.column(bytes, layer, speed).ok_or(misplaced)?.enumerate() {
+        let interval = interval
+            .filter(|i| i.from.0 >= end_mm && i.from < i.to && i.to.0 <= shape.depth_to_mm)
+            .ok_or(interval_order(layer, speed, position))?;
+        end_mm = interval.to.0;
+    }
+    Ok(range.end)
 }
 
 /// Speeds must be positive, finite and strictly ascending.

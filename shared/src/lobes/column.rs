@@ -6,7 +6,7 @@ use super::{Answer, Interval, Kind, NotKnown};
 use crate::units::{Hertz, Millimeters};
 
 /// Intervals of a column after joining up to four columns; more are merged to the unstable side.
-const CAPACITY: usize = 24;
+const CAPACITY: usize = 32;
 
 /// The depths that are not stable at one speed, sorted and without overlaps; intervals may touch.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,18 +144,11 @@ impl Column {
         (from_mm, to_mm)
     }
 
-    /// The column between two neighbouring ones; `weight` of `b` from 0 to 1.
+    /// Fills an empty column with the one between two neighbouring ones; `weight` of `b` from 0 to 1.
     ///
     /// Intervals that overlap or touch, in one column or across, form a group. A group with the same sequence of kinds in both
     /// columns, overlapping pair by pair, is interpolated; any other is unstable where either column is.
-    pub(super) fn blend(a: &Self, b: &Self, weight: f32) -> Self {
-        if weight <= 0.0 {
-            return a.clone();
-        }
-        if weight >= 1.0 {
-            return b.clone();
-        }
-        let mut out = Self::new(a.depth_from_mm, a.depth_to_mm);
+    pub(super) fn blend(&mut self, a: &Self, b: &Self, weight: f32) {
         let (mut rest_a, mut rest_b) = (a.intervals.as_slice(), b.intervals.as_slice());
         while !(rest_a.is_empty() && rest_b.is_empty()) {
             let (count_a, count_b) = group(rest_a, rest_b);
@@ -163,16 +156,15 @@ impl Column {
             let (group_b, tail_b) = rest_b.split_at(count_b.min(rest_b.len()));
             if is_same_topology(group_a, group_b) {
                 for (x, y) in group_a.iter().zip(group_b) {
-                    out.push(out.interpolate(x, y, weight));
+                    self.push(self.interpolate(x, y, weight));
                 }
             } else if weight <= 0.5 {
-                out.push_union(group_a, group_b);
+                self.push_union(group_a, group_b);
             } else {
-                out.push_union(group_b, group_a);
+                self.push_union(group_b, group_a);
             }
             (rest_a, rest_b) = (tail_a, tail_b);
         }
-        out
     }
 
     /// The interval between two that belong together.

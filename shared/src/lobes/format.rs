@@ -343,27 +343,35 @@ impl Shape {
         Some(from..to)
     }
 
-    pub(super) fn interval(&self, bytes: &[u8], index: usize) -> Option<Interval> {
-        if index >= self.intervals {
-            return None;
-        }
-        let offset = self
-            .intervals_offset()
-            .checked_add(index.checked_mul(INTERVAL_LENGTH)?)?;
-        Some(Interval {
-            from: Millimeters(self.depth_mm(u16_at(bytes, offset)?)),
-            to: Millimeters(self.depth_mm(u16_at(bytes, offset + 2)?)),
-            chatter: Hertz(f32::from(u16_at(bytes, offset + 4)?) * self.chatter_step_hz()),
-            kind: kind_of(*bytes.get(offset + 6)?)?,
-        })
-    }
-
-    fn depth_mm(&self, code: u16) -> f32 {
+    /// The intervals of a column; `None` for one of a kind that does not exist.
+    pub(super) fn column<'a>(
+        &self,
+        bytes: &'a [u8],
+        layer: usize,
+        speed: usize,
+    ) -> Option<impl ExactSizeIterator<Item = Option<Interval>> + use<'a>> {
+        let range = self.column_range(bytes, layer, speed)?;
+        let offset = |index: usize| {
+            self.intervals_offset()
+                .checked_add(index.checked_mul(INTERVAL_LENGTH)?)
+        };
+        let entries = bytes.get(offset(range.start)?..offset(range.end)?)?;
+        let (depth_from_mm, depth_to_mm) = (self.depth_from_mm, self.depth_to_mm);
+        let (depth_step_mm, chatter_step_hz) = (self.depth_step_mm(), self.chatter_step_hz());
         // The ends must come out exactly: they say that an interval reaches the end of the table.
-        match code {
-            u16::MAX => self.depth_to_mm,
-            _ => self.depth_from_mm + f32::from(code) * self.depth_step_mm(),
-        }
+        let depth = move |code: u16| match code {
+            u16::MAX => Millimeters(depth_to_mm),
+            _ => Millimeters(depth_from_mm + f32::from(code) * depth_step_mm),
+        };
+        let (entries, _) = entries.as_chunks::<INTERVAL_LENGTH>();
+        Some(entries.iter().map(move |&[a, b, c, d, e, f, kind, _]| {
+            Some(Interval {
+                from: depth(u16::from_le_bytes([a, b])),
+                to: depth(u16::from_le_bytes([c, d])),
+                kind: kind_of(kind)?,
+                chatter: Hertz(f32::from(u16::from_le_bytes([e, f])) * chatter_step_hz),
+            })
+        }))
     }
 }
 

@@ -1,0 +1,134 @@
+//! What is certain of a cell of the table, the speeds between two of its grid, without interpolation.
+
+use heapless::Vec;
+
+use super::DEPTH_MARGIN;
+use crate::lobes::{CutLobes, FEW, Interval};
+
+/// What a cell is for the depth of a cut with its margin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cell {
+    /// All of it is stable.
+    Stable,
+    /// None of it is.
+    Unstable,
+    /// It changes within, or cannot be told from the entries alone.
+    Mixed,
+}
+
+/// What the entries at one speed of the grid say of a depth with its margin, in all layers that matter.
+#[derive(Clone, Copy)]
+pub(super) struct Node {
+    /// All depths within the margin are stable in all layers.
+    is_stable: bool,
+    /// The depth less its margin, the depth, the depth and its margin: stable in no layer.
+    is_unstable: [bool; 3],
+}
+
+impl Node {
+    /// The node at a speed of the grid, of a table that ends at `depth_to_mm`; `None` where its entries alone are not
+    /// enough to tell what lies between it and the next.
+    pub(super) fn at(
+        cut: &CutLobes<'_>,
+        speed_index: usize,
+        depth_mm: f32,
+        depth_to_mm: f32,
+    ) -> Option<Self> {
+        let probes_mm = [1.0 - DEPTH_MARGIN, 1.0, 1.0 + DEPTH_MARGIN].map(|factor| factor * depth_mm);
+        let [from_mm, _, to_mm] = probes_mm;
+        let mut node = Self {
+            is_stable: to_mm <= depth_to_mm,
+            is_unstable: [true; 3],
+        };
+        for layer in cut.layers() {
+            let mut is_covered = [false; 3];
+            for interval in cut.stored(layer, speed_index)? {
+                let Interval { from, to, .. } = interval?;
+                node.is_stable &= (to.0 <= from_mm && to.0 < depth_to_mm) || from.0 > to_mm;
+                for (is_covered, probe_mm) in is_covered.iter_mut().zip(probes_mm) {
+                    *is_covered |= from.0 <= probe_mm && probe_mm < to.0;
+                }
+            }
+            for (is_unstable, is_covered) in node.is_unstable.iter_mut().zip(is_covered) {
+                *is_unstable &= is_covered;
+            }
+        }
+        Some(node)
+    }
+}
+
+impl Cell {
+    /// The cell between two nodes.
+    pub(super) fn between(a: Option<Node>, b: Option<Node>) -> Self {
+        let (Some(a), Some(b)) = (a, b) else {
+            return Self::Mixed;
+        };
+        if a.is_stable && b.is_stable {
+            Self::Stable
+        } else if a.is_unstable.iter().zip(b.is_unstable).any(|(a, b)| *a && b) {
+            Self::Unstable
+        } else {
+            Self::Mixed
+        }
+    }
+}
+
+/// No quiet depth of up to `depth_mm` is larger than this at a speed of the grid, or between two that are next to each
+/// other.
+///
+/// A depth that is stable between entries is stable in one of them. So all depths within the margin of a quiet one
+/// lie in the stable ranges of the entries taken together.
+pub(super) fn largest_possible_mm(
+    cut: &CutLobes<'_>,
+    speed_indices: impl IntoIterator<Item = usize>,
+    depth_mm: f32,
+    depth_to_mm: f32,
+) -> f32 {
+    let mut ranges_mm: Ranges = Vec::new();
+    for index in speed_indices {
+        for layer in cut.layers() {
+            if add_stable_ranges(&mut ranges_mm, cut, layer, index, depth_to_mm).is_none() {
+                return depth_mm;
+            }
+        }
+    }
+    let (mut largest_mm, mut from_mm, mut to_mm) = (0.0, 0.0, 0.0);
+    for range_mm in ranges_mm {
+        if range_mm.0 > to_mm {
+            (from_mm, to_mm) = range_mm;
+        } else {
+            to_mm = f32::max(to_mm, range_mm.1);
+        }
+        let upper_mm = f32::min(to_mm / (1.0 + DEPTH_MARGIN), depth_mm);
+        if upper_mm >= from_mm / (1.0 - DEPTH_MARGIN) {
+            largest_mm = f32::max(largest_mm, upper_mm);
+        }
+    }
+    largest_mm
+}
+
+/// Stable ranges of up to four columns, ascending in their beginnings.
+type Ranges = Vec<(f32, f32), { 4 * (FEW + 1) }>;
+
+fn add_stable_ranges(
+    ranges_mm: &mut Ranges,
+    cut: &CutLobes<'_>,
+    layer: usize,
+    speed_index: usize,
+    depth_to_mm: f32,
+) -> Option<()> {
+    let mut add = |from_mm: f32, to_mm: f32| {
+        if from_mm < to_mm {
+            let place = ranges_mm.iter().position(|&(other_mm, _)| from_mm < other_mm);
+            let _ = ranges_mm.insert(place.unwrap_or(ranges_mm.len()), (from_mm, to_mm));
+        }
+    };
+    let mut from_mm = 0.0;
+    for interval in cut.stored(layer, speed_index)? {
+        let interval = interval?;
+        add(from_mm, interval.from.0);
+        from_mm = interval.to.0;
+    }
+    add(from_mm, depth_to_mm);
+    Some(())
+}

@@ -1,0 +1,205 @@
+//! The largest quiet depth, where no speed is quiet at the present one.
+
+use heapless::{Deque, Vec};
+
+use super::cell::largest_possible_mm;
+use super::quiet::{Direction, Quiet};
+use super::rule::ratio;
+use super::{BETTER, DEPTH_MARGIN, SPEED_BAND};
+use crate::units::{Millimeters, Rpm};
+
+/// Of smaller depths at other speeds that differ by less than this factor the one at the nearer speed is taken.
+const WORTH: f32 = 1.02;
+
+/// The most speeds that are looked at exactly for a smaller depth, each the most promising of its neighbourhood.
+const PROMISES: usize = 8;
+
+/// Ranges of quiet depths at one speed; what does not fit is left out, which is on the safe side.
+type Ranges = Vec<(f32, f32), 24>;
+
+/// A speed, and a bound for the depths that may be quiet there.
+#[derive(Clone, Copy)]
+struct Promise {
+    rpm: f32,
+    depth_mm: f32,
+}
+
+impl Quiet<'_> {
+    /// The largest quiet depth up to that of the cut that was found, and the speed for it: the present one unless another
+    /// is better.
+    ///
+    /// What is stored at the speeds of the grid bounds the quiet depth of every speed from above; the most promising
+    /// speeds are looked at exactly, until none promises more than what was found.
+    pub(super) fn largest_depth(&self, speed: Rpm) -> Option<(Rpm, Millimeters)> {
+        let present_mm = self.largest_depth_mm(speed.0, 0.0);
+        let mut best = present_mm.map(|depth_mm| (speed.0, depth_mm));
+        let mut to_beat_mm = present_mm.map_or(0.0, |depth_mm| BETTER * depth_mm);
+        for promise in self.promises(speed, to_beat_mm) {
+            if promise.depth_mm <= to_beat_mm {
+                break;
+            }
+            if let Some(depth_mm) = self.largest_depth_mm(promise.rpm, to_beat_mm) {
+                best = Some((promise.rpm, depth_mm));
+                to_beat_mm = WORTH * depth_mm;
+            }
+        }
+        best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
+    }
+
+    /// The speeds that promise the largest quiet depths above `to_beat_mm`, the most promising first.
+    fn promises(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Promise, PROMISES> {
+        let mut promises: Vec<Promise, PROMISES> = Vec::new();
+        let (low_rpm, high_rpm) = self.known_rpm;
+        if low_rpm > high_rpm {
+            return promises;
+        }
+        let mut behind = Window::default();
+        // Two walks over the same speeds: `ahead` is a band further than the speed whose band is looked at.
+        let mut rpm = low_rpm;
+        let mut ahead_rpm = low_rpm;
+        loop {
+            let band_end_rpm = f32::min(rpm * (1.0 + SPEED_BAND), high_rpm);
+            while ahead_rpm <= band_end_rpm {
+                behind.push(ahead_rpm, self.possible_mm(ahead_rpm));
+                if ahead_rpm == high_rpm {
+                    break;
+                }
+                ahead_rpm = self.next_point(ahead_rpm, high_rpm);
+            }
+            behind.drop_below(rpm * (1.0 - SPEED_BAND));
+            let depth_mm = behind.least_mm(self.depth_mm);
+            if depth_mm > to_beat_mm {
+                insert(&mut promises, Promise { rpm, depth_mm }, speed);
+            }
+            if rpm == high_rpm {
+                return promises;
+            }
+            rpm = self.next_point(rpm, high_rpm);
+        }
+    }
+
+    /// The next speed at which a depth is looked for: the next of the grid, or half the speed band on.
+    fn next_point(&self, rpm: f32, end_rpm: f32) -> f32 {
+        let (_, cell_end_rpm) = self.cell_at(Direction::Faster, rpm, end_rpm);
+        f32::min(rpm * (1.0 + 0.5 * SPEED_BAND), cell_end_rpm)
+    }
+
+    /// No depth that is quiet at this speed is larger, by what is stored at it, or around it.
+    fn possible_mm(&self, rpm: f32) -> f32 {
+        let index = self.table.speeds_up_to(Rpm(rpm)).saturating_sub(1);
+        let is_on_grid = self.table.speed(index) == Some(Rpm(rpm));
+        let indices = index..index + if is_on_grid { 1 } else { 2 };
+        largest_possible_mm(&self.cut, indices, self.depth_mm, self.depth_to_mm)
+    }
+
+    /// The largest quiet depth at a speed, if it is more than `at_least_mm`.
+    fn largest_depth_mm(&self, rpm: f32, at_least_mm: f32) -> Option<f32> {
+        let (low_rpm, high_rpm) = self.known_rpm;
+        let from_rpm = f32::max(rpm * (1.0 - SPEED_BAND), self.machine_rpm.0);
+        let to_rpm = f32::min(rpm * (1.0 + SPEED_BAND), self.machine_rpm.1);
+        if from_rpm < low_rpm || to_rpm > high_rpm {
+            return None;
+        }
+        let mut quiet = self.quiet_depths(rpm)?;
+        let mut rpm = from_rpm;
+        loop {
+            quiet = intersection(&quiet, &self.quiet_depths(rpm)?);
+            let largest_mm = quiet.iter().map(|&(_, to_mm)| to_mm).fold(0.0, f32::max);
+            if largest_mm <= at_least_mm {
+                return None;
+            }
+            if rpm >= to_rpm {
+                return Some(largest_mm);
+            }
+            let (index, cell_end_rpm) = self.cell_at(Direction::Faster, rpm, to_rpm);
+            rpm = self.next_rpm(Direction::Faster, rpm, index, cell_end_rpm);
+        }
+    }
+
+    /// The depths up to that of the cut that are stable with margin at exactly this speed.
+    fn quiet_depths(&self, rpm: f32) -> Option<Ranges> {
+        let column = self.cut.column(Rpm(rpm)).ok()?;
+        let mut ranges = Ranges::new();
+        for (from, to) in column.stable() {
+            let from_mm = from.0 / (1.0 - DEPTH_MARGIN);
+            let to_mm = f32::min(to.0 / (1.0 + DEPTH_MARGIN), self.depth_mm);
+            if from_mm < to_mm && ranges.push((from_mm, to_mm)).is_err() {
+                break;
+            }
+        }
+        Some(ranges)
+    }
+}
+
+/// Keeps the best promises in order, and of those within a speed band of each other the best.
+fn insert(promises: &mut Vec<Promise, PROMISES>, new: Promise, speed: Rpm) {
+    let is_better = |a: &Promise, b: &Promise| {
+        let is_nearer = ratio(Rpm(a.rpm), speed) < ratio(Rpm(b.rpm), speed);
+        a.depth_mm > WORTH * b.depth_mm || (is_nearer && WORTH * a.depth_mm >= b.depth_mm)
+    };
+    if let Some(index) = promises
+        .iter()
+        .position(|old| ratio(Rpm(old.rpm), Rpm(new.rpm)) <= 1.0 + SPEED_BAND)
+    {
+        match promises.get(index) {
+            Some(old) if is_better(&new, old) => promises.remove(index),
+            _ => return,
+        };
+    }
+    let place = promises
+        .iter()
+        .position(|old| is_better(&new, old))
+        .unwrap_or(promises.len());
+    if promises.is_full() && place < promises.len() {
+        promises.pop();
+    }
+    // Where it is the least of too many it is left out.
+    let _ = promises.insert(place, new);
+}
+
+/// The least of the bounds within a moving band of speeds.
+#[derive(Default)]
+struct Window {
+    /// Ascending in speed and in bound: a bound that a later one undercuts is forgotten. Where there are too many the newest is
+    /// left out, which makes the bound larger and harms nothing.
+    bounds: Deque<(f32, f32), 32>,
+}
+
+impl Window {
+    fn push(&mut self, rpm: f32, bound_mm: f32) {
+        while self
+            .bounds
+            .back()
+            .is_some_and(|&(_, last_mm)| last_mm >= bound_mm)
+        {
+            self.bounds.pop_back();
+        }
+        let _ = self.bounds.push_back((rpm, bound_mm));
+    }
+
+    fn drop_below(&mut self, rpm: f32) {
+        while self.bounds.front().is_some_and(|&(first_rpm, _)| first_rpm < rpm) {
+            self.bounds.pop_front();
+        }
+    }
+
+    fn least_mm(&self, otherwise_mm: f32) -> f32 {
+        self.bounds
+            .front()
+            .map_or(otherwise_mm, |&(_, bound_mm)| bound_mm)
+    }
+}
+
+/// What two ascending lists of ranges have in common.
+fn intersection(a: &Ranges, b: &Ranges) -> Ranges {
+    let mut common = Ranges::new();
+    for &(a_from, a_to) in a {
+        for &(b_from, b_to) in b {
+            let (from, to) = (f32::max(a_from, b_from), f32::min(a_to, b_to));
+            if from < to && common.push((from, to)).is_err() {
+                return common;
+            }
+        }
+    }
+    common
+}

@@ -1,0 +1,169 @@
+//! The lobes of one cut: the layers of a table between which its feed lies.
+
+use super::{Column, FEED_TOLERANCE, IMMERSION_TOLERANCE, Interval, LobeTable, NotKnown};
+use crate::units::{Degrees, Millimeters, Rpm};
+use crate::working_point::WorkingPoint;
+
+/// Two columns of n and m intervals join to at most 2n + m: four of this many to 27, which a [`Column`] holds.
+pub(crate) const FEW: usize = 3;
+
+/// A place between two speeds of the grid.
+#[derive(Clone, Copy)]
+struct Between {
+    /// Index of the speed below.
+    below: usize,
+    /// Weight of the speed above, 0 to 1.
+    weight: f32,
+}
+
+/// The columns of a table for one feed, immersion and posture.
+#[derive(Clone, Copy, Debug)]
+pub struct CutLobes<'a> {
+    table: LobeTable<'a>,
+    near: usize,
+    far: usize,
+    /// Weight of the far layer, 0 to 1.
+    weight: f32,
+}
+
+impl<'a> CutLobes<'a> {
+    pub(super) fn new(table: LobeTable<'a>, working_point: &WorkingPoint) -> Result<Self, NotKnown> {
+        let (near, far, weight) = bracket_feed(&table, working_point)?;
+        Ok(Self {
+            table,
+            near,
+            far,
+            weight,
+        })
+    }
+
+    /// The column at any speed.
+    pub fn column(&self, speed: Rpm) -> Result<Column, NotKnown> {
+        let between = self.between(speed)?;
+        let mut column = self.table.empty_column();
+        self.read(self.near, between, &mut column)?;
+        if self.near == self.far {
+            return Ok(column);
+        }
+        let mut far = self.table.empty_column();
+        self.read(self.far, between, &mut far)?;
+        let mut blended = self.table.empty_column();
+        blended.blend(&column, &far, self.weight);
+        Ok(blended)
+    }
+
+    /// The layers on both sides of the feed, or the one that holds for it.
+    pub(crate) fn layers(&self) -> impl Iterator<Item = usize> + use<> {
+        [Some(self.near), (self.far != self.near).then_some(self.far)]
+            .into_iter()
+            .flatten()
+    }
+
+    /// What is stored in a layer at one speed of the grid; `None` for an interval that cannot be read.
+    ///
+    /// Between two speeds of the grid a depth that is stable in the lists of both, in all [`layers`](Self::layers), is
+    /// stable, and one that is stable in none of them is not: most questions need no interpolation. `None` where a list has
+    /// more than [`FEW`] intervals, so that this is not certain, or cannot be read.
+    pub(crate) fn stored(
+        &self,
+        layer: usize,
+        speed_index: usize,
+    ) -> Option<impl Iterator<Item = Option<Interval>> + use<'a>> {
+        let LobeTable { bytes, shape } = self.table;
+        shape
+            .column(bytes, layer, speed_index)
+            .filter(|column| column.len() <= FEW)
+    }
+
+    /// Reads the column of one layer into an empty one.
+    fn read(&self, layer: usize, between: Between, column: &mut Column) -> Result<(), NotKnown> {
+        if between.weight == 0.0 {
+            return self.table.read_column(layer, between.below, column);
+        }
+        let (mut below, mut above) = (self.table.empty_column(), self.table.empty_column());
+        self.table.read_column(layer, between.below, &mut below)?;
+        self.table.read_column(layer, between.below + 1, &mut above)?;
+        column.blend(&below, &above, between.weight);
+        Ok(())
+    }
+
+    /// The speeds of the grid around a speed.
+    fn between(&self, speed: Rpm) -> Result<Between, NotKnown> {
+        let count = self.table.shape.speeds;
+        let outside = || NotKnown::Speed {
+            asked: speed,
+            from: Rpm(self.table.speed_rpm(0)),
+            to: Rpm(self.table.speed_rpm(count.saturating_sub(1))),
+        };
+        let above = self.table.speeds_up_to(speed);
+        let below = above.checked_sub(1).ok_or_else(outside)?;
+        let below_rpm = self.table.speed_rpm(below);
+        if below_rpm == speed.0 {
+            return Ok(Between { below, weight: 0.0 });
+        }
+        if above >= count {
+            return Err(outside());
+        }
+        let weight = (speed.0 - below_rpm) / (self.table.speed_rpm(above) - below_rpm);
+        if (0.0..=1.0).contains(&weight) {
+            Ok(Between { below, weight })
+        } else {
+            Err(NotKnown::Damaged)
+        }
+    }
+}
+
+/// The two layers whose feeds are around that of the working point, and the weight of the second; the same
+/// layer twice where one holds for it.
+fn bracket_feed(
+    table: &LobeTable<'_>,
+    working_point: &WorkingPoint,
+) -> Result<(usize, usize, f32), NotKnown> {
+    let feed_mm = working_point.feed_per_tooth.0;
+    let mut posture_known = false;
+    let mut range: Option<(f32, f32)> = None;
+    let mut below: Option<(usize, f32)> = None;
+    let mut above: Option<(usize, f32)> = None;
+    for (index, layer) in table.layers().enumerate() {
+        if layer.posture != working_point.posture {
+            continue;
+        }
+        posture_known = true;
+        if !is_close(layer.start, working_point.start) || !is_close(layer.exit, working_point.exit) {
+            continue;
+        }
+        let (from_mm, to_mm) = (layer.feed_from.0, layer.feed_to.0);
+        if feed_mm >= from_mm * (1.0 - FEED_TOLERANCE) && feed_mm <= to_mm * (1.0 + FEED_TOLERANCE) {
+            return Ok((index, index, 0.0));
+        }
+        let (low, high) = range.unwrap_or((from_mm, to_mm));
+        range = Some((f32::min(low, from_mm), f32::max(high, to_mm)));
+        if to_mm < feed_mm && below.is_none_or(|(_, best)| to_mm > best) {
+            below = Some((index, to_mm));
+        }
+        if from_mm > feed_mm && above.is_none_or(|(_, best)| from_mm < best) {
+            above = Some((index, from_mm));
+        }
+    }
+    match (below, above, range) {
+        (Some((low, low_mm)), Some((high, high_mm)), _) => {
+            Ok((low, high, (feed_mm - low_mm) / (high_mm - low_mm)))
+        }
+        (_, _, Some((from, to))) => Err(NotKnown::Feed {
+            asked: Millimeters(feed_mm),
+            from: Millimeters(from),
+            to: Millimeters(to),
+        }),
+        (_, _, None) if posture_known => Err(NotKnown::Immersion {
+            start: working_point.start,
+            exit: working_point.exit,
+        }),
+        (_, _, None) => Err(NotKnown::Posture {
+            asked: working_point.posture,
+        }),
+    }
+}
+
+fn is_close(a: Degrees, b: Degrees) -> bool {
+    (a.0 - b.0).abs() <= IMMERSION_TOLERANCE.0
+}
