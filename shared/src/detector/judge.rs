@@ -137,7 +137,7 @@ const SAME_TONE: f32 = 0.05;
 /// What persists must be this part of the forced vibration at least to be called chatter.
 const PERSISTENT_SHARE: f32 = 0.7;
 /// A residual of this part of the forced vibration that nothing explains is chatter, where a tone is in it.
-const WILD_SHARE: f32 = 0.5;
+const WILD_SHARE: f32 = 1.0;
 /// A tone of less than this part of the power of its band is no chatter.
 const TONE_SHARE: f32 = 0.1;
 /// Forced vibration of more than this, root mean square over a tooth period, is worth a word, in m/s².
