@@ -3,6 +3,7 @@
 pub mod case;
 pub mod cli;
 pub mod continuation;
+pub mod demo;
 pub mod device;
 mod eigenvalues;
 pub mod file;

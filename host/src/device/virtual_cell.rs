@@ -68,6 +68,19 @@ impl VirtualCell {
         )
     }
 
+    /// From when to when the tool of such a cut is in the workpiece in full, in seconds since the first sample.
+    ///
+    /// # Errors
+    /// As [`cut`](Self::cut).
+    pub fn full_cut_s(
+        &self,
+        spindle_rpm: f64,
+        depth_mm: f64,
+        seconds: f64,
+    ) -> Result<[f64; 2], VirtualCutError> {
+        VirtualCut::new(spindle_rpm, depth_mm, seconds).full_cut_s(&self.case)
+    }
+
     /// Cut after cut without end, computed while the one before is heard: period doubling, a quiet cut, a Hopf.
     pub fn cuts_for_ever(self) -> Receiver<Heard> {
         const CUTS: [(f64, f64); 3] = [(1045.0, 2.0), (1045.0, 1.0), (900.0, 2.0)];

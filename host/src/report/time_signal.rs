@@ -1,5 +1,7 @@
 //! A signal over time, with the moments that matter marked.
 
+use std::ops::Range;
+
 use plotters::prelude::{LineSeries, PathElement, Text};
 use plotters::style::Color;
 
@@ -19,7 +21,8 @@ const SIZE: (u32, u32) = (960, 280);
 /// pixels would only make the file bigger.
 const STRETCHES: usize = 1200;
 
-/// Draws `values` at the times `t_s` (as many, in order) as SVG.
+/// Draws `values` at the times `t_s` (as many, in order) as SVG; `range` is that of the axis of values, by default what holds
+/// them.
 ///
 /// # Errors
 /// Where there is nothing to draw, or the drawing library refuses.
@@ -29,11 +32,12 @@ pub fn time_signal(
     t_s: &[f64],
     values: &[f64],
     moments: &[Moment],
+    range: Option<Range<f64>>,
 ) -> Result<String, PictureError> {
     let (Some(&from), Some(&to)) = (t_s.first(), t_s.last()) else {
         return Err(PictureError::nothing("a signal needs samples"));
     };
-    let y = span(values.iter().copied());
+    let y = range.unwrap_or_else(|| span(values.iter().copied()));
     let labels = Labels {
         title,
         x: "time [s]",

@@ -2,7 +2,7 @@
 
 use quietcut_core::advice::{Action, Advice, Obstacle, Source};
 use quietcut_core::detector::{Judgement, Reason, Verdict};
-use quietcut_core::lobes::NotKnown;
+use quietcut_core::lobes::{self, NotKnown};
 use quietcut_core::monitor::Report;
 use quietcut_core::units::Rpm;
 use quietcut_core::working_point::WorkingPoint;
@@ -168,6 +168,16 @@ pub fn obstacle(obstacle: &Obstacle) -> String {
         Obstacle::NoSpeedWithinLimits => {
             "the tooth-passing rule has no speed within the limits of the machine".into()
         }
+    }
+}
+
+/// How stability is lost.
+pub fn limit(kind: lobes::Kind) -> &'static str {
+    match kind {
+        lobes::Kind::Hopf => "chatter at a frequency of its own (Hopf)",
+        lobes::Kind::Flip => "chatter at every second tooth (period doubling)",
+        lobes::Kind::Fold => "the forced vibration jumps (fold)",
+        lobes::Kind::Undecided => "the computation could not decide",
     }
 }
 
