@@ -35,11 +35,6 @@ impl Error {
         Self::Other(cause.into())
     }
 
-    /// A verb that is listed and not built yet.
-    pub fn not_built(verb: &str) -> Self {
-        Self::other(format!("{verb}: not built yet"))
-    }
-
     /// 2 for bad usage or input, 1 for anything else.
     pub fn exit_status(&self) -> u8 {
         match self {
