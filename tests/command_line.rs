@@ -120,3 +120,110 @@ fn the_same_seed_cuts_the_same_file_and_it_replays() {
     );
     assert_eq!(replayed["summary"]["clipped"], 0);
 }
+
+#[test]
+fn examples_run() {
+    // Beside each other: examples of one verb use what the line before has made.
+    std::thread::scope(|scope| {
+        for verb in VERBS {
+            scope.spawn(move || {
+                let folder = folder();
+                let there = folder.path().join("tests/cases");
+                std::fs::create_dir_all(&there).expect("a folder can be made");
+                let name = "kuka-kr90-acetal.toml";
+                std::fs::copy(cases().join(name), there.join(name)).expect("the case can be copied");
+                for example in examples(verb) {
+                    let ran = quietcut(folder.path(), &example);
+                    assert_eq!(ran.status, Some(0), "{example:?}: {ran:?}");
+                    assert!(!ran.stdout.is_empty(), "{example:?} says nothing");
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn json_is_exactly_one_object() {
+    let folder = folder();
+    let case = cases().join("kuka-kr90-acetal.toml");
+    let case = case.to_str().expect("a path in UTF-8");
+    for arguments in [
+        &["lobes", case, "--at", "1045,2"][..],
+        &["lobes", case, "--rpm", "900:1000:3", "--depth-mm", "0.1:3:10"],
+        &["table", case, "--rpm", "900:1000:2", "--out", "a.qct"],
+        &["table", "--show", "a.qct"],
+        &[
+            "simulate",
+            case,
+            "--rpm",
+            "900",
+            "--depth-mm",
+            "1",
+            "--seconds",
+            "3",
+            "--out",
+            "a.csv",
+        ],
+        &["replay", "a.csv", "--table", "a.qct"],
+        &["replay", "a.csv", "--table", "a.qct", "--port", "simulated"],
+        &["upload", "simulated", "a.qct"],
+        &["info", "simulated"],
+        &[
+            "work",
+            "simulated",
+            "--depth-mm",
+            "2",
+            "--start",
+            "90",
+            "--exit",
+            "180",
+            "--feed",
+            "0.15",
+        ],
+        &["monitor", "simulated", "--seconds", "0.5"],
+    ] {
+        let answer = quietcut(folder.path(), &[arguments, &["--json"]].concat());
+        assert!(answer.json().is_object(), "{arguments:?}: {answer:?}");
+        assert_eq!(answer.stdout.lines().count(), 1, "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_recording_is_heard_on_the_device_as_it_is_here() {
+    let folder = folder();
+    let case = cases().join("kuka-kr90-acetal.toml");
+    let case = case.to_str().expect("a path in UTF-8");
+    let run = |arguments: &[&str]| {
+        let ran = quietcut(folder.path(), arguments);
+        assert_eq!(ran.status, Some(0), "{ran:?}");
+        ran.stdout
+    };
+    run(&["table", case, "--out", "a.qct"]);
+    run(&[
+        "simulate",
+        case,
+        "--rpm",
+        "1045",
+        "--depth-mm",
+        "2",
+        "--seconds",
+        "8",
+        "--out",
+        "a.csv",
+    ]);
+    let here = run(&["replay", "a.csv", "--table", "a.qct", "--json"]);
+    let there = run(&[
+        "replay",
+        "a.csv",
+        "--table",
+        "a.qct",
+        "--port",
+        "simulated",
+        "--json",
+    ]);
+    assert!(
+        here.contains("period-doubling") && here.contains("table"),
+        "{here}"
+    );
+    assert_eq!(here, there);
+}

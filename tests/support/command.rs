@@ -75,6 +75,11 @@ pub struct Running {
 }
 
 impl Running {
+    /// Closes standard output, as `head` does when it has enough.
+    pub fn stop_reading(&mut self) {
+        drop(self.child.stdout.take());
+    }
+
     /// Waits for the end; a run that does not end is killed and fails the test.
     pub fn finish(mut self) -> Outcome {
         let drain = |stream: Option<Box<dyn Read + Send>>| {

@@ -31,7 +31,7 @@ pub enum BenchError {
 const SILENCE: Duration = Duration::from_secs(20);
 
 /// How long each cut is.
-const CUT_SECONDS: f64 = 8.0;
+const CUT_SECONDS: f64 = 16.0;
 
 /// A cell, a device, a serial line, a host.
 pub struct Bench {
@@ -147,7 +147,7 @@ fn take(trial: &mut Trial, event: Event, start: &mut Option<Nanoseconds>) {
                 .strobes
                 .iter()
                 .filter(|strobe| strobe.band == Band::Structure);
-            trial.strobes.extend(slow);
+            trial.strobes.extend(slow.map(|&strobe| (chunk.sequence, strobe)));
         }
         Event::Report(mut report) => {
             let start = start.get_or_insert(report.time);

@@ -1,5 +1,7 @@
 //! The report of the demonstration.
 
+use std::ops::{Range, RangeInclusive};
+
 use maud::{Markup, html};
 use quietcut_core::lobes::LobeTable;
 
@@ -8,7 +10,7 @@ use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::marks::{Mark, MarkKind};
 use crate::report::page::{figure, page as whole_page};
 use crate::report::spectrum::{SpectrumMarks, spectrum};
-use crate::report::stroboscope::{samples_per_tooth, stroboscopic_map};
+use crate::report::stroboscope::samples_per_tooth;
 use crate::report::time_signal::{Moment, time_signal};
 use crate::report::{PictureError, words};
 
@@ -22,9 +24,9 @@ pub struct Story {
 }
 
 /// Spindle speeds that the chart shows, rev/min.
-const CHART_RPM: std::ops::RangeInclusive<f64> = 600.0..=2400.0;
+const CHART_RPM: RangeInclusive<f64> = 750.0..=1350.0;
 /// Depths that the chart shows, mm.
-const CHART_DEPTH_MM: f64 = 5.0;
+const CHART_DEPTH_MM: f64 = 4.0;
 /// Frequencies that the spectra show: the modes of the robot and a few harmonics of the teeth.
 const SPECTRUM_HZ: f64 = 120.0;
 
@@ -88,30 +90,49 @@ fn kind(trial: &Trial) -> String {
 }
 
 fn chapter(story: &Story) -> Result<Markup, PictureError> {
-    let first = &story.first;
-    let axis = loudest(first);
-    let mut all = vec![first];
-    all.extend(&story.advised);
+    let trials: Vec<&Trial> = std::iter::once(&story.first).chain(&story.advised).collect();
+    let axis = loudest(&story.first);
     // Both cuts on one scale: the quiet one shall look as quiet as it is.
-    let largest = all
+    let scale = Scale {
+        axis,
+        signal: around_zero(
+            trials
+                .iter()
+                .flat_map(|trial| trial.trace.axes[axis].iter().copied()),
+        ),
+        strobes: around_zero(
+            trials
+                .iter()
+                .flat_map(|trial| trial.strobes_in_cut(axis))
+                .map(|(_, value)| value),
+        ),
+    };
+    let parts = trials
         .iter()
-        .flat_map(|trial| &trial.trace.axes[axis])
-        .fold(0.0, |m: f64, a| m.max(a.abs()));
-    let parts = all
-        .into_iter()
-        .map(|trial| pictures(trial, axis, largest))
+        .map(|trial| pictures(trial, &scale))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
-        h2 { (headline(first)) }
-        (account(first))
-        @for (index, part) in parts.iter().enumerate() {
-            @if index == 1 && let Some(advised) = &story.advised {
-                h2 { "As the device says: " (headline(advised)) }
-                (account(advised))
+        @for (index, (trial, part)) in trials.iter().zip(&parts).enumerate() {
+            h2 {
+                @if index > 0 { "As the device says: " }
+                (headline(trial))
             }
+            (account(trial))
             (part)
         }
     })
+}
+
+/// What the pictures of one story have in common.
+struct Scale {
+    axis: usize,
+    signal: Range<f64>,
+    strobes: Range<f64>,
+}
+
+fn around_zero(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let largest = 1.08 * values.fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    -largest..largest
 }
 
 fn headline(trial: &Trial) -> String {
@@ -139,52 +160,32 @@ fn account(trial: &Trial) -> Markup {
     }
 }
 
-fn pictures(trial: &Trial, axis: usize, largest: f64) -> Result<Markup, PictureError> {
-    let name = ["x", "y", "z"][axis];
-    let quantity = format!("acceleration {name} [m/s²]");
+fn pictures(trial: &Trial, scale: &Scale) -> Result<Markup, PictureError> {
+    let axis = scale.axis;
+    let quantity = format!("acceleration {} [m/s²]", ["x", "y", "z"][axis]);
     let [from_s, to_s] = trial.full_cut_s;
-    let mut moments = vec![
-        Moment {
-            t_s: from_s,
-            label: "full cut".into(),
-        },
-        Moment {
-            t_s: to_s,
-            label: "tool leaves".into(),
-        },
-    ];
-    if let Some(report) = trial.alarm() {
-        moments.push(Moment {
-            t_s: seconds(report),
-            label: "chatter heard".into(),
-        });
-    }
-    let range = -1.08 * largest..1.08 * largest;
-    let signal = time_signal(
-        "",
-        &quantity,
-        &trial.trace.t_s,
-        &trial.trace.axes[axis],
-        &moments,
-        Some(range),
-    )?;
-    let strobes: Vec<f64> = trial
-        .strobes
-        .iter()
-        .map(|strobe| f64::from(strobe.meters_per_second2[axis]))
-        .collect();
-    let mut pairs = Vec::new();
+    let moment = |t_s, label: &str| Moment {
+        t_s,
+        label: label.into(),
+    };
+    let mut moments = vec![moment(from_s, "full cut"), moment(to_s, "tool leaves")];
+    moments.extend(
+        trial
+            .alarm()
+            .map(|report| moment(seconds(report), "chatter heard")),
+    );
+    let (t_s, values) = (&trial.trace.t_s, &trial.trace.axes[axis]);
+    let signal = time_signal("", &quantity, t_s, values, &moments, Some(scale.signal.clone()))?;
+    let mut pair = Vec::new();
     if let Some(last) = trial.spectrum_in_cut() {
         let frequency_hz: Vec<f64> = (0..last.power.len())
             .map(|bin| bin as f64 * last.bin_hz)
             .collect();
         let amplitude: Vec<f64> = last.power.iter().map(|power| power.sqrt()).collect();
+        let chatter = trial.alarm().and_then(|report| report.judgement.chatter);
         let marks = SpectrumMarks {
             tooth_passing_hz: Some(trial.tooth_passing_hz()),
-            chatter_hz: trial
-                .alarm()
-                .and_then(|report| report.judgement.chatter)
-                .map(|chatter| f64::from(chatter.0)),
+            chatter_hz: chatter.map(|chatter| f64::from(chatter.0)),
         };
         let picture = spectrum(
             "Spectrum at the end of the cut",
@@ -193,24 +194,23 @@ fn pictures(trial: &Trial, axis: usize, largest: f64) -> Result<Markup, PictureE
             SPECTRUM_HZ,
             marks,
         )?;
-        pairs.push(figure(&picture, "As the device computed it, all axes together."));
+        pair.push(figure(
+            &picture,
+            "As the device computed it; all axes together, rms per bin.",
+        ));
     }
-    if strobes.len() > 1 {
-        let picture = samples_per_tooth("One sample per tooth", &quantity, &strobes)?;
-        pairs.push(figure(
+    let strobes = trial.strobes_in_cut(axis);
+    if !strobes.is_empty() {
+        let range = Some(scale.strobes.clone());
+        let picture = samples_per_tooth("One sample per tooth", &quantity, &strobes, range)?;
+        pair.push(figure(
             &picture,
             "One line: every tooth feels the same. Two lines: period doubling. Waves: a Hopf.",
-        ));
-        let newest = strobes.get(strobes.len() / 2..).unwrap_or_default();
-        let picture = stroboscopic_map("Stroboscopic map, second half of the cut", &quantity, newest)?;
-        pairs.push(figure(
-            &picture,
-            "A point: quiet. Two: period doubling. A ring: a Hopf.",
         ));
     }
     Ok(html! {
         (figure(&signal, "What the sensor felt below 400 Hz."))
-        div.pair { @for pair in &pairs { (pair) } }
+        div.pair { @for picture in &pair { (picture) } }
     })
 }
 

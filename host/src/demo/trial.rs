@@ -33,8 +33,8 @@ pub struct Trial {
     pub reports: Vec<Report>,
     /// Spectra of the structure band.
     pub spectra: Vec<Spectrum>,
-    /// Samples once per tooth in the structure band.
-    pub strobes: Vec<Strobe>,
+    /// Samples once per tooth in the structure band, with the number of the block that made them.
+    pub strobes: Vec<(u32, Strobe)>,
 }
 
 impl Trial {
@@ -72,6 +72,19 @@ impl Trial {
     pub fn vibration(&self) -> [f64; 3] {
         let [from_s, to_s] = self.full_cut_s;
         self.trace.rms([to_s - 0.25 * (to_s - from_s), to_s])
+    }
+
+    /// Samples once per tooth of the full cut along one axis: number of the tooth pass, and acceleration in m/s².
+    pub fn strobes_in_cut(&self, axis: usize) -> Vec<(u32, f64)> {
+        let in_cut = |sequence: u32| {
+            let report = self.reports.partition_point(|report| report.sequence < sequence);
+            let t_s = self.reports.get(report).map_or(0.0, seconds);
+            (self.full_cut_s[0]..self.full_cut_s[1]).contains(&t_s)
+        };
+        let strobes = self.strobes.iter().filter(|(sequence, _)| in_cut(*sequence));
+        strobes
+            .filter_map(|(_, strobe)| Some((strobe.tooth, f64::from(*strobe.meters_per_second2.get(axis)?))))
+            .collect()
     }
 
     /// The newest spectrum of the full cut.

@@ -13,6 +13,10 @@ const CASE_TEXT: &str = include_str!("../../../tests/cases/kuka-kr90-acetal.toml
 /// The sample clock of the virtual sensor runs this much too fast: a real one is off by up to 3 %.
 const CLOCK_ERROR: f64 = 0.01;
 
+/// The spindle turns this long before and after the tool is in the workpiece: what one cut made has died out before the
+/// next begins.
+const AIR_SECONDS: f64 = 1.0;
+
 /// A milling robot with its tool over a block of acetal.
 #[derive(Clone, Debug)]
 pub struct VirtualCell {
@@ -60,7 +64,7 @@ impl VirtualCell {
             clock_error: CLOCK_ERROR,
             ..Accelerometer::IIS3DWB_16G
         };
-        VirtualCut::new(spindle_rpm, depth_mm, seconds).hear(
+        virtual_cut(spindle_rpm, depth_mm, seconds).hear(
             &self.case,
             accelerometer,
             TachometerModel::ONE_MARK,
@@ -78,13 +82,13 @@ impl VirtualCell {
         depth_mm: f64,
         seconds: f64,
     ) -> Result<[f64; 2], VirtualCutError> {
-        VirtualCut::new(spindle_rpm, depth_mm, seconds).full_cut_s(&self.case)
+        virtual_cut(spindle_rpm, depth_mm, seconds).full_cut_s(&self.case)
     }
 
     /// Cut after cut without end, computed while the one before is heard: period doubling, a quiet cut, a Hopf.
     pub fn cuts_for_ever(self) -> Receiver<Heard> {
         const CUTS: [(f64, f64); 3] = [(1045.0, 2.0), (1045.0, 1.0), (900.0, 2.0)];
-        const SECONDS: f64 = 8.0;
+        const SECONDS: f64 = 12.0;
         let (send, receive) = sync_channel(1);
         std::thread::spawn(move || {
             for (seed, (spindle_rpm, depth_mm)) in (1..).zip(CUTS.into_iter().cycle()) {
@@ -98,6 +102,13 @@ impl VirtualCell {
             }
         });
         receive
+    }
+}
+
+fn virtual_cut(spindle_rpm: f64, depth_mm: f64, seconds: f64) -> VirtualCut {
+    VirtualCut {
+        air_s: AIR_SECONDS,
+        ..VirtualCut::new(spindle_rpm, depth_mm, seconds)
     }
 }
 

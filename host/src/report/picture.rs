@@ -104,11 +104,13 @@ pub(super) fn axes<'a, 'c>(
 
 /// A number at an axis: no noise digits of binary fractions.
 fn tick(value: &f64) -> String {
-    if *value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e6) {
-        format!("{value:.1e}")
+    let size = value.abs();
+    if size < 1e-12 {
+        "0".into()
+    } else if (1e-3..1e6).contains(&size) {
+        format!("{}", (value * 1e4).round() / 1e4)
     } else {
-        let rounded = (value * 1e4).round() / 1e4;
-        format!("{}", rounded + 0.0)
+        format!("{value:.1e}")
     }
 }
 
@@ -138,6 +140,7 @@ mod tests {
     fn ticks_and_spans_are_plain() {
         assert_eq!(tick(&0.30000000000000004), "0.3");
         assert_eq!(tick(&-0.0), "0");
+        assert_eq!(tick(&-1.1e-16), "0");
         assert_eq!(tick(&2.5e-5), "2.5e-5");
         assert_eq!(span([1.0, f64::NAN, 3.0].into_iter()), 0.88..3.12);
         assert_eq!(span(std::iter::empty()), -1.0..1.0);

@@ -1,86 +1,59 @@
-//! Samples once per tooth: one line is a quiet cut, two are period doubling, a cloud or a ring is a Hopf.
+//! Samples once per tooth: one line is a quiet cut, two are period doubling, waves are a Hopf.
+
+use std::ops::Range;
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, PathElement, WHITE};
 use plotters::style::{Color, RGBColor};
 
-use super::picture::{BLUE, Canvas, GRID, INK, Labels, ORANGE, PictureError, axes, draw, span, text};
+use super::picture::{BLUE, GRID, INK, Labels, ORANGE, PictureError, axes, draw, span, text};
 
 const SIZE: (u32, u32) = (470, 330);
 
-/// Draws samples once per tooth over the count of teeth as SVG; even and odd teeth have their own colour.
+/// Draws samples over the number of their tooth passes as SVG; even and odd passes have their own colour. `range` is that of
+/// the axis of samples, by default what holds them.
 ///
 /// # Errors
 /// Where there is nothing to draw, or the drawing library refuses.
-pub fn samples_per_tooth(title: &str, quantity: &str, samples: &[f64]) -> Result<String, PictureError> {
-    enough(samples)?;
+pub fn samples_per_tooth(
+    title: &str,
+    quantity: &str,
+    samples: &[(u32, f64)],
+    range: Option<Range<f64>>,
+) -> Result<String, PictureError> {
+    let (Some(&(first, _)), Some(&(last, _))) = (samples.first(), samples.last()) else {
+        return Err(PictureError::nothing("a stroboscopic picture needs samples"));
+    };
     let labels = Labels {
         title,
         x: "tooth passes",
         y: quantity,
     };
-    let points: Vec<(f64, f64)> = samples
-        .iter()
-        .enumerate()
-        .map(|(k, &value)| (k as f64, value))
-        .collect();
-    draw(SIZE, |canvas| {
-        scatter(canvas, &labels, &points, 0.0..samples.len() as f64)
-    })
-}
-
-/// Draws each sample over the one before (the stroboscopic map) as SVG.
-///
-/// # Errors
-/// Where there is nothing to draw, or the drawing library refuses.
-pub fn stroboscopic_map(title: &str, quantity: &str, samples: &[f64]) -> Result<String, PictureError> {
-    enough(samples)?;
-    let x = format!("{quantity}, one tooth before");
-    let labels = Labels {
-        title,
-        x: &x,
-        y: quantity,
-    };
-    let points: Vec<(f64, f64)> = samples.windows(2).map(|pair| (pair[0], pair[1])).collect();
-    let range = span(samples.iter().copied());
-    draw(SIZE, |canvas| scatter(canvas, &labels, &points, range))
-}
-
-fn enough(samples: &[f64]) -> Result<(), PictureError> {
-    if samples.len() < 2 {
-        return Err(PictureError::nothing(
-            "a stroboscopic picture needs at least two samples",
-        ));
-    }
-    Ok(())
-}
-
-fn scatter(
-    canvas: &Canvas<'_>,
-    labels: &Labels<'_>,
-    points: &[(f64, f64)],
-    x: std::ops::Range<f64>,
-) -> Result<(), PictureError> {
-    let mut y = span(points.iter().map(|&(_, value)| value));
+    let passes = |tooth: u32| f64::from(tooth.wrapping_sub(first));
+    let mut y = range.unwrap_or_else(|| span(samples.iter().map(|&(_, value)| value)));
     // Room for the legend above the samples.
     y.end += 0.25 * (y.end - y.start);
-    let mut chart = axes(canvas, labels, x, y)?;
-    let kinds: [(usize, RGBColor, &str); 2] = [(0, BLUE, "even teeth"), (1, ORANGE, "odd teeth")];
-    for (parity, color, name) in kinds {
-        let own = points.iter().skip(parity).step_by(2);
+    draw(SIZE, |canvas| {
+        let mut chart = axes(canvas, &labels, 0.0..passes(last) + 1.0, y)?;
+        let kinds: [(u32, RGBColor, &str); 2] = [(0, BLUE, "even passes"), (1, ORANGE, "odd passes")];
+        for (parity, color, name) in kinds {
+            let own = samples.iter().filter(|(tooth, _)| tooth % 2 == parity);
+            chart
+                .draw_series(
+                    own.map(|&(tooth, value)| Circle::new((passes(tooth), value), 2, color.filled())),
+                )?
+                .label(name)
+                .legend(move |(x, y)| PathElement::new([(x + 4, y), (x + 14, y)], color.stroke_width(4)));
+        }
         chart
-            .draw_series(own.map(|&at| Circle::new(at, 2, color.filled())))?
-            .label(name)
-            .legend(move |(x, y)| PathElement::new([(x + 4, y), (x + 14, y)], color.stroke_width(4)));
-    }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
-        .background_style(WHITE.mix(0.8))
-        .border_style(GRID)
-        .label_font(text(12, INK))
-        .draw()?;
-    Ok(())
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .background_style(WHITE.mix(0.8))
+            .border_style(GRID)
+            .label_font(text(12, INK))
+            .draw()?;
+        Ok(())
+    })
 }
 
 #[cfg(test)]
@@ -88,12 +61,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_sample_is_drawn_once() {
-        let samples: Vec<f64> = (0..40).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
-        let over_time = samples_per_tooth("s", "a [m/s²]", &samples).unwrap();
-        assert_eq!(over_time.matches("<circle").count(), 40);
-        let map = stroboscopic_map("s", "a [m/s²]", &samples).unwrap();
-        assert_eq!(map.matches("<circle").count(), 39);
-        assert!(samples_per_tooth("s", "a", &[1.0]).is_err());
+    fn the_colour_follows_the_tooth() {
+        // A pass is missing: by their place in the list the later ones would change colour.
+        let samples: Vec<(u32, f64)> = (0..41)
+            .filter(|tooth| *tooth != 20)
+            .map(|tooth| (tooth, if tooth % 2 == 0 { 1.0 } else { -1.0 }))
+            .collect();
+        let svg = samples_per_tooth("s", "a [m/s²]", &samples, None).unwrap();
+        let circles = |color: RGBColor| {
+            let fill = format!("#{:02X}{:02X}{:02X}", color.0, color.1, color.2);
+            svg.lines()
+                .filter(|line| line.starts_with("<circle") && line.contains(&fill))
+                .count()
+        };
+        assert_eq!((circles(BLUE), circles(ORANGE)), (20, 20));
+        assert!(samples_per_tooth("s", "a", &[], None).is_err());
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use plotters::prelude::{LineSeries, PathElement, Text};
+use plotters::prelude::{LineSeries, PathElement, Rectangle, Text, WHITE};
 use plotters::style::Color;
 
 use super::picture::{BLUE, CHATTER, INK, Labels, PictureError, axes, draw, span, text};
@@ -52,11 +52,11 @@ pub fn time_signal(
             let (x, top) = chart.backend_coord(&(moment.t_s, y.end));
             // Labels of near moments must not lie on one another.
             let row = 16 * (index as i32 % 3);
-            canvas.draw(&Text::new(
-                moment.label.as_str(),
-                (x + 6, top + 4 + row),
-                text(13, INK),
-            ))?;
+            let (at, style) = ((x + 6, top + 4 + row), text(13, INK));
+            let (w, h) = canvas.estimate_text_size(&moment.label, &style)?;
+            let paper = [(at.0 - 2, at.1 - 1), (at.0 + w as i32 + 3, at.1 + h as i32 + 2)];
+            canvas.draw(&Rectangle::new(paper, WHITE.mix(0.8).filled()))?;
+            canvas.draw(&Text::new(moment.label.as_str(), at, style))?;
         }
         Ok(())
     })

@@ -1,0 +1,161 @@
+//! Wrong input: one clear message that names file, line or key, the value found and what would be right; exit status 2;
+//! and nothing is written.
+#![allow(clippy::expect_used)]
+
+use std::fs;
+use std::path::Path;
+
+use quietcut_tests::command::{Outcome, cases, folder, quietcut};
+
+const RECORDING: &str = "t [s],ax [m/s^2],tacho [1]\n0,0.1,0\n0.0001,0.2,1\n0.0002,0.1,0\n";
+
+fn case_text() -> String {
+    fs::read_to_string(cases().join("kuka-kr90-acetal.toml")).expect("the case is there")
+}
+
+/// Runs `lobes` on the case with one text replaced by another.
+fn with(folder: &Path, right: &str, wrong: &str) -> Outcome {
+    let text = case_text();
+    assert!(text.contains(right), "{right}");
+    fs::write(folder.join("case.toml"), text.replacen(right, wrong, 1)).expect("a file can be written");
+    quietcut(folder, &["lobes", "case.toml", "--at", "900,2"])
+}
+
+#[test]
+fn wrong_cases() {
+    let folder = folder();
+    let with = |right, wrong| with(folder.path(), right, wrong);
+    with("teeth = 2", "teeth = 2\nflutes = 2").refused(&["case.toml", "line", "flutes"]);
+    with("teeth = 2", "teeth = 0").refused(&["case.toml", "line", "tool.teeth", "found 0"]);
+    with("teeth = 2", "teeth = -2").refused(&["case.toml", "teeth"]);
+    with("teeth = 2", "teeth = \"two\"").refused(&["case.toml", "line", "teeth"]);
+    with("feed_per_tooth_mm = 0.15", "feed_per_tooth_mm = -0.15").refused(&[
+        "case.toml",
+        "line",
+        "cut.feed_per_tooth_mm",
+        "-0.15",
+    ]);
+    with("damping_ratio = 0.0285", "damping_ratio = nan").refused(&["case.toml", "line", "damping_ratio"]);
+    with("[tool]", "[tool").refused(&["case.toml", "line"]);
+    with("[material]", "[matter]").refused(&["case.toml", "line", "matter"]);
+    fs::write(folder.path().join("case.toml"), [0xff, 0xfe]).expect("a file can be written");
+    quietcut(folder.path(), &["lobes", "case.toml", "--at", "900,2"]).refused(&["case.toml", "UTF-8"]);
+}
+
+#[test]
+fn missing_files() {
+    let folder = folder();
+    let run = |arguments: &[&str]| quietcut(folder.path(), arguments).refused(&["no.such", "cannot read"]);
+    run(&["lobes", "no.such", "--at", "900,2"]);
+    run(&["table", "no.such", "--out", "a.qct"]);
+    run(&["table", "--show", "no.such"]);
+    run(&[
+        "simulate",
+        "no.such",
+        "--rpm",
+        "900",
+        "--depth-mm",
+        "2",
+        "--seconds",
+        "2",
+        "--out",
+        "a.csv",
+    ]);
+    run(&["replay", "no.such"]);
+    run(&["upload", "simulated", "no.such"]);
+    let left = fs::read_dir(folder.path()).expect("the folder is there").count();
+    assert_eq!(left, 0);
+}
+
+#[test]
+fn wrong_numbers_of_a_cut() {
+    let folder = folder();
+    fs::write(folder.path().join("case.toml"), case_text()).expect("a file can be written");
+    let run = |arguments: &[&str]| quietcut(folder.path(), arguments);
+    let simulate = |rpm, depth| {
+        run(&[
+            "simulate",
+            "case.toml",
+            "--rpm",
+            rpm,
+            "--depth-mm",
+            depth,
+            "--seconds",
+            "2",
+            "--out",
+            "a.csv",
+        ])
+    };
+    simulate("900", "-2").refused(&["--depth-mm", "-2", "greater than 0"]);
+    simulate("0", "2").refused(&["--rpm", "0", "greater than 0"]);
+    simulate("fast", "2").refused(&["--rpm", "fast", "not a number"]);
+    run(&["lobes", "case.toml", "--at", "900,-2"]).refused(&["-2"]);
+    run(&["lobes", "case.toml", "--at", "900"]).refused(&["900", "RPM,MM"]);
+    run(&["lobes", "case.toml", "--rpm", "600:900:4", "--depth-mm=-1:2:5"])
+        .refused(&["--depth-mm", "greater than 0"]);
+    run(&[
+        "simulate",
+        "case.toml",
+        "--rpm",
+        "900",
+        "--depth-mm",
+        "2",
+        "--seconds",
+        "2",
+        "--out",
+        "no/such/a.csv",
+    ])
+    .refused(&["no/such/a", "cannot write"]);
+    assert!(!folder.path().join("a.csv").exists());
+}
+
+#[test]
+fn wrong_recordings() {
+    let folder = folder();
+    let replay = |text: &str, more: &[&str]| {
+        fs::write(folder.path().join("a.csv"), text).expect("a file can be written");
+        quietcut(folder.path(), &[&["replay", "a.csv"], more].concat())
+    };
+    let teeth = &["--teeth", "2"][..];
+    replay(&RECORDING.replace("0.2,1", "0.2x,1"), teeth).refused(&["a.csv", "3", "0.2x"]);
+    replay(&RECORDING.replace("0.2,1", "0.2"), teeth).refused(&["a.csv", "3"]);
+    replay(&RECORDING.replace("m/s^2", "furlong"), teeth).refused(&["a.csv", "furlong"]);
+    replay(&RECORDING.replace("0.0002", "0.0009"), teeth).refused(&["a.csv"]);
+    replay("", teeth).refused(&["a.csv"]);
+    replay(RECORDING, &[]).refused(&["a.csv", "teeth"]);
+    replay(RECORDING, &["--teeth", "0"]).refused(&["--teeth", "0"]);
+    replay(
+        &RECORDING
+            .replace(",tacho [1]", "")
+            .replace(",0\n", "\n")
+            .replace(",1\n", "\n"),
+        teeth,
+    )
+    .refused(&["a.csv", "tacho", "--rpm"]);
+    replay(RECORDING, &["--teeth", "2", "--table", "a.csv"]).refused(&["a.csv", "QCLT"]);
+    replay(RECORDING, &["--teeth", "2", "--port", "/dev/no-such-port"]).refused(&["/dev/no-such-port"]);
+}
+
+#[test]
+fn a_reader_that_stops_is_no_error() {
+    let folder = folder();
+    fs::write(folder.path().join("case.toml"), case_text()).expect("a file can be written");
+    let mut running = quietcut_tests::command::start(
+        folder.path(),
+        &[
+            "lobes",
+            "case.toml",
+            "--rpm",
+            "600:2400:400",
+            "--depth-mm",
+            "0.1:4:40",
+        ],
+    );
+    running.stop_reading();
+    let outcome = running.finish();
+    assert_eq!(
+        (outcome.status, outcome.stderr.as_str()),
+        (Some(0), ""),
+        "{outcome:?}"
+    );
+}
