@@ -9,6 +9,7 @@ use quietcut_core::units::{Degrees, Millimeters};
 use quietcut_core::working_point::WorkingPoint;
 use serde::Serialize;
 
+use super::port::WorkingPointAnswer;
 use super::{Error, Output};
 use crate::demo::{Bench, BenchError, Story, Trial, page};
 use crate::device::VirtualCell;
@@ -138,7 +139,7 @@ fn lobes(cell: &VirtualCell) -> Result<Vec<u8>, Error> {
     Ok(build_table(std::slice::from_ref(cell.case()), &request)?)
 }
 
-/// `deepest stable cut at the worst speed: 1.33 mm at 1044 rev/min, limited by period doubling`.
+/// `at the worst speed, 1045 rev/min, cuts up to 1.33 mm are stable; deeper: …`.
 fn lowest_limit(table: &LobeTable<'_>) -> String {
     let limits = table.speeds().enumerate().filter_map(|(index, speed)| {
         let limit = *table.entry(0, index)?.first_limit()?;
@@ -164,7 +165,7 @@ fn story(
     depth_mm: f64,
     output: Output,
 ) -> Result<Story, Error> {
-    tell_working_point(bench, cell, depth_mm)?;
+    tell_working_point(bench, cell, depth_mm, output)?;
     let first = bench.cut(rpm, depth_mm)?;
     account(&first, output)?;
     let advice = first.alarm().and_then(|report| report.advice);
@@ -178,16 +179,27 @@ fn story(
         return Ok(Story { first, advised: None });
     };
     output.line(format!("   As told {rpm:.0} rev/min, {depth_mm:.2} mm deep"))?;
-    tell_working_point(bench, cell, depth_mm)?;
+    tell_working_point(bench, cell, depth_mm, output)?;
     let advised = bench.cut(rpm, depth_mm)?;
     account(&advised, output)?;
+    if advised.is_quiet() {
+        let (before, after) = (loudest(&first), loudest(&advised));
+        output.line(format!(
+            "   Result  {before:.2} m/s² before, {after:.2} m/s² now; what is left keeps step with the teeth"
+        ))?;
+    }
     Ok(Story {
         first,
         advised: Some(advised),
     })
 }
 
-fn tell_working_point(bench: &mut Bench, cell: &VirtualCell, depth_mm: f64) -> Result<(), Error> {
+fn tell_working_point(
+    bench: &mut Bench,
+    cell: &VirtualCell,
+    depth_mm: f64,
+    output: Output,
+) -> Result<(), Error> {
     let cut = cell.case().cut().map_err(Error::other)?;
     let point = WorkingPoint {
         axial_depth: Millimeters(depth_mm as f32),
@@ -196,7 +208,11 @@ fn tell_working_point(bench: &mut Bench, cell: &VirtualCell, depth_mm: f64) -> R
         feed_per_tooth: Millimeters(cut.feed_per_tooth_mm as f32),
         posture: 0,
     };
-    Ok(bench.client().set_working_point(Some(point))?)
+    bench.client().set_working_point(Some(point))?;
+    output.line(format!(
+        "           the device is told: {}",
+        WorkingPointAnswer::new(&point)
+    ))
 }
 
 /// What happened, in lines for a machinist.
@@ -223,10 +239,15 @@ fn account(trial: &Trial, output: Output) -> Result<(), Error> {
             "the tool leaves; the device called no chatter: QUIET",
         )?,
     }
-    let loudest = trial.vibration().into_iter().fold(0.0, f64::max);
     output.line(format!(
-        "           vibration at the end of the cut: {loudest:.2} m/s² rms"
+        "           vibration at the end of the cut: {:.2} m/s² rms",
+        loudest(trial)
     ))
+}
+
+/// Vibration at the end of the cut along the axis that has most.
+fn loudest(trial: &Trial) -> f64 {
+    trial.vibration().into_iter().fold(0.0, f64::max)
 }
 
 /// A demonstration whose device did not hear chatter, or whose advice was not quiet, has failed, whatever it printed.

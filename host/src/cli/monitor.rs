@@ -69,7 +69,11 @@ fn listen(client: &mut Client, output: Output, is_over: impl Fn() -> bool) -> Re
         };
         let is_news = log.take(&report).is_some();
         if is_news || said.elapsed() >= QUIET_LINES {
-            output.line(words::line(&report))?;
+            output.line(if is_news {
+                words::line(&report)
+            } else {
+                words::state(&report)
+            })?;
             said = Instant::now();
         }
     }

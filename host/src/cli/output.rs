@@ -16,11 +16,6 @@ pub struct Output {
 }
 
 impl Output {
-    /// True where the answer is one JSON object: then [`line`](Self::line) says nothing.
-    pub fn is_json(self) -> bool {
-        self.json
-    }
-
     /// One line for people; nothing with `--json`.
     pub fn line(self, text: impl Display) -> Result<(), Error> {
         if self.json { Ok(()) } else { print(&text) }

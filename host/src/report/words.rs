@@ -74,20 +74,25 @@ pub fn reason(reason: Reason) -> &'static str {
 
 /// A report on one line: time, speed, verdict, advice.
 pub fn line(report: &Report) -> String {
+    match &report.advice {
+        Some(advice) if advice.action != Action::Keep => format!(
+            "{}: {} ({})",
+            state(report),
+            action(advice),
+            why(advice, &report.judgement, report.speed)
+        ),
+        _ => state(report),
+    }
+}
+
+/// A report on one line without its advice.
+pub fn state(report: &Report) -> String {
     let speed = report.speed.map_or_else(
         || "      speed ?".into(),
         |speed| format!("{:6.0} rev/min", speed.0),
     );
     let seconds = super::answer::seconds(report);
-    let said = verdict(&report.judgement);
-    match &report.advice {
-        Some(advice) if advice.action != Action::Keep => format!(
-            "{seconds:9.2} s  {speed}  {said}: {} ({})",
-            action(advice),
-            why(advice, &report.judgement, report.speed)
-        ),
-        _ => format!("{seconds:9.2} s  {speed}  {said}"),
-    }
+    format!("{seconds:9.2} s  {speed}  {}", verdict(&report.judgement))
 }
 
 /// What to do: `go to 1480 rev/min`.
