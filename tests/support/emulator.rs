@@ -180,6 +180,15 @@ impl<'m> Emulator<'m> {
         self.pass_store(&store);
     }
 
+    /// The most bytes of stack that the device used so far.
+    pub fn stack_bytes(&mut self) -> usize {
+        self.feed(&[Stimulus::AskStack]);
+        let log = self.log();
+        let line = log.lines().rev().find_map(|line| line.split_once("stack: "));
+        let bytes = line.and_then(|(_, rest)| rest.split(' ').next()?.parse().ok());
+        bytes.unwrap_or_else(|| panic!("no depth of the stack in the log:\n{log}"))
+    }
+
     fn pass_store(&mut self, store: &[u8]) {
         self.memory.store(store);
         let bytes = store.len() as u32;

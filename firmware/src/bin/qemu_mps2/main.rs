@@ -15,6 +15,7 @@
 mod clock;
 mod flash;
 mod logger;
+mod stack;
 mod uart;
 
 use cortex_m::peripheral::NVIC;
@@ -33,6 +34,8 @@ static SPINDLE_BYTES: Received<{ SPINDLE.base }> = Received::new();
 
 #[entry]
 fn main() -> ! {
+    // SAFETY: no interrupt is on, and this is the first function.
+    unsafe { stack::paint() };
     clock::start();
     LOG.open(false);
     LINK.open(true);
@@ -77,8 +80,10 @@ fn main() -> ! {
 }
 
 fn take_stimulus(stimulus: &Stimulus, blocks: &mut u32) -> u8 {
-    if let Stimulus::Block(_) = stimulus {
-        *blocks += 1;
+    match stimulus {
+        Stimulus::Block(_) => *blocks += 1,
+        Stimulus::AskStack => defmt::info!("stack: {=usize} bytes at most", stack::most_bytes()),
+        Stimulus::Edge(_) | Stimulus::Stored { .. } => {}
     }
     TAKEN
 }
