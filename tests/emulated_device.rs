@@ -1,91 +1,309 @@
-//! The ARM image in the emulator: what it says over its serial ports.
-#![allow(clippy::expect_used)]
+//! Hardware in the loop with simulated signals: the ARM image in the emulator, fed by a virtual spindle and asked by the
+//! host's client and by the real command.
+#![allow(clippy::expect_used, clippy::panic)]
 
-use std::io::{Read, Write};
+use std::time::{Duration, Instant};
 
-use quietcut_core::acceleration::Block;
-use quietcut_core::tachometer::Edge;
-use quietcut_core::units::Nanoseconds;
+use quietcut::device::Client;
+use quietcut::simulate::Entry;
+use quietcut_core::lobes::LobeTable;
+use quietcut_core::protocol::{Info, Slot, VERSION};
 use quietcut_firmware::stimulus::Stimulus;
-use quietcut_tests::emulator::{self, Emulator, Memory};
+use quietcut_tests::command::{folder, quietcut};
+use quietcut_tests::emulator::{self, Emulator, Memory, PATIENCE};
+use quietcut_tests::firmware_image;
+use quietcut_tests::said::{ALL, Said, Step};
+use quietcut_tests::cut::{Cut, table};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn connect(emulator: &Emulator<'_>) -> (Client, Info) {
+    Client::connect(Box::new(emulator.port())).expect("the device answers")
+}
+
+fn stimuli(steps: &[Step]) -> Vec<Stimulus> {
+    let of = |(block, edges): &Step| {
+        let edges = edges.iter().copied().map(Stimulus::Edge);
+        edges.chain([Stimulus::Block(block.clone())]).collect::<Vec<_>>()
+    };
+    steps.iter().flat_map(of).collect()
+}
+
+fn upload(client: &mut Client, bytes: &[u8]) -> Info {
+    let table = LobeTable::parse(bytes).expect("a table");
+    client
+        .upload(&table, |_, _| ())
+        .expect("the device takes the table")
+        .info
+}
+
+fn name_in_use(info: &Info) -> &str {
+    info.table.as_ref().map_or("", |table| table.name.as_str())
+}
 
 #[test]
-fn boots_and_answers() {
+fn boots_and_says_who_it_is() {
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
-    let mut link = emulator.link();
-    link.write_all(b"quietcut").expect("the device takes bytes");
-    let mut answer = [0; 8];
-    link.read_exact(&mut answer).expect("the device answers");
-    assert_eq!(&answer, b"quietcut");
     assert!(
         emulator.log().contains("INFO quietcut on mps2-an386"),
         "{}",
         emulator.log()
     );
+    let (mut client, info) = connect(&emulator);
+    assert_eq!(info.board, "qemu-mps2");
+    assert_eq!(info.protocol, VERSION);
+    assert_eq!(info.sensor, None);
+    assert_eq!(info.slots, [Slot::Empty, Slot::Empty]);
+    assert_eq!(info.table, None);
+    assert_eq!(client.status().expect("an answer").frame_errors.total(), 0);
 }
 
 #[test]
-fn answers_on_a_serial_device() {
+fn the_command_uploads_asks_and_sets() {
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
     let device = emulator.serial_device();
-    let mut port = serialport::new(device.path(), 921_600)
-        .timeout(emulator::PATIENCE)
-        .open()
-        .expect("a serial device");
-    for round in 0..3 {
-        let began = std::time::Instant::now();
-        port.write_all(b"quietcut").expect("the device takes bytes");
-        let mut answer = [0; 8];
-        port.read_exact(&mut answer).expect("the device answers");
-        assert_eq!(&answer, b"quietcut");
-        println!("round trip {round}: {:?}", began.elapsed());
-    }
-}
+    let folder = folder();
+    std::fs::write(folder.path().join("kuka.qct"), table("kuka", 1.5, 100)).expect("a file");
 
-fn cut(blocks: u32) -> Vec<Stimulus> {
-    let block = |sequence: u32| Block {
-        sequence,
-        time: Nanoseconds(u64::from(sequence) * 2_400_000),
-        counts: (0..64_i16).map(|i| [i * 100, -i * 200, i]).collect(),
-        ..Block::default()
-    };
-    let edge = |sequence: u32| Edge {
-        time: Nanoseconds(u64::from(sequence) * 2_400_000),
-    };
-    (0..blocks)
-        .flat_map(|i| [Stimulus::Edge(edge(i)), Stimulus::Block(block(i))])
-        .collect()
+    let began = Instant::now();
+    let info = quietcut(folder.path(), &["info", device.path(), "--json"]).json();
+    println!("info: {:?}", began.elapsed());
+    assert_eq!(info["board"], "qemu-mps2", "{info}");
+    let uploaded = quietcut(folder.path(), &["upload", device.path(), "kuka.qct", "--json"]).json();
+    assert_eq!(uploaded["table"]["name"], "kuka", "{uploaded}");
+    let work = [
+        "work",
+        device.path(),
+        "--depth-mm",
+        "2",
+        "--start",
+        "90",
+        "--exit",
+        "180",
+        "--feed",
+        "0.15",
+        "--json",
+    ];
+    quietcut(folder.path(), &work).json();
+    let info = quietcut(folder.path(), &["info", device.path(), "--json"]).json();
+    assert_eq!(info["table"]["name"], "kuka", "{info}");
+    assert_eq!(info["working_point"]["depth_mm"], 2.0, "{info}");
+    assert_eq!(info["frame_errors"], 0, "{info}");
 }
 
 #[test]
-fn takes_simulated_samples() {
+fn a_table_survives_a_restart() {
+    let memory = Memory::erased();
+    let bytes = table("lasting", 1.5, 200);
+    let emulator = Emulator::start(&memory);
+    let (mut client, _) = connect(&emulator);
+    let began = Instant::now();
+    let info = upload(&mut client, &bytes);
+    println!("upload of {} bytes: {:?}", bytes.len(), began.elapsed());
+    assert_eq!(name_in_use(&info), "lasting");
+    emulator.kill();
+    let emulator = Emulator::start(&memory);
+    let (_, info) = connect(&emulator);
+    assert_eq!(name_in_use(&info), "lasting");
+    // The payload stands in the flash, byte for byte, behind the header with its own generation.
+    let flash = memory.flash();
+    assert!(
+        flash
+            .windows(bytes.len() - 32)
+            .any(|window| *window == bytes[32..])
+    );
+}
+
+#[test]
+fn a_power_cut_leaves_the_old_or_the_new_table() {
+    const CUTS: usize = 12;
+    let seed: u64 = rand::random();
+    println!("seed {seed}");
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let memory = Memory::erased();
+    let tables = [table("even", 1.5, 300), table("odd", 2.5, 300)];
+    let names = ["even", "odd"];
+    let emulator = Emulator::start(&memory);
+    let (mut client, _) = connect(&emulator);
+    let began = Instant::now();
+    upload(&mut client, &tables[0]);
+    let whole = began.elapsed();
+    emulator.kill();
+
+    let mut kept = 0;
+    for cut in 1..=CUTS {
+        let (old, new) = (names[(cut + 1) % 2], names[cut % 2]);
+        let emulator = Emulator::start(&memory);
+        let (mut client, info) = connect(&emulator);
+        assert_eq!(name_in_use(&info), old, "cut {cut}");
+        let uploading = std::thread::spawn({
+            let bytes = tables[cut % 2].clone();
+            move || {
+                let table = LobeTable::parse(&bytes).expect("a table");
+                client.upload(&table, |_, _| ()).is_ok()
+            }
+        });
+        // Up to a quarter later than an upload takes, so that some get through.
+        let wait = whole.mul_f64(random.random_range(0.0..1.25));
+        std::thread::sleep(wait);
+        emulator.kill();
+        let is_told_done = uploading.join().expect("the upload ends");
+
+        let emulator = Emulator::start(&memory);
+        let (mut client, info) = connect(&emulator);
+        let found = name_in_use(&info).to_owned();
+        assert!(
+            found == old || found == new,
+            "cut {cut} after {wait:?}: {found:?} is in use"
+        );
+        assert!(
+            !is_told_done || found == new,
+            "cut {cut} after {wait:?}: the upload was done"
+        );
+        kept += usize::from(found == old);
+        // Whatever the cut left behind: the upload can go on, and ends with the new table.
+        assert_eq!(
+            name_in_use(&upload(&mut client, &tables[cut % 2])),
+            new,
+            "cut {cut} after {wait:?}"
+        );
+    }
+    println!("an upload takes {whole:?}; {kept} of {CUTS} cuts left the old table");
+    assert!(kept > 0, "no cut came in the middle of an upload");
+}
+
+#[test]
+fn a_damaged_table_is_not_used() {
+    let memory = Memory::erased();
+    let emulator = Emulator::start(&memory);
+    let (mut client, _) = connect(&emulator);
+    let info = upload(&mut client, &table("older", 1.5, 50));
+    assert!(matches!(info.slots, [Slot::InUse(_), _]), "{info:?}");
+    let newer = table("newer", 2.5, 50);
+    let info = upload(&mut client, &newer);
+    let slot = info
+        .slots
+        .iter()
+        .position(|slot| matches!(slot, Slot::InUse(_)))
+        .expect("a slot in use");
+    emulator.kill();
+    let at = slot * memory.flash().len() / 2 + newer.len() / 2;
+    let byte = memory.flash()[at];
+    memory.damage(at, &[byte ^ 0x10]);
+    let emulator = Emulator::start(&memory);
+    let (_, info) = connect(&emulator);
+    assert_eq!(name_in_use(&info), "older");
+    assert!(matches!(info.slots[slot], Slot::Damaged(_)), "{info:?}");
+}
+
+/// Sets host and device up alike and lets both hear the same cut; the device through `feed`.
+fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step]) + Send) -> usize {
     let memory = Memory::erased();
     let mut emulator = Emulator::start(&memory);
-    let stimuli = cut(100);
-    let began = std::time::Instant::now();
-    emulator.feed(&stimuli);
+    let (mut client, _) = connect(&emulator);
+    let table = table("acetal", 1.5, 181);
+    upload(&mut client, &table);
+    client.set_settings(cut.settings).expect("settings that can be");
+    client
+        .set_working_point(Some(cut.working_point))
+        .expect("a cut that can be");
+    client.subscribe(ALL).expect("a subscription");
+    let host = Said::on_host(cut.settings, Some(&table), Some(&cut.working_point), &cut.steps);
+    let device = std::thread::scope(|scope| {
+        scope.spawn(|| feed(&mut emulator, &cut.steps));
+        Said::from_device(&mut client, cut.steps.len(), PATIENCE)
+    });
+    host.assert_same(&device);
+    let status = client.status().expect("an answer");
+    assert_eq!((status.dropped, client.lost_frames()), (0, 0));
     println!(
-        "serial port: {:.0} samples/s",
-        64_000.0 / began.elapsed().as_secs_f64()
+        "{} reports, {} blocks with strobes, {} spectra: the same to the bit",
+        host.reports.len(),
+        host.strobes.len(),
+        host.spectra.len()
     );
-    let began = std::time::Instant::now();
-    emulator.feed_stored(&cut(1000));
+    emulator.stack_bytes()
+}
+
+#[test]
+fn says_the_same_as_the_host_to_the_bit() {
+    // A flip, with entry and exit.
+    let cut = Cut::new(Entry::Feed, 1045.0, 2.0, 4.0, 1);
+    let samples: usize = cut.steps.iter().map(|(block, _)| block.counts.len()).sum();
+    let stack = assert_same_to_the_bit(&cut, |emulator, steps| {
+        let began = Instant::now();
+        emulator.feed_stored(&stimuli(steps));
+        println!(
+            "memory: {:.0} samples/s",
+            samples as f64 / began.elapsed().as_secs_f64()
+        );
+    });
+    let room = firmware_image::nucleo_stack_bytes();
+    println!("stack: {stack} bytes of {room} on the real board");
+    // The real board's interrupts come on top: some hundred bytes each, at four priorities.
+    assert!(stack + 4096 <= room);
+}
+
+#[test]
+fn hears_blocks_over_its_serial_port() {
+    // A Hopf case; with a block lost, one clipped, and one without edges.
+    let mut cut = Cut::new(Entry::None, 900.0, 2.0, 0.8, 2);
+    cut.steps.remove(50);
+    cut.steps[100].0.lost = 3;
+    let clipped = &mut cut.steps[150].0;
+    clipped.counts[7] = [i16::MAX, 0, i16::MIN];
+    clipped.clipped = 1;
+    cut.steps[200].1.clear();
+    let samples: usize = cut.steps.iter().map(|(block, _)| block.counts.len()).sum();
+    assert_same_to_the_bit(&cut, |emulator, steps| {
+        let began = Instant::now();
+        emulator.feed(&stimuli(steps));
+        println!(
+            "serial port: {:.0} samples/s",
+            samples as f64 / began.elapsed().as_secs_f64()
+        );
+    });
+}
+
+#[test]
+fn hears_blocks_over_the_link() {
+    let cut = Cut::new(Entry::None, 1045.0, 2.0, 0.4, 3);
+    let memory = Memory::erased();
+    let emulator = Emulator::start(&memory);
+    let (mut client, _) = connect(&emulator);
+    client.set_settings(cut.settings).expect("settings that can be");
+    client.subscribe(ALL).expect("a subscription");
+    let began = Instant::now();
+    for (block, edges) in &cut.steps {
+        client.feed(block, edges).expect("the device takes a block");
+    }
     println!(
-        "memory: {:.0} samples/s",
-        64_000.0 / began.elapsed().as_secs_f64()
+        "link: {:.0} blocks/s",
+        cut.steps.len() as f64 / began.elapsed().as_secs_f64()
     );
+    let device = Said::from_device(&mut client, cut.steps.len(), Duration::from_secs(1));
+    Said::on_host(cut.settings, None, None, &cut.steps).assert_same(&device);
+    assert!(client.status().expect("an answer").is_fed);
+}
+
+#[test]
+fn a_refused_stimulus_is_told() {
+    let memory = Memory::erased();
+    let mut emulator = Emulator::start(&memory);
+    assert!(!emulator.takes_frame(b"\x03no\x00"));
+    let overlong: Vec<u8> = (0..2000).map(|i| u8::from(i < 1999)).collect();
+    assert!(!emulator.takes_frame(&overlong));
+    // And the board goes on.
+    emulator.feed(&stimuli(&Cut::new(Entry::None, 1045.0, 0.5, 0.1, 4).steps[..3]));
 }
 
 #[test]
 fn counts_instructions() {
-    let counts = emulator::count_instructions();
-    assert_eq!(counts, emulator::count_instructions(), "a count must repeat");
-    // Per turn: add, store and load of the black box, count, compare, branch.
-    let turns = counts["loop-of-1000-additions"];
-    assert!(
-        (3000..=8000).contains(&turns),
-        "{turns} instructions for 1000 turns"
+    assert_eq!(
+        emulator::count_instructions(),
+        emulator::count_instructions(),
+        "a count must repeat"
     );
 }

@@ -4,6 +4,7 @@
 
 pub mod accelerometer;
 pub mod acquisition;
+pub mod defaults;
 pub mod device;
 pub mod flash_model;
 pub mod link;

@@ -12,11 +12,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use quietcut::device::DeviceError;
+use quietcut::device::port::Port;
 use quietcut_firmware::stimulus::{
     FLASH_BYTES, MAX_FRAME_BYTES, MEMORY_BYTES, REFUSED, STORE_OFFSET, Stimulus, TAKEN,
 };
 use tempfile::TempDir;
 
+use crate::command::alone;
 use crate::device_log;
 use crate::firmware_image;
 use crate::pty::Pty;
@@ -130,10 +133,11 @@ impl<'m> Emulator<'m> {
         emulator
     }
 
-    /// Waits for the first entry of the log, which the device writes when its ports are open.
+    /// Waits for the first whole entry of the log, which the device writes when its ports are open.
     fn wait_for_start(&mut self) {
         let began = Instant::now();
-        while fs::metadata(self.log_path()).map_or(0, |log| log.len()) == 0 {
+        // A frame of the log ends with a zero.
+        while !fs::read(self.log_path()).is_ok_and(|log| log.contains(&0)) {
             let end = self.end();
             assert!(
                 end.is_empty() && began.elapsed() < PATIENCE,
@@ -146,6 +150,11 @@ impl<'m> Emulator<'m> {
     /// The link to the device, as a stream of bytes with a limit on every wait.
     pub fn link(&self) -> UnixStream {
         self.link.try_clone().expect("a second handle of the link")
+    }
+
+    /// The link as a port of the host's client.
+    pub fn port(&self) -> SocketPort {
+        SocketPort(self.link())
     }
 
     /// The link as a serial device, for programs that open one; not to be used beside [`Self::link`].
@@ -163,6 +172,14 @@ impl<'m> Emulator<'m> {
             }
             self.expect_taken(ahead.len());
         }
+    }
+
+    /// Sends bytes where a stimulus should come; true where the board takes them for one.
+    pub fn takes_frame(&mut self, bytes: &[u8]) -> bool {
+        self.spindle.write_all(bytes).expect("the emulator takes bytes");
+        let mut answer = [0];
+        self.spindle.read_exact(&mut answer).expect("the board answers");
+        answer == [TAKEN]
     }
 
     /// Passes stimuli through the board's memory, for long recordings.
@@ -247,6 +264,45 @@ impl Drop for Emulator<'_> {
     }
 }
 
+/// The link to an emulated device, for the host's client.
+pub struct SocketPort(UnixStream);
+
+impl Port for SocketPort {
+    fn name(&self) -> &str {
+        "the emulator"
+    }
+
+    fn send(&mut self, bytes: &[u8], timeout: Duration) -> Result<(), DeviceError> {
+        let sent = self
+            .0
+            .set_write_timeout(Some(timeout))
+            .and_then(|()| self.0.write_all(bytes));
+        sent.map_err(|_| self.unplugged())
+    }
+
+    fn receive(&mut self, into: &mut [u8], timeout: Duration) -> Result<usize, DeviceError> {
+        // A socket takes no time of zero for a limit.
+        let timeout = timeout.max(Duration::from_micros(1));
+        let received = self
+            .0
+            .set_read_timeout(Some(timeout))
+            .and_then(|()| self.0.read(into));
+        match received {
+            Ok(count) if count > 0 => Ok(count),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => Ok(0),
+            _ => Err(self.unplugged()),
+        }
+    }
+}
+
+impl SocketPort {
+    fn unplugged(&self) -> DeviceError {
+        DeviceError::Unplugged {
+            port: self.name().into(),
+        }
+    }
+}
+
 /// Runs an image that prints lines `NAME COUNT` and ends, counting instructions.
 pub fn count_instructions() -> BTreeMap<String, u64> {
     let mut command = qemu(&firmware_image::count_instructions());
@@ -296,6 +352,7 @@ fn qemu(image: &Path) -> Command {
 }
 
 fn spawn(mut command: Command) -> Child {
+    let _alone = alone();
     match command.spawn() {
         Ok(process) => process,
         Err(error) if error.kind() == ErrorKind::NotFound => {

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
+use object::{Object, ObjectSymbol};
+
 /// The image of the emulated board.
 pub fn qemu_mps2() -> PathBuf {
     image("qemu_mps2")
@@ -16,6 +18,17 @@ pub fn nucleo_g474re() -> PathBuf {
 /// The image that counts instructions in the emulator.
 pub fn count_instructions() -> PathBuf {
     image("examples/count_instructions")
+}
+
+/// Bytes of stack of the real board.
+pub fn nucleo_stack_bytes() -> usize {
+    let bytes = fs::read(nucleo_g474re()).expect("the image");
+    let elf = object::File::parse(&*bytes).expect("an ELF file");
+    let address = |name: &str| {
+        let symbol = elf.symbols().find(|symbol| symbol.name() == Ok(name));
+        symbol.unwrap_or_else(|| panic!("no symbol {name}")).address()
+    };
+    (address("_stack_start") - address("_stack_end")) as usize
 }
 
 /// Path of an image; fails the test where it is missing or older than a source it was built from.

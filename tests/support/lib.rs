@@ -5,9 +5,11 @@
 
 pub mod chain_bits;
 pub mod command;
+pub mod cut;
 pub mod device_log;
 pub mod emulator;
 pub mod firmware_image;
 pub mod pty;
 pub mod table_bits;
+pub mod said;
 pub mod virtual_cut;

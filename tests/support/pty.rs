@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use crate::command::alone;
 use quietcut::device::pseudo_terminal::PseudoTerminal;
 
 /// How long the threads wait before they look whether they are still wanted.
@@ -22,9 +23,11 @@ pub struct Pty {
 impl Pty {
     /// A serial device that passes bytes to and from this socket.
     pub fn to_socket(socket: UnixStream) -> Self {
+        let alone = alone();
         let terminal = PseudoTerminal::new().expect("a pseudo-terminal");
         let path = terminal.path().to_owned();
         let wanted = Arc::new(AtomicBool::new(true));
+        drop(alone);
         socket.set_read_timeout(Some(TURN)).expect("a limit on reading");
         let second = terminal
             .try_clone()

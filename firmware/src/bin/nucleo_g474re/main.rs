@@ -11,75 +11,85 @@
 //! | PA2, PA3 | ST-LINK | LPUART1 TX and RX: the link to the host, 921 600 baud, 8N1 |
 //! | SWD | ST-LINK | log of defmt over RTT |
 //!
-//! What runs at which priority, the highest first: the timer's captures; the link's bytes; the reading of the sensor,
-//! in an executor of its own; the pipeline and the link's messages, in the main executor.
+//! What runs at which priority, the highest first: the timer's captures; the link's port and DMA; the tasks that read the
+//! sensor and pass bytes, in an executor of their own; the device, in the main executor.
 #![no_std]
 #![no_main]
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod event_timer;
+mod link_line;
+mod sensor;
 mod table_flash;
 
+use cortex_m_rt::exception;
 use defmt_rtt as _;
-use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_executor::{InterruptExecutor, SpawnError, SpawnToken, Spawner};
+use embassy_stm32::flash::Flash;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_stm32::mode::Blocking;
 use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::usart::{self, BufferedUart};
+use embassy_stm32::usart::{self, Uart};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Config, bind_interrupts, interrupt, pac, peripherals};
+use embassy_stm32::{Config, bind_interrupts, dma, interrupt, peripherals};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
-use embassy_time::{Delay, Duration, Timer, with_timeout};
+use embassy_sync::signal::Signal;
+use embassy_time::{Delay, Duration, with_timeout};
 use embedded_hal_bus::spi::ExclusiveDevice;
-use embedded_io_async::{Read, Write};
-use quietcut_core::acceleration::Block;
-use quietcut_firmware::accelerometer::Accelerometer;
+use heapless::Vec;
+use quietcut_core::acceleration::{Block, Sensor};
+use quietcut_core::monitor::State;
+use quietcut_core::protocol::message::MAX_BLOCK_EDGES;
+use quietcut_core::tachometer::Edge;
+use quietcut_core::units::Nanoseconds;
 use quietcut_firmware::accelerometer::iis3dwb::{Configuration, Iis3dwb};
-use quietcut_firmware::acquisition::Acquisition;
+use quietcut_firmware::defaults;
+use quietcut_firmware::device::{Clock, Device, Identity};
 use static_cell::StaticCell;
 
-use crate::event_timer::RISE;
+use crate::event_timer::EDGES;
+use crate::link_line::LinkLine;
+use crate::sensor::BLOCKS;
 use crate::table_flash::TableFlash;
 
 bind_interrupts!(struct Irqs {
-    LPUART1 => usart::BufferedInterruptHandler<peripherals::LPUART1>;
+    LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
+    DMA1_CHANNEL1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
 });
 
+const IDENTITY: Identity = Identity {
+    board: "nucleo-g474re",
+    sensor: Some(Sensor::IIS3DWB_16G),
+};
 const LINK_BAUD: u32 = 921_600;
 const SENSOR_BUS: Hertz = Hertz(10_000_000);
 const WATCHDOG_MICROSECONDS: u32 = 2_000_000;
-/// The watermark line rises every 2.4 ms: after this without it something is wrong.
-const SENSOR_TIMEOUT: Duration = Duration::from_millis(10);
-const SENSOR_RETRY: Duration = Duration::from_secs(1);
-/// Blocks that wait while a page of flash is erased (22 ms) or a spectrum is computed.
-const MAX_BLOCKS: usize = 16;
+/// The main loop turns at least this often, also where nothing comes.
+const TURN: Duration = Duration::from_millis(500);
 
-type Sensor =
-    Iis3dwb<ExclusiveDevice<Spi<'static, Blocking, spi::mode::Master>, Output<'static>, Delay>, Delay>;
+/// There is something to do for the device: blocks, bytes, or room for bytes.
+static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+static IO_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-static BLOCKS: Channel<CriticalSectionRawMutex, Block, MAX_BLOCKS> = Channel::new();
-static SENSOR_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
-
-/// The interrupt of a port that is not used runs the executor that reads the sensor.
+/// The interrupt of a port that is not used runs the tasks for sensor and link.
 #[interrupt]
 unsafe fn UART4() {
     // SAFETY: this is the interrupt that the executor was started with.
-    unsafe { SENSOR_EXECUTOR.on_interrupt() }
+    unsafe { IO_EXECUTOR.on_interrupt() }
 }
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let board = embassy_stm32::init(clocks());
-    defmt::info!("quietcut on NUCLEO-G474RE");
     let mut watchdog = IndependentWatchdog::new(board.IWDG, WATCHDOG_MICROSECONDS);
     watchdog.unleash();
-
     interrupt::TIM2.set_priority(Priority::P1);
     interrupt::LPUART1.set_priority(Priority::P2);
+    interrupt::DMA1_CHANNEL1.set_priority(Priority::P2);
+    interrupt::DMA1_CHANNEL2.set_priority(Priority::P2);
     interrupt::UART4.set_priority(Priority::P6);
     event_timer::start(board.TIM2, board.PA0, board.PA1);
 
@@ -88,99 +98,100 @@ async fn main(_spawner: Spawner) {
     config.frequency = SENSOR_BUS;
     let bus = Spi::new_blocking(board.SPI3, board.PC10, board.PC12, board.PC11, config);
     let select = Output::new(board.PD2, Level::High, Speed::VeryHigh);
-    // Cannot fail: setting an output has no error.
-    let Ok(device) = ExclusiveDevice::new(bus, select, Delay);
-    let sensor = Iis3dwb::new(device, Delay, Configuration::default());
-    match read_sensor(Acquisition::new(sensor)) {
-        Ok(task) => SENSOR_EXECUTOR.start(interrupt::UART4).spawn(task),
-        Err(_) => defmt::panic!("the task that reads the sensor runs already"),
-    }
+    let Ok(bus) = ExclusiveDevice::new(bus, select, Delay);
+    let sensor = Iis3dwb::new(bus, Delay, Configuration::default());
 
-    let _tables = TableFlash::new(embassy_stm32::flash::Flash::new_blocking(board.FLASH));
-
-    static SENT: StaticCell<[u8; 4096]> = StaticCell::new();
-    static RECEIVED: StaticCell<[u8; 4096]> = StaticCell::new();
     let mut config = usart::Config::default();
     config.baudrate = LINK_BAUD;
-    let link = BufferedUart::new(
+    let port = Uart::new(
         board.LPUART1,
         board.PA3,
         board.PA2,
-        SENT.init([0; 4096]),
-        RECEIVED.init([0; 4096]),
+        board.DMA1_CH1,
+        board.DMA1_CH2,
         Irqs,
         config,
     );
-    let Ok(mut link) = link else {
+    let Ok(port) = port else {
         defmt::panic!("the link cannot run at {=u32} baud", LINK_BAUD)
     };
+    let (sender, receiver) = port.split();
+    static RING: StaticCell<[u8; 1024]> = StaticCell::new();
+    let receiver = receiver.into_ring_buffered(RING.init([0; 1024]));
+
+    let io = IO_EXECUTOR.start(interrupt::UART4);
+    io.spawn(first(sensor::read(sensor)));
+    io.spawn(first(link_line::receive(receiver)));
+    io.spawn(first(link_line::send(sender)));
+
+    static STATE: StaticCell<State> = StaticCell::new();
+    let state = STATE.init_with(State::default);
+    let settings = defaults::settings(Sensor::IIS3DWB_16G);
+    let tables = TableFlash::new(Flash::new_blocking(board.FLASH));
+    let Ok(mut device) = Device::new(IDENTITY, settings, state, tables, BoardClock) else {
+        defmt::panic!("the settings of this board cannot be")
+    };
+    defmt::info!("quietcut on NUCLEO-G474RE");
+    let mut edges = BlockEdges::default();
     loop {
-        let mut bytes = [0; 64];
-        let received = with_timeout(Duration::from_millis(500), link.read(&mut bytes)).await;
-        if let Ok(Ok(count)) = received
-            && let Some(bytes) = bytes.get(..count)
-        {
-            // Errors of the port are those of the line: the frame they fall in is dropped by its checksum.
-            let _ = link.write_all(bytes).await;
+        while let Ok(block) = BLOCKS.try_receive() {
+            device.take(&block, edges.until_the_end_of(&block));
+            let Ok(_) = device.poll(&mut LinkLine);
+            watchdog.pet();
         }
+        let Ok(_) = device.poll(&mut LinkLine);
         watchdog.pet();
+        // Carries the timer's count on, where no event does.
+        event_timer::now();
+        // Without work for a turn there is just another turn.
+        let _ = with_timeout(TURN, WORK.wait()).await;
     }
 }
 
-/// Starts the sensor, reads its queue whenever the watermark line rises, and starts it again after an error.
-#[embassy_executor::task]
-async fn read_sensor(mut acquisition: Acquisition<Sensor>) {
-    loop {
-        if let Err(error) = acquisition.start() {
-            defmt::error!("sensor: {}", error);
-            Timer::after(SENSOR_RETRY).await;
-            continue;
+/// The task that was made, the only one of its kind.
+fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
+    match task {
+        Ok(task) => task,
+        Err(_) => defmt::panic!("a task was made twice"),
+    }
+}
+
+/// The tachometer edges of each block.
+#[derive(Default)]
+struct BlockEdges {
+    edges: Vec<Edge, MAX_BLOCK_EDGES>,
+    /// An edge behind the end of the newest block.
+    ahead: Option<Edge>,
+}
+
+impl BlockEdges {
+    /// The edges up to the end of a block that belong to none before it.
+    fn until_the_end_of(&mut self, block: &Block) -> &[Edge] {
+        let period_ns = (1e9 / Sensor::IIS3DWB_16G.nominal_rate.0) as u64;
+        let end = Nanoseconds(block.time.0 + block.counts.len() as u64 * period_ns);
+        self.edges.clear();
+        while !self.edges.is_full() {
+            let Some(edge) = self.ahead.take().or_else(|| EDGES.try_receive().ok()) else {
+                break;
+            };
+            if edge.time > end {
+                self.ahead = Some(edge);
+                break;
+            }
+            // Cannot fail: the list is not full.
+            let _ = self.edges.push(edge);
         }
-        RISE.reset();
-        defmt::info!("sensor: started");
-        let Err(why) = read_blocks(&mut acquisition).await;
-        defmt::error!("sensor: {}", why);
+        &self.edges
     }
 }
 
-/// Passes blocks on until the sensor fails.
-async fn read_blocks(
-    acquisition: &mut Acquisition<Sensor>,
-) -> Result<core::convert::Infallible, SensorFailure> {
-    loop {
-        // While the line is high it cannot rise: more samples are there already.
-        let rise = if watermark_is_reached() || acquisition.is_behind() {
-            RISE.try_take()
-        } else {
-            with_timeout(SENSOR_TIMEOUT, RISE.wait()).await.ok()
-        };
-        let block = acquisition
-            .read(rise, event_timer::now())
-            .map_err(SensorFailure::Driver)?
-            .ok_or(SensorFailure::Silent)?;
-        if BLOCKS.try_send(block.clone()).is_err() {
-            defmt::warn!(
-                "block {=u32} is dropped: the pipeline is too slow",
-                block.sequence
-            );
-        }
-        // A rise during the read belongs to no known sample.
-        RISE.reset();
+/// The board's clock as the device sees it.
+struct BoardClock;
+
+impl Clock for BoardClock {
+    fn now(&self) -> Nanoseconds {
+        event_timer::now()
     }
-}
-
-/// Why the sensor is started again.
-#[derive(defmt::Format)]
-enum SensorFailure {
-    /// The driver found an error.
-    Driver(<Sensor as Accelerometer>::Error),
-    /// No samples came.
-    Silent,
-}
-
-/// True while the sensor's queue holds as many samples as the watermark or more.
-fn watermark_is_reached() -> bool {
-    pac::GPIOA.idr().read().idr(1) == pac::gpio::vals::Idr::HIGH
 }
 
 /// 160 MHz from the board's crystal of 24 MHz: the fastest at which a divider of 16 gives the
@@ -202,6 +213,15 @@ fn clocks() -> Config {
     config.rcc.sys = Sysclk::PLL1_R;
     config.rcc.boost = true;
     config
+}
+
+/// Comes where a table is read that a loss of power has damaged, and goes on.
+// SAFETY: the handler touches a flag of the flash only.
+#[exception]
+unsafe fn NonMaskableInt() {
+    if !table_flash::pass_over_damage() {
+        defmt::panic!("an interrupt that cannot be turned off, of unknown cause");
+    }
 }
 
 /// Says why, and starts anew.

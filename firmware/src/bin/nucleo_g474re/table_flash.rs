@@ -3,7 +3,9 @@
 //! The program runs from the first bank. Interrupts go on while a page is erased; only the caller waits.
 
 use embassy_stm32::flash::{Blocking, Error, FLASH_BASE, Flash};
+use embassy_stm32::pac;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use quietcut_firmware::storage::TableMemory;
 
 unsafe extern "C" {
     /// Start of the first slot; only its address means anything.
@@ -40,6 +42,26 @@ impl TableFlash {
             Some(end) if end <= self.bytes => Ok(self.start + offset),
             _ => Err(Error::Size),
         }
+    }
+}
+
+/// Serves the interrupt that cannot be turned off: it comes where a double word with two wrong bits is read.
+///
+/// That is what a loss of power leaves of a write. The bytes read count as they are: the checksum of the table finds them out.
+/// Returns false where the interrupt has another cause.
+pub(crate) fn pass_over_damage() -> bool {
+    let is_damage = pac::FLASH.eccr().read().eccd();
+    if is_damage {
+        // The flag goes away where a one is written to it.
+        pac::FLASH.eccr().modify(|register| register.set_eccd(true));
+    }
+    is_damage
+}
+
+impl TableMemory for TableFlash {
+    fn mapped(&self) -> &[u8] {
+        // SAFETY: `memory.x` gives these addresses to the slots; they hold bytes of any value, and are written through `self` only.
+        unsafe { core::slice::from_raw_parts(&raw const __table_slots_start, self.bytes as usize) }
     }
 }
 

@@ -2,6 +2,9 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use quietcut_core::units::Nanoseconds;
+use quietcut_firmware::device;
+
 const CONTROL: usize = 0x4000_0000;
 const VALUE: usize = CONTROL + 4;
 const RELOAD: usize = CONTROL + 8;
@@ -40,6 +43,15 @@ pub(crate) fn microseconds() -> u64 {
         if WRAPS.load(Ordering::Relaxed) == wraps {
             return (u64::from(wraps) << 32 | u64::from(ticks)) / u64::from(TICKS_PER_MICROSECOND);
         }
+    }
+}
+
+/// The board's clock as the device sees it.
+pub(crate) struct BoardClock;
+
+impl device::Clock for BoardClock {
+    fn now(&self) -> Nanoseconds {
+        Nanoseconds(microseconds() * 1000)
     }
 }
 

@@ -7,6 +7,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
 use quietcut_firmware::stimulus::FLASH_BYTES;
+use quietcut_firmware::storage::TableMemory;
 
 use crate::clock;
 
@@ -37,14 +38,23 @@ impl ErrorType for Flash {
     type Error = NorFlashErrorKind;
 }
 
+impl TableMemory for Flash {
+    fn mapped(&self) -> &[u8] {
+        // SAFETY: the memory exists, holds bytes of any value, and is written through `self` only.
+        unsafe { core::slice::from_raw_parts(PSRAM_BASE as *const u8, FLASH_BYTES) }
+    }
+}
+
 impl ReadNorFlash for Flash {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
         check_read(self, offset, bytes.len())?;
-        let first = (PSRAM_BASE + offset as usize) as *const u8;
-        // SAFETY: the range was checked to lie in the flash, which is written through `self` only.
-        bytes.copy_from_slice(unsafe { core::slice::from_raw_parts(first, bytes.len()) });
+        let range = self
+            .mapped()
+            .get(offset as usize..)
+            .and_then(|rest| rest.get(..bytes.len()));
+        bytes.copy_from_slice(range.ok_or(NorFlashErrorKind::OutOfBounds)?);
         Ok(())
     }
 

@@ -15,22 +15,30 @@
 mod clock;
 mod flash;
 mod logger;
+mod spindle;
 mod stack;
 mod uart;
 
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{entry, exception};
-use heapless::Vec;
-use quietcut_firmware::stimulus::{MAX_FRAME_BYTES, MEMORY_BYTES, REFUSED, STORE_OFFSET, Stimulus, TAKEN};
+use quietcut_core::acceleration::Sensor;
+use quietcut_core::monitor::State;
+use quietcut_firmware::defaults;
+use quietcut_firmware::device::{Device, Identity};
+use static_cell::StaticCell;
 
-use crate::flash::{Flash, PSRAM_BASE};
-use crate::uart::{LINK, LOG, Received, SPINDLE};
+use crate::clock::BoardClock;
+use crate::flash::Flash;
+use crate::spindle::Spindle;
+use crate::uart::{LINK, LOG, SPINDLE};
+
+const IDENTITY: Identity = Identity {
+    board: "qemu-mps2",
+    sensor: None,
+};
 
 /// To wake from sleep takes the emulator longer than to pass a byte: stay awake within a message.
 const IDLE_TURNS_BEFORE_SLEEP: u32 = 2000;
-
-static LINK_BYTES: Received<{ LINK.base }> = Received::new();
-static SPINDLE_BYTES: Received<{ SPINDLE.base }> = Received::new();
 
 #[entry]
 fn main() -> ! {
@@ -40,81 +48,54 @@ fn main() -> ! {
     LOG.open(false);
     LINK.open(true);
     SPINDLE.open(true);
-    // SAFETY: the handlers of these interrupts share data with this function through mutexes only.
-    unsafe {
-        NVIC::unmask(Irq::Link);
-        NVIC::unmask(Irq::Spindle);
-        NVIC::unmask(Irq::Clock);
-    }
+    // SAFETY: the handler of this interrupt shares an atomic with this function.
+    unsafe { NVIC::unmask(Irq::Clock) };
     // SAFETY: the only call.
-    let _flash = unsafe { Flash::take() };
+    let flash = unsafe { Flash::take() };
+
+    static STATE: StaticCell<State> = StaticCell::new();
+    let state = STATE.init_with(State::default);
+    let settings = defaults::settings(Sensor::IIS3DWB_16G);
+    let Ok(mut device) = Device::new(IDENTITY, settings, state, flash, BoardClock) else {
+        defmt::panic!("the settings of this board cannot be")
+    };
+    let mut line = LINK;
+    let mut spindle = Spindle::new();
     defmt::info!("quietcut on mps2-an386");
 
-    let mut frame: Vec<u8, MAX_FRAME_BYTES> = Vec::new();
-    let mut blocks = 0_u32;
     let mut idle_turns = 0_u32;
     loop {
-        let mut idle = true;
-        while let Some(byte) = LINK_BYTES.take() {
-            idle = false;
-            LINK.send(&[byte]);
-        }
-        while let Some(byte) = SPINDLE_BYTES.take() {
-            idle = false;
-            let overlong = frame.push(byte).is_err();
-            if byte == 0 || overlong {
-                let answer = match postcard::from_bytes_cobs::<Stimulus>(&mut frame) {
-                    Ok(Stimulus::Stored { bytes }) => take_stored(bytes as usize, &mut blocks),
-                    Ok(stimulus) => take_stimulus(&stimulus, &mut blocks),
-                    Err(_) => REFUSED,
-                };
+        let Ok(mut is_busy) = device.poll(&mut line);
+        while let Some(byte) = SPINDLE.receive() {
+            is_busy = true;
+            if let Some(answer) = spindle.take(byte, &mut device, &mut line) {
                 SPINDLE.send(&[answer]);
-                frame.clear();
             }
         }
-        idle_turns = if idle { idle_turns.saturating_add(1) } else { 0 };
-        if idle_turns > IDLE_TURNS_BEFORE_SLEEP {
+        idle_turns = if is_busy { 0 } else { idle_turns.saturating_add(1) };
+        if idle_turns > IDLE_TURNS_BEFORE_SLEEP && device.outgoing().is_empty() {
             sleep();
         }
     }
 }
 
-fn take_stimulus(stimulus: &Stimulus, blocks: &mut u32) -> u8 {
-    match stimulus {
-        Stimulus::Block(_) => *blocks += 1,
-        Stimulus::AskStack => defmt::info!("stack: {=usize} bytes at most", stack::most_bytes()),
-        Stimulus::Edge(_) | Stimulus::Stored { .. } => {}
-    }
-    TAKEN
-}
-
-fn take_stored(bytes: usize, blocks: &mut u32) -> u8 {
-    if bytes > MEMORY_BYTES - STORE_OFFSET {
-        return REFUSED;
-    }
-    // SAFETY: the range lies within the PSRAM, no section is linked there, and the host does not
-    // write to it between its message and our answer.
-    let mut rest = unsafe { core::slice::from_raw_parts((PSRAM_BASE + STORE_OFFSET) as *const u8, bytes) };
-    while !rest.is_empty() {
-        match postcard::take_from_bytes::<Stimulus>(rest) {
-            Ok((Stimulus::Stored { .. }, _)) | Err(_) => return REFUSED,
-            Ok((stimulus, after)) => {
-                take_stimulus(&stimulus, blocks);
-                rest = after;
-            }
-        }
-    }
-    TAKEN
-}
-
-/// Waits for an interrupt unless bytes came in meanwhile.
+/// Waits for a byte, unless one is there.
 ///
-/// With interrupts off an interrupt that comes between the look and the wait is not lost: the wait
-/// ends at once and the interrupt is served when they are on again.
+/// The ports' interrupts are on here only, and all interrupts are off: none is served, but one ends the wait, also
+/// where it came between the look and the wait.
 fn sleep() {
     cortex_m::interrupt::disable();
-    if LINK_BYTES.is_empty() && SPINDLE_BYTES.is_empty() {
+    for (port, irq) in [(LINK, Irq::Link), (SPINDLE, Irq::Spindle)] {
+        port.clear_interrupt();
+        NVIC::unpend(irq);
+        // SAFETY: the section begun above keeps it from being served.
+        unsafe { NVIC::unmask(irq) };
+    }
+    if !LINK.has_received() && !SPINDLE.has_received() {
         cortex_m::asm::wfi();
+    }
+    for irq in [Irq::Link, Irq::Spindle] {
+        NVIC::mask(irq);
     }
     // SAFETY: ends the section begun above; no other critical section is open here.
     unsafe { cortex_m::interrupt::enable() };
@@ -136,15 +117,11 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
 }
 
 /// Takes every interrupt: without a device crate all of them have this one handler.
-// SAFETY: the handler touches shared data through mutexes and atomics only, so that it may interrupt anything.
+// SAFETY: the handler touches shared data through an atomic only, so that it may interrupt anything.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {
-    const LINK: i16 = Irq::Link as i16;
-    const SPINDLE: i16 = Irq::Spindle as i16;
     const CLOCK: i16 = Irq::Clock as i16;
     match number {
-        LINK => LINK_BYTES.fill(),
-        SPINDLE => SPINDLE_BYTES.fill(),
         CLOCK => clock::wrap(),
         other => defmt::panic!("interrupt {=i16} has no handler", other),
     }

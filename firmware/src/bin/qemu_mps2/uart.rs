@@ -1,14 +1,16 @@
-//! The board's serial ports, and the queues that their receive interrupts fill.
+//! The board's serial ports.
+//!
+//! They hold one byte each way. Nothing is lost for that: where a byte was not taken yet the emulator holds back the
+//! sender. So the ports are polled, and their interrupts only end the board's sleep.
 
-use core::cell::RefCell;
+use core::convert::Infallible;
 
-use cortex_m::interrupt::{self, Mutex};
-use heapless::Deque;
+use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 
 /// A serial port of the CMSDK: data, state, control, interrupt flags and divider by word.
 #[derive(Clone, Copy)]
 pub(crate) struct Uart {
-    pub(crate) base: usize,
+    base: usize,
 }
 
 /// UART0.
@@ -38,7 +40,7 @@ impl Uart {
         self.write(Self::DIVIDER, 16);
         self.write(Self::CONTROL, Self::TX_ON);
         if receive {
-            self.interrupt_on_receive(true);
+            self.write(Self::CONTROL, Self::TX_ON | Self::RX_ON | Self::RX_INTERRUPT_ON);
             // Only a read tells QEMU to look at its end again: else the first byte waits for a second.
             self.read(Self::DATA);
         }
@@ -46,18 +48,26 @@ impl Uart {
 
     pub(crate) fn send(self, bytes: &[u8]) {
         for &byte in bytes {
-            while self.read(Self::STATE) & Self::TX_FULL != 0 {}
+            while !self.can_send() {}
             self.write(Self::DATA, u32::from(byte));
         }
     }
 
-    fn receive(self) -> Option<u8> {
-        (self.read(Self::STATE) & Self::RX_FULL != 0).then(|| self.read(Self::DATA) as u8)
+    pub(crate) fn receive(self) -> Option<u8> {
+        self.has_received().then(|| self.read(Self::DATA) as u8)
     }
 
-    fn interrupt_on_receive(self, on: bool) {
-        let interrupt = if on { Self::RX_INTERRUPT_ON } else { 0 };
-        self.write(Self::CONTROL, Self::TX_ON | Self::RX_ON | interrupt);
+    pub(crate) fn has_received(self) -> bool {
+        self.read(Self::STATE) & Self::RX_FULL != 0
+    }
+
+    fn can_send(self) -> bool {
+        self.read(Self::STATE) & Self::TX_FULL == 0
+    }
+
+    /// Takes the interrupt back that the last byte raised.
+    pub(crate) fn clear_interrupt(self) {
+        self.write(Self::INTERRUPT, Self::RX_INTERRUPT);
     }
 
     fn read(self, register: usize) -> u32 {
@@ -71,49 +81,41 @@ impl Uart {
     }
 }
 
-/// Bytes on their way from a receive interrupt to the main loop.
-///
-/// Where the queue is full the byte stays in the port and its interrupt is turned off: the emulator
-/// then holds back the sender, and nothing is lost.
-pub(crate) struct Received<const BASE: usize>(Mutex<RefCell<Deque<u8, 4096>>>);
+impl ErrorType for Uart {
+    type Error = Infallible;
+}
 
-impl<const BASE: usize> Received<BASE> {
-    const PORT: Uart = Uart { base: BASE };
+impl ReadReady for Uart {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(self.has_received())
+    }
+}
 
-    pub(crate) const fn new() -> Self {
-        Self(Mutex::new(RefCell::new(Deque::new())))
+impl Read for Uart {
+    /// Takes what is there: 0 bytes where nothing is.
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
+        let bytes = core::iter::from_fn(|| self.receive());
+        Ok(buffer
+            .iter_mut()
+            .zip(bytes)
+            .map(|(place, byte)| *place = byte)
+            .count())
+    }
+}
+
+impl WriteReady for Uart {
+    fn write_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(self.can_send())
+    }
+}
+
+impl Write for Uart {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        self.send(bytes);
+        Ok(bytes.len())
     }
 
-    /// The oldest byte that has not been taken.
-    pub(crate) fn take(&self) -> Option<u8> {
-        let (byte, was_full) = interrupt::free(|token| {
-            let mut queue = self.0.borrow(token).borrow_mut();
-            let was_full = queue.is_full();
-            (queue.pop_front(), was_full)
-        });
-        if was_full {
-            self.fill();
-            Self::PORT.interrupt_on_receive(true);
-        }
-        byte
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        interrupt::free(|token| self.0.borrow(token).borrow().is_empty())
-    }
-
-    /// Serves the receive interrupt.
-    pub(crate) fn fill(&self) {
-        interrupt::free(|token| {
-            // The flag goes first: a byte that comes after the last look raises it again.
-            Self::PORT.write(Uart::INTERRUPT, Uart::RX_INTERRUPT);
-            let mut queue = self.0.borrow(token).borrow_mut();
-            while !queue.is_full() {
-                let Some(byte) = Self::PORT.receive() else { return };
-                // Cannot fail: the queue is not full.
-                let _ = queue.push_back(byte);
-            }
-            Self::PORT.interrupt_on_receive(false);
-        });
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
     }
 }

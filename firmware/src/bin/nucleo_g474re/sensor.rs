@@ -1,0 +1,89 @@
+//! Reads the accelerometer: blocks to the device whenever the watermark line rises.
+
+use core::convert::Infallible;
+
+use embassy_stm32::gpio::Output;
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::pac;
+use embassy_stm32::spi::{Spi, mode::Master};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use embassy_time::{Delay, Duration, Timer, with_timeout};
+use embedded_hal_bus::spi::ExclusiveDevice;
+use quietcut_core::acceleration::Block;
+use quietcut_firmware::accelerometer::Accelerometer;
+use quietcut_firmware::accelerometer::iis3dwb::Iis3dwb;
+use quietcut_firmware::acquisition::Acquisition;
+
+use crate::WORK;
+use crate::event_timer::{self, RISE};
+
+/// The board's accelerometer.
+pub(crate) type Sensor =
+    Iis3dwb<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, Delay>, Delay>;
+
+/// Blocks that wait while a page of flash is erased (22 ms) or a spectrum is computed.
+const MAX_BLOCKS: usize = 16;
+
+/// The line rises every 2.4 ms. Where it does not, it is not connected, and the queue is read at this interval; it is full after 19 ms.
+const LINE_TIMEOUT: Duration = Duration::from_millis(10);
+const RETRY: Duration = Duration::from_secs(1);
+
+/// Blocks in their order; the newest are dropped where nobody takes them.
+pub(crate) static BLOCKS: Channel<CriticalSectionRawMutex, Block, MAX_BLOCKS> = Channel::new();
+
+/// Why the sensor is started again.
+#[derive(defmt::Format)]
+enum Failure {
+    /// The driver found an error.
+    Driver(<Sensor as Accelerometer>::Error),
+    /// No samples came.
+    Silent,
+}
+
+/// Starts the sensor, reads it, and starts it again after an error.
+#[embassy_executor::task]
+pub(crate) async fn read(sensor: Sensor) {
+    let mut acquisition = Acquisition::new(sensor);
+    loop {
+        if let Err(error) = acquisition.start() {
+            defmt::error!("sensor: {}", error);
+            Timer::after(RETRY).await;
+            continue;
+        }
+        RISE.reset();
+        defmt::info!("sensor: started");
+        let Err(failure) = read_blocks(&mut acquisition).await;
+        defmt::error!("sensor: {}", failure);
+    }
+}
+
+/// Passes blocks on until the sensor fails.
+async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible, Failure> {
+    loop {
+        // While the line is high it cannot rise: more samples are there already.
+        let rise = if watermark_is_reached() || acquisition.is_behind() {
+            RISE.try_take()
+        } else {
+            with_timeout(LINE_TIMEOUT, RISE.wait()).await.ok()
+        };
+        let block = acquisition
+            .read(rise, event_timer::now())
+            .map_err(Failure::Driver)?
+            .ok_or(Failure::Silent)?;
+        if BLOCKS.try_send(block.clone()).is_err() {
+            defmt::warn!(
+                "block {=u32} is dropped: the pipeline is too slow",
+                block.sequence
+            );
+        }
+        WORK.signal(());
+        // A rise during the read belongs to no known sample.
+        RISE.reset();
+    }
+}
+
+/// True while the sensor's queue holds as many samples as the watermark or more.
+fn watermark_is_reached() -> bool {
+    pac::GPIOA.idr().read().idr(1) == pac::gpio::vals::Idr::HIGH
+}

@@ -1,0 +1,95 @@
+//! What the virtual spindle sends, in place of sensor and tachometer.
+
+use heapless::Vec;
+use quietcut_core::protocol::message::MAX_BLOCK_EDGES;
+use quietcut_core::tachometer::Edge;
+use quietcut_firmware::device::Device;
+use quietcut_firmware::stimulus::{MAX_FRAME_BYTES, MEMORY_BYTES, REFUSED, STORE_OFFSET, Stimulus, TAKEN};
+
+use crate::clock::BoardClock;
+use crate::flash::{Flash, PSRAM_BASE};
+use crate::stack;
+use crate::uart::Uart;
+
+/// Takes stimuli and gives them to the device.
+pub(crate) struct Spindle {
+    frame: Vec<u8, MAX_FRAME_BYTES>,
+    /// True while the rest of a frame that is too long is passed over.
+    is_skipping: bool,
+    /// Edges for the next block.
+    edges: Vec<Edge, MAX_BLOCK_EDGES>,
+}
+
+type BoardDevice = Device<'static, Flash, BoardClock>;
+
+impl Spindle {
+    pub(crate) const fn new() -> Self {
+        Self {
+            frame: Vec::new(),
+            is_skipping: false,
+            edges: Vec::new(),
+        }
+    }
+
+    /// Takes a byte from the port; at the end of a frame the answer.
+    pub(crate) fn take(&mut self, byte: u8, device: &mut BoardDevice, line: &mut Uart) -> Option<u8> {
+        if self.is_skipping {
+            self.is_skipping = byte != 0;
+            return None;
+        }
+        if self.frame.push(byte).is_err() {
+            self.frame.clear();
+            self.is_skipping = byte != 0;
+            return Some(REFUSED);
+        }
+        if byte != 0 {
+            return None;
+        }
+        let stimulus = postcard::from_bytes_cobs(&mut self.frame);
+        self.frame.clear();
+        let is_done = match stimulus {
+            Ok(Stimulus::Stored { bytes }) => self.play(bytes as usize, device, line),
+            Ok(stimulus) => self.give(stimulus, device, line),
+            Err(_) => None,
+        };
+        Some(if is_done.is_some() { TAKEN } else { REFUSED })
+    }
+
+    /// Gives all stimuli in the board's memory to the device.
+    fn play(&mut self, bytes: usize, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
+        if bytes > MEMORY_BYTES - STORE_OFFSET {
+            return None;
+        }
+        // SAFETY: the range lies within the PSRAM, no section is linked there, and the host does not
+        // write to it between its message and our answer.
+        let mut rest =
+            unsafe { core::slice::from_raw_parts((PSRAM_BASE + STORE_OFFSET) as *const u8, bytes) };
+        while !rest.is_empty() {
+            let (stimulus, after) = postcard::take_from_bytes(rest).ok()?;
+            self.give(stimulus, device, line)?;
+            rest = after;
+        }
+        Some(())
+    }
+
+    /// `None` where the stimulus cannot be taken.
+    fn give(&mut self, stimulus: Stimulus, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
+        match stimulus {
+            Stimulus::Edge(edge) => self.edges.push(edge).ok()?,
+            Stimulus::Block(block) => {
+                device.take(&block, &self.edges);
+                self.edges.clear();
+                // Unlike a real spindle this one waits for the line, so that no report is dropped.
+                loop {
+                    let Ok(is_busy) = device.poll(line);
+                    if !is_busy && device.outgoing().is_empty() {
+                        break;
+                    }
+                }
+            }
+            Stimulus::AskStack => defmt::info!("stack: {=usize} bytes at most", stack::most_bytes()),
+            Stimulus::Stored { .. } => return None,
+        }
+        Some(())
+    }
+}
