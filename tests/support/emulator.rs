@@ -136,8 +136,8 @@ impl<'m> Emulator<'m> {
     /// Waits for the first whole entry of the log, which the device writes when its ports are open.
     fn wait_for_start(&mut self) {
         let began = Instant::now();
-        // A frame of the log ends with a zero.
-        while !fs::read(self.log_path()).is_ok_and(|log| log.contains(&0)) {
+        // A frame of the log ends with a zero; another zero may stand before it.
+        while !fs::read(self.log_path()).is_ok_and(|log| log.len() > 1 && log.ends_with(&[0])) {
             let end = self.end();
             assert!(
                 end.is_empty() && began.elapsed() < PATIENCE,
