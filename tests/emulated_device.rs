@@ -10,10 +10,10 @@ use quietcut_core::lobes::LobeTable;
 use quietcut_core::protocol::{Info, Slot, VERSION};
 use quietcut_firmware::stimulus::Stimulus;
 use quietcut_tests::command::{folder, quietcut};
-use quietcut_tests::emulator::{self, Emulator, Memory, PATIENCE};
+use quietcut_tests::cut::{Cut, table};
+use quietcut_tests::emulator::{self, Cost, Emulator, Memory, PATIENCE};
 use quietcut_tests::firmware_image;
 use quietcut_tests::said::{ALL, Said, Step};
-use quietcut_tests::cut::{Cut, table};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -199,7 +199,7 @@ fn a_damaged_table_is_not_used() {
 }
 
 /// Sets host and device up alike and lets both hear the same cut; the device through `feed`.
-fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step]) + Send) -> usize {
+fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step]) + Send) -> Cost {
     let memory = Memory::erased();
     let mut emulator = Emulator::start(&memory);
     let (mut client, _) = connect(&emulator);
@@ -224,7 +224,7 @@ fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step
         host.strobes.len(),
         host.spectra.len()
     );
-    emulator.stack_bytes()
+    emulator.cost()
 }
 
 #[test]
@@ -232,7 +232,7 @@ fn says_the_same_as_the_host_to_the_bit() {
     // A flip, with entry and exit.
     let cut = Cut::new(Entry::Feed, 1045.0, 2.0, 4.0, 1);
     let samples: usize = cut.steps.iter().map(|(block, _)| block.counts.len()).sum();
-    let stack = assert_same_to_the_bit(&cut, |emulator, steps| {
+    let cost = assert_same_to_the_bit(&cut, |emulator, steps| {
         let began = Instant::now();
         emulator.feed_stored(&stimuli(steps));
         println!(
@@ -240,9 +240,9 @@ fn says_the_same_as_the_host_to_the_bit() {
             samples as f64 / began.elapsed().as_secs_f64()
         );
     });
-    let room = firmware_image::nucleo_stack_bytes();
+    let (stack, room) = (cost.stack_bytes, firmware_image::nucleo_stack_bytes());
     println!("stack: {stack} bytes of {room} on the real board");
-    // The real board's interrupts come on top: some hundred bytes each, at four priorities.
+    // The real board's interrupts come on top: four priorities, of which one reads the sensor.
     assert!(stack + 4096 <= room);
 }
 
@@ -297,6 +297,28 @@ fn a_refused_stimulus_is_told() {
     assert!(!emulator.takes_frame(&overlong));
     // And the board goes on.
     emulator.feed(&stimuli(&Cut::new(Entry::None, 1045.0, 0.5, 0.1, 4).steps[..3]));
+}
+
+#[test]
+fn keeps_up_with_the_sensor() {
+    let cut = Cut::new(Entry::Feed, 1045.0, 2.0, 4.0, 1);
+    let memory = Memory::erased();
+    let mut emulator = Emulator::start_counting(&memory);
+    let (mut client, _) = connect(&emulator);
+    upload(&mut client, &table("acetal", 1.5, 181));
+    client.set_settings(cut.settings).expect("settings that can be");
+    client
+        .set_working_point(Some(cut.working_point))
+        .expect("a cut that can be");
+    emulator.feed_stored(&stimuli(&cut.steps));
+    let (mean, most) = emulator.cost().instructions();
+    println!("instructions for a block of 64 samples: {mean:.0} in the mean, {most:.0} at most");
+    // The real board runs at 160 MHz and gets 64 samples in 2.4 ms, 384 000 cycles. An instruction takes it 1.5 cycles or so, its
+    // flash and the floating point unit included, and reading the sensor a fifth of its time.
+    let cycles_per_block = 64.0 / 26_667.0 * 160e6;
+    assert!(1.5 * mean < 0.6 * cycles_per_block);
+    // Blocks wait in a queue of 16.
+    assert!(1.5 * most < 0.8 * 16.0 * cycles_per_block);
 }
 
 #[test]

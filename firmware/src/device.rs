@@ -205,7 +205,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
 
     /// Forgets what the pipeline has learned.
     fn restart(&mut self) {
-        *self.state = State::default();
+        self.state.reset();
         self.outbox.clear();
         self.edges.clear();
         self.told = None;

@@ -44,6 +44,6 @@ pub enum Stimulus {
         /// Bytes from [`STORE_OFFSET`] on.
         bytes: u32,
     },
-    /// Asks the board to log how deep its stack went.
-    AskStack,
+    /// Asks the board to log how deep its stack went, and how long its blocks took.
+    AskCost,
 }

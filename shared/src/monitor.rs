@@ -215,6 +215,29 @@ impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
         }
     }
 
+    /// Knows nothing again. What is only read where it was written since stays as it is.
+    fn reset(&mut self) {
+        let Self {
+            overlap,
+            power: _,
+            bin,
+            fresh,
+            background,
+            tone,
+            sampler,
+            growth,
+            passed,
+            floor,
+            since_look,
+        } = self;
+        overlap.reset();
+        *bin = Hertz(0.0);
+        background.reset();
+        *sampler = SamplerState::new();
+        growth.reset();
+        (*fresh, *tone, *passed, *floor, *since_look) = (false, None, false, 0.0, 0);
+    }
+
     /// Forgets the signal, but not what is usual.
     fn interrupt(&mut self) {
         self.overlap.reset();
@@ -260,6 +283,33 @@ impl State {
             advice: None,
             strobes: Vec::new(),
         }
+    }
+
+    /// Knows nothing again, as after [`State::new`], in place: a state is too large for the stack of a microcontroller.
+    pub fn reset(&mut self) {
+        let Self {
+            sample_clock,
+            tachometer,
+            losses,
+            decimation,
+            structure,
+            tool,
+            tool_work: _,
+            work: _,
+            damage,
+            heard_speed,
+            detector,
+            advice,
+            strobes,
+        } = self;
+        *sample_clock = SampleClockState::new();
+        *tachometer = TachometerState::new();
+        *decimation = decimation::State::new();
+        structure.reset();
+        tool.reset();
+        *detector = Detector::new();
+        strobes.clear();
+        (*losses, *damage, *heard_speed, *advice) = (0, 0.0, None, None);
     }
 
     /// The points of the stroboscopic map that the newest block made, oldest first: of the structure band where it holds tooth

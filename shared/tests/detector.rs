@@ -5,8 +5,9 @@
 mod virtual_cut;
 
 use quietcut_core::detector::Verdict;
+use quietcut_core::monitor::{Band, Monitor, State};
 use virtual_cut::listen::{Course, Heard, listen, run, settings};
-use virtual_cut::milling::robot;
+use virtual_cut::milling::{machine_tool, robot};
 use virtual_cut::virtual_sensor::VirtualSensor;
 
 const COURSE: Course = Course {
@@ -58,5 +59,28 @@ fn robot_chatter_is_heard_and_named() {
         assert!((frequency - chatter_hz).abs() < 0.1, "{frequency}");
         // Out of the material again.
         assert_eq!(heard.last().unwrap().judgement.verdict, Verdict::AirCut);
+    }
+}
+
+#[test]
+fn a_state_that_was_reset_is_a_new_one() {
+    let with = VirtualSensor::usual(3);
+    let (robot, tool) = (robot(1050.0), machine_tool(5000.0));
+    let chatter = run(&robot, 2e-3, COURSE, 64, &with);
+    let other = run(&tool, 0.5e-3, COURSE, 64, &with);
+    let mut used = Box::new(State::new());
+    for (process, capture) in [(&robot, &chatter), (&tool, &other), (&robot, &chatter)] {
+        let monitor = Monitor::new(settings(with.sensor, &with, process.teeth)).unwrap();
+        let mut new = Box::new(State::new());
+        used.reset();
+        for (block, edges) in &capture.blocks {
+            let expected = monitor.step(&mut new, block, edges, None, None);
+            assert_eq!(monitor.step(&mut used, block, edges, None, None), expected);
+            assert_eq!(used.strobes(), new.strobes());
+            for band in [Band::Structure, Band::Tool] {
+                assert_eq!(used.spectrum(band), new.spectrum(band));
+                assert_eq!(used.has_fresh_spectrum(band), new.has_fresh_spectrum(band));
+            }
+        }
     }
 }

@@ -28,6 +28,10 @@ use crate::pty::Pty;
 /// machine needs some tenths of a second at worst, a stored recording some seconds.
 pub const PATIENCE: Duration = Duration::from_secs(30);
 
+/// Options of QEMU: one instruction takes 2⁶ ns.
+const COUNTING: [&str; 2] = ["-icount", "shift=6"];
+const SECONDS_PER_INSTRUCTION: f64 = 64e-9;
+
 /// Frames sent ahead of their answers: more make nothing faster, the emulator takes byte by byte.
 const FRAMES_AHEAD: usize = 16;
 
@@ -97,6 +101,15 @@ pub struct Emulator<'m> {
 impl<'m> Emulator<'m> {
     /// Starts the emulated board with this memory.
     pub fn start(memory: &'m Memory) -> Self {
+        Self::start_with(memory, &[])
+    }
+
+    /// The same, with a clock that runs by instructions.
+    pub fn start_counting(memory: &'m Memory) -> Self {
+        Self::start_with(memory, &COUNTING)
+    }
+
+    fn start_with(memory: &'m Memory, options: &[&str]) -> Self {
         let image = firmware_image::qemu_mps2();
         let directory = TempDir::with_prefix("quietcut-emulator-").expect("a temporary folder");
         let listen = |name| UnixListener::bind(directory.path().join(name)).expect("a socket");
@@ -118,6 +131,7 @@ impl<'m> Emulator<'m> {
             .args(["-serial", &format!("file:{}", path("log"))])
             .args(["-chardev", &format!("socket,id=spindle,path={}", path("spindle"))])
             .args(["-serial", "chardev:spindle"])
+            .args(options)
             .stdout(Stdio::null());
         let mut process = spawn(command);
         let link = accept(&link, &mut process);
@@ -197,13 +211,25 @@ impl<'m> Emulator<'m> {
         self.pass_store(&store);
     }
 
-    /// The most bytes of stack that the device used so far.
-    pub fn stack_bytes(&mut self) -> usize {
-        self.feed(&[Stimulus::AskStack]);
+    /// What the device has cost so far.
+    pub fn cost(&mut self) -> Cost {
+        self.feed(&[Stimulus::AskCost]);
         let log = self.log();
-        let line = log.lines().rev().find_map(|line| line.split_once("stack: "));
-        let bytes = line.and_then(|(_, rest)| rest.split(' ').next()?.parse().ok());
-        bytes.unwrap_or_else(|| panic!("no depth of the stack in the log:\n{log}"))
+        let line = log.lines().rev().find_map(|line| line.split_once("cost: "));
+        let numbers = line.map(|(_, line)| {
+            let words = line.split(|c: char| !c.is_ascii_digit());
+            words.filter_map(|word| word.parse().ok()).collect::<Vec<u64>>()
+        });
+        let Some(&[stack_bytes, blocks, ticks, most_ticks]) = numbers.as_deref() else {
+            panic!("no cost in the log:\n{log}")
+        };
+        // 25 MHz.
+        let seconds = |ticks: u64| ticks as f64 / 25e6;
+        Cost {
+            stack_bytes: stack_bytes as usize,
+            mean_s: seconds(ticks) / blocks.max(1) as f64,
+            most_s: seconds(most_ticks),
+        }
     }
 
     fn pass_store(&mut self, store: &[u8]) {
@@ -264,6 +290,27 @@ impl Drop for Emulator<'_> {
     }
 }
 
+/// What the device costs.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// The most bytes of stack in use, without the main function's.
+    pub stack_bytes: usize,
+    /// Mean time of a block, s.
+    pub mean_s: f64,
+    /// The longest time of a block, s.
+    pub most_s: f64,
+}
+
+impl Cost {
+    /// The time in instructions, where the emulator counts them: mean and most.
+    pub fn instructions(&self) -> (f64, f64) {
+        (
+            self.mean_s / SECONDS_PER_INSTRUCTION,
+            self.most_s / SECONDS_PER_INSTRUCTION,
+        )
+    }
+}
+
 /// The link to an emulated device, for the host's client.
 pub struct SocketPort(UnixStream);
 
@@ -306,9 +353,9 @@ impl SocketPort {
 /// Runs an image that prints lines `NAME COUNT` and ends, counting instructions.
 pub fn count_instructions() -> BTreeMap<String, u64> {
     let mut command = qemu(&firmware_image::count_instructions());
-    // One instruction takes 2⁶ ns.
     command
-        .args(["-M", "mps2-an386", "-serial", "null", "-icount", "shift=6"])
+        .args(["-M", "mps2-an386", "-serial", "null"])
+        .args(COUNTING)
         .stdout(Stdio::piped());
     let mut process = spawn(command);
     let began = Instant::now();

@@ -10,6 +10,6 @@ pub mod device_log;
 pub mod emulator;
 pub mod firmware_image;
 pub mod pty;
-pub mod table_bits;
 pub mod said;
+pub mod table_bits;
 pub mod virtual_cut;

@@ -47,7 +47,7 @@ use quietcut_core::units::Nanoseconds;
 use quietcut_firmware::accelerometer::iis3dwb::{Configuration, Iis3dwb};
 use quietcut_firmware::defaults;
 use quietcut_firmware::device::{Clock, Device, Identity};
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::event_timer::EDGES;
 use crate::link_line::LinkLine;
@@ -73,6 +73,12 @@ const TURN: Duration = Duration::from_millis(500);
 /// There is something to do for the device: blocks, bytes, or room for bytes.
 static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static IO_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+
+/// Memory for the pipeline's state, which the device resets. With all bits zero it takes no room in the program.
+static STATE: ConstStaticCell<State> = ConstStaticCell::new(NO_BITS);
+
+// SAFETY: the compiler refuses a constant whose bits are no value of its type.
+const NO_BITS: State = unsafe { core::mem::zeroed() };
 
 /// The interrupt of a port that is not used runs the tasks for sensor and link.
 #[interrupt]
@@ -124,11 +130,9 @@ async fn main(_spawner: Spawner) {
     io.spawn(first(link_line::receive(receiver)));
     io.spawn(first(link_line::send(sender)));
 
-    static STATE: StaticCell<State> = StaticCell::new();
-    let state = STATE.init_with(State::default);
     let settings = defaults::settings(Sensor::IIS3DWB_16G);
     let tables = TableFlash::new(Flash::new_blocking(board.FLASH));
-    let Ok(mut device) = Device::new(IDENTITY, settings, state, tables, BoardClock) else {
+    let Ok(mut device) = Device::new(IDENTITY, settings, STATE.take(), tables, BoardClock) else {
         defmt::panic!("the settings of this board cannot be")
     };
     defmt::info!("quietcut on NUCLEO-G474RE");

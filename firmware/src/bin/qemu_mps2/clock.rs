@@ -30,7 +30,8 @@ pub(crate) fn wrap() {
     WRAPS.store(WRAPS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
 }
 
-fn ticks() -> u32 {
+/// Ticks of 40 ns, modulo 2³².
+pub(crate) fn ticks() -> u32 {
     // SAFETY: reads the value of timer 0.
     u32::MAX - unsafe { (VALUE as *const u32).read_volatile() }
 }

@@ -13,10 +13,10 @@
 #![deny(clippy::undocumented_unsafe_blocks)]
 
 mod clock;
+mod cost;
 mod flash;
 mod logger;
 mod spindle;
-mod stack;
 mod uart;
 
 use cortex_m::peripheral::NVIC;
@@ -25,9 +25,10 @@ use quietcut_core::acceleration::Sensor;
 use quietcut_core::monitor::State;
 use quietcut_firmware::defaults;
 use quietcut_firmware::device::{Device, Identity};
-use static_cell::StaticCell;
+use static_cell::ConstStaticCell;
 
 use crate::clock::BoardClock;
+use crate::cost::Cost;
 use crate::flash::Flash;
 use crate::spindle::Spindle;
 use crate::uart::{LINK, LOG, SPINDLE};
@@ -40,10 +41,16 @@ const IDENTITY: Identity = Identity {
 /// To wake from sleep takes the emulator longer than to pass a byte: stay awake within a message.
 const IDLE_TURNS_BEFORE_SLEEP: u32 = 2000;
 
+/// Memory for the pipeline's state, which the device resets. With all bits zero it takes no room in the program.
+static STATE: ConstStaticCell<State> = ConstStaticCell::new(NO_BITS);
+
+// SAFETY: the compiler refuses a constant whose bits are no value of its type.
+const NO_BITS: State = unsafe { core::mem::zeroed() };
+
 #[entry]
 fn main() -> ! {
     // SAFETY: no interrupt is on, and this is the first function.
-    unsafe { stack::paint() };
+    let cost = unsafe { Cost::watch() };
     clock::start();
     LOG.open(false);
     LINK.open(true);
@@ -53,14 +60,12 @@ fn main() -> ! {
     // SAFETY: the only call.
     let flash = unsafe { Flash::take() };
 
-    static STATE: StaticCell<State> = StaticCell::new();
-    let state = STATE.init_with(State::default);
     let settings = defaults::settings(Sensor::IIS3DWB_16G);
-    let Ok(mut device) = Device::new(IDENTITY, settings, state, flash, BoardClock) else {
+    let Ok(mut device) = Device::new(IDENTITY, settings, STATE.take(), flash, BoardClock) else {
         defmt::panic!("the settings of this board cannot be")
     };
     let mut line = LINK;
-    let mut spindle = Spindle::new();
+    let mut spindle = Spindle::new(cost);
     defmt::info!("quietcut on mps2-an386");
 
     let mut idle_turns = 0_u32;

@@ -7,8 +7,8 @@ use quietcut_firmware::device::Device;
 use quietcut_firmware::stimulus::{MAX_FRAME_BYTES, MEMORY_BYTES, REFUSED, STORE_OFFSET, Stimulus, TAKEN};
 
 use crate::clock::BoardClock;
+use crate::cost::Cost;
 use crate::flash::{Flash, PSRAM_BASE};
-use crate::stack;
 use crate::uart::Uart;
 
 /// Takes stimuli and gives them to the device.
@@ -18,16 +18,18 @@ pub(crate) struct Spindle {
     is_skipping: bool,
     /// Edges for the next block.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
+    cost: Cost,
 }
 
 type BoardDevice = Device<'static, Flash, BoardClock>;
 
 impl Spindle {
-    pub(crate) const fn new() -> Self {
+    pub(crate) fn new(cost: Cost) -> Self {
         Self {
             frame: Vec::new(),
             is_skipping: false,
             edges: Vec::new(),
+            cost,
         }
     }
 
@@ -77,7 +79,7 @@ impl Spindle {
         match stimulus {
             Stimulus::Edge(edge) => self.edges.push(edge).ok()?,
             Stimulus::Block(block) => {
-                device.take(&block, &self.edges);
+                self.cost.of_block(|| device.take(&block, &self.edges));
                 self.edges.clear();
                 // Unlike a real spindle this one waits for the line, so that no report is dropped.
                 loop {
@@ -87,7 +89,7 @@ impl Spindle {
                     }
                 }
             }
-            Stimulus::AskStack => defmt::info!("stack: {=usize} bytes at most", stack::most_bytes()),
+            Stimulus::AskCost => self.cost.log(),
             Stimulus::Stored { .. } => return None,
         }
         Some(())
