@@ -538,6 +538,7 @@ fn fed_blocks_say_the_same_to_the_bit() {
     let blocks = blocks(400);
     let expected = straight(&blocks, Some(&LobeTable::parse(&file).unwrap()));
 
+    assert!(!expected.spectra.is_empty() && !expected.strobes.is_empty());
     // On a line that takes all, and on one that takes a few bytes at a time.
     for takes in [None, Some(7)] {
         let mut state = State::default();

@@ -174,7 +174,8 @@ struct Advised {
     chatter: Option<Hertz>,
     speed: Rpm,
     working_point: Option<WorkingPoint>,
-    with_table: bool,
+    /// CRC-32 of the table.
+    table: Option<u32>,
 }
 
 /// One band on its way from samples to findings.
@@ -735,6 +736,7 @@ impl Monitor {
         table: Option<&LobeTable<'_>>,
         working_point: Option<&WorkingPoint>,
     ) -> Option<Advice> {
+        let table_crc = table.and_then(|table| Some(table.header().ok()?.crc));
         let moved = |a: f32, b: f32, step: f32| (a - b).abs() > step * b.abs();
         let same = state.advice.as_ref().filter(|advised| {
             let chatter = match (advised.chatter, judgement.chatter) {
@@ -745,7 +747,7 @@ impl Monitor {
                 && chatter
                 && !moved(advised.speed.0, speed.0, ADVICE_SPEED_STEP)
                 && advised.working_point.as_ref() == working_point
-                && advised.with_table == table.is_some()
+                && advised.table == table_crc
         });
         if let Some(advised) = same {
             return Some(advised.advice);
@@ -758,7 +760,7 @@ impl Monitor {
             chatter: judgement.chatter,
             speed,
             working_point: working_point.copied(),
-            with_table: table.is_some(),
+            table: table_crc,
         });
         Some(advice)
     }
