@@ -316,7 +316,7 @@ fn keeps_up_with_the_sensor() {
     // The real board runs at 160 MHz and gets 64 samples in 2.4 ms, 384 000 cycles. An instruction takes it 1.5 cycles or so, its
     // flash and the floating point unit included, and reading the sensor a fifth of its time.
     let cycles_per_block = 64.0 / 26_667.0 * 160e6;
-    assert!(1.5 * mean < 0.6 * cycles_per_block);
+    assert!(1.5 * mean < 0.8 * cycles_per_block);
     // Blocks wait in a queue of 16.
     assert!(1.5 * most < 0.8 * 16.0 * cycles_per_block);
 }
