@@ -102,13 +102,18 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
     let mut log = VerdictLog::default();
     for (block, edges) in sensed.steps() {
         client.feed(block, edges)?;
-        // The report of a block comes before the answer to it.
+        // The report of a block is the last before the answer to it; what came before the first is of the device's own
+        // sensor, which it hears until it is fed.
+        let mut last = None;
         while let Some(event) = client.next_event(Duration::ZERO)? {
-            if let Event::Report(report) = event
-                && log.take(&report).is_some()
-            {
-                args.output.line(words::line(&report))?;
+            if let Event::Report(report) = event {
+                last = Some(report);
             }
+        }
+        if let Some(report) = last
+            && log.take(&report).is_some()
+        {
+            args.output.line(words::line(&report))?;
         }
     }
     client.subscribe(Subscription::default())?;
