@@ -36,6 +36,8 @@ const CUTS: [(f64, f64); 2] = [(1045.0, 2.0), (900.0, 2.0)];
 const TABLE_RPM: (f64, f64) = (600.0, 2400.0);
 const TABLE_DEPTH_MM: f64 = 6.0;
 
+const TITLE: &str = "quietcut demo: a milling robot, chatter, and the quiet speed";
+
 #[derive(Serialize)]
 struct Answer {
     report: PathBuf,
@@ -65,53 +67,29 @@ struct TrialAnswer {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let began = Instant::now();
-    let say = |text: String| args.output.line(text);
+    let output = args.output;
     std::fs::create_dir_all(&args.out).map_err(|cause| {
         Error::input(format!(
             "--out {}: cannot make the folder: {cause}",
             args.out.display()
         ))
     })?;
-
-    say("A milling robot with a two-tooth cutter in a block of acetal. Nothing here is recorded: lobes, cuts, sensor and\n\
-         device are computed now, and the device is the program of the real one behind a serial line.\n".into())?;
+    output.line(
+        "A milling robot with a two-tooth cutter in a block of acetal. Nothing here is recorded: lobes, cuts, sensor and\n\
+         device are computed now, and the device is the program of the real one behind a serial line.\n",
+    )?;
     let cell = VirtualCell::new().map_err(Error::other)?;
-    let bytes = lobes(&cell)?;
+    let bytes = lobes(&cell, output)?;
     let table = LobeTable::parse(&bytes).map_err(Error::other)?;
-    say(format!(
-        "1  Lobes   {}\n           {:.1} s for {} speeds",
-        lowest_limit(&table),
-        began.elapsed().as_secs_f64(),
-        table.speeds().len()
-    ))?;
-
-    let (mut bench, info) = Bench::new(cell.clone())?;
-    say(format!(
-        "2  Device  {} with firmware {}, at {}",
-        info.board,
-        info.firmware,
-        bench.serial_port()
-    ))?;
-    let sent = Instant::now();
-    bench.client().upload(&table, |_, _| {})?;
-    say(format!(
-        "           lobe table sent: {} bytes in {:.2} s",
-        bytes.len(),
-        sent.elapsed().as_secs_f64()
-    ))?;
-
+    let mut bench = switch_on(&cell, &table, output)?;
     let mut stories = Vec::new();
-    for (index, (rpm, depth_mm)) in CUTS.into_iter().enumerate() {
-        say(format!(
-            "\n{}  Cut     {rpm} rev/min, {depth_mm} mm deep",
-            index + 3
-        ))?;
-        stories.push(story(&mut bench, &cell, rpm, depth_mm, args.output)?);
+    for (number, (rpm, depth_mm)) in (3..).zip(CUTS) {
+        output.line(format!("\n{number}  Cut     {rpm} rev/min, {depth_mm} mm deep"))?;
+        stories.push(story(&mut bench, &cell, rpm, depth_mm, output)?);
     }
 
     let (report, table_file) = (args.out.join("report.html"), args.out.join("lobes.qct"));
-    let title = "quietcut demo: a milling robot, chatter, and the quiet speed";
-    let html = page(title, &table, &stories).map_err(Error::other)?;
+    let html = page(TITLE, &table, &stories).map_err(Error::other)?;
     file::write(&table_file, &bytes)?;
     file::write(&report, html.as_bytes())?;
     let answer = Answer {
@@ -120,23 +98,46 @@ pub fn run(args: Args) -> Result<(), Error> {
         report,
         table: table_file,
     };
-    let text = format!(
-        "\n{}  Report  {} ({:.0} s in all)",
-        CUTS.len() + 3,
-        answer.report.display(),
-        answer.seconds
-    );
-    args.output.answer(&answer, text)?;
+    let (number, report, seconds) = (CUTS.len() + 3, answer.report.display(), answer.seconds);
+    output.answer(
+        &answer,
+        format_args!("\n{number}  Report  {report} ({seconds:.0} s in all)"),
+    )?;
     judge(&stories)
 }
 
-fn lobes(cell: &VirtualCell) -> Result<Vec<u8>, Error> {
+/// Computes the table of the cell.
+fn lobes(cell: &VirtualCell, output: Output) -> Result<Vec<u8>, Error> {
+    let began = Instant::now();
     let request = TableRequest {
         rpm: Some(TABLE_RPM),
         depth_mm: Some(TABLE_DEPTH_MM),
         ..TableRequest::default()
     };
-    Ok(build_table(std::slice::from_ref(cell.case()), &request)?)
+    let bytes = build_table(std::slice::from_ref(cell.case()), &request)?;
+    let table = LobeTable::parse(&bytes).map_err(Error::other)?;
+    let (limit, speeds) = (lowest_limit(&table), table.speeds().len());
+    let seconds = began.elapsed().as_secs_f64();
+    output.line(format!(
+        "1  Lobes   {limit}\n           {speeds} speeds in {seconds:.1} s"
+    ))?;
+    Ok(bytes)
+}
+
+/// Switches the device on and gives it the table.
+fn switch_on(cell: &VirtualCell, table: &LobeTable<'_>, output: Output) -> Result<Bench, Error> {
+    let (mut bench, info) = Bench::new(cell.clone())?;
+    let port = bench.serial_port();
+    output.line(format!(
+        "2  Device  {} with firmware {}, at {port}",
+        info.board, info.firmware
+    ))?;
+    bench.client().upload(table, |_, _| {})?;
+    let bytes = table.bytes().len();
+    output.line(format!(
+        "           lobe table sent over the serial line: {bytes} bytes"
+    ))?;
+    Ok(bench)
 }
 
 /// `at the worst speed, 1045 rev/min, cuts up to 1.33 mm are stable; deeper: …`.

@@ -187,40 +187,18 @@ impl Client {
             encode(request, number, &mut buffer).map_err(|_| DeviceError::TooLarge { request: name })?;
         let began = Instant::now();
         let mut fault = None;
-        for attempt in 1..=ATTEMPTS {
+        for _ in 0..ATTEMPTS {
             self.port.send(frame, SEND)?;
-            let mut deadline = Instant::now() + within;
-            loop {
-                let left = deadline.saturating_duration_since(Instant::now());
-                match self.receive(left, Some(number))? {
-                    Some(Answer::Reply(Reply::Refused(refusal))) => {
-                        return Err(DeviceError::Refused {
-                            port: self.port.name().into(),
-                            request: name,
-                            refusal,
-                        });
-                    }
-                    Some(Answer::Reply(reply)) => return Ok(reply),
-                    Some(Answer::Version(theirs)) => return Err(self.version(theirs)),
-                    Some(Answer::Unreadable(error)) => {
-                        tracing::debug!("{}: {name}, attempt {attempt}: {error}", self.port.name());
-                        fault = Some(error);
-                        // It may have been a report, with the answer just behind it.
-                        deadline = deadline.min(Instant::now() + AFTER_NOISE);
-                    }
-                    Some(Answer::Again(error)) => {
-                        tracing::debug!(
-                            "{}: {name}, attempt {attempt}: the device got {error}",
-                            self.port.name()
-                        );
-                        fault = Some(error);
-                        break;
-                    }
-                    None => {}
+            match self.await_reply(number, within, &mut fault)? {
+                Some(Reply::Refused(refusal)) => {
+                    return Err(DeviceError::Refused {
+                        port: self.port.name().into(),
+                        request: name,
+                        refusal,
+                    });
                 }
-                if left.is_zero() {
-                    break;
-                }
+                Some(reply) => return Ok(reply),
+                None => {}
             }
         }
         let port = self.port.name().to_owned();
@@ -238,6 +216,38 @@ impl Client {
                 attempts: ATTEMPTS,
             },
         })
+    }
+
+    /// Waits for the reply to a request that was sent; `None` where it must be sent again.
+    fn await_reply(
+        &mut self,
+        number: u16,
+        within: Duration,
+        fault: &mut Option<FrameError>,
+    ) -> Result<Option<Reply>, DeviceError> {
+        let mut deadline = Instant::now() + within;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.receive(left, Some(number))? {
+                Some(Answer::Reply(reply)) => return Ok(Some(reply)),
+                Some(Answer::Version(theirs)) => return Err(self.version(theirs)),
+                Some(Answer::Unreadable(error)) => {
+                    tracing::debug!("{}: request {number}: {error}", self.port.name());
+                    *fault = Some(error);
+                    // It may have been a report, with the answer just behind it.
+                    deadline = deadline.min(Instant::now() + AFTER_NOISE);
+                }
+                Some(Answer::Again(error)) => {
+                    tracing::debug!("{}: request {number} came as {error}", self.port.name());
+                    *fault = Some(error);
+                    return Ok(None);
+                }
+                None => {}
+            }
+            if left.is_zero() {
+                return Ok(None);
+            }
+        }
     }
 
     /// Takes what comes within `timeout`, up to the first thing that matters to a request with this number.

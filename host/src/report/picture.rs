@@ -4,7 +4,7 @@ use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
-use plotters::prelude::{Cartesian2d, RGBColor, SVGBackend, WHITE};
+use plotters::prelude::{Cartesian2d, RGBColor, Rectangle, SVGBackend, Text, WHITE};
 use plotters::style::{Color, IntoFont, TextStyle};
 
 /// A picture that could not be drawn.
@@ -100,6 +100,24 @@ pub(super) fn axes<'a, 'c>(
         .y_label_formatter(&tick)
         .draw()?;
     Ok(chart)
+}
+
+/// A word on paper of its own, so that lines below do not cross it; `at` is its left upper corner.
+pub(super) fn label(
+    canvas: &Canvas<'_>,
+    at: (i32, i32),
+    word: &str,
+    color: RGBColor,
+) -> Result<(), PictureError> {
+    let style = text(13, color);
+    let (width, height) = canvas.estimate_text_size(word, &style)?;
+    let paper = [
+        (at.0 - 2, at.1 - 1),
+        (at.0 + width as i32 + 3, at.1 + height as i32 + 2),
+    ];
+    canvas.draw(&Rectangle::new(paper, WHITE.mix(0.8).filled()))?;
+    canvas.draw(&Text::new(word, at, style))?;
+    Ok(())
 }
 
 /// A number at an axis: no noise digits of binary fractions.

@@ -1,11 +1,10 @@
 //! A spectrum, with the harmonics of the tooth passing and the chatter frequency marked.
 
 use plotters::chart::SeriesLabelPosition;
-use plotters::prelude::{LineSeries, PathElement, Polygon, Rectangle, Text, WHITE};
+use plotters::prelude::{LineSeries, PathElement, Polygon, WHITE};
 use plotters::style::Color;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::picture::{BLUE, CHATTER, GRID, INK, Labels, ORANGE, PictureError, axes, draw, span, text};
+use super::picture::{BLUE, CHATTER, GRID, INK, Labels, ORANGE, PictureError, axes, draw, label, span, text};
 
 const SIZE: (u32, u32) = (470, 330);
 
@@ -59,24 +58,20 @@ pub fn spectrum(
         }
         chart.draw_series(LineSeries::new(line.iter().copied(), BLUE.stroke_width(2)))?;
         if let Some(chatter_hz) = marks.chatter_hz.filter(|hertz| (0.0..=last_hz).contains(hertz)) {
-            let nearest = line
-                .iter()
-                .min_by(|a, b| (a.0 - chatter_hz).abs().total_cmp(&(b.0 - chatter_hz).abs()));
+            let near = |a: &f64, b: &f64| (a - chatter_hz).abs().total_cmp(&(b - chatter_hz).abs());
+            let nearest = line.iter().min_by(|a, b| near(&a.0, &b.0));
             let height = nearest.map_or(top, |&(_, value)| value);
             let (x, y) = chart.backend_coord(&(chatter_hz, height));
-            let tip = [(x, y - 3), (x - 5, y - 13), (x + 5, y - 13)];
-            canvas.draw(&Polygon::new(tip, CHATTER))?;
-            let label = format!("chatter {chatter_hz:.1} Hz");
-            let style = text(13, CHATTER);
-            let (w, h) = canvas.estimate_text_size(&label, &style)?;
-            let (left, top) = (x + 9, y - 16);
-            let paper = [(left - 2, top), (left + w as i32 + 4, top + h as i32 + 2)];
-            canvas.draw(&Rectangle::new(paper, WHITE.mix(0.8).filled()))?;
-            canvas.draw(&Text::new(
-                label,
-                (left, top),
-                style.pos(Pos::new(HPos::Left, VPos::Top)),
+            canvas.draw(&Polygon::new(
+                [(x, y - 3), (x - 5, y - 13), (x + 5, y - 13)],
+                CHATTER,
             ))?;
+            label(
+                canvas,
+                (x + 9, y - 16),
+                &format!("chatter {chatter_hz:.1} Hz"),
+                CHATTER,
+            )?;
         }
         if marks.tooth_passing_hz.is_some() {
             chart

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use plotters::prelude::{LineSeries, PathElement, Rectangle, Text, WHITE};
+use plotters::prelude::{LineSeries, PathElement};
 use plotters::style::Color;
 
-use super::picture::{BLUE, CHATTER, INK, Labels, PictureError, axes, draw, span, text};
+use super::picture::{BLUE, CHATTER, INK, Labels, PictureError, axes, draw, label, span};
 
 /// A moment on the time axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,11 +52,7 @@ pub fn time_signal(
             let (x, top) = chart.backend_coord(&(moment.t_s, y.end));
             // Labels of near moments must not lie on one another.
             let row = 16 * (index as i32 % 3);
-            let (at, style) = ((x + 6, top + 4 + row), text(13, INK));
-            let (w, h) = canvas.estimate_text_size(&moment.label, &style)?;
-            let paper = [(at.0 - 2, at.1 - 1), (at.0 + w as i32 + 3, at.1 + h as i32 + 2)];
-            canvas.draw(&Rectangle::new(paper, WHITE.mix(0.8).filled()))?;
-            canvas.draw(&Text::new(moment.label.as_str(), at, style))?;
+            label(canvas, (x + 6, top + 4 + row), &moment.label, INK)?;
         }
         Ok(())
     })
