@@ -24,7 +24,7 @@ pub struct Story {
 }
 
 /// Spindle speeds that the chart shows, rev/min.
-const CHART_RPM: RangeInclusive<f64> = 750.0..=1350.0;
+const CHART_RPM: RangeInclusive<f64> = 850.0..=1200.0;
 /// Depths that the chart shows, mm.
 const CHART_DEPTH_MM: f64 = 4.0;
 /// Frequencies that the spectra show: the modes of the robot and a few harmonics of the teeth.
