@@ -229,6 +229,65 @@ fn edges_are_found_on_a_swinging_base_line() {
     }
 }
 
+/// One mark per turn: a pulse of a tenth of a turn with sloping sides, from 0 to 1.
+fn pulse_level(turns: f64) -> f64 {
+    let position = turns.rem_euclid(1.0);
+    let side = |from: f64| ((position - from) / 0.02).clamp(0.0, 1.0);
+    side(0.5) - side(0.6)
+}
+
+/// Times of the edges, in samples, of a pulse every 200 samples; the record begins at `start` of a turn.
+fn pulse_edges(start: f64, noise: f64, seed: u64) -> Vec<f64> {
+    // Noise up to four fifths of the least swing from peak to peak.
+    let detector = LevelDetector {
+        least_swing: (2.5 * noise) as f32,
+    };
+    let mut state = LevelDetectorState::default();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let edges = (0..4000).filter_map(|n| {
+        let level = pulse_level(start + f64::from(n) / 200.0) + noise * random.random_range(-1.0..1.0);
+        let part = detector.step(&mut state, level as f32)?;
+        Some(f64::from(n) - f64::from(part))
+    });
+    edges.collect()
+}
+
+#[test]
+fn a_record_may_begin_anywhere_on_a_pulse() {
+    let seed = rand::random();
+    println!("seed {seed}");
+    for step in 0..200 {
+        let start = f64::from(step) / 200.0;
+        let edges = pulse_edges(start, 0.02, seed);
+        let because = format!("begun at {start} of a turn: {edges:?}");
+        // From the middle of the rising side to its end the first edge may have been before the record.
+        assert!((19..=20).contains(&edges.len()), "{because}");
+        // The first edge is found near the foot of the side, the second where a part of the swing was seen: 4 samples of side.
+        for pair in edges.windows(2) {
+            assert!((pair[1] - pair[0] - 200.0).abs() < 4.0, "{because}");
+        }
+        // From then on the edges are at half the swing: noise of 0.02 at both ends, the usual swing known to 0.04,
+        // on a slope of 0.25 per sample.
+        for pair in edges.windows(2).skip(2) {
+            assert!((pair[1] - pair[0] - 200.0).abs() < 0.5, "{because}");
+        }
+    }
+}
+
+#[test]
+fn a_signal_that_becomes_smaller_is_found_again() {
+    let detector = LevelDetector { least_swing: 0.05 };
+    let mut state = LevelDetectorState::default();
+    let mut late = 0;
+    for n in 0..20_000 {
+        let size = if n < 6000 { 1.0 } else { 0.1 };
+        let edge = detector.step(&mut state, (size * pulse_level(f64::from(n) / 200.0)) as f32);
+        late += usize::from(edge.is_some() && n >= 15_000);
+    }
+    // Two silences of eight turns halve the usual swing below twice the small one.
+    assert_eq!(late, 25);
+}
+
 #[test]
 fn wheels_that_cannot_be_are_refused() {
     for wheel in [

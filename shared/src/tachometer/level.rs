@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Finds the rising edges of a level whose base line wanders: a switch, a light barrier, a variable-reluctance sensor.
 ///
 /// A rising edge is where the level has climbed from its last valley by half the usual swing, a fall where it has
-/// come down from its last crest by as much. Both references move with the signal, so a base line that
+/// come down from its last crest by as much; in both cases by the least swing at least. Both references move with the signal, so a base line that
 /// swings, even by more than a pulse, moves no threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelDetector {
@@ -22,11 +22,14 @@ pub struct LevelDetectorState {
     high: bool,
     /// Lowest level since the last fall, highest since the last rise.
     extreme: f32,
-    /// The last crest, from which the level fell.
-    crest: f32,
-    /// The usual swing from valley to crest; 0 before the first.
+    /// The last valley, from which the level rose to an edge.
+    valley: f32,
+    /// The last crest, from which the level fell; `None` before the first fall: the record may begin anywhere on a pulse.
+    crest: Option<f32>,
+    /// The usual swing from crest to valley, and whether a whole one was seen; before that what is known of it.
     swing: f32,
-    /// Samples since the last rising edge, and between the last two.
+    is_learned: bool,
+    /// Samples since the last rising edge, and between the last two; 0 before the second.
     since_edge: u32,
     between_edges: u32,
 }
@@ -52,16 +55,17 @@ impl LevelDetector {
         }
         let Some(before) = state.level.replace(level) else {
             state.extreme = level;
-            state.crest = level;
             return None;
         };
         state.since_edge = state.since_edge.saturating_add(1);
         if state.between_edges > 0 && state.since_edge / SILENT_INTERVALS > state.between_edges {
             state.swing *= 0.5;
+            state.is_learned = state.swing > self.least_swing;
             state.since_edge = 0;
         }
-        let swing = if state.swing > self.least_swing {
-            state.swing
+        let half = EDGE_LEVEL * state.swing;
+        let step = if half > self.least_swing {
+            half
         } else {
             self.least_swing
         };
@@ -69,9 +73,13 @@ impl LevelDetector {
             if level > state.extreme {
                 state.extreme = level;
             }
-            if level < state.extreme - EDGE_LEVEL * swing {
+            if level < state.extreme - step {
                 state.high = false;
-                state.crest = state.extreme;
+                state.crest = Some(state.extreme);
+                if !state.is_learned {
+                    // The first climb may have begun before the record.
+                    state.swing = state.extreme - state.valley;
+                }
                 state.extreme = level;
             }
             return None;
@@ -79,31 +87,33 @@ impl LevelDetector {
         if level < state.extreme {
             state.extreme = level;
         }
-        let threshold = state.extreme + EDGE_LEVEL * swing;
+        let threshold = state.extreme + step;
         if level < threshold {
             return None;
         }
-        self.learn(state, state.crest - state.extreme);
+        if let Some(crest) = state.crest {
+            state.learn(crest - state.extreme);
+            state.between_edges = state.since_edge;
+        }
         state.high = true;
+        state.valley = state.extreme;
         state.extreme = level;
-        state.between_edges = state.since_edge;
         state.since_edge = 0;
         // The valley itself may be the sample before; the level then rises from it to here.
         let part = (level - threshold) / (level - before);
         Some(part.clamp(0.0, 1.0))
     }
+}
 
+impl LevelDetectorState {
     /// Lets the usual swing follow a fall from crest to valley.
-    fn learn(&self, state: &mut LevelDetectorState, swing: f32) {
-        if state.swing < self.least_swing {
-            state.swing = if swing > self.least_swing {
-                swing
-            } else {
-                self.least_swing
-            };
-            return;
+    fn learn(&mut self, swing: f32) {
+        if self.is_learned {
+            let bound = SWING_MOVES * self.swing;
+            self.swing += (SWING_FOLLOWS * (swing - self.swing)).clamp(-bound, bound);
+        } else {
+            self.swing = swing;
+            self.is_learned = true;
         }
-        let bound = SWING_MOVES * state.swing;
-        state.swing += (SWING_FOLLOWS * (swing - state.swing)).clamp(-bound, bound);
     }
 }
