@@ -7,6 +7,7 @@ pub mod demo;
 pub mod device;
 mod eigenvalues;
 pub mod file;
+pub mod frf;
 pub mod milling;
 pub mod recording;
 pub mod report;
