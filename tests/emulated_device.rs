@@ -8,25 +8,16 @@ use quietcut::device::Client;
 use quietcut::simulate::Entry;
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::protocol::{Info, Slot, VERSION};
-use quietcut_firmware::stimulus::Stimulus;
 use quietcut_tests::command::{folder, quietcut};
 use quietcut_tests::cut::{Cut, table};
 use quietcut_tests::emulator::{self, Cost, Emulator, Memory, PATIENCE};
 use quietcut_tests::firmware_image;
-use quietcut_tests::said::{ALL, Said, Step};
+use quietcut_tests::said::{ALL, Said, Step, stimuli};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 fn connect(emulator: &Emulator<'_>) -> (Client, Info) {
     Client::connect(Box::new(emulator.port())).expect("the device answers")
-}
-
-fn stimuli(steps: &[Step]) -> Vec<Stimulus> {
-    let of = |(block, edges): &Step| {
-        let edges = edges.iter().copied().map(Stimulus::Edge);
-        edges.chain([Stimulus::Block(block.clone())]).collect::<Vec<_>>()
-    };
-    steps.iter().flat_map(of).collect()
 }
 
 fn upload(client: &mut Client, bytes: &[u8]) -> Info {

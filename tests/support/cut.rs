@@ -4,11 +4,12 @@ use quietcut::case::Case;
 use quietcut::simulate::{Accelerometer, Entry, TachometerModel, VirtualCut};
 use quietcut_core::lobes::{Content, Interval, Kind, Layer, Validity, encode, encoded_length};
 use quietcut_core::monitor::Settings;
-use quietcut_core::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
-use quietcut_core::working_point::{Limits, Tool, WorkingPoint};
+use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
+use quietcut_core::working_point::{Limits, WorkingPoint};
 
+use crate::acceptance::settings;
 use crate::command;
-use crate::said::Step;
+use crate::said::{Step, steps};
 
 /// A cut of `kuka-kr90-acetal`, heard by a sensor whose clock is off by 2 %.
 pub struct Cut {
@@ -36,23 +37,14 @@ impl Cut {
         let heard = cut
             .hear(&case, accelerometer, tachometer, seed)
             .expect("a cut that can be simulated");
-        let mut edges = heard.edges.into_iter().peekable();
-        let ends: Vec<_> = heard.blocks.iter().skip(1).map(|block| block.time).collect();
-        let ends = ends.into_iter().chain([Nanoseconds(u64::MAX)]);
-        let steps = heard.blocks.into_iter().zip(ends);
         let cut = case.cut().expect("a cut");
         Self {
             settings: Settings {
-                sensor: accelerometer.sensor(),
-                tool: Tool {
-                    teeth: case.tool().expect("a tool").teeth as u8,
-                },
-                wheel: Some(tachometer.wheel),
-                assumed_speed: None,
                 limits: Some(Limits {
                     rpm_min: Rpm(600.0),
                     rpm_max: Rpm(2400.0),
                 }),
+                ..settings(&case, accelerometer, tachometer)
             },
             working_point: WorkingPoint {
                 axial_depth: Millimeters(depth_mm as f32),
@@ -61,13 +53,7 @@ impl Cut {
                 feed_per_tooth: Millimeters(cut.feed_per_tooth_mm as f32),
                 posture: 0,
             },
-            steps: steps
-                .map(|(block, end)| {
-                    let mine = std::iter::from_fn(|| edges.next_if(|edge| edge.time < end));
-                    let mine = mine.collect();
-                    (block, mine)
-                })
-                .collect(),
+            steps: steps(heard),
         }
     }
 }

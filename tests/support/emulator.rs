@@ -32,6 +32,10 @@ pub const PATIENCE: Duration = Duration::from_secs(30);
 const COUNTING: [&str; 2] = ["-icount", "shift=6"];
 const SECONDS_PER_INSTRUCTION: f64 = 64e-9;
 
+/// Bytes of stimuli that are stored at once: the board takes a second or so for them, far below [`PATIENCE`].
+const STORED_AT_ONCE: usize = 1024 * 1024;
+const _: () = assert!(STORED_AT_ONCE <= MEMORY_BYTES - STORE_OFFSET);
+
 /// Frames sent ahead of their answers: more make nothing faster, the emulator takes byte by byte.
 const FRAMES_AHEAD: usize = 16;
 
@@ -202,7 +206,7 @@ impl<'m> Emulator<'m> {
         for stimulus in stimuli {
             let mut bytes = [0; MAX_FRAME_BYTES];
             let bytes = postcard::to_slice(stimulus, &mut bytes).expect("room for a stimulus");
-            if store.len() + bytes.len() > MEMORY_BYTES - STORE_OFFSET {
+            if store.len() + bytes.len() > STORED_AT_ONCE {
                 self.pass_store(&store);
                 store.clear();
             }

@@ -3,6 +3,7 @@
 // A helper that cannot do its work fails the test that called it.
 #![allow(clippy::expect_used, clippy::panic)]
 
+pub mod acceptance;
 pub mod chain_bits;
 pub mod command;
 pub mod cut;

@@ -4,12 +4,16 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use quietcut::device::{Client, Event};
+use quietcut::simulate::Heard;
 use quietcut_core::acceleration::Block;
+use quietcut_core::detector::Verdict;
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::monitor::{Band, Monitor, Report, Settings, State};
 use quietcut_core::protocol::{Reports, Subscription};
 use quietcut_core::tachometer::Edge;
+use quietcut_core::units::Nanoseconds;
 use quietcut_core::working_point::WorkingPoint;
+use quietcut_firmware::stimulus::Stimulus;
 
 /// Everything that can be subscribed to.
 pub const ALL: Subscription = Subscription {
@@ -20,6 +24,28 @@ pub const ALL: Subscription = Subscription {
 
 /// Samples and edges of one step.
 pub type Step = (Block, Vec<Edge>);
+
+/// What sensors heard in steps: an edge belongs to the block before whose successor it came.
+pub fn steps(heard: Heard) -> Vec<Step> {
+    let mut edges = heard.edges.into_iter().peekable();
+    let ends: Vec<_> = heard.blocks.iter().skip(1).map(|block| block.time).collect();
+    let ends = ends.into_iter().chain([Nanoseconds(u64::MAX)]);
+    let steps = heard.blocks.into_iter().zip(ends).map(|(block, end)| {
+        let mine = std::iter::from_fn(|| edges.next_if(|edge| edge.time < end));
+        let mine = mine.collect();
+        (block, mine)
+    });
+    steps.collect()
+}
+
+/// Steps as the virtual spindle of an emulated board sends them.
+pub fn stimuli(steps: &[Step]) -> Vec<Stimulus> {
+    let of = |(block, edges): &Step| {
+        let edges = edges.iter().copied().map(Stimulus::Edge);
+        edges.chain([Stimulus::Block(block.clone())]).collect::<Vec<_>>()
+    };
+    steps.iter().flat_map(of).collect()
+}
 
 /// What was said. Numbers are kept by their bits: a NaN equals itself, and 0 is not −0.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -115,6 +141,18 @@ impl Said {
 
     /// Asserts that a device said the same; names the first report that differs in words.
     pub fn assert_same(&self, device: &Self) {
+        self.assert_same_reports(device);
+        assert!(
+            self.strobes == device.strobes,
+            "points of the stroboscopic map differ"
+        );
+        let which = |said: &Self| said.spectra.keys().copied().collect::<Vec<_>>();
+        assert_eq!(which(self), which(device), "blocks with spectra");
+        assert!(self.spectra == device.spectra, "bins of the spectra differ");
+    }
+
+    /// The same of the reports alone.
+    pub fn assert_same_reports(&self, device: &Self) {
         let pairs = self.reports.iter().zip(&device.reports);
         for (number, (here, there)) in pairs.enumerate() {
             let words = |bytes| postcard::from_bytes::<Report>(bytes).expect("a report");
@@ -126,12 +164,14 @@ impl Said {
             );
         }
         assert_eq!(self.reports.len(), device.reports.len(), "number of reports");
-        assert!(
-            self.strobes == device.strobes,
-            "points of the stroboscopic map differ"
-        );
-        let which = |said: &Self| said.spectra.keys().copied().collect::<Vec<_>>();
-        assert_eq!(which(self), which(device), "blocks with spectra");
-        assert!(self.spectra == device.spectra, "bins of the spectra differ");
+    }
+
+    /// The first chatter that was called.
+    pub fn first_alarm(&self) -> Option<Verdict> {
+        let verdicts = self.reports.iter().map(|bytes| {
+            let report: Report = postcard::from_bytes(bytes).expect("a report");
+            report.judgement.verdict
+        });
+        verdicts.into_iter().find(|verdict| verdict.is_chatter())
     }
 }

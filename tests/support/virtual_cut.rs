@@ -5,9 +5,10 @@ use std::fmt;
 use quietcut::case::Case;
 use quietcut::simulate::{Accelerometer, Model, Regeneration, Room, Settings, TachometerModel, VirtualCut};
 use quietcut_core::detector::Verdict;
-use quietcut_core::monitor::{self, Monitor, State};
-use quietcut_core::tachometer::Edge;
-use quietcut_core::working_point::Tool;
+use quietcut_core::monitor::{Monitor, State};
+
+use crate::acceptance::settings;
+use crate::said::steps;
 
 /// What came of a cut.
 #[derive(Clone, Debug)]
@@ -86,24 +87,11 @@ pub fn judged(
     let heard = cut
         .hear(case, accelerometer, tachometer, seed)
         .expect("the cut can be simulated");
-    let teeth = u8::try_from(case.tool().expect("a tool").teeth).expect("a few teeth");
-    let monitor = Monitor::new(monitor::Settings {
-        sensor: accelerometer.sensor(),
-        tool: Tool { teeth },
-        wheel: Some(tachometer.wheel),
-        assumed_speed: None,
-        limits: None,
-    })
-    .expect("settings that can be");
+    let monitor = Monitor::new(settings(case, accelerometer, tachometer)).expect("settings that can be");
     let mut state = State::default();
     let mut verdicts: Vec<(f64, Verdict, Option<f32>)> = Vec::new();
-    let mut edges = heard.edges.as_slice();
-    for (index, block) in heard.blocks.iter().enumerate() {
-        let end = heard.blocks.get(index + 1).map(|next| next.time);
-        let now = edges.partition_point(|edge: &Edge| end.is_none_or(|end| edge.time < end));
-        let (mine, later) = edges.split_at(now);
-        edges = later;
-        let report = monitor.step(&mut state, block, mine, None, None);
+    for (block, edges) in &steps(heard) {
+        let report = monitor.step(&mut state, block, edges, None, None);
         let judgement = report.judgement;
         if verdicts.last().is_none_or(|last| last.1 != judgement.verdict) {
             verdicts.push((

@@ -1,0 +1,67 @@
+//! The cuts of `simulated_cuts`, all twenty, in the emulator: what it says is the same to the bit as on the host.
+#![allow(clippy::expect_used)]
+
+use std::sync::Mutex;
+use std::time::Instant;
+
+use quietcut::device::Client;
+use quietcut_core::protocol::{Reports, Subscription};
+use quietcut_tests::acceptance::{ABOVE, AcceptanceCut, BELOW, LIMITS};
+use quietcut_tests::emulator::{Emulator, Memory, PATIENCE};
+use quietcut_tests::said::{Said, steps, stimuli};
+
+/// Every report; spectra and stroboscopic samples, which take longer to send than to compute, are compared in `emulated_device`.
+const REPORTS: Subscription = Subscription {
+    reports: Reports::All,
+    spectra: false,
+    strobes: false,
+};
+
+/// Lets host and emulator hear the cut; what the emulator said.
+fn emulated(cut: &AcceptanceCut) -> Said {
+    let heard = cut
+        .cut
+        .hear(&cut.case, cut.accelerometer, cut.tachometer, cut.seed)
+        .expect("a cut that can be simulated");
+    let steps = steps(heard);
+    let host = Said::on_host(cut.settings(), None, None, &steps);
+    let memory = Memory::erased();
+    let mut emulator = Emulator::start(&memory);
+    let (mut client, _) = Client::connect(Box::new(emulator.port())).expect("the device answers");
+    client.set_settings(cut.settings()).expect("settings that can be");
+    client.subscribe(REPORTS).expect("a subscription");
+    let began = Instant::now();
+    let device = std::thread::scope(|scope| {
+        scope.spawn(|| emulator.feed_stored(&stimuli(&steps)));
+        Said::from_device(&mut client, steps.len(), PATIENCE)
+    });
+    let status = client.status().expect("an answer");
+    assert_eq!((status.dropped, client.lost_frames()), (0, 0));
+    println!(
+        "{cut}: {} reports in {:.1?}",
+        device.reports.len(),
+        began.elapsed()
+    );
+    host.assert_same_reports(&device);
+    device
+}
+
+#[test]
+fn says_of_all_twenty_what_the_host_says_and_is_right() {
+    let cuts = (0..LIMITS.len()).flat_map(|index| [(index, BELOW), (index, ABOVE)]);
+    let cuts = Mutex::new(cuts);
+    let next = || cuts.lock().expect("no worker panics here").next();
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some((index, share)) = next() {
+                    let cut = AcceptanceCut::new(index, share);
+                    let said = emulated(&cut);
+                    let right = (share > 1.0).then_some(LIMITS[index].2);
+                    assert_eq!(said.first_alarm(), right, "{cut}");
+                }
+            });
+        }
+    });
+}
