@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::method::MethodName;
 use super::{Error, Output, Range};
 use crate::case::Case;
-use crate::continuation::{self, ForcedProblem};
 use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::page::{figure, page};
-use crate::stability::{Chart, CubicTerms, Point, Problem, SpeedLine, StabilityError, chart, point};
+use crate::stability::{Chart, Method, Point, SpeedLine, chart, method_in_words};
 
 /// Stability limits over speed, or the dominant multiplier at points.
 #[derive(Debug, clap::Args)]
@@ -28,9 +28,9 @@ pub struct Args {
     /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "rpm")]
     depth_mm: Option<Range>,
-    /// How to compute: collocation of the one-period map.
+    /// How to compute.
     #[arg(long, value_enum, default_value_t)]
-    method: Method,
+    method: MethodName,
     /// Leave out the cubic terms of a structure: the limits for vanishing feed.
     #[arg(long)]
     linear: bool,
@@ -44,74 +44,41 @@ pub struct Args {
     output: Output,
 }
 
-/// The methods that can be asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-enum Method {
-    /// Collocation of the one-period map.
-    #[default]
-    Collocation,
-}
-
 #[derive(Serialize)]
 struct Points {
+    method: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blind_to: Option<&'static str>,
     points: Vec<Point>,
 }
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let Method::Collocation = args.method;
     let case = Case::read(&args.case).map_err(Error::input)?;
-    let is_nonlinear = case.structure().map_err(Error::input)?.is_nonlinear();
-    let model = if is_nonlinear && !args.linear {
-        Model::Nonlinear(ForcedProblem::new(&case)?)
-    } else {
-        Model::Linear(Problem::new(&case, CubicTerms::LeaveOut)?)
-    };
+    let method = args.method.on(&case, args.linear)?;
     match (args.rpm, args.depth_mm) {
-        (Some(rpm), Some(depth_mm)) => run_chart(&case, &model, rpm, depth_mm, args.out, args.output),
-        _ => run_points(&model, &args.at, args.output),
-    }
-}
-
-/// What multipliers are computed about.
-enum Model {
-    /// Rest: the limits do not depend on the forced motion.
-    Linear(Problem),
-    /// The forced orbit at the feed of the case.
-    Nonlinear(ForcedProblem),
-}
-
-impl Model {
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
-        match self {
-            Self::Linear(problem) => point(problem, rpm, depth_mm),
-            Self::Nonlinear(problem) => continuation::point(problem, rpm, depth_mm),
+        (Some(rpm), Some(depth_mm)) => {
+            run_chart(&case, method.as_ref(), rpm, depth_mm, args.out, args.output)
         }
-    }
-
-    fn chart(&self, speeds_rpm: &[f64], depth_mm: f64, samples: usize) -> Result<Chart, StabilityError> {
-        match self {
-            Self::Linear(problem) => chart(problem, speeds_rpm, depth_mm, samples),
-            Self::Nonlinear(problem) => continuation::chart(problem, speeds_rpm, depth_mm),
-        }
+        _ => run_points(method.as_ref(), &args.at, args.output),
     }
 }
 
-fn run_points(model: &Model, at: &[(f64, f64)], output: Output) -> Result<(), Error> {
+fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<(), Error> {
     let points = at
         .iter()
-        .map(|&(rpm, depth_mm)| model.point(rpm, depth_mm))
+        .map(|&(rpm, depth_mm)| method.point(rpm, depth_mm))
         .collect::<Result<Vec<_>, _>>()?;
-    let mut text = String::new();
+    let (name, blind_to) = (method.name(), method.blind_to());
+    let mut text = format!("by {}", method_in_words(name, blind_to));
     for point in &points {
         let chatter = point
             .chatter_hz
             .map_or_else(String::new, |hz| format!(", {hz:.2} Hz"));
-        let separator = if text.is_empty() { "" } else { "\n" };
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "{separator}{} rev/min, {} mm: {}, |multiplier| = {:.6} ± {:.0e} ({}{chatter})",
+            "\n{} rev/min, {} mm: {}, |multiplier| = {:.6} ± {:.0e} ({}{chatter})",
             point.rpm,
             point.depth_mm,
             point.verdict.name(),
@@ -120,12 +87,17 @@ fn run_points(model: &Model, at: &[(f64, f64)], output: Output) -> Result<(), Er
             point.kind.name(),
         );
     }
-    output.answer(&Points { points }, text)
+    let answer = Points {
+        method: name,
+        blind_to,
+        points,
+    };
+    output.answer(&answer, text)
 }
 
 fn run_chart(
     case: &Case,
-    model: &Model,
+    method: &dyn Method,
     rpm: Range,
     depth_mm: Range,
     out: Option<PathBuf>,
@@ -138,7 +110,7 @@ fn run_chart(
     } else {
         depth_mm.count()
     };
-    let chart = model.chart(&rpm.values(), deepest_mm, samples)?;
+    let chart = chart(method, &rpm.values(), deepest_mm, samples)?;
     if let Some(path) = &out {
         write_chart(case, &chart, deepest_mm, path)?;
     }
@@ -150,7 +122,10 @@ fn run_chart(
 }
 
 fn limits_as_text(chart: &Chart) -> String {
-    let mut text = String::from("  rev/min  first limit [mm]  kind   chatter [Hz]  stable [mm]");
+    let mut text = format!(
+        "by {}\n  rev/min  first limit [mm]  kind   chatter [Hz]  stable [mm]",
+        chart.method_in_words()
+    );
     for line in &chart.speeds {
         let stable: Vec<String> = line
             .stable_mm
@@ -198,14 +173,15 @@ fn picture(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
     let mut columns: Vec<Column> = chart.speeds.iter().map(Column::from).collect();
     columns.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
     // What can be wrong with a picture is what was asked for: a single speed.
-    lobe_chart(&case.name, &columns, depth_mm, &[]).map_err(Error::input)
+    let title = format!("{}, by {}", case.name, chart.method_in_words());
+    lobe_chart(&title, &columns, depth_mm, &[]).map_err(Error::input)
 }
 
 fn as_page(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
     let svg = picture(case, chart, depth_mm)?;
     let caption = format!(
         "Stable depths over spindle speed, by {}. Lines: where stability is first lost.",
-        chart.method
+        chart.method_in_words()
     );
     let body = maud::html! {
         h1 { (case.name) }

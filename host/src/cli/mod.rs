@@ -6,6 +6,7 @@ pub mod demo;
 mod error;
 pub mod info;
 pub mod lobes;
+mod method;
 pub mod monitor;
 mod number;
 mod output;

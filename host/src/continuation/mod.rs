@@ -11,6 +11,5 @@ mod orbit;
 mod variation;
 
 pub use branch::{Branch, BranchPoint, Event, Extent, follow_depth};
-pub use chart::{chart, point};
 pub use forced::ForcedProblem;
 pub use orbit::{Orbit, OrbitError};

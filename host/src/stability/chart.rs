@@ -1,10 +1,10 @@
-//! Charts: the line of every speed, computed in parallel.
+//! Charts: the line of every speed, by any method.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::line::{SpeedLine, line};
-use super::{Problem, StabilityError};
+use super::StabilityError;
+use super::line::SpeedLine;
+use super::method::Method;
 
 /// The fewest steps in depth at which multipliers are followed, however coarse the chart.
 const SAMPLES_MIN: usize = 40;
@@ -14,6 +14,9 @@ const SAMPLES_MIN: usize = 40;
 pub struct Chart {
     /// Name of the method.
     pub method: &'static str,
+    /// What the method cannot see; `None` for one that sees all of linear stability.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind_to: Option<&'static str>,
     /// One line per speed, in the order asked for.
     pub speeds: Vec<SpeedLine>,
 }
@@ -23,20 +26,17 @@ pub struct Chart {
 /// The result does not depend on the number of threads.
 ///
 /// # Errors
-/// Those of [`line()`], of the first speed that fails.
-pub fn chart(
-    problem: &Problem,
+/// Those of [`Method::line`], of the first speed that fails.
+pub fn chart<M: Method + ?Sized>(
+    method: &M,
     speeds_rpm: &[f64],
     depth_mm: f64,
     samples: usize,
 ) -> Result<Chart, StabilityError> {
-    let lines: Vec<Result<SpeedLine, StabilityError>> = speeds_rpm
-        .par_iter()
-        .map(|&rpm| line(problem, rpm, depth_mm, samples.max(SAMPLES_MIN)))
-        .collect();
     Ok(Chart {
-        method: "collocation",
-        speeds: lines.into_iter().collect::<Result<_, _>>()?,
+        method: method.name(),
+        blind_to: method.blind_to(),
+        speeds: method.lines(speeds_rpm, depth_mm, samples.max(SAMPLES_MIN))?,
     })
 }
 
@@ -52,13 +52,18 @@ pub struct Refinement {
 }
 
 impl Chart {
+    /// The method and, where there is something, what it cannot see: for captions.
+    pub fn method_in_words(&self) -> String {
+        method_in_words(self.method, self.blind_to)
+    }
+
     /// Adds speeds where limits bend, kinds change, and islands begin or end; speeds must be ascending.
     ///
     /// # Errors
-    /// Those of [`line()`].
-    pub fn refined(
+    /// Those of [`Method::line`].
+    pub fn refined<M: Method + ?Sized>(
         mut self,
-        problem: &Problem,
+        method: &M,
         depth_mm: f64,
         refinement: Refinement,
     ) -> Result<Self, StabilityError> {
@@ -75,7 +80,7 @@ impl Chart {
                 })
                 .map(|(pair, _)| 0.5 * (pair[0].rpm + pair[1].rpm))
                 .collect();
-            let between = chart(problem, &middles, depth_mm, SAMPLES_MIN)?.speeds;
+            let between = chart(method, &middles, depth_mm, SAMPLES_MIN)?.speeds;
             let mut between = between.into_iter().peekable();
             let mut speeds = Vec::with_capacity(self.speeds.len() + middles.len());
             let mut next_open = Vec::with_capacity(speeds.capacity());
@@ -100,6 +105,14 @@ impl Chart {
             open = next_open;
         }
         Ok(self)
+    }
+}
+
+/// The name of a method and what it is blind to.
+pub fn method_in_words(method: &str, blind_to: Option<&str>) -> String {
+    match blind_to {
+        Some(what) => format!("{method} (blind to {what})"),
+        None => method.to_owned(),
     }
 }
 

@@ -3,8 +3,91 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::period::Period;
+use super::characteristic::{Characteristic, Crossing, Workspace};
+use super::line::{SpeedLine, line};
+use super::method::Method;
+use super::multiplier::chatter_hz;
+use super::period::{Period, Resolution};
+use super::point::{Point, point};
+use super::spectrum::Spectrum;
+use super::{Problem, StabilityError};
 use crate::eigenvalues::eigenvalues;
+
+/// The default method: collocation of the one-period map, limits from the characteristic matrix.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Collocation {
+    /// The problem that it solves.
+    pub problem: Problem,
+}
+
+impl Method for Collocation {
+    fn name(&self) -> &'static str {
+        "collocation"
+    }
+
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        point(&self.problem, rpm, depth_mm)
+    }
+
+    fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+        line(&self.problem, rpm, depth_mm, samples)
+    }
+}
+
+/// The multipliers at one speed: all of them by collocation, single ones from the characteristic matrix.
+pub(super) struct Collocated<'a> {
+    problem: &'a Problem,
+    rpm: f64,
+    /// For all multipliers at once.
+    coarse: Period,
+    /// For limits.
+    period: Period,
+    characteristic: Characteristic,
+    workspace: Workspace,
+}
+
+impl<'a> Collocated<'a> {
+    /// Fine enough for depths up to `deepest_m`.
+    pub(super) fn new(problem: &'a Problem, rpm: f64, deepest_m: f64) -> Self {
+        // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
+        let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::WORKING);
+        let characteristic = Characteristic::new(&period, 2.0 * deepest_m);
+        Self {
+            problem,
+            rpm,
+            coarse: Period::new(problem, rpm, deepest_m, Resolution::SCAN),
+            period,
+            workspace: characteristic.workspace(),
+            characteristic,
+        }
+    }
+}
+
+impl Spectrum for Collocated<'_> {
+    fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
+        multipliers(&self.coarse, depth_m)
+    }
+
+    fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64> {
+        self.characteristic
+            .multiplier_near(guess, depth_m, reach, &mut self.workspace)
+    }
+
+    fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64> {
+        self.characteristic
+            .sensitivity(multiplier, depth_m, &mut self.workspace)
+    }
+
+    fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
+        self.characteristic
+            .crossing_near(guess, low_m, high_m, &mut self.workspace)
+    }
+
+    fn chatter_hz(&self, crossing: &Crossing) -> Option<f64> {
+        let Crossing { multiplier, depth_m } = *crossing;
+        chatter_hz(self.problem, self.rpm, &self.period, multiplier, depth_m)
+    }
+}
 
 /// The matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at a depth, m.
 ///

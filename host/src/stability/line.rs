@@ -3,11 +3,11 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::characteristic::{Characteristic, Crossing, Workspace};
-use super::collocation;
-use super::multiplier::{Kind, chatter_hz};
-use super::period::{Period, Resolution};
+use super::characteristic::Crossing;
+use super::collocation::Collocated;
+use super::multiplier::Kind;
 use super::point::{check_depth, check_speed};
+use super::spectrum::Spectrum;
 use super::{Problem, StabilityError};
 
 /// How often an interval of depths is halved where its multipliers cannot be followed from end to end.
@@ -77,19 +77,37 @@ pub struct SpeedLine {
 /// # Errors
 /// Speed or depth out of range, or a computation that leaves the range of numbers.
 pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+    line_of(rpm, depth_mm, samples, |deepest_m| {
+        Collocated::new(problem, rpm, deepest_m)
+    })
+}
+
+/// [`line()`] of any method that has multipliers; `spectrum` gives them at this speed, good for depths up to its
+/// argument, m.
+pub(super) fn line_of<S: Spectrum>(
+    rpm: f64,
+    depth_mm: f64,
+    samples: usize,
+    spectrum: impl Fn(f64) -> S,
+) -> Result<SpeedLine, StabilityError> {
     check_speed(rpm)?;
     check_depth(depth_mm)?;
     let depth_m = depth_mm * 1e-3;
     let samples = samples.max(1);
-    let mut scan = Scan::new(problem, rpm, depth_m * FIRST_PART);
+    let mut deepest_m = depth_m * FIRST_PART;
+    let mut scan = Scan {
+        rpm,
+        spectrum: spectrum(deepest_m),
+        crossings: Vec::new(),
+    };
     let mut low = scan.sample(0.0)?;
     let start = low.outside();
     for index in 1..=samples {
         let share = index as f64 / samples as f64;
-        if share * depth_m > scan.deepest_m {
+        if share * depth_m > deepest_m {
             // The deeper, the finer must a period be cut: shallow depths need not pay for deep ones.
-            let deepest_m = (2.0 * scan.deepest_m).max(share * depth_m).min(depth_m);
-            scan = scan.deeper(deepest_m);
+            deepest_m = (2.0 * deepest_m).max(share * depth_m).min(depth_m);
+            scan.spectrum = spectrum(deepest_m);
         }
         let high = scan.sample(depth_m * share)?;
         let found = scan.between(&low, &high, 0)?;
@@ -147,45 +165,13 @@ struct Found {
     outward: bool,
 }
 
-struct Scan<'a> {
-    problem: &'a Problem,
+struct Scan<S> {
     rpm: f64,
-    /// The depth up to which both periods are fine enough, m.
-    deepest_m: f64,
-    /// For all multipliers at once.
-    coarse: Period,
-    /// For limits.
-    period: Period,
-    characteristic: Characteristic,
-    workspace: Workspace,
+    spectrum: S,
     crossings: Vec<Found>,
 }
 
-impl<'a> Scan<'a> {
-    fn new(problem: &'a Problem, rpm: f64, deepest_m: f64) -> Self {
-        // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
-        let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::WORKING);
-        let characteristic = Characteristic::new(&period, 2.0 * deepest_m);
-        Scan {
-            problem,
-            rpm,
-            deepest_m,
-            coarse: Period::new(problem, rpm, deepest_m, Resolution::SCAN),
-            period,
-            workspace: characteristic.workspace(),
-            characteristic,
-            crossings: Vec::new(),
-        }
-    }
-
-    /// The same scan with periods cut for larger depths.
-    fn deeper(self, deepest_m: f64) -> Self {
-        Scan {
-            crossings: self.crossings,
-            ..Self::new(self.problem, self.rpm, deepest_m)
-        }
-    }
-
+impl<S: Spectrum> Scan<S> {
     fn broke_down(&self, depth_m: f64, what: &'static str) -> StabilityError {
         StabilityError::BrokeDown {
             rpm: self.rpm,
@@ -195,8 +181,10 @@ impl<'a> Scan<'a> {
     }
 
     fn sample(&mut self, depth_m: f64) -> Result<Sample, StabilityError> {
-        let all = collocation::multipliers(&self.coarse, depth_m)
-            .ok_or_else(|| self.broke_down(depth_m, "the collocation equations have no finite solution"))?;
+        let all = self
+            .spectrum
+            .multipliers(depth_m)
+            .ok_or_else(|| self.broke_down(depth_m, "the equations of the period have no finite solution"))?;
         let roots = all
             .into_iter()
             .take_while(|multiplier| multiplier.norm() > FOLLOWED)
@@ -208,16 +196,16 @@ impl<'a> Scan<'a> {
 
     /// A multiplier with its derivative; near the circle it is polished first, so that its side is right.
     fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
-        let (characteristic, workspace) = (&self.characteristic, &mut self.workspace);
+        let spectrum = &mut self.spectrum;
         let multiplier = if (coarse.norm() - 1.0).abs() < POLISHED {
-            characteristic
-                .multiplier_near(coarse, depth_m, POLISHED, workspace)
+            spectrum
+                .multiplier_near(coarse, depth_m, POLISHED)
                 .unwrap_or(coarse)
         } else {
             coarse
         };
         let slope = if (multiplier.norm() - 1.0).abs() < FAR {
-            characteristic.sensitivity(multiplier, depth_m, workspace)
+            spectrum.sensitivity(multiplier, depth_m)
         } else {
             None
         };
@@ -283,9 +271,7 @@ impl<'a> Scan<'a> {
             depth_m: low.depth_m + share * (high.depth_m - low.depth_m),
             multiplier: from.multiplier + (to.multiplier - from.multiplier) * share,
         };
-        let crossing =
-            self.characteristic
-                .crossing_near(guess, low.depth_m, high.depth_m, &mut self.workspace)?;
+        let crossing = self.spectrum.crossing_near(guess, low.depth_m, high.depth_m)?;
         // The multiplier found must lie on this branch, not on another that crosses nearby.
         let distance = (crossing.multiplier - guess.multiplier).norm();
         (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(Found {
@@ -336,13 +322,7 @@ impl<'a> Scan<'a> {
                 depth_mm: crossing.depth_m * 1e3,
                 kind: Kind::of(crossing.multiplier),
                 gain: !outward,
-                chatter_hz: chatter_hz(
-                    self.problem,
-                    self.rpm,
-                    &self.period,
-                    crossing.multiplier,
-                    crossing.depth_m,
-                ),
+                chatter_hz: self.spectrum.chatter_hz(crossing),
             };
             let count = switch.kind.count();
             outside += if *outward { count } else { -count };

@@ -10,6 +10,7 @@ use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::Limits;
 
 use super::chart::{Chart, Refinement, chart};
+use super::collocation::Collocation;
 use super::line::SpeedLine;
 use super::{CubicTerms, Kind, Problem, StabilityError};
 use crate::case::Case;
@@ -65,7 +66,7 @@ pub enum BuildError {
 }
 
 struct Family {
-    problem: Problem,
+    method: Collocation,
     validity: Validity,
 }
 
@@ -93,7 +94,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
     let speeds = speeds_of_all(&families, &coarse, depth_mm, refinement)?;
     let mut layers = Vec::with_capacity(families.len());
     for family in &families {
-        layers.push(chart(&family.problem, &speeds, depth_mm, 0)?);
+        layers.push(chart(&family.method, &speeds, depth_mm, 0)?);
     }
     written(first, &families, &layers, depth_mm)
 }
@@ -125,7 +126,7 @@ fn families(cases: &[Case], request: &TableRequest) -> Result<Vec<Family>, Build
         if !problem.process.axial_depth_modulation {
             families.push(Family {
                 validity: validity(0.0, ANY_FEED_MM),
-                problem,
+                method: Collocation { problem },
             });
             continue;
         }
@@ -139,7 +140,7 @@ fn families(cases: &[Case], request: &TableRequest) -> Result<Vec<Family>, Build
             problem.process.feed_per_tooth_m = feed_mm * 1e-3;
             families.push(Family {
                 validity: validity(feed_mm as f32, feed_mm as f32),
-                problem,
+                method: Collocation { problem },
             });
         }
     }
@@ -152,7 +153,8 @@ fn default_speeds(first: &Case, families: &[Family]) -> (f64, f64) {
         return (limits.rpm_min.max(0.01 * limits.rpm_max), limits.rpm_max);
     }
     let rpm = families.first().map_or(1.0, |family| {
-        most_flexible_hz(&family.problem) * 60.0 / family.problem.teeth as f64
+        let problem = &family.method.problem;
+        most_flexible_hz(problem) * 60.0 / problem.teeth as f64
     });
     (0.5 * rpm, 5.0 * rpm)
 }
@@ -178,7 +180,7 @@ fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> Result<f64,
     while depth_mm < DEEPEST_MM {
         let mut lowest_mm = f64::INFINITY;
         for family in families {
-            for line in chart(&family.problem, &speeds, depth_mm, 0)?.speeds {
+            for line in chart(&family.method, &speeds, depth_mm, 0)?.speeds {
                 lowest_mm = line
                     .first_limit
                     .map_or(lowest_mm, |limit| lowest_mm.min(limit.depth_mm));
@@ -213,7 +215,7 @@ fn speeds_of_all(
     let mut speeds = Vec::new();
     for family in families {
         let refined =
-            chart(&family.problem, coarse, depth_mm, 0)?.refined(&family.problem, depth_mm, refinement)?;
+            chart(&family.method, coarse, depth_mm, 0)?.refined(&family.method, depth_mm, refinement)?;
         speeds.extend(refined.speeds.iter().map(|line| line.rpm));
     }
     speeds.sort_by(f64::total_cmp);
@@ -254,7 +256,9 @@ fn written(
     let content = Content {
         name: &first.name[..end],
         // A tool has at most 64 teeth.
-        teeth: families.first().map_or(0, |family| family.problem.teeth as u8),
+        teeth: families
+            .first()
+            .map_or(0, |family| family.method.problem.teeth as u8),
         limits: first.limits.map(|limits| Limits {
             rpm_min: Rpm(limits.rpm_min as f32),
             rpm_max: Rpm(limits.rpm_max as f32),

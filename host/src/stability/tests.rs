@@ -325,14 +325,16 @@ fn what_is_not_covered_is_refused_with_the_reason() {
 
 #[test]
 fn a_chart_is_the_same_for_any_number_of_threads_and_refinement_finds_the_notch() {
-    let problem = problem("kuka-kr90-acetal");
+    let method = Collocation {
+        problem: problem("kuka-kr90-acetal"),
+    };
     let speeds: Vec<f64> = (0..16).map(|i| 900.0 + 20.0 * f64::from(i)).collect();
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| chart(&problem, &speeds, 5.0, 40).unwrap())
+        pool.install(|| chart(&method, &speeds, 5.0, 40).unwrap())
     };
     assert_eq!(with(1), with(3));
     let refinement = Refinement {
@@ -340,7 +342,7 @@ fn a_chart_is_the_same_for_any_number_of_threads_and_refinement_finds_the_notch(
         least_step: 1e-4,
         most_speeds: 500,
     };
-    let refined = with(2).refined(&problem, 5.0, refinement).unwrap();
+    let refined = with(2).refined(&method, 5.0, refinement).unwrap();
     let lowest = refined
         .speeds
         .iter()
