@@ -312,20 +312,30 @@ impl<S: Spectrum> Scan<S> {
     }
 
     fn finish(self, start: i32, depth_mm: f64) -> SpeedLine {
-        let mut outside = start;
-        let mut stable_from = (start == 0).then_some(0.0);
-        let mut stable_mm = Vec::new();
-        let mut first_limit = None;
-        let mut switches = Vec::with_capacity(self.crossings.len());
-        for Found { crossing, outward } in &self.crossings {
-            let switch = Switch {
+        let switches = self
+            .crossings
+            .iter()
+            .map(|Found { crossing, outward }| Switch {
                 depth_mm: crossing.depth_m * 1e3,
                 kind: Kind::of(crossing.multiplier),
                 gain: !outward,
                 chatter_hz: self.spectrum.chatter_hz(crossing),
-            };
+            })
+            .collect();
+        SpeedLine::of_switches(self.rpm, depth_mm, start, switches)
+    }
+}
+
+impl SpeedLine {
+    /// The line that switches, by depth, make of depths from 0 to `depth_mm`, where `outside` multipliers are outside
+    /// at depth 0.
+    pub(super) fn of_switches(rpm: f64, depth_mm: f64, mut outside: i32, switches: Vec<Switch>) -> Self {
+        let mut stable_from = (outside == 0).then_some(0.0);
+        let mut stable_mm = Vec::new();
+        let mut first_limit = None;
+        for switch in &switches {
             let count = switch.kind.count();
-            outside += if *outward { count } else { -count };
+            outside += if switch.gain { -count } else { count };
             match (stable_from, outside) {
                 (Some(from), 1..) => {
                     stable_mm.push([from, switch.depth_mm]);
@@ -339,13 +349,12 @@ impl<S: Spectrum> Scan<S> {
                 (None, ..=0) => stable_from = Some(switch.depth_mm),
                 _ => {}
             }
-            switches.push(switch);
         }
         if let Some(from) = stable_from {
             stable_mm.push([from, depth_mm]);
         }
-        SpeedLine {
-            rpm: self.rpm,
+        Self {
+            rpm,
             stable_mm,
             bistable_mm: Vec::new(),
             first_limit,

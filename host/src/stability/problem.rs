@@ -79,33 +79,14 @@ impl Problem {
     /// A section is missing, the structure is indefinite, or the case has what the equation above has not:
     /// variable pitch, cubic terms (see `cubic`), extensions other than axial-depth-modulation.
     pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
-        let (structure, tool) = (case.structure()?, case.tool()?);
-        let (material, cut) = (case.material()?, case.cut()?);
-        case.refuse_extensions_but(
-            &[AXIAL_DEPTH_MODULATION],
-            "linear stability has no term for it; remove the table to see the limits without it",
-        )?;
-        let not_covered = |what| StabilityError::NotCovered {
-            path: case.path.clone(),
-            what,
-        };
-        if tool.has_variable_pitch() {
-            return Err(not_covered(
-                "tool.pitch_deg: teeth at unequal distances have several delays; equal pitch is needed here",
-            ));
-        }
+        let structure = case.structure()?;
+        let (process, teeth) = cutting(case)?;
         if structure.is_nonlinear() && cubic == CubicTerms::Refuse {
-            return Err(not_covered(
-                "structure.cubic_stiffness, structure.cubic_damping: with cubic terms the limit depends on the \
-                 forced motion; ask for the linear part (--linear) or leave them out",
-            ));
-        }
-        let modulated = case.axial_depth_modulation();
-        if modulated && tool.runout.is_some_and(|runout| runout.offset_um > 0.0) {
-            return Err(not_covered(
-                "tool.runout_um: with axial-depth-modulation the feed force would differ from tooth to tooth; \
-                 leave out one of them",
-            ));
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "structure.cubic_stiffness, structure.cubic_damping: with cubic terms the limit depends on the \
+                       forced motion; ask for the linear part (--linear) or leave them out",
+            });
         }
         let first_order = structure
             .first_order()
@@ -114,9 +95,9 @@ impl Problem {
                 cause,
             })?;
         Ok(Self {
-            structure: first_order.turned(cut.feed_direction_deg),
-            process: Process::new(tool, material, cut, modulated),
-            teeth: tool.teeth,
+            structure: first_order.turned(case.cut()?.feed_direction_deg),
+            process,
+            teeth,
         })
     }
 
@@ -133,4 +114,33 @@ impl Problem {
             .map(|pole| -pole.re)
             .fold(0.0, f64::max)
     }
+}
+
+/// The cutting process of a case and its number of teeth, whatever the structure.
+///
+/// # Errors
+/// A section is missing, or there is variable pitch, an extension other than axial-depth-modulation, or runout with it.
+pub(super) fn cutting(case: &Case) -> Result<(Process, usize), StabilityError> {
+    let (tool, material, cut) = (case.tool()?, case.material()?, case.cut()?);
+    case.refuse_extensions_but(
+        &[AXIAL_DEPTH_MODULATION],
+        "linear stability has no term for it; remove the table to see the limits without it",
+    )?;
+    let not_covered = |what| StabilityError::NotCovered {
+        path: case.path.clone(),
+        what,
+    };
+    if tool.has_variable_pitch() {
+        return Err(not_covered(
+            "tool.pitch_deg: teeth at unequal distances have several delays; equal pitch is needed here",
+        ));
+    }
+    let modulated = case.axial_depth_modulation();
+    if modulated && tool.runout.is_some_and(|runout| runout.offset_um > 0.0) {
+        return Err(not_covered(
+            "tool.runout_um: with axial-depth-modulation the feed force would differ from tooth to tooth; \
+             leave out one of them",
+        ));
+    }
+    Ok((Process::new(tool, material, cut, modulated), tool.teeth))
 }
