@@ -8,28 +8,17 @@ use quietcut::device::Client;
 use quietcut::simulate::Entry;
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::protocol::{Info, Slot, VERSION};
-use quietcut_tests::command::{folder, quietcut};
 use quietcut_tests::cut::{Cut, table};
 use quietcut_tests::emulator::{self, Cost, Emulator, Memory, PATIENCE};
 use quietcut_tests::firmware_image;
 use quietcut_tests::said::{ALL, Said, Step, stimuli};
+use quietcut_tests::scenario::{self, name_in_use, upload};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+/// A session of the host's client with an emulated device.
 fn connect(emulator: &Emulator<'_>) -> (Client, Info) {
-    Client::connect(Box::new(emulator.port())).expect("the device answers")
-}
-
-fn upload(client: &mut Client, bytes: &[u8]) -> Info {
-    let table = LobeTable::parse(bytes).expect("a table");
-    client
-        .upload(&table, |_, _| ())
-        .expect("the device takes the table")
-        .info
-}
-
-fn name_in_use(info: &Info) -> &str {
-    info.table.as_ref().map_or("", |table| table.name.as_str())
+    scenario::connect(&|| Box::new(emulator.port()))
 }
 
 #[test]
@@ -51,37 +40,31 @@ fn boots_and_says_who_it_is() {
 }
 
 #[test]
-fn the_command_uploads_asks_and_sets() {
+fn the_command_uploads_tells_and_asks() {
     let memory = Memory::erased();
     let emulator = Emulator::start(&memory);
-    let device = emulator.serial_device();
-    let folder = folder();
-    std::fs::write(folder.path().join("kuka.qct"), table("kuka", 1.5, 100)).expect("a file");
+    scenario::the_command_uploads_tells_and_asks(emulator.serial_device().path());
+}
 
-    let began = Instant::now();
-    let info = quietcut(folder.path(), &["info", device.path(), "--json"]).json();
-    println!("info: {:?}", began.elapsed());
-    assert_eq!(info["board"], "qemu-mps2", "{info}");
-    let uploaded = quietcut(folder.path(), &["upload", device.path(), "kuka.qct", "--json"]).json();
-    assert_eq!(uploaded["table"]["name"], "kuka", "{uploaded}");
-    let work = [
-        "work",
-        device.path(),
-        "--depth-mm",
-        "2",
-        "--start",
-        "90",
-        "--exit",
-        "180",
-        "--feed",
-        "0.15",
-        "--json",
-    ];
-    quietcut(folder.path(), &work).json();
-    let info = quietcut(folder.path(), &["info", device.path(), "--json"]).json();
-    assert_eq!(info["table"]["name"], "kuka", "{info}");
-    assert_eq!(info["working_point"]["depth_mm"], 2.0, "{info}");
-    assert_eq!(info["frame_errors"], 0, "{info}");
+#[test]
+fn the_command_replays_a_recording() {
+    let memory = Memory::erased();
+    let emulator = Emulator::start(&memory);
+    scenario::a_recording_is_heard_there_as_it_is_here(emulator.serial_device().path());
+}
+
+#[test]
+fn bad_frames_are_named_and_harm_nothing() {
+    let memory = Memory::erased();
+    let emulator = Emulator::start(&memory);
+    scenario::bad_frames_are_named_and_harm_nothing(&|| Box::new(emulator.port()));
+}
+
+#[test]
+fn a_table_with_a_wrong_crc_does_not_replace_the_last_good_one() {
+    let memory = Memory::erased();
+    let emulator = Emulator::start(&memory);
+    scenario::a_table_with_a_wrong_crc_does_not_replace_the_last_good_one(&|| Box::new(emulator.port()));
 }
 
 #[test]

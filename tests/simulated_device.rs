@@ -5,16 +5,15 @@
 use std::fs;
 use std::path::Path;
 use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
 
 use quietcut::device::port::{Port, SerialLine};
-use quietcut::device::{Client, Pace, Setup, SimulatedDevice};
+use quietcut::device::{Pace, Setup, SimulatedDevice};
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::protocol::message::MAX_CHUNK;
-use quietcut_core::protocol::{Decoder, FrameError, MAX_FRAME, Reply, Request, Response, Upload, encode};
+use quietcut_core::protocol::{Reply, Request, Upload};
 use quietcut_tests::command::{alone, cases, folder, quietcut};
-
-const SECOND: Duration = Duration::from_secs(1);
+use quietcut_tests::raw_host::RawHost;
+use quietcut_tests::scenario;
 
 /// Writes the table of the robot to `folder/robot.qct` and returns its bytes.
 fn table(folder: &Path) -> Vec<u8> {
@@ -79,55 +78,6 @@ fn a_table_outlives_the_command_and_a_wrong_one_does_not_replace_it() {
     run(&["info", "/dev/null", "--state", "device.bin"]).refused(&["--state", "simulated", "/dev/null"]);
 }
 
-/// A host that says what it likes.
-struct RawHost {
-    line: SerialLine,
-    decoder: Decoder,
-}
-
-impl RawHost {
-    fn open(device: &SimulatedDevice) -> Self {
-        let line = SerialLine::open(device.path()).expect("the port opens");
-        Self {
-            line,
-            decoder: Decoder::new(),
-        }
-    }
-
-    fn say(&mut self, bytes: &[u8]) {
-        self.line.send(bytes, SECOND).expect("the line takes bytes");
-    }
-
-    fn hear(&mut self) -> Response {
-        let began = Instant::now();
-        while began.elapsed() < 5 * SECOND {
-            // One byte at a time: what comes behind the frame is left for the next call.
-            let mut byte = [0];
-            if self.line.receive(&mut byte, SECOND).expect("the line holds") == 1
-                && let Some(frame) = self.decoder.push(byte[0])
-            {
-                return frame.expect("a whole frame").message().expect("a response");
-            }
-        }
-        panic!("the device says nothing");
-    }
-
-    fn ask(&mut self, number: u16, request: &Request) -> Reply {
-        self.say(&frame(number, request));
-        match self.hear() {
-            Response::Reply { request, reply } if request == number => reply,
-            other => panic!("{other:?}"),
-        }
-    }
-}
-
-fn frame(number: u16, request: &Request) -> Vec<u8> {
-    let mut buffer = [0; MAX_FRAME];
-    encode(request, number, &mut buffer)
-        .expect("a request fits a frame")
-        .to_vec()
-}
-
 fn device(state: &Path) -> SimulatedDevice {
     let _alone = alone();
     let setup = Setup {
@@ -138,82 +88,30 @@ fn device(state: &Path) -> SimulatedDevice {
     SimulatedDevice::start(setup, channel().1).expect("a device")
 }
 
+/// Opens the line to a simulated device.
+fn line(device: &SimulatedDevice) -> Box<dyn Port> {
+    Box::new(SerialLine::open(device.path()).expect("the port opens"))
+}
+
 #[test]
 fn bad_frames_are_named_and_harm_nothing() {
     let folder = folder();
-    table(folder.path());
-    let state = folder.path().join("device.bin");
-    let sent = quietcut(
-        folder.path(),
-        &["upload", "simulated", "robot.qct", "--state", "device.bin"],
-    );
-    assert_eq!(sent.status, Some(0), "{sent:?}");
-
-    let device = device(&state);
-    let mut host = RawHost::open(&device);
-    let Reply::Info(before) = host.ask(100, &Request::Hello) else {
-        panic!("hello is answered by info")
-    };
-    assert!(before.table.is_some());
-
-    let mut refusal = |bytes: &[u8]| {
-        host.say(bytes);
-        match host.hear() {
-            Response::FrameRefused(error) => error,
-            other => panic!("{other:?}"),
-        }
-    };
-    // An abort and a commit would do harm, were they done.
-    let good = frame(101, &Request::UploadCommit);
-    let truncated = [&good[..good.len() - 4], &[0]].concat();
-    let error = refusal(&truncated);
-    assert!(
-        matches!(
-            error,
-            FrameError::Cobs | FrameError::TooShort { .. } | FrameError::Crc { .. }
-        ),
-        "{error}"
-    );
-    let mut corrupted = good.clone();
-    corrupted[2] ^= 0x10;
-    let error = refusal(&corrupted);
-    assert!(matches!(error, FrameError::Crc { .. }), "{error}");
-    let error = refusal(&frame(107, &Request::UploadCommit));
-    assert_eq!(
-        error,
-        FrameError::OutOfOrder {
-            expected: 101,
-            found: 107
-        }
-    );
-    let error = refusal(&[0x55; 2000]);
-    assert!(matches!(error, FrameError::TooLong { .. }), "{error}");
-    // Ends the frame without an end.
-    host.say(&[0]);
-    host.say(&other_version(101));
-    let Response::FrameRefused(FrameError::Version { theirs: 99, .. }) = host.hear() else {
-        panic!("a frame of version 99 is refused")
-    };
-
-    let Reply::Info(after) = host.ask(101, &Request::Info) else {
-        panic!("info is answered by info")
-    };
-    assert_eq!(after, before);
+    let device = device(&folder.path().join("device.bin"));
+    scenario::bad_frames_are_named_and_harm_nothing(&|| line(&device));
 }
 
-/// A frame that is right in all but its version.
-fn other_version(number: u16) -> Vec<u8> {
-    let [low, high] = number.to_le_bytes();
-    let mut raw = vec![99, low, high, 0];
-    raw.extend(quietcut_core::checksum::crc32([&raw[..]]).to_le_bytes());
-    // COBS by hand: each zero is replaced by the distance to the next.
-    let mut cobs = Vec::new();
-    for part in raw.split(|&byte| byte == 0) {
-        cobs.push(part.len() as u8 + 1);
-        cobs.extend(part);
-    }
-    cobs.push(0);
-    cobs
+#[test]
+fn a_table_with_a_wrong_crc_does_not_replace_the_last_good_one() {
+    let folder = folder();
+    let device = device(&folder.path().join("device.bin"));
+    scenario::a_table_with_a_wrong_crc_does_not_replace_the_last_good_one(&|| line(&device));
+}
+
+#[test]
+fn the_command_replays_a_recording() {
+    let folder = folder();
+    let device = device(&folder.path().join("device.bin"));
+    scenario::a_recording_is_heard_there_as_it_is_here(device.path());
 }
 
 #[test]
@@ -225,7 +123,7 @@ fn an_interrupted_upload_goes_on() {
     // Until the flash has kept a page of it.
     {
         let device = device(&state);
-        let mut host = RawHost::open(&device);
+        let mut host = RawHost::new(line(&device));
         host.ask(1, &Request::Hello);
         let mut number = 2;
         let header = parsed.header().expect("a header");
@@ -270,29 +168,8 @@ fn an_interrupted_upload_goes_on() {
 fn the_working_point_is_told_and_kept_while_the_device_is_on() {
     let folder = folder();
     let device = device(&folder.path().join("device.bin"));
-    let told = quietcut(
-        folder.path(),
-        &[
-            "work",
-            device.path(),
-            "--depth-mm",
-            "2",
-            "--start",
-            "90",
-            "--exit",
-            "180",
-            "--feed",
-            "0.15",
-            "--json",
-        ],
-    );
-    let expected = serde_json::json!({"depth_mm": 2.0, "start_deg": 90.0, "exit_deg": 180.0, "feed_per_tooth_mm": 0.15, "posture": 0});
-    assert_eq!(told.json()["working_point"], expected);
-    // Another run, another session, the same device.
-    let info = quietcut(folder.path(), &["info", device.path(), "--json"]).json();
-    assert_eq!(info["working_point"], expected);
-    let line = SerialLine::open(device.path()).expect("the port is free again");
-    let (mut client, _) = Client::connect(Box::new(line)).expect("the device answers");
+    scenario::the_command_uploads_tells_and_asks(device.path());
+    let (mut client, _) = scenario::connect(&|| line(&device));
     client.set_working_point(None).expect("the device forgets");
     assert_eq!(client.status().expect("a status").working_point, None);
 }

@@ -11,6 +11,8 @@ pub mod device_log;
 pub mod emulator;
 pub mod firmware_image;
 pub mod pty;
+pub mod raw_host;
 pub mod said;
+pub mod scenario;
 pub mod table_bits;
 pub mod virtual_cut;

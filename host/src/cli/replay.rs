@@ -93,6 +93,20 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
         client.upload(&parse(path, bytes)?, |_, _| {})?;
     }
     let (settings, status) = (client.settings()?, client.status()?);
+    let heard = hear(args, &mut client, sensed);
+    // Also where something went wrong on the way; that is told then.
+    let left = client
+        .subscribe(Subscription::default())
+        .and_then(|()| client.set_working_point(status.working_point))
+        .and_then(|()| client.set_settings(settings))
+        .and_then(|()| client.reset());
+    let log = heard?;
+    left?;
+    Ok(log)
+}
+
+/// Sets a device up for a recording and feeds it.
+fn hear(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<VerdictLog, Error> {
     client.set_settings(sensed.settings)?;
     client.set_working_point(sensed.working_point)?;
     client.subscribe(Subscription {
@@ -116,10 +130,6 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
             args.output.line(words::line(&report))?;
         }
     }
-    client.subscribe(Subscription::default())?;
-    client.set_working_point(status.working_point)?;
-    client.set_settings(settings)?;
-    client.reset()?;
     Ok(log)
 }
 

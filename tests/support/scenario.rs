@@ -1,0 +1,200 @@
+//! What happens between a host and a device, whatever port the device is at: emulated or simulated.
+
+use quietcut::device::Client;
+use quietcut::device::port::Port;
+use quietcut_core::lobes::{LobeTable, TableError};
+use quietcut_core::protocol::message::MAX_CHUNK;
+use quietcut_core::protocol::{FrameError, Info, Refusal, Reply, Request, Response, Slot};
+
+use crate::command::{cases, folder, quietcut};
+use crate::cut::table;
+use crate::raw_host::{RawHost, frame, frame_of_version};
+
+/// Opens the line to the device of a test; one line is open at a time.
+pub type Open<'a> = &'a dyn Fn() -> Box<dyn Port>;
+
+/// A session of the host's client, and what the device says of itself.
+pub fn connect(open: Open<'_>) -> (Client, Info) {
+    Client::connect(open()).expect("the device answers")
+}
+
+/// Uploads a table by the host's client; what the device says of itself afterwards.
+pub fn upload(client: &mut Client, bytes: &[u8]) -> Info {
+    let table = LobeTable::parse(bytes).expect("a table");
+    client
+        .upload(&table, |_, _| ())
+        .expect("the device takes the table")
+        .info
+}
+
+/// Name of the table in use; empty where there is none.
+pub fn name_in_use(info: &Info) -> &str {
+    info.table.as_ref().map_or("", |table| table.name.as_str())
+}
+
+/// The real command uploads a table to the serial port `port`, tells the working point and asks for both.
+pub fn the_command_uploads_tells_and_asks(port: &str) {
+    let folder = folder();
+    let run = |arguments: &[&str]| quietcut(folder.path(), arguments).json();
+    std::fs::write(folder.path().join("kuka.qct"), table("kuka", 1.5, 100)).expect("a file");
+    let uploaded = run(&["upload", port, "kuka.qct", "--json"]);
+    assert_eq!(uploaded["table"]["name"], "kuka", "{uploaded}");
+    let cut = [
+        "--depth-mm",
+        "2",
+        "--start",
+        "90",
+        "--exit",
+        "180",
+        "--feed",
+        "0.15",
+    ];
+    let expected = serde_json::json!({"depth_mm": 2.0, "start_deg": 90.0, "exit_deg": 180.0, "feed_per_tooth_mm": 0.15, "posture": 0});
+    let told = run(&[&["work", port, "--json"], &cut[..]].concat());
+    assert_eq!(told["working_point"], expected);
+    // Another run, another session, the same device.
+    let info = run(&["info", port, "--json"]);
+    assert_eq!(info["table"]["name"], "kuka", "{info}");
+    assert_eq!(info["working_point"], expected);
+    assert_eq!(info["frame_errors"], 0, "{info}");
+}
+
+/// The real command replays a recording of chatter on the device at the serial port `port`: the answer is, to the last digit, that of the
+/// pipeline in the command, and the device is left as it was but for the table.
+pub fn a_recording_is_heard_there_as_it_is_here(port: &str) {
+    let folder = folder();
+    let run = |arguments: &[&str]| {
+        let ran = quietcut(folder.path(), arguments);
+        assert_eq!(ran.status, Some(0), "{ran:?}");
+        ran.stdout
+    };
+    let case = cases().join("kuka-kr90-acetal.toml");
+    let case = case.to_str().expect("a path in UTF-8");
+    // Few samples: the emulated port is slow. The chatter at 17 Hz does not need more.
+    let cut = ["--depth-mm", "2", "--seconds", "8", "--sample-rate-hz", "2000"];
+    run(&[&["simulate", case, "--rpm", "1045", "--out", "cut.csv"], &cut[..]].concat());
+    std::fs::write(folder.path().join("kuka.qct"), table("kuka", 1.5, 100)).expect("a file");
+    let settings = || run(&["info", port, "--json"]);
+    let before: serde_json::Value = serde_json::from_str(&settings()).expect("JSON");
+    let replay = ["replay", "cut.csv", "--table", "kuka.qct", "--json"];
+    let here = run(&replay);
+    let there = run(&[&replay[..], &["--port", port]].concat());
+    assert!(
+        here.contains("period-doubling") && here.contains(r#""source":"table""#),
+        "{here}"
+    );
+    assert_eq!(here, there);
+    let after: serde_json::Value = serde_json::from_str(&settings()).expect("JSON");
+    for key in [
+        "sample_rate_hz",
+        "teeth",
+        "working_point",
+        "frame_errors",
+        "dropped",
+    ] {
+        assert!(before.get(key).is_some(), "{before}");
+        assert_eq!(before[key], after[key], "{key}: {after}");
+    }
+}
+
+/// Frames that are cut short, changed, out of order, too long or of another version are each refused by name, and do
+/// nothing: table and slots stay.
+pub fn bad_frames_are_named_and_harm_nothing(open: Open<'_>) {
+    let (mut client, _) = connect(open);
+    upload(&mut client, &table("kept", 1.5, 50));
+    drop(client);
+    let mut host = RawHost::new(open());
+    let Reply::Info(before) = host.ask(100, &Request::Hello) else {
+        panic!("hello is answered by info")
+    };
+    assert_eq!(name_in_use(&before), "kept");
+
+    let mut refusal = |bytes: &[u8]| {
+        host.say(bytes);
+        match host.hear() {
+            Response::FrameRefused(error) => error,
+            other => panic!("{other:?}"),
+        }
+    };
+    // A commit would do harm, were it done.
+    let good = frame(101, &Request::UploadCommit);
+    let truncated = [&good[..good.len() - 4], &[0]].concat();
+    let error = refusal(&truncated);
+    assert!(
+        matches!(
+            error,
+            FrameError::Cobs | FrameError::TooShort { .. } | FrameError::Crc { .. }
+        ),
+        "{error}"
+    );
+    let mut corrupted = good.clone();
+    corrupted[2] ^= 0x10;
+    let error = refusal(&corrupted);
+    assert!(matches!(error, FrameError::Crc { .. }), "{error}");
+    let error = refusal(&frame(107, &Request::UploadCommit));
+    assert_eq!(
+        error,
+        FrameError::OutOfOrder {
+            expected: 101,
+            found: 107
+        }
+    );
+    let error = refusal(&[0x55; 2000]);
+    assert!(matches!(error, FrameError::TooLong { .. }), "{error}");
+    // Ends the frame without an end.
+    host.say(&[0]);
+    host.say(&frame_of_version(99, 101));
+    let Response::FrameRefused(FrameError::Version { theirs: 99, .. }) = host.hear() else {
+        panic!("a frame of version 99 is refused")
+    };
+
+    let Reply::Info(after) = host.ask(101, &Request::Info) else {
+        panic!("info is answered by info")
+    };
+    assert_eq!(after, before);
+}
+
+/// A table that comes with a wrong CRC, past the checks of the host's client, is refused; the last good one stays in use.
+pub fn a_table_with_a_wrong_crc_does_not_replace_the_last_good_one(open: Open<'_>) {
+    let (mut client, _) = connect(open);
+    let before = upload(&mut client, &table("good", 1.5, 50));
+    drop(client);
+    let mut bytes = table("wrong", 2.5, 50);
+    let header = LobeTable::parse(&bytes)
+        .expect("a table")
+        .header()
+        .expect("a header");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+
+    let mut host = RawHost::new(open());
+    host.ask(1, &Request::Hello);
+    let mut reply = host.ask(2, &Request::UploadBegin(header));
+    let mut number = 3;
+    while let Reply::Upload(upload) = reply {
+        let offset = upload.received as usize;
+        let Some(rest) = bytes.get(offset..).filter(|rest| !rest.is_empty()) else {
+            break;
+        };
+        let data = rest[..rest.len().min(MAX_CHUNK)].try_into().expect("a chunk");
+        let offset = upload.received;
+        reply = host.ask(number, &Request::UploadChunk { offset, data });
+        number += 1;
+    }
+    let reply = host.ask(number, &Request::UploadCommit);
+    assert!(
+        matches!(reply, Reply::Refused(Refusal::Table(TableError::Crc { .. }))),
+        "{reply:?}"
+    );
+    let Reply::Info(after) = host.ask(number + 1, &Request::Info) else {
+        panic!("info is answered by info")
+    };
+    assert_eq!(after.table, before.table);
+    let good = |info: &Info| {
+        info.slots
+            .iter()
+            .filter(|slot| matches!(slot, Slot::InUse(_)))
+            .count()
+    };
+    assert_eq!((good(&after), good(&before)), (1, 1), "{after:?}");
+}
