@@ -5,6 +5,7 @@
 mod characteristic;
 mod chart;
 pub(crate) mod collocation;
+mod eigenmotion;
 pub(crate) mod gauss;
 mod line;
 mod lobe_table;
@@ -13,6 +14,7 @@ pub(crate) mod multiplier;
 pub(crate) mod period;
 mod point;
 mod problem;
+mod sensitivity;
 mod spectrum;
 
 pub use chart::{Chart, Refinement, chart, method_in_words};
@@ -23,6 +25,9 @@ pub use method::Method;
 pub use multiplier::{Kind, Verdict};
 pub use point::{LEAST_ERROR, Point, point};
 pub use problem::{CubicTerms, Problem, StabilityError};
+pub use sensitivity::{Sensitivity, Slope, Tangent};
 
+#[cfg(test)]
+mod sensitivity_tests;
 #[cfg(test)]
 mod tests;

@@ -153,7 +153,7 @@ fn eigenfunction_forces(
 }
 
 /// A vector that the matrix multiplies by about `eigenvalue`, by inverse iteration.
-fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
+pub(super) fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
     let order = matrix.nrows();
     // A shift a little off the eigenvalue keeps the matrix regular and separates the vector by 1e8 at each step.
     let shift = eigenvalue * (1.0 + 1e-8);

@@ -71,7 +71,7 @@ pub(crate) struct Port {
 }
 
 /// The most e-folds by which a mode may decay within an element: e^{−A t} appears in it, and its size is lost in digits.
-const DECAY_MAX: f64 = 5.0;
+pub(super) const DECAY_MAX: f64 = 5.0;
 
 /// The most nodes of an element.
 const NODES_MAX: u32 = 40;
@@ -123,7 +123,7 @@ impl Period {
 }
 
 /// How fast things move: the structure by itself, and under the stiffness of the cut.
-struct Rates {
+pub(super) struct Rates {
     /// Fastest pole, rad/s.
     poles: f64,
     /// nᵀ C B D, 1/s per meter of depth: velocity along the chip normal that the chip's own force makes at once.
@@ -135,7 +135,7 @@ struct Rates {
 }
 
 impl Rates {
-    fn new(problem: &Problem) -> Self {
+    pub(super) fn new(problem: &Problem) -> Self {
         let structure = &problem.structure;
         let process = &problem.process;
         let engagement = &process.engagement;
@@ -170,7 +170,7 @@ impl Rates {
     }
 
     /// An estimate, rad/s, of how fast the solution turns or grows at a depth.
-    fn at(&self, depth_m: f64) -> f64 {
+    pub(super) fn at(&self, depth_m: f64) -> f64 {
         let depth_m = depth_m + self.modulation_m;
         self.poles + (self.inertial * depth_m).sqrt() + self.direct * depth_m
     }
@@ -178,7 +178,7 @@ impl Rates {
 
 /// The fewest nodes, from 4 to 40, with which a step over `angle` has a relative error below `tolerance`:
 /// (m!)² z^{2m+1} / ((2m)! (2m+1)!), that of the Padé approximant to e^{iz}.
-fn degree(angle: f64, tolerance: f64) -> usize {
+pub(super) fn degree(angle: f64, tolerance: f64) -> usize {
     // For m = 0 the expression is z; each further node multiplies it by z² m² / ((2m)² (4m² − 1)).
     let mut error = angle;
     for m in 1..=NODES_MAX {

@@ -5,6 +5,7 @@ mod direction;
 mod error;
 mod first_order;
 mod matrices;
+mod modal;
 mod modes;
 
 pub use definiteness::{Indefinite, Remedy};
@@ -12,6 +13,7 @@ pub use direction::Direction;
 pub use error::StructureError;
 pub use first_order::FirstOrder;
 pub use matrices::Matrices;
+pub use modal::ModalPart;
 pub use modes::Mode;
 
 /// A structure as a case gives it, in the machine's directions.
