@@ -172,7 +172,6 @@ impl Rows {
 
     /// One double step on the block from `first` to `last`.
     fn sweep(&mut self, first: usize, last: usize, shift: Shift) {
-        let n = self.size;
         let (start, mut vector) = self.start(first, last, shift);
         for i in start + 2..=last {
             self.set(i, i - 2, 0.0);
@@ -209,24 +208,61 @@ impl Rows {
             let p = p + s;
             let (x, y, z) = (p / s, q / s, r / s);
             let (q, r) = (q / p, r / p);
-            for j in k..=last {
-                let mut sum = self.at(k, j) + q * self.at(k + 1, j);
-                if triple {
-                    sum += r * self.at(k + 2, j);
-                    self.entries[(k + 2) * n + j] -= sum * z;
-                }
-                self.entries[(k + 1) * n + j] -= sum * y;
-                self.entries[k * n + j] -= sum * x;
+            self.reflect_rows(k, last, [q, r], [x, y, z]);
+            self.reflect_columns(k, first..(last.min(k + 3) + 1), [q, r], [x, y, z], triple);
+        }
+    }
+
+    /// Rows k, k + 1 and, up to `last`, k + 2 from the left.
+    fn reflect_rows(&mut self, k: usize, last: usize, [q, r]: [f64; 2], [x, y, z]: [f64; 3]) {
+        let n = self.size;
+        let (row_k, rest) = self.entries[k * n..].split_at_mut(n);
+        let (row_1, rest) = rest.split_at_mut(n);
+        let (row_k, row_1) = (&mut row_k[k..=last], &mut row_1[k..=last]);
+        if k + 1 < last {
+            let row_2 = &mut rest[k..=last];
+            for ((a, b), c) in row_k.iter_mut().zip(row_1).zip(row_2) {
+                let sum = *a + q * *b + r * *c;
+                *a -= sum * x;
+                *b -= sum * y;
+                *c -= sum * z;
             }
-            for i in first..=last.min(k + 3) {
-                let row = &mut self.entries[i * n + k..(i + 1) * n];
-                let mut sum = x * row[0] + y * row[1];
-                if triple {
-                    sum += z * row[2];
-                    row[2] -= sum * r;
+        } else {
+            for (a, b) in row_k.iter_mut().zip(row_1) {
+                let sum = *a + q * *b;
+                *a -= sum * x;
+                *b -= sum * y;
+            }
+        }
+    }
+
+    /// Columns k, k + 1 and, of a `triple`, k + 2 from the right.
+    fn reflect_columns(
+        &mut self,
+        k: usize,
+        rows: std::ops::Range<usize>,
+        [q, r]: [f64; 2],
+        [x, y, z]: [f64; 3],
+        triple: bool,
+    ) {
+        let n = self.size;
+        let rows = self.entries[rows.start * n..rows.end * n].chunks_exact_mut(n);
+        if triple {
+            for row in rows {
+                if let Some([a, b, c]) = row.get_mut(k..k + 3) {
+                    let sum = x * *a + y * *b + z * *c;
+                    *a -= sum;
+                    *b -= sum * q;
+                    *c -= sum * r;
                 }
-                row[1] -= sum * q;
-                row[0] -= sum;
+            }
+        } else {
+            for row in rows {
+                if let Some([a, b]) = row.get_mut(k..k + 2) {
+                    let sum = x * *a + y * *b;
+                    *a -= sum;
+                    *b -= sum * q;
+                }
             }
         }
     }

@@ -244,15 +244,20 @@ fn polynomial(element: &Element, scale: f64) -> Vec<f64> {
     let mut seen = element.observe.clone();
     let drive = &element.drive * scale;
     let kernel = &element.kernel * scale;
+    let mut next = seen.clone();
+    let mut term = element.flow.clone();
     for _ in 1..TERMS_MAX {
-        let term = &drive * &seen;
-        coefficients.extend(by_rows(&term));
+        drive.mul_to(&seen, &mut term);
+        for row in 0..term.nrows() {
+            coefficients.extend(term.row(row).iter());
+        }
         let size = term.amax();
         largest = largest.max(size);
         if size < TERM * largest {
             break;
         }
-        seen = &kernel * &seen;
+        kernel.mul_to(&seen, &mut next);
+        std::mem::swap(&mut seen, &mut next);
     }
     coefficients
 }

@@ -106,17 +106,22 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
         // p − w Q p = E x − w Q p_τ
         let weighted = &element.kernel * depth_m;
         let implicit = DMatrix::identity(ports, ports) - &weighted;
-        let mut right = &element.observe * &state;
-        let mut past = right.columns_mut(first, ports);
+        // Chips of later elements are not in it yet.
+        let known = first + ports;
+        let mut seen = &element.observe * state.columns(0, known);
+        let mut past = seen.columns_mut(first, ports);
         past -= &weighted;
-        let seen = implicit.lu().solve(&right)?;
-        let mut chip = seen.clone();
-        for port in 0..ports {
-            chip[(port, first + port)] -= 1.0;
+        if !implicit.lu().solve_mut(&mut seen) {
+            return None;
         }
-        state = &element.flow * &state + &element.drive * chip * depth_m;
-        map.rows_mut(first, ports).copy_from(&seen);
-        first += ports;
+        map.view_mut((first, 0), (ports, known)).copy_from(&seen);
+        for port in 0..ports {
+            seen[(port, first + port)] -= 1.0;
+        }
+        let mut next = &element.flow * state.columns(0, known);
+        next.gemm(depth_m, &element.drive, &seen, 1.0);
+        state.columns_mut(0, known).copy_from(&next);
+        first = known;
     }
     map.rows_mut(0, order).copy_from(&(&period.flight * state));
     Some(map)
@@ -127,7 +132,7 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
 pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
     let map = monodromy(period, depth_m)?;
     let mut multipliers = eigenvalues(map)?;
-    multipliers.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
+    multipliers.sort_by(|p, q| q.norm_sqr().total_cmp(&p.norm_sqr()).then(q.im.total_cmp(&p.im)));
     Some(multipliers)
 }
 

@@ -1,6 +1,7 @@
 //! Gauss–Legendre nodes on [0, 1], for collocation.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
@@ -15,7 +16,17 @@ pub(crate) struct Gauss {
     pub(crate) integrals: DMatrix<f64>,
 }
 
+/// The rules with up to 40 nodes.
+const SHARED: usize = 41;
+
 impl Gauss {
+    /// The rule with `count` nodes, computed once; the one with 40 where more are asked for.
+    pub(crate) fn shared(count: usize) -> &'static Self {
+        static RULES: [OnceLock<Gauss>; SHARED] = [const { OnceLock::new() }; SHARED];
+        let count = count.clamp(1, SHARED - 1);
+        RULES[count].get_or_init(|| Self::new(count))
+    }
+
     /// The rule with `count` nodes, at least 1.
     pub(crate) fn new(count: usize) -> Self {
         let (points, weights): (Vec<f64>, Vec<f64>) = (0..count).map(|i| root(count, i)).unzip();

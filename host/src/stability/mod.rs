@@ -6,6 +6,8 @@ mod characteristic;
 mod chart;
 pub(crate) mod collocation;
 mod eigenmotion;
+mod element;
+mod exponential;
 pub(crate) mod gauss;
 mod line;
 mod lobe_table;
