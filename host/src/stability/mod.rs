@@ -8,6 +8,7 @@ pub(crate) mod collocation;
 mod eigenmotion;
 mod element;
 mod exponential;
+mod frequency;
 pub(crate) mod gauss;
 mod line;
 mod lobe_table;
@@ -21,6 +22,7 @@ mod spectrum;
 
 pub use chart::{Chart, Refinement, chart, method_in_words};
 pub use collocation::Collocation;
+pub use frequency::{FrequencyProblem, ModeCoupling, MultiFrequency, Nyquist, Zoa};
 pub use line::{Limit, SpeedLine, Switch, line};
 pub use lobe_table::{BuildError, TableRequest, build_table};
 pub use method::Method;
