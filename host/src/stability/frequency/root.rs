@@ -168,8 +168,8 @@ pub(super) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
 ///
 /// # Errors
 /// The root cannot be found or confirmed; it was not measured.
-pub(super) fn averaged_point<'a>(
-    problem: &'a FrequencyProblem,
+pub(super) fn averaged_point(
+    problem: &FrequencyProblem,
     rpm: f64,
     depth_mm: f64,
     open_loop: impl Fn(&FrequencyProblem) -> AveragedLoop<'_>,
