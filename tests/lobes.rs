@@ -195,3 +195,57 @@ fn a_table_is_written_whole_and_shown_again() {
     )
     .refused(&["4 teeth"]);
 }
+
+#[test]
+fn other_methods_say_their_name_settings_and_error() {
+    let at = |options: &[&str]| {
+        let mut arguments = vec!["lobes"];
+        let case = case("insperger-1dof-ad1");
+        arguments.extend([case.as_str(), "--at", "5000,0.5", "--json"]);
+        arguments.extend(options);
+        json(&arguments)
+    };
+    for (options, name, steps) in [
+        (&["--method", "sdm", "--steps", "40"][..], "sdm", "40 steps"),
+        (
+            &["--method", "sdm", "--order", "0", "--steps", "60"],
+            "sdm of order 0",
+            "60 steps",
+        ),
+        (&["--method", "fdm"], "fdm", "100 steps"),
+    ] {
+        let answer = at(options);
+        assert_eq!(answer["method"], name);
+        assert!(
+            answer["settings"]
+                .as_str()
+                .is_some_and(|settings| settings.contains(steps))
+        );
+        let point = &answer["points"][0];
+        let (size, error) = (&point["multiplier_abs"], &point["error"]);
+        let (size, error) = (size.as_f64().expect("size"), error.as_f64().expect("error"));
+        // 40 to 100 steps are wrong in the second or third digit, and say so.
+        assert!(error > 1e-3 && (size - 1.073_975_59).abs() < error, "{point}");
+    }
+    assert_eq!(at(&[])["method"], "collocation");
+    assert!(at(&[])["settings"].is_null());
+}
+
+#[test]
+fn methods_refuse_what_they_are_not_defined_for_and_options_of_others() {
+    let refused = |name: &str, options: &[&str], words: &[&str]| {
+        let mut arguments = vec!["lobes"];
+        let case = case(name);
+        arguments.extend([case.as_str(), "--at", "900,1"]);
+        arguments.extend(options);
+        quietcut(folder().path(), &arguments).refused(words);
+    };
+    let cubic = "kuka-kr90-full-cubic";
+    refused(cubic, &["--method", "sdm"], &["cubic_stiffness", "--linear"]);
+    refused(cubic, &["--method", "fdm"], &["cubic_stiffness", "--linear"]);
+    let linear = "kuka-kr90-full";
+    refused(linear, &["--steps", "40"], &["--steps", "sdm and fdm"]);
+    refused(linear, &["--method", "fdm", "--order", "0"], &["--order", "sdm"]);
+    refused(linear, &["--method", "sdm", "--steps", "0"], &["0", "from 1"]);
+    refused(linear, &["--method", "sdm", "--order", "2"], &["2", "0 or 1"]);
+}

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::method::MethodName;
+use super::method::MethodChoice;
 use super::{Error, Output, Range};
 use crate::case::Case;
 use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::page::{figure, page};
-use crate::stability::{Chart, Method, Point, SpeedLine, chart, method_in_words};
+use crate::stability::{Chart, Label, Method, Point, SpeedLine, chart};
 
 /// Stability limits over speed, or the dominant multiplier at points.
 #[derive(Debug, clap::Args)]
@@ -28,12 +28,8 @@ pub struct Args {
     /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "rpm")]
     depth_mm: Option<Range>,
-    /// How to compute.
-    #[arg(long, value_enum, default_value_t)]
-    method: MethodName,
-    /// Leave out the cubic terms of a structure: the limits for vanishing feed.
-    #[arg(long)]
-    linear: bool,
+    #[command(flatten)]
+    method: MethodChoice,
     /// Chart or table to write: svg, html, csv or json by its ending.
     #[arg(long, value_name = "FILE", requires = "rpm")]
     out: Option<PathBuf>,
@@ -46,16 +42,15 @@ pub struct Args {
 
 #[derive(Serialize)]
 struct Points {
-    method: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    blind_to: Option<&'static str>,
+    #[serde(flatten)]
+    label: Label,
     points: Vec<Point>,
 }
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case).map_err(Error::input)?;
-    let method = args.method.on(&case, args.linear)?;
+    let method = args.method.on(&case)?;
     match (args.rpm, args.depth_mm) {
         (Some(rpm), Some(depth_mm)) => {
             run_chart(&case, method.as_ref(), rpm, depth_mm, args.out, args.output)
@@ -69,8 +64,8 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
         .iter()
         .map(|&(rpm, depth_mm)| method.point(rpm, depth_mm))
         .collect::<Result<Vec<_>, _>>()?;
-    let (name, blind_to) = (method.name(), method.blind_to());
-    let mut text = format!("by {}", method_in_words(name, blind_to));
+    let label = Label::of(method);
+    let mut text = format!("by {label}");
     for point in &points {
         let chatter = point
             .chatter_hz
@@ -87,12 +82,7 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
             point.kind.name(),
         );
     }
-    let answer = Points {
-        method: name,
-        blind_to,
-        points,
-    };
-    output.answer(&answer, text)
+    output.answer(&Points { label, points }, text)
 }
 
 fn run_chart(
@@ -124,7 +114,7 @@ fn run_chart(
 fn limits_as_text(chart: &Chart) -> String {
     let mut text = format!(
         "by {}\n  rev/min  first limit [mm]  kind   chatter [Hz]  stable [mm]",
-        chart.method_in_words()
+        chart.label
     );
     for line in &chart.speeds {
         let stable: Vec<String> = line
@@ -173,7 +163,7 @@ fn picture(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
     let mut columns: Vec<Column> = chart.speeds.iter().map(Column::from).collect();
     columns.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
     // What can be wrong with a picture is what was asked for: a single speed.
-    let title = format!("{}, by {}", case.name, chart.method_in_words());
+    let title = format!("{}, by {}", case.name, chart.label);
     lobe_chart(&title, &columns, depth_mm, &[]).map_err(Error::input)
 }
 
@@ -181,7 +171,7 @@ fn as_page(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
     let svg = picture(case, chart, depth_mm)?;
     let caption = format!(
         "Stable depths over spindle speed, by {}. Lines: where stability is first lost.",
-        chart.method_in_words()
+        chart.label
     );
     let body = maud::html! {
         h1 { (case.name) }

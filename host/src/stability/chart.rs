@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::StabilityError;
 use super::line::SpeedLine;
-use super::method::Method;
+use super::method::{Label, Method};
 
 /// The fewest steps in depth at which multipliers are followed, however coarse the chart.
 const SAMPLES_MIN: usize = 40;
@@ -12,11 +12,9 @@ const SAMPLES_MIN: usize = 40;
 /// A stability chart.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Chart {
-    /// Name of the method.
-    pub method: &'static str,
-    /// What the method cannot see; `None` for one that sees all of linear stability.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub blind_to: Option<&'static str>,
+    /// The method that computed it.
+    #[serde(flatten)]
+    pub label: Label,
     /// One line per speed, in the order asked for.
     pub speeds: Vec<SpeedLine>,
 }
@@ -34,8 +32,7 @@ pub fn chart<M: Method + ?Sized>(
     samples: usize,
 ) -> Result<Chart, StabilityError> {
     Ok(Chart {
-        method: method.name(),
-        blind_to: method.blind_to(),
+        label: Label::of(method),
         speeds: method.lines(speeds_rpm, depth_mm, samples.max(SAMPLES_MIN))?,
     })
 }
@@ -52,11 +49,6 @@ pub struct Refinement {
 }
 
 impl Chart {
-    /// The method and, where there is something, what it cannot see: for captions.
-    pub fn method_in_words(&self) -> String {
-        method_in_words(self.method, self.blind_to)
-    }
-
     /// Adds speeds where limits bend, kinds change, and islands begin or end; speeds must be ascending.
     ///
     /// # Errors
@@ -105,14 +97,6 @@ impl Chart {
             open = next_open;
         }
         Ok(self)
-    }
-}
-
-/// The name of a method and what it is blind to.
-pub fn method_in_words(method: &str, blind_to: Option<&str>) -> String {
-    match blind_to {
-        Some(what) => format!("{method} (blind to {what})"),
-        None => method.to_owned(),
     }
 }
 

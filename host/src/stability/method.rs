@@ -1,6 +1,8 @@
 //! The one interface of all methods.
 
+use num_complex::Complex64;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::StabilityError;
 use super::line::SpeedLine;
@@ -15,6 +17,11 @@ pub trait Method: Sync {
 
     /// What the method cannot see, in words that follow "blind to"; `None` for one that sees all of linear stability.
     fn blind_to(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// What its answers depend on beside the case, such as a number of steps; `None` where there is nothing.
+    fn settings(&self) -> Option<String> {
         None
     }
 
@@ -52,5 +59,81 @@ pub trait Method: Sync {
             .map(|&rpm| self.line(rpm, depth_mm, samples))
             .collect();
         lines.into_iter().collect()
+    }
+}
+/// What every answer says of the method that it comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Label {
+    /// [`Method::name`].
+    pub method: &'static str,
+    /// [`Method::settings`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settings: Option<String>,
+    /// [`Method::blind_to`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind_to: Option<&'static str>,
+}
+
+impl Label {
+    /// The label of a method.
+    pub fn of<M: Method + ?Sized>(method: &M) -> Self {
+        Self {
+            method: method.name(),
+            settings: method.settings(),
+            blind_to: method.blind_to(),
+        }
+    }
+}
+
+/// For captions.
+impl std::fmt::Display for Label {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.method)?;
+        if let Some(settings) = &self.settings {
+            write!(f, ", {settings}")?;
+        }
+        match self.blind_to {
+            Some(what) => write!(f, " (blind to {what})"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// An estimate of |error| of a multiplier from a method of an order p in its step, by comparison with a half and a
+/// quarter of the step (Richardson).
+///
+/// Of what changes with the k-th halving 2^{kp}/(2^{kp} − 1) is the error, by its leading term; the larger of both counts,
+/// since with one halving terms may cancel, and three times that, since p holds for small steps only. It is not
+/// below `least`, which says what the numbers can hold, relative to max(1, |μ|).
+pub(super) fn step_error(
+    whole: Complex64,
+    half: Complex64,
+    quarter: Complex64,
+    order: u32,
+    least: f64,
+) -> f64 {
+    let by_change = |finer: Complex64, halvings: u32| {
+        let power = f64::from(halvings * order).exp2();
+        (whole - finer).norm() * power / (power - 1.0)
+    };
+    let change = by_change(half, 1).max(by_change(quarter, 2));
+    (3.0 * change).max(least * whole.norm().max(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_a_step_is_that_of_its_leading_term_with_room() {
+        let exact = Complex64::new(0.3, -0.9);
+        for order in 1..=4 {
+            let with = |step: f64| exact + Complex64::new(0.2, 0.1) * step.powi(order);
+            let error = (with(0.1) - exact).norm();
+            let stated = step_error(with(0.1), with(0.05), with(0.025), order as u32, 1e-12);
+            // The leading term alone is exact: what is stated is three times the error, to rounding.
+            assert!((stated - 3.0 * error).abs() < 1e-12, "{order}");
+        }
+        assert_eq!(step_error(exact, exact, exact, 2, 1e-9), 1e-9);
     }
 }

@@ -5,33 +5,45 @@
 mod characteristic;
 mod chart;
 pub(crate) mod collocation;
+mod discretized;
 mod eigenmotion;
 mod element;
 mod exponential;
-mod frequency;
+mod fdm;
 pub(crate) mod gauss;
+mod krylov;
 mod line;
 mod lobe_table;
 mod method;
 pub(crate) mod multiplier;
+mod one_period;
+mod passages;
 pub(crate) mod period;
+mod pitched;
 mod point;
 mod problem;
+mod sdm;
 mod sensitivity;
 mod spectrum;
+mod stepped;
 
-pub use chart::{Chart, Refinement, chart, method_in_words};
+pub use chart::{Chart, Refinement, chart};
 pub use collocation::Collocation;
-pub use frequency::{FrequencyProblem, ModeCoupling, MultiFrequency, Nyquist, Zoa};
+pub use fdm::{Fdm, FullDiscretization};
 pub use line::{Limit, SpeedLine, Switch, line};
 pub use lobe_table::{BuildError, TableRequest, build_table};
-pub use method::Method;
+pub use method::{Label, Method};
 pub use multiplier::{Kind, Verdict};
+pub use pitched::Pitched;
 pub use point::{LEAST_ERROR, Point, point};
 pub use problem::{CubicTerms, Problem, StabilityError};
 pub use sensitivity::{Sensitivity, Slope, Tangent};
 
 #[cfg(test)]
 mod sensitivity_tests;
+pub use sdm::{Sdm, SdmOrder, SemiDiscretization};
+
+#[cfg(test)]
+mod agreement;
 #[cfg(test)]
 mod tests;

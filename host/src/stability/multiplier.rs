@@ -96,8 +96,24 @@ pub(crate) fn chatter_hz(
     multiplier: Complex64,
     depth_m: f64,
 ) -> Option<f64> {
-    let tooth_period_s = problem.tooth_period_s(rpm);
     let forces = eigenfunction_forces(period, multiplier, depth_m)?;
+    loudest_hz(problem, problem.tooth_period_s(rpm), multiplier, |s| {
+        let mut harmonic = Vector3::<Complex64>::zeros();
+        for (time_s, force) in &forces {
+            harmonic += force * (-s * *time_s).exp();
+        }
+        Some((problem.structure.transfer(s)? * harmonic).norm())
+    })
+}
+
+/// The frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest; `size` gives its size at an exponent
+/// s with e^{sT} = μ.
+pub(super) fn loudest_hz(
+    problem: &Problem,
+    period_s: f64,
+    multiplier: Complex64,
+    size: impl Fn(Complex64) -> Option<f64>,
+) -> Option<f64> {
     let growth = multiplier.ln();
     let fastest = problem
         .structure
@@ -106,16 +122,11 @@ pub(crate) fn chatter_hz(
         .map(|pole| pole.im)
         .fold(0.0, f64::max);
     // Above the fastest pole the receptance only falls; one harmonic beyond is enough.
-    let highest = (fastest * tooth_period_s / TAU).ceil() as i32 + 1;
+    let highest = (fastest * period_s / TAU).ceil() as i32 + 1;
     (-highest..=highest)
         .filter_map(|k| {
-            let s = (growth + Complex64::new(0.0, TAU * f64::from(k))) / tooth_period_s;
-            let mut harmonic = Vector3::<Complex64>::zeros();
-            for (time_s, force) in &forces {
-                harmonic += force * (-s * *time_s).exp();
-            }
-            let displacement = problem.structure.transfer(s)? * harmonic;
-            Some((displacement.norm(), s.im.abs() / TAU))
+            let s = (growth + Complex64::new(0.0, TAU * f64::from(k))) / period_s;
+            Some((size(s)?, s.im.abs() / TAU))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, frequency_hz)| frequency_hz)

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use crate::case::{AXIAL_DEPTH_MODULATION, Case, CaseError};
-use crate::frf::FrfError;
 use crate::milling::Process;
 use crate::structure::{FirstOrder, StructureError};
 
@@ -51,43 +50,6 @@ pub enum StabilityError {
         /// What is not covered, and what can be done instead.
         what: &'static str,
     },
-    /// Receptances are infinite.
-    #[error(
-        "a mode of {frequency_hz:.4} Hz has no damping: its receptance is infinite there; damping is needed, or a method \
-         that does not go through receptances"
-    )]
-    Undamped {
-        /// Frequency of the mode, Hz.
-        frequency_hz: f64,
-    },
-    /// Nothing can couple.
-    #[error(
-        "mode coupling is not defined here: {found}; two modes that move the tool in feed and normal direction are needed"
-    )]
-    NoModeCoupling {
-        /// What there is.
-        found: &'static str,
-    },
-    /// A table of frequency response functions cannot be used.
-    #[error(transparent)]
-    Frf(#[from] FrfError),
-    /// What was asked depends on frequencies that a table does not have.
-    #[error(
-        "at {rpm} rev/min and {depth_mm:.4} mm the cut vibrates at {frequency_hz:.3} Hz, but the frequency response \
-         functions were measured from {first_hz} to {last_hz} Hz only; measure there too, or ask for less depth"
-    )]
-    NotMeasured {
-        /// Spindle speed, rev/min.
-        rpm: f64,
-        /// Axial depth, mm.
-        depth_mm: f64,
-        /// Frequency of the vibration, Hz.
-        frequency_hz: f64,
-        /// First frequency of the table, Hz.
-        first_hz: f64,
-        /// Last frequency of the table, Hz.
-        last_hz: f64,
-    },
     /// A speed or depth that no cut has.
     #[error("{quantity} {value}: {expected} is needed")]
     Argument {
@@ -117,8 +79,20 @@ impl Problem {
     /// A section is missing, the structure is indefinite, or the case has what the equation above has not:
     /// variable pitch, cubic terms (see `cubic`), extensions other than axial-depth-modulation.
     pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
+        Self::of(case, cubic, cutting(case)?)
+    }
+
+    /// As [`new`](Self::new), but unequal pitches are replaced by their mean.
+    pub(super) fn with_mean_pitch(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
+        Self::of(case, cubic, cutting_with_mean_pitch(case)?)
+    }
+
+    fn of(
+        case: &Case,
+        cubic: CubicTerms,
+        (process, teeth): (Process, usize),
+    ) -> Result<Self, StabilityError> {
         let structure = case.structure()?;
-        let (process, teeth) = cutting(case)?;
         if structure.is_nonlinear() && cubic == CubicTerms::Refuse {
             return Err(StabilityError::NotCovered {
                 path: case.path.clone(),
@@ -159,6 +133,17 @@ impl Problem {
 /// # Errors
 /// A section is missing, or there is variable pitch, an extension other than axial-depth-modulation, or runout with it.
 pub(super) fn cutting(case: &Case) -> Result<(Process, usize), StabilityError> {
+    if case.tool()?.has_variable_pitch() {
+        return Err(StabilityError::NotCovered {
+            path: case.path.clone(),
+            what: "tool.pitch_deg: teeth at unequal distances have several delays; equal pitch is needed here",
+        });
+    }
+    cutting_with_mean_pitch(case)
+}
+
+/// The same, with unequal pitches replaced by their mean.
+fn cutting_with_mean_pitch(case: &Case) -> Result<(Process, usize), StabilityError> {
     let (tool, material, cut) = (case.tool()?, case.material()?, case.cut()?);
     case.refuse_extensions_but(
         &[AXIAL_DEPTH_MODULATION],
@@ -168,11 +153,6 @@ pub(super) fn cutting(case: &Case) -> Result<(Process, usize), StabilityError> {
         path: case.path.clone(),
         what,
     };
-    if tool.has_variable_pitch() {
-        return Err(not_covered(
-            "tool.pitch_deg: teeth at unequal distances have several delays; equal pitch is needed here",
-        ));
-    }
     let modulated = case.axial_depth_modulation();
     if modulated && tool.runout.is_some_and(|runout| runout.offset_um > 0.0) {
         return Err(not_covered(

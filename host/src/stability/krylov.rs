@@ -1,0 +1,243 @@
+//! The largest eigenvalues of a linear map that is known by what it does to vectors.
+//!
+//! One-period maps of delay equations are compact: all but a few eigenvalues lie close to zero, and block Arnoldi finds
+//! those few in a space of some dozens of vectors. Blocks also find the eigenvalues of structures with equal modes,
+//! of which a single vector would show one only.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::multiplier::eigenvector;
+use crate::eigenvalues::eigenvalues;
+
+/// Vectors in a block: as many directions may have the same mode.
+const BLOCK: usize = 3;
+
+/// Up to this size all eigenvalues are computed from the whole matrix: it is as fast.
+const WHOLE: usize = 90;
+
+/// After so many blocks the eigenvalues are looked at, and again after as many more.
+const LOOK: usize = 10;
+
+/// Residual ‖M v − μ v‖ with ‖v‖ = 1 below which an eigenvalue is taken: rounding in a map of some hundred steps.
+const RESIDUAL: f64 = 1e-11;
+
+/// A linear map of ℝⁿ.
+pub(super) trait LinearMap {
+    /// n.
+    fn size(&self) -> usize;
+
+    /// What the map makes of each column, n × columns; `None` where the equations have no solution.
+    fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>>;
+}
+
+/// Eigenvalues above a size, largest first, and a space that holds their eigenvectors.
+#[derive(Clone, Debug)]
+pub(super) struct Dominant {
+    /// The eigenvalues; complex ones in exact pairs.
+    pub(super) eigenvalues: Vec<Complex64>,
+    /// Orthonormal columns; `None` for the whole space.
+    basis: Option<DMatrix<f64>>,
+    /// The map within that space.
+    projected: DMatrix<f64>,
+}
+
+impl Dominant {
+    /// All eigenvalues larger than `least`. `None` where nothing finite comes out.
+    pub(super) fn of(map: &impl LinearMap, least: f64) -> Option<Self> {
+        // Beyond half the size the whole matrix is cheaper.
+        let most = map.size() / 2;
+        if map.size() > WHOLE
+            && let Some(found) = arnoldi(map, least, most)
+        {
+            return Some(found);
+        }
+        let projected = map.apply(&DMatrix::identity(map.size(), map.size()))?;
+        Some(Self {
+            eigenvalues: larger(&projected, least)?,
+            basis: None,
+            projected,
+        })
+    }
+
+    /// The largest eigenvalues, however small they are.
+    pub(super) fn any(map: &impl LinearMap) -> Option<Self> {
+        let mut least = 0.25;
+        loop {
+            let found = Self::of(map, least)?;
+            if !found.eigenvalues.is_empty() || least < 1e-12 {
+                return Some(found);
+            }
+            least *= 0.1;
+        }
+    }
+
+    /// The eigenvector of one of the eigenvalues, of length 1.
+    pub(super) fn vector(&self, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
+        let within = eigenvector(&self.projected.map(Complex64::from), eigenvalue)?;
+        Some(match &self.basis {
+            Some(basis) => basis.map(Complex64::from) * within,
+            None => within,
+        })
+    }
+}
+
+/// Block Arnoldi with full orthogonalization; `None` where the space would have to grow beyond `most`.
+fn arnoldi(map: &impl LinearMap, least: f64, most: usize) -> Option<Dominant> {
+    let size = map.size();
+    // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
+    let mut basis = DMatrix::zeros(size, most + BLOCK);
+    let mut projected = DMatrix::zeros(most + BLOCK, most);
+    let (first, _) = orthonormal(start(size));
+    basis.columns_mut(0, first.ncols()).copy_from(&first);
+    let (mut done, mut width) = (0, first.ncols());
+    for count in 1.. {
+        if done + width > most {
+            return None;
+        }
+        let mut image = map.apply(&basis.columns(done, width).into_owned())?;
+        let known = basis.columns(0, done + width);
+        // Twice is enough: what the first pass leaves in the space is rounding of the image.
+        for _ in 0..2 {
+            let part = known.tr_mul(&image);
+            image -= known * &part;
+            let mut sum = projected.view_mut((0, done), (done + width, width));
+            sum += part;
+        }
+        let (next, coupling) = orthonormal(image);
+        let end = done + width;
+        projected
+            .view_mut((end, done), (next.ncols(), width))
+            .copy_from(&coupling);
+        basis.columns_mut(end, next.ncols()).copy_from(&next);
+        if next.ncols() == 0 || count % LOOK == 0 {
+            let within = projected.view((0, 0), (end, end)).into_owned();
+            let eigenvalues = larger(&within, least)?;
+            if are_settled(&within, &coupling, &eigenvalues) {
+                return Some(Dominant {
+                    eigenvalues,
+                    basis: Some(basis.columns(0, end).into_owned()),
+                    projected: within,
+                });
+            }
+        }
+        (done, width) = (end, next.ncols());
+    }
+    None
+}
+
+/// True where ‖K y‖ is small for the last part y of every eigenvector: the residual of M at μ.
+fn are_settled(projected: &DMatrix<f64>, coupling: &DMatrix<f64>, eigenvalues: &[Complex64]) -> bool {
+    let complex = projected.map(Complex64::from);
+    let coupling = coupling.map(Complex64::from);
+    let width = coupling.ncols();
+    eigenvalues.iter().filter(|value| value.im >= 0.0).all(|&value| {
+        eigenvector(&complex, value).is_some_and(|vector| {
+            let last = vector.rows(vector.len() - width, width);
+            (&coupling * last).norm() < RESIDUAL * value.norm().max(1.0)
+        })
+    })
+}
+
+/// The eigenvalues of a matrix that are larger than `least`, largest first, of pairs the upper one first.
+fn larger(matrix: &DMatrix<f64>, least: f64) -> Option<Vec<Complex64>> {
+    let mut values = eigenvalues(matrix.clone())?;
+    values.retain(|value| value.norm() > least);
+    values.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
+    Some(values)
+}
+
+/// A block that is the same at every call and has a part along everything.
+fn start(size: usize) -> DMatrix<f64> {
+    // Weyl sequences: multiples of irrational numbers modulo one.
+    let irrational = [2.0_f64.sqrt(), 3.0_f64.sqrt(), 5.0_f64.sqrt()];
+    DMatrix::from_fn(size, BLOCK, |i, j| ((i + 1) as f64 * irrational[j]).fract() - 0.5)
+}
+
+/// Q and R of a block, Q without columns that depend on those before.
+fn orthonormal(block: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let columns = block.ncols();
+    let mut kept: Vec<DVector<f64>> = Vec::with_capacity(columns);
+    let mut factor = DMatrix::zeros(columns, columns);
+    let scale = block.norm();
+    for j in 0..columns {
+        let mut column = block.column(j).into_owned();
+        for _ in 0..2 {
+            for (i, earlier) in kept.iter().enumerate() {
+                let part = earlier.dot(&column);
+                factor[(i, j)] += part;
+                column.axpy(-part, earlier, 1.0);
+            }
+        }
+        let norm = column.norm();
+        // What is left of a dependent column is rounding.
+        if norm > 1e-14 * scale && norm > 0.0 {
+            factor[(kept.len(), j)] = norm;
+            kept.push(column / norm);
+        }
+    }
+    let rank = kept.len();
+    let basis = if kept.is_empty() {
+        DMatrix::zeros(block.nrows(), 0)
+    } else {
+        DMatrix::from_columns(&kept)
+    };
+    (basis, factor.rows(0, rank).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Matrix(DMatrix<f64>);
+
+    impl LinearMap for Matrix {
+        fn size(&self) -> usize {
+            self.0.nrows()
+        }
+
+        fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+            Some(&self.0 * columns)
+        }
+    }
+
+    /// A matrix with a pair, a double and a negative eigenvalue outside a cloud of small ones, turned by reflections.
+    fn matrix(size: usize) -> Matrix {
+        let mut matrix = DMatrix::from_fn(size, size, |i, j| {
+            if i == j {
+                0.2 * ((i + 1) as f64 * 0.618).fract()
+            } else {
+                0.0
+            }
+        });
+        for (index, value) in [(0, 0.5), (1, 0.5), (2, 0.9), (3, 0.9), (4, -1.1)] {
+            matrix[(index, index)] = value;
+        }
+        (matrix[(0, 1)], matrix[(1, 0)]) = (0.8, -0.8);
+        for k in 1..4_u32 {
+            let normal =
+                DVector::from_fn(size, |i, _| ((i + 1) as f64 * f64::from(k).sqrt()).sin()).normalize();
+            let reflection = DMatrix::identity(size, size) - &normal * normal.transpose() * 2.0;
+            matrix = &reflection * matrix * &reflection;
+        }
+        Matrix(matrix)
+    }
+
+    #[test]
+    fn few_large_eigenvalues_are_found_with_their_vectors_in_small_and_large_maps() {
+        for size in [40, 300] {
+            let map = matrix(size);
+            let found = Dominant::of(&map, 0.3).unwrap();
+            assert_eq!(found.basis.is_some(), size == 300);
+            let expected = [(-1.1, 0.0), (0.5, 0.8), (0.5, -0.8), (0.9, 0.0), (0.9, 0.0)];
+            assert_eq!(found.eigenvalues.len(), expected.len());
+            for (value, (re, im)) in found.eigenvalues.iter().zip(expected) {
+                // The matrix is normal: eigenvalues are as good as the residual.
+                assert!((value - Complex64::new(re, im)).norm() < 1e-10, "{found:?}");
+                let vector = found.vector(*value).unwrap();
+                let miss = map.0.map(Complex64::from) * &vector - &vector * *value;
+                assert!(miss.norm() < 1e-9 && (vector.norm() - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+}
