@@ -9,7 +9,9 @@
 //! }
 //! ```
 //!
-//! Nothing here waits, but for the flash: a page that is erased during an upload holds the device up for as long as the flash takes.
+//! Nothing here waits, but for the flash: a request of an upload holds the device up for as long as a page takes to be erased.
+//! A board with a sensor takes the blocks that came meanwhile, and only [`flush`](Device::flush)es between them, before it
+//! [`poll`](Device::poll)s for the next request: so an upload takes longer, and no sample is lost.
 //! The requests of the host are done one at a time, in order; see [`quietcut_core::protocol`]. While the host feeds
 //! blocks, those of the sensor are passed over.
 
@@ -130,7 +132,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends and receives as much as the line has and takes; true where there was something to do.
+    /// Sends as much as the line takes, and receives until a request is done; true where there was something to do: then call it
+    /// again.
     ///
     /// # Errors
     /// Those of the line.
@@ -143,13 +146,25 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
                 self.input.extend(buffer.into_iter().take(count));
             }
             let input = core::mem::take(&mut self.input);
+            let frames = self.link.frames();
             let count = self.receive(&input);
             self.input.extend(input.iter().copied().skip(count));
             is_busy |= self.link.flush(line)? || count > 0;
-            if count == 0 {
+            if count == 0 || self.link.frames() != frames {
                 return Ok(is_busy);
             }
         }
+    }
+
+    /// Sends as much as the line takes, and receives nothing.
+    ///
+    /// # Errors
+    /// Those of the line.
+    pub fn flush<IO: Line>(&mut self, line: &mut IO) -> Result<(), IO::Error> {
+        while self.link.flush(line)? {
+            self.pump();
+        }
+        Ok(())
     }
 
     /// Takes bytes from the host and does what they ask; how many were taken.

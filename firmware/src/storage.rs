@@ -9,22 +9,27 @@
 //!
 //! and what stands before the journal is a table, byte for byte as [`quietcut_core::lobes::format`] has it, but with a
 //! generation of its own. At the start the valid table with the newest generation is taken into use, so the order of an
-//! upload is: erase the header of the *other* slot, write the payload page by page, check it, write the header. Until the last
-//! word of the header stands, the slot is not valid and the old table stays.
+//! upload is: erase the *other* slot and write the payload, page by page from the header's on, check it, write the header.
+//! Until the last word of the header stands, the slot is not valid and the old table stays.
 //!
 //! The journal remembers across a power cut which table was on its way and how far it was: an upload goes on at the
 //! page it had reached.
+//!
+//! No request erases more than one page, so that none holds the device up for longer than that takes.
 
+mod contents;
 mod journal;
+mod progress;
 
 use embedded_storage::nor_flash::NorFlash;
-use heapless::Vec;
 use quietcut_core::lobes::format::{HEADER_LENGTH, SCHEMA};
 use quietcut_core::lobes::{Header, LobeTable, TableError};
 use quietcut_core::protocol::message::SLOTS;
 use quietcut_core::protocol::{Refusal, Slot, Upload};
 
+use contents::Contents;
 use journal::Journal;
+use progress::Progress;
 
 /// The largest [`NorFlash::WRITE_SIZE`] that is possible.
 const MAX_WRITE_SIZE: usize = HEADER_LENGTH;
@@ -47,57 +52,6 @@ pub struct Storage<M> {
     contents: [Contents; SLOTS],
     in_use: Option<usize>,
     upload: Option<Progress>,
-}
-
-/// What is in the table part of a slot.
-#[derive(Clone, Copy)]
-enum Contents {
-    Empty,
-    Damaged(TableError),
-    Valid(Header),
-}
-
-/// An upload under way.
-struct Progress {
-    slot: usize,
-    /// Header of the file.
-    header: Header,
-    /// Bytes of the table that have come, its header included.
-    received: u32,
-    /// The slot is erased up to here, but for what is written already.
-    erased_to: u32,
-    /// Received bytes that do not fill a word of the flash yet.
-    tail: Vec<u8, MAX_WRITE_SIZE>,
-}
-
-impl Progress {
-    /// Goes on behind the first `received` bytes, which end with a page.
-    fn resumed(slot: usize, header: Header, received: u32) -> Self {
-        // The page that follows may be half written, the first one if no page was finished.
-        let erased_to = if received == HEADER_LENGTH as u32 {
-            0
-        } else {
-            received
-        };
-        Self {
-            slot,
-            header,
-            received,
-            erased_to,
-            tail: Vec::new(),
-        }
-    }
-
-    fn written(&self) -> u32 {
-        self.received - self.tail.len() as u32
-    }
-
-    fn state(&self) -> Upload {
-        Upload {
-            header: self.header,
-            received: self.received,
-        }
-    }
 }
 
 impl<M: TableMemory> Storage<M> {
@@ -196,14 +150,11 @@ impl<M: TableMemory> Storage<M> {
         let slot = self.free_slot();
         self.upload = None;
         let journal = self.journal(slot);
-        // The journal first: without it nothing in the slot counts as a part of a table.
+        // The journal first: without it nothing in the slot counts as a part of a table. The pages are erased as they are reached.
         self.erase(journal.start(), Self::PAGE)?;
-        self.erase(self.start_of(slot), Self::PAGE)?;
-        self.examine(slot);
         let record = Journal::<M>::record(&header);
         self.write(journal.start(), &record)?;
-        let mut upload = Progress::resumed(slot, header, HEADER_LENGTH as u32);
-        upload.erased_to = Self::PAGE;
+        let upload = Progress::resumed(slot, header, self.next_generation(), &[]);
         let state = upload.state();
         self.upload = Some(upload);
         Ok(state)
@@ -248,22 +199,12 @@ impl<M: TableMemory> Storage<M> {
             });
         }
         let slot = upload.slot;
-        let checked = self.payload(slot, &header).map_or(
-            Err(TableError::Length {
-                header: header.length,
-                found: self.slot_capacity(),
-            }),
-            |payload| {
-                header
-                    .check_payload(payload)
-                    .map(|()| header.with_generation(self.next_generation(), payload))
-            },
-        );
-        let committed = match checked {
+        let committed = match upload.checked() {
             Ok(renewed) => self
                 .write(self.start_of(slot), &renewed.to_bytes())
                 .and_then(|()| {
-                    self.examine(slot);
+                    // The CRC is that of what was written and read back.
+                    self.note(slot, Self::entries_checked);
                     match self.contents_of(slot) {
                         Contents::Valid(_) => Ok(()),
                         Contents::Damaged(why) => Err(Refusal::Table(why)),
@@ -274,7 +215,7 @@ impl<M: TableMemory> Storage<M> {
         };
         match committed {
             Ok(()) => self.in_use = Some(slot),
-            Err(_) => self.discard(slot),
+            Err(_) => self.forget(slot),
         }
         committed
     }
@@ -285,7 +226,7 @@ impl<M: TableMemory> Storage<M> {
     /// [`Refusal::NoUpload`].
     pub fn abort(&mut self) -> Result<(), Refusal> {
         let slot = self.upload.take().ok_or(Refusal::NoUpload)?.slot;
-        self.discard(slot);
+        self.forget(slot);
         Ok(())
     }
 
@@ -307,10 +248,6 @@ impl<M: TableMemory> Storage<M> {
         Journal::new(self.start_of(slot) + self.slot_capacity(), self.slot_capacity())
     }
 
-    fn contents_of(&self, slot: usize) -> Contents {
-        self.contents.get(slot).copied().unwrap_or(Contents::Empty)
-    }
-
     /// The bytes of a slot before the journal.
     fn slot_bytes(&self, slot: usize) -> &[u8] {
         let start = self.start_of(slot) as usize;
@@ -323,143 +260,6 @@ impl<M: TableMemory> Storage<M> {
         let bytes = self.slot_bytes(slot);
         let header = Header::read(bytes).ok()?;
         bytes.get(..header.length as usize)
-    }
-
-    fn payload(&self, slot: usize, header: &Header) -> Option<&[u8]> {
-        self.slot_bytes(slot).get(HEADER_LENGTH..header.length as usize)
-    }
-
-    /// Looks what is in a slot.
-    fn examine(&mut self, slot: usize) {
-        let bytes = self.slot_bytes(slot);
-        let is_empty = bytes.iter().take(HEADER_LENGTH).all(|&byte| byte == ERASED);
-        let read = || {
-            let header = Header::read(bytes)?;
-            let table = bytes.get(..header.length as usize).ok_or(TableError::Length {
-                header: header.length,
-                found: bytes.len() as u32,
-            })?;
-            LobeTable::parse(table).map(|_| header)
-        };
-        let contents = match read() {
-            Ok(header) => Contents::Valid(header),
-            Err(_) if is_empty => Contents::Empty,
-            Err(why) => Contents::Damaged(why),
-        };
-        if let Some(slot) = self.contents.get_mut(slot) {
-            *slot = contents;
-        }
-    }
-
-    fn newest(&self) -> Option<usize> {
-        let generation = |slot: &usize| match self.contents_of(*slot) {
-            Contents::Valid(header) => Some(header.generation),
-            _ => None,
-        };
-        let slots = || (0..SLOTS).filter(|slot| generation(slot).is_some());
-        // Generations may come round: the newer of two is the one less than half a round ahead.
-        slots().reduce(|a, b| match (generation(&a), generation(&b)) {
-            (Some(of_a), Some(of_b)) if of_b.wrapping_sub(of_a) < u32::MAX / 2 => b,
-            _ => a,
-        })
-    }
-
-    fn next_generation(&self) -> u32 {
-        match self.in_use.map(|slot| self.contents_of(slot)) {
-            Some(Contents::Valid(header)) => header.generation.wrapping_add(1),
-            _ => 1,
-        }
-    }
-
-    /// The slot for the next upload: one that is not in use.
-    fn free_slot(&self) -> usize {
-        (0..SLOTS)
-            .find(|&slot| self.in_use != Some(slot))
-            .unwrap_or_default()
-    }
-
-    /// The upload that the journals know of.
-    fn unfinished(&self) -> Option<Progress> {
-        let empty = |&slot: &usize| matches!(self.contents_of(slot), Contents::Empty);
-        (0..SLOTS).filter(empty).find_map(|slot| {
-            let (header, received) = self.journal(slot).read(self.memory.mapped())?;
-            let fits = header.schema == SCHEMA && header.length <= self.slot_capacity();
-            fits.then(|| Progress::resumed(slot, header, received))
-        })
-    }
-
-    /// Makes a slot empty. Where the flash does not let itself be erased, what is left is no valid table either.
-    fn discard(&mut self, slot: usize) {
-        let journal = self.journal(slot).start();
-        let _ = self
-            .erase(journal, Self::PAGE)
-            .and_then(|()| self.erase(self.start_of(slot), Self::PAGE));
-        self.examine(slot);
-    }
-
-    /// Writes data behind what has come: whole words at once, the rest waits in the tail.
-    fn receive(&mut self, mut upload: Progress, mut data: &[u8]) -> Result<Progress, Refusal> {
-        let journal = self.journal(upload.slot);
-        while !data.is_empty() {
-            let to_mark = journal.next_mark(upload.written()) - upload.written();
-            let whole = data.len().min(to_mark as usize) / M::WRITE_SIZE * M::WRITE_SIZE;
-            let (head, rest) = data.split_at(if upload.tail.is_empty() && whole > 0 {
-                whole
-            } else {
-                1
-            });
-            data = rest;
-            let at = upload.written();
-            upload.received += head.len() as u32;
-            if upload.tail.is_empty() && whole > 0 {
-                self.program(&mut upload, at, head)?;
-            } else {
-                upload.tail.extend_from_slice(head).map_err(|_| Refusal::Flash)?;
-                if upload.received == upload.header.length {
-                    while upload.tail.len() < M::WRITE_SIZE {
-                        upload.tail.push(ERASED).map_err(|_| Refusal::Flash)?;
-                    }
-                }
-                if upload.tail.len() == M::WRITE_SIZE {
-                    let tail = core::mem::take(&mut upload.tail);
-                    self.program(&mut upload, at, &tail)?;
-                }
-            }
-            let is_complete = upload.received == upload.header.length;
-            if is_complete || journal.is_at_mark(upload.written()) {
-                self.mark(&journal, &upload)?;
-            }
-        }
-        Ok(upload)
-    }
-
-    /// Writes whole words at an offset of the slot, erasing the pages they begin.
-    fn program(&mut self, upload: &mut Progress, offset: u32, words: &[u8]) -> Result<(), Refusal> {
-        let start = self.start_of(upload.slot);
-        let end = offset + words.len() as u32;
-        while upload.erased_to < end {
-            self.erase(start + upload.erased_to, Self::PAGE)?;
-            upload.erased_to += Self::PAGE;
-        }
-        self.write(start + offset, words)
-    }
-
-    /// Notes in the journal how much is written.
-    ///
-    /// A power cut may have left this very mark half written: then it stays as it is, and the next one says it too.
-    fn mark(&mut self, journal: &Journal<M>, upload: &Progress) -> Result<(), Refusal> {
-        let (offset, mark) = journal.mark(&upload.header, upload.written());
-        let range = offset as usize..offset as usize + mark.len();
-        let is_erased = self
-            .memory
-            .mapped()
-            .get(range)
-            .is_some_and(|bytes| bytes.iter().all(|&byte| byte == ERASED));
-        if is_erased {
-            self.write(offset, &mark)
-        } else {
-            Ok(())
-        }
     }
 
     fn erase(&mut self, from: u32, length: u32) -> Result<(), Refusal> {

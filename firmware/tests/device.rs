@@ -85,7 +85,7 @@ impl<'a> Bench<'a> {
 
     fn exchange(&mut self, bytes: &[u8]) -> Vec<Response> {
         self.wire.to_device.extend(bytes);
-        self.device.poll(&mut self.wire).unwrap();
+        while self.device.poll(&mut self.wire).unwrap() {}
         self.host.hear(&mut self.wire)
     }
 

@@ -3,6 +3,10 @@
 
 mod support;
 
+use std::cell::Cell;
+use std::rc::Rc;
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use proptest::prelude::*;
 use quietcut_core::lobes::{Header, TableError};
 use quietcut_core::protocol::{Refusal, Slot, Upload};
@@ -221,6 +225,118 @@ fn what_is_refused_leaves_the_table_in_use() {
     assert_holds(&storage, &old);
     let storage = Storage::new(Flash::new(storage.into_memory().into_bytes()));
     assert_holds(&storage, &old);
+}
+
+/// Flash that counts the pages it erases.
+struct Counting {
+    flash: Flash,
+    erased: Rc<Cell<u32>>,
+}
+
+impl ErrorType for Counting {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for Counting {
+    const READ_SIZE: usize = Flash::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
+        self.flash.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.flash.capacity()
+    }
+}
+
+impl NorFlash for Counting {
+    const WRITE_SIZE: usize = Flash::WRITE_SIZE;
+    const ERASE_SIZE: usize = Flash::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        self.erased
+            .set(self.erased.get() + (to - from) / Self::ERASE_SIZE as u32);
+        self.flash.erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
+        self.flash.write(offset, bytes)
+    }
+}
+
+impl TableMemory for Counting {
+    fn mapped(&self) -> &[u8] {
+        self.flash.mapped()
+    }
+}
+
+#[test]
+fn no_request_erases_more_than_a_page() {
+    // An eighth of a page, as the longest chunk is of the board's: more would touch two pages from their second word on.
+    const PIECE: usize = 32;
+    let erased = Rc::new(Cell::new(0));
+    let mut storage = Storage::new(Counting {
+        flash: empty(),
+        erased: erased.clone(),
+    });
+    let spent = || {
+        let pages = erased.take();
+        assert!(pages <= 1, "{pages} pages");
+        pages
+    };
+    let mut all = 0;
+    for (name, speeds) in [("first", 60), ("second", 90), ("third", 70), ("fourth", 80)] {
+        let file = table(name, 1.0, speeds);
+        let mut upload = storage.begin(Header::read(&file).unwrap()).unwrap();
+        all += spent();
+        while (upload.received as usize) < file.len() {
+            let rest = &file[upload.received as usize..];
+            upload = storage
+                .chunk(upload.received, &rest[..rest.len().min(PIECE)])
+                .unwrap();
+            all += spent();
+        }
+        // The third is given up.
+        if name == "third" {
+            storage.abort().unwrap();
+        } else {
+            storage.commit().unwrap();
+        }
+        all += spent();
+    }
+    let mut wrong = table("wrong", 1.0, 60);
+    wrong[200] ^= 1;
+    storage.begin(Header::read(&wrong).unwrap()).unwrap();
+    all += spent();
+    for (index, piece) in wrong[HEADER..].chunks(PIECE).enumerate() {
+        storage.chunk((HEADER + PIECE * index) as u32, piece).unwrap();
+        all += spent();
+    }
+    assert!(matches!(
+        storage.commit(),
+        Err(Refusal::Table(TableError::Crc { .. }))
+    ));
+    all += spent();
+    // Three to five pages of each table, and journals.
+    assert!(all > 20, "{all} pages");
+}
+
+#[test]
+fn a_table_stays_valid_until_its_pages_are_needed() {
+    let mut storage = Storage::new(empty());
+    send(&mut storage, &table("older", 1.0, 60), 100).unwrap();
+    send(&mut storage, &table("newer", 1.0, 60), 100).unwrap();
+    let next = table("next", 1.0, 60);
+    let header = Header::read(&next).unwrap();
+    storage.begin(header).unwrap();
+    assert!(matches!(storage.slots()[0], Slot::Unfinished(_)));
+    storage.abort().unwrap();
+    assert!(matches!(storage.slots()[0], Slot::Valid(_)));
+    storage.begin(header).unwrap();
+    storage.chunk(32, &next[32..100]).unwrap();
+    storage.abort().unwrap();
+    assert_eq!(storage.slots()[0], Slot::Empty);
+    assert_eq!(name_in_use(&storage).as_deref(), Some("newer"));
 }
 
 #[test]

@@ -8,17 +8,39 @@ const CRC_32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 ///
 /// It finds every single flipped bit and every burst of up to 32 bits.
 pub fn crc32<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> u32 {
-    let mut digest = digest();
+    let mut crc = Crc32::new();
     for piece in pieces {
-        digest.update(piece);
+        crc.update(piece);
     }
-    digest.finalize()
+    crc.value()
 }
 
-/// A CRC-32 under way.
-fn digest() -> Digest<'static, u32, Table<1>> {
-    static ENGINE: Crc<u32, Table<1>> = CRC_32;
-    ENGINE.digest()
+/// A CRC-32 under way: of bytes that come piece by piece.
+#[derive(Clone)]
+pub struct Crc32(Digest<'static, u32, Table<1>>);
+
+impl Default for Crc32 {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Crc32 {
+    /// Of nothing yet.
+    pub fn new() -> Self {
+        static ENGINE: Crc<u32, Table<1>> = CRC_32;
+        Self(ENGINE.digest())
+    }
+
+    /// Takes the bytes that follow.
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The checksum of all bytes so far.
+    pub fn value(&self) -> u32 {
+        self.0.clone().finalize()
+    }
 }
 
 #[cfg(test)]

@@ -126,8 +126,13 @@ impl<'a> LobeTable<'a> {
         header.check(bytes)?;
         let shape = Shape::read(bytes)?;
         let table = Self { bytes, shape };
-        check::check_entries(&table)?;
+        table.check_entries()?;
         Ok(table)
+    }
+
+    /// Refuses entries that no table may have, as [`parse`](Self::parse) does: for a table whose CRC is known to be right.
+    pub fn check_entries(&self) -> Result<(), TableError> {
+        check::check_entries(self)
     }
 
     /// The table in bytes that [`parse`](Self::parse) accepted before: the CRC and the entries are not checked again.

@@ -224,7 +224,8 @@ impl<'m> Emulator<'m> {
             let words = line.split(|c: char| !c.is_ascii_digit());
             words.filter_map(|word| word.parse().ok()).collect::<Vec<u64>>()
         });
-        let Some(&[stack_bytes, blocks, ticks, most_ticks]) = numbers.as_deref() else {
+        let Some(&[stack_bytes, blocks, ticks, most_ticks, request_ticks, flash_ticks]) = numbers.as_deref()
+        else {
             panic!("no cost in the log:\n{log}")
         };
         // 25 MHz.
@@ -233,6 +234,8 @@ impl<'m> Emulator<'m> {
             stack_bytes: stack_bytes as usize,
             mean_s: seconds(ticks) / blocks.max(1) as f64,
             most_s: seconds(most_ticks),
+            request_s: seconds(request_ticks),
+            flash_s: seconds(flash_ticks),
         }
     }
 
@@ -303,15 +306,24 @@ pub struct Cost {
     pub mean_s: f64,
     /// The longest time of a block, s.
     pub most_s: f64,
+    /// The longest time of a request, s, but for the flash.
+    pub request_s: f64,
+    /// The longest time that a request kept the flash busy, s.
+    pub flash_s: f64,
 }
 
 impl Cost {
-    /// The time in instructions, where the emulator counts them: mean and most.
+    /// The time of a block in instructions, where the emulator counts them: mean and most.
     pub fn instructions(&self) -> (f64, f64) {
         (
             self.mean_s / SECONDS_PER_INSTRUCTION,
             self.most_s / SECONDS_PER_INSTRUCTION,
         )
+    }
+
+    /// The longest request in instructions, where the emulator counts them, but for the flash.
+    pub fn request_instructions(&self) -> f64 {
+        self.request_s / SECONDS_PER_INSTRUCTION
     }
 }
 

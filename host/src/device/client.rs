@@ -21,7 +21,7 @@ const ATTEMPTS: u32 = 4;
 /// pseudo-terminal.
 const REPLY: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 1200 });
 
-/// The same where flash memory is erased first: 64 pages of 2 KB at 22 ms each, and as much again.
+/// The same where flash memory may be erased first: a page in 22 ms, and before it the blocks that wait; and many times as much.
 pub(super) const REPLY_AFTER_ERASE: Duration = Duration::from_secs(3);
 
 /// How long an answer is still waited for behind a frame that cannot be read.

@@ -45,7 +45,7 @@ use core::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::{Interval, Kind, TableError, Validity};
-use crate::checksum::crc32;
+use crate::checksum::{Crc32, crc32};
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::Limits;
 
@@ -182,9 +182,17 @@ impl Header {
         bytes
     }
 
+    /// The CRC-32 of a table with this header, as far as the header: the payload is to follow.
+    pub fn begin_crc(&self) -> Crc32 {
+        let mut crc = Crc32::new();
+        crc.update(self.without_crc().get(..CRC_OFFSET).unwrap_or_default());
+        crc
+    }
+
     fn crc_with(&self, payload: &[u8]) -> u32 {
-        let header = self.without_crc();
-        crc32([header.get(..CRC_OFFSET).unwrap_or_default(), payload])
+        let mut crc = self.begin_crc();
+        crc.update(payload);
+        crc.value()
     }
 }
 

@@ -51,7 +51,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::event_timer::EDGES;
 use crate::link_line::LinkLine;
-use crate::sensor::BLOCKS;
+use crate::sensor::{BLOCKS, MAX_BLOCKS};
 use crate::table_flash::TableFlash;
 
 bind_interrupts!(struct Irqs {
@@ -138,17 +138,22 @@ async fn main(_spawner: Spawner) {
     defmt::info!("quietcut on NUCLEO-G474RE");
     let mut edges = BlockEdges::default();
     loop {
-        while let Ok(block) = BLOCKS.try_receive() {
+        // All that wait, and those that come meanwhile, before a request that may erase a page; but requests are heard also
+        // where the pipeline cannot keep up.
+        for _ in 0..2 * MAX_BLOCKS {
+            let Ok(block) = BLOCKS.try_receive() else { break };
             device.take(&block, edges.until_the_end_of(&block));
-            let Ok(_) = device.poll(&mut LinkLine);
+            let Ok(()) = device.flush(&mut LinkLine);
             watchdog.pet();
         }
-        let Ok(_) = device.poll(&mut LinkLine);
+        let Ok(is_busy) = device.poll(&mut LinkLine);
         watchdog.pet();
         // Carries the timer's count on, where no event does.
         event_timer::now();
-        // Without work for a turn there is just another turn.
-        let _ = with_timeout(TURN, WORK.wait()).await;
+        if !is_busy {
+            // Without work for a turn there is just another turn.
+            let _ = with_timeout(TURN, WORK.wait()).await;
+        }
     }
 }
 

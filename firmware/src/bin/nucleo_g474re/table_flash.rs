@@ -1,6 +1,11 @@
 //! The two table slots: the second bank of the internal flash, as `memory.x` says.
 //!
-//! The program runs from the first bank. Interrupts go on while a page is erased; only the caller waits.
+//! The program runs from the first bank, so the processor and its interrupts go on while a page of the second is erased or written
+//! (RM0440, chapter 3: read-while-write); only the caller waits. The driver turns the data cache off meanwhile and empties it,
+//! and refuses to start where the option bytes join the banks to one.
+//!
+//! What no emulator shows, and no board has confirmed yet: that samples go on being read while a page is erased, and that a
+//! double word which a loss of power left half written raises the interrupt of [`pass_over_damage`] and nothing else.
 
 use embassy_stm32::flash::{Blocking, Error, FLASH_BASE, Flash};
 use embassy_stm32::pac;

@@ -1,9 +1,9 @@
-//! What the pipeline costs: the depth of the stack, and the time that each block takes.
+//! What the device costs: the depth of the stack, and the time that each block and each look at the link takes.
 //!
 //! The memory below the stack is painted at the start and looked at later. Time is that of the board's timer: where the emulator
 //! counts instructions (`-icount shift=6`) one instruction is 64 ns of it.
 
-use crate::clock;
+use crate::{clock, flash};
 
 /// More than the real board has in all.
 const PAINTED_BYTES: usize = 128 * 1024;
@@ -18,6 +18,9 @@ pub(crate) struct Cost {
     blocks: u32,
     ticks: u64,
     most_ticks: u32,
+    /// The longest look at the link, which may end with a request: without the time of the flash, and that of the flash.
+    request_ticks: u32,
+    flash_ticks: u32,
 }
 
 impl Cost {
@@ -38,6 +41,8 @@ impl Cost {
             blocks: 0,
             ticks: 0,
             most_ticks: 0,
+            request_ticks: 0,
+            flash_ticks: 0,
         }
     }
 
@@ -51,14 +56,27 @@ impl Cost {
         self.most_ticks = self.most_ticks.max(ticks);
     }
 
+    /// Looks at the link, does what the host asks, and notes how long that takes.
+    pub(crate) fn of_request<T>(&mut self, work: impl FnOnce() -> T) -> T {
+        let (start, flash_start) = (clock::ticks(), flash::busy_ticks());
+        let done = work();
+        let flash_ticks = flash::busy_ticks().wrapping_sub(flash_start);
+        let ticks = clock::ticks().wrapping_sub(start);
+        self.request_ticks = self.request_ticks.max(ticks.saturating_sub(flash_ticks));
+        self.flash_ticks = self.flash_ticks.max(flash_ticks);
+        done
+    }
+
     /// Writes all to the log.
     pub(crate) fn log(&self) {
         defmt::info!(
-            "cost: {=usize} bytes of stack; {=u32} blocks took {=u64} ticks, one at most {=u32}",
+            "cost: {=usize} bytes of stack; {=u32} blocks took {=u64} ticks, one at most {=u32}; a request at most {=u32}, and the flash {=u32}",
             self.stack_bytes(),
             self.blocks,
             self.ticks,
-            self.most_ticks
+            self.most_ticks,
+            self.request_ticks,
+            self.flash_ticks
         );
     }
 

@@ -3,6 +3,8 @@
 //! Pages of 2 KB are erased to ones, double words of 8 bytes are written once. The times are those of
 //! the STM32G474: a power cut falls where it would fall on the real board.
 
+use core::sync::atomic::{AtomicU32, Ordering};
+
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
@@ -18,6 +20,20 @@ const PAGE_BYTES: usize = 2048;
 const DOUBLE_WORD_BYTES: usize = 8;
 const ERASE_PAGE_MICROSECONDS: u32 = 22_000;
 const WRITE_DOUBLE_WORD_MICROSECONDS: u32 = 82;
+
+static BUSY_TICKS: AtomicU32 = AtomicU32::new(0);
+
+/// For how long the flash was busy, in ticks of the clock, modulo 2³².
+pub(crate) fn busy_ticks() -> u32 {
+    BUSY_TICKS.load(Ordering::Relaxed)
+}
+
+fn be_busy(microseconds: u32) {
+    let start = clock::ticks();
+    clock::wait_microseconds(microseconds);
+    let ticks = clock::ticks().wrapping_sub(start);
+    BUSY_TICKS.store(busy_ticks().wrapping_add(ticks), Ordering::Relaxed);
+}
 
 /// The only handle of the flash: [`Flash::take`] makes one.
 pub(crate) struct Flash(());
@@ -70,7 +86,7 @@ impl NorFlash for Flash {
     fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
         check_erase(self, from, to)?;
         for page in (from as usize..to as usize).step_by(PAGE_BYTES) {
-            clock::wait_microseconds(ERASE_PAGE_MICROSECONDS);
+            be_busy(ERASE_PAGE_MICROSECONDS);
             for offset in (page..page + PAGE_BYTES).step_by(DOUBLE_WORD_BYTES) {
                 // SAFETY: the range was checked to lie in the flash; volatile, so that the writes reach the
                 // file in this order.
@@ -93,7 +109,7 @@ impl NorFlash for Flash {
             if !erased && word != 0 {
                 return Err(NorFlashErrorKind::Other);
             }
-            clock::wait_microseconds(WRITE_DOUBLE_WORD_MICROSECONDS);
+            be_busy(WRITE_DOUBLE_WORD_MICROSECONDS);
             // SAFETY: as in `erase`.
             unsafe { Self::word(offset).write_volatile(word) };
         }

@@ -70,7 +70,7 @@ fn main() -> ! {
 
     let mut idle_turns = 0_u32;
     loop {
-        let Ok(mut is_busy) = device.poll(&mut line);
+        let Ok(mut is_busy) = spindle.cost.of_request(|| device.poll(&mut line));
         while let Some(byte) = SPINDLE.receive() {
             is_busy = true;
             if let Some(answer) = spindle.take(byte, &mut device, &mut line) {

@@ -18,7 +18,8 @@ pub(crate) struct Spindle {
     is_skipping: bool,
     /// Edges for the next block.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
-    cost: Cost,
+    /// What the device costs.
+    pub(crate) cost: Cost,
 }
 
 type BoardDevice = Device<'static, Flash, BoardClock>;
