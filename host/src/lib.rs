@@ -2,6 +2,7 @@
 
 pub mod case;
 pub mod cli;
+mod complex_eigenvalues;
 pub mod continuation;
 pub mod demo;
 pub mod device;

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, SMatrix};
 use num_complex::Complex64;
 
 use super::{FrfError, FrfTable};
+use crate::structure::feed_axes;
 
 /// The fewest lines through which a cubic passes.
 const LINES_MIN: usize = 4;
@@ -45,6 +46,16 @@ impl Interpolation {
         Ok(Self { frequency_hz, lines })
     }
 
+    /// Through every second line and the last one; `None` where those are too few.
+    pub fn thinned(&self) -> Option<Self> {
+        let last = self.lines.len() - 1;
+        let kept = || (0..last).step_by(2).chain([last]);
+        (kept().count() >= LINES_MIN).then(|| Self {
+            frequency_hz: kept().map(|index| self.frequency_hz[index]).collect(),
+            lines: kept().map(|index| self.lines[index]).collect(),
+        })
+    }
+
     /// First and last frequency of the table, Hz.
     pub fn band_hz(&self) -> (f64, f64) {
         match self.frequency_hz.as_slice() {
@@ -59,41 +70,62 @@ impl Interpolation {
         &self.frequency_hz
     }
 
-    /// H at a frequency, Hz, of either sign.
-    pub fn at(&self, frequency_hz: f64) -> Matrix3<Complex64> {
-        let positive = self.at_positive(frequency_hz.abs());
-        if frequency_hz < 0.0 {
-            positive.map(|entry| entry.conj())
-        } else {
-            positive
+    /// The same receptances seen by a feed that is turned by `angle_deg` from x towards y.
+    pub fn turned(&self, angle_deg: f64) -> Self {
+        let machine_from_feed = feed_axes(angle_deg).map(Complex64::from);
+        Self {
+            frequency_hz: self.frequency_hz.clone(),
+            lines: self
+                .lines
+                .iter()
+                .map(|line| machine_from_feed.transpose() * line * machine_from_feed)
+                .collect(),
         }
     }
 
-    fn at_positive(&self, frequency_hz: f64) -> Matrix3<Complex64> {
-        let (first, last) = self.band_hz();
-        if frequency_hz < first {
-            let share = frequency_hz / first;
-            return self.lines[0].map(|entry| Complex64::new(entry.re, entry.im * share));
+    /// H on the lines, m/N.
+    pub fn lines(&self) -> &[Matrix3<Complex64>] {
+        &self.lines
+    }
+
+    /// H(s) at the complex frequency f = s/2πi, Hz.
+    ///
+    /// Beside the real axis the polynomial of the nearest lines is continued: good as far from it as lines are apart,
+    /// or as the nearest mode allows.
+    pub fn at(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
+        if frequency_hz.re < 0.0 {
+            // Conjugate in s is −f̄ in f.
+            self.at_positive(-frequency_hz.conj()).map(|entry| entry.conj())
+        } else {
+            self.at_positive(frequency_hz)
         }
-        if frequency_hz > last {
-            return self.lines[self.lines.len() - 1] * Complex64::from((last / frequency_hz).powi(2));
+    }
+
+    fn at_positive(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
+        let (first, last) = self.band_hz();
+        if frequency_hz.re < first {
+            let share = frequency_hz / first;
+            return self.lines[0].map(|entry| entry.re + Complex64::I * entry.im * share);
+        }
+        if frequency_hz.re > last {
+            return self.lines[self.lines.len() - 1] * (last / frequency_hz).powi(2);
         }
         // The first line at or above: two lines below it, it and one more, as far as there are.
-        let above = self.frequency_hz.partition_point(|&line| line < frequency_hz);
+        let above = self.frequency_hz.partition_point(|&line| line < frequency_hz.re);
         let from = above.saturating_sub(2).min(self.lines.len() - 4);
         self.cubic([from, from + 1, from + 2, from + 3], frequency_hz)
     }
 
     /// The cubic through four lines.
-    fn cubic(&self, nodes: [usize; 4], frequency_hz: f64) -> Matrix3<Complex64> {
+    fn cubic(&self, nodes: [usize; 4], frequency_hz: Complex64) -> Matrix3<Complex64> {
         let at = nodes.map(|node| self.frequency_hz[node]);
         let mut sum = SMatrix::zeros();
         for (i, &node) in nodes.iter().enumerate() {
-            let mut weight = 1.0;
+            let mut weight = Complex64::ONE;
             for j in (0..4).filter(|&j| j != i) {
                 weight *= (frequency_hz - at[j]) / (at[i] - at[j]);
             }
-            sum += self.lines[node] * Complex64::from(weight);
+            sum += self.lines[node] * weight;
         }
         sum
     }
@@ -109,7 +141,7 @@ impl Interpolation {
         let worst = (3..count.saturating_sub(3))
             .map(|index| {
                 let nodes = [index - 3, index - 1, index + 1, index + 3];
-                let predicted = self.cubic(nodes, self.frequency_hz[index]);
+                let predicted = self.cubic(nodes, self.frequency_hz[index].into());
                 largest(&(predicted - self.lines[index]))
             })
             .fold(0.0, f64::max);
@@ -161,10 +193,12 @@ mod tests {
         // Half bandwidth ζf = 0.51 Hz.
         for (step, bound) in [(0.1, 1.2e-3), (0.2, 0.02), (0.05, 8e-5)] {
             let interpolation = Interpolation::new(&table(5.0, 40.0, step)).unwrap();
-            assert!((interpolation.at(17.0 + step)[(0, 0)] - mode(17.0 + step)).norm() < 1e-12 * peak());
+            assert!(
+                (interpolation.at((17.0 + step).into())[(0, 0)] - mode(17.0 + step)).norm() < 1e-12 * peak()
+            );
             let worst = (0..3500)
                 .map(|i| 5.0 + 0.01 * f64::from(i))
-                .map(|f| (interpolation.at(f)[(0, 0)] - mode(f)).norm() / peak())
+                .map(|f| (interpolation.at(f.into())[(0, 0)] - mode(f)).norm() / peak())
                 .fold(0.0, f64::max);
             assert!(worst < bound, "{step}: {worst}");
             // An estimate: right within a factor of two.
@@ -181,15 +215,28 @@ mod tests {
         let interpolation = Interpolation::new(&table(3.0, 100.0, 0.1)).unwrap();
         // The mode itself is off the stiffness line by (3/17)² of it, and off the inertia line by (17/100)².
         for f in [0.0, 1.0, 2.9] {
-            assert!((interpolation.at(f)[(0, 0)] - mode(f)).norm() < 0.033 * mode(f).norm());
+            assert!((interpolation.at(f.into())[(0, 0)] - mode(f)).norm() < 0.033 * mode(f).norm());
         }
         for f in [101.0, 200.0, 1000.0] {
-            assert!((interpolation.at(f)[(0, 0)] - mode(f)).norm() < 0.033 * mode(f).norm());
+            assert!((interpolation.at(f.into())[(0, 0)] - mode(f)).norm() < 0.033 * mode(f).norm());
         }
-        assert_eq!(interpolation.at(0.0)[(0, 0)].im, 0.0);
-        let negative = interpolation.at(-16.93);
-        assert_eq!(negative[(1, 0)], interpolation.at(16.93)[(1, 0)].conj());
+        assert_eq!(interpolation.at(0.0.into())[(0, 0)].im, 0.0);
+        let negative = interpolation.at((-16.93).into());
+        assert_eq!(negative[(1, 0)], interpolation.at(16.93.into())[(1, 0)].conj());
         assert_eq!(negative[(0, 1)], Complex64::ZERO);
+    }
+
+    #[test]
+    fn beside_the_axis_it_is_the_mode_continued() {
+        let interpolation = Interpolation::new(&table(5.0, 40.0, 0.1)).unwrap();
+        for sigma in [-0.3, 0.3, 1.0] {
+            let s = Complex64::new(sigma, TAU * 16.95);
+            let pole = TAU * 17.0;
+            let exact = (s * s + s * (2.0 * 0.03 * pole) + pole * pole).inv();
+            let continued = interpolation.at(s / Complex64::new(0.0, TAU))[(0, 0)];
+            // One rad/s is 0.16 Hz: 1.6 lines off the axis, where the pole is 0.51 Hz away.
+            assert!((continued - exact).norm() < 0.02 * exact.norm(), "{sigma}");
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod eigenmotion;
 mod element;
 mod exponential;
 mod fdm;
+mod frequency;
 pub(crate) mod gauss;
 mod krylov;
 mod line;
@@ -30,6 +31,7 @@ mod stepped;
 pub use chart::{Chart, Refinement, chart};
 pub use collocation::Collocation;
 pub use fdm::{Fdm, FullDiscretization};
+pub use frequency::{FrequencyProblem, ModeCoupling, MultiFrequency, Nyquist, Zoa};
 pub use line::{Limit, SpeedLine, Switch, line};
 pub use lobe_table::{BuildError, TableRequest, build_table};
 pub use method::{Label, Method};
@@ -37,13 +39,12 @@ pub use multiplier::{Kind, Verdict};
 pub use pitched::Pitched;
 pub use point::{LEAST_ERROR, Point, point};
 pub use problem::{CubicTerms, Problem, StabilityError};
+pub use sdm::{Sdm, SdmOrder, SemiDiscretization};
 pub use sensitivity::{Sensitivity, Slope, Tangent};
 
 #[cfg(test)]
-mod sensitivity_tests;
-pub use sdm::{Sdm, SdmOrder, SemiDiscretization};
-
-#[cfg(test)]
 mod agreement;
+#[cfg(test)]
+mod sensitivity_tests;
 #[cfg(test)]
 mod tests;

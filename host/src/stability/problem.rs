@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::case::{AXIAL_DEPTH_MODULATION, Case, CaseError};
+use crate::frf::FrfError;
 use crate::milling::Process;
 use crate::structure::{FirstOrder, StructureError};
 
@@ -49,6 +50,43 @@ pub enum StabilityError {
         path: PathBuf,
         /// What is not covered, and what can be done instead.
         what: &'static str,
+    },
+    /// Receptances are infinite.
+    #[error(
+        "a mode of {frequency_hz:.4} Hz has no damping: its receptance is infinite there; damping is needed, or a method \
+         that does not go through receptances"
+    )]
+    Undamped {
+        /// Frequency of the mode, Hz.
+        frequency_hz: f64,
+    },
+    /// Nothing can couple.
+    #[error(
+        "mode coupling is not defined here: {found}; two modes that move the tool in feed and normal direction are needed"
+    )]
+    NoModeCoupling {
+        /// What there is.
+        found: &'static str,
+    },
+    /// A table of frequency response functions cannot be used.
+    #[error(transparent)]
+    Frf(#[from] FrfError),
+    /// What was asked depends on frequencies that a table does not have.
+    #[error(
+        "at {rpm} rev/min and {depth_mm:.4} mm the cut vibrates at {frequency_hz:.3} Hz, but the frequency response \
+         functions were measured from {first_hz} to {last_hz} Hz only; measure there too, or ask for less depth"
+    )]
+    NotMeasured {
+        /// Spindle speed, rev/min.
+        rpm: f64,
+        /// Axial depth, mm.
+        depth_mm: f64,
+        /// Frequency of the vibration, Hz.
+        frequency_hz: f64,
+        /// First frequency of the table, Hz.
+        first_hz: f64,
+        /// Last frequency of the table, Hz.
+        last_hz: f64,
     },
     /// A speed or depth that no cut has.
     #[error("{quantity} {value}: {expected} is needed")]

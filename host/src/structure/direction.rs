@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use nalgebra::Matrix3;
+
 /// A displacement of, or a rotation about, an axis of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Direction {
@@ -51,6 +53,12 @@ impl fmt::Display for Direction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
+}
+
+/// Feed, normal and axial direction, as columns, of a feed that is turned by `angle_deg` from x towards y.
+pub fn feed_axes(angle_deg: f64) -> Matrix3<f64> {
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0)
 }
 
 /// A name that is no direction.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3};
 use num_complex::Complex64;
 
-use super::{Direction, Form, Matrices, Mode, Structure, StructureError};
+use super::{Direction, Form, Matrices, Mode, Structure, StructureError, feed_axes};
 use crate::eigenvalues::eigenvalues;
 
 /// ẋ = A x + B F, u = C x with F and u the force on and the displacement of the tool centre point in x, y, z.
@@ -52,8 +52,7 @@ impl FirstOrder {
     ///
     /// Force and displacement are then in feed, normal and axial direction.
     pub fn turned(&self, angle_deg: f64) -> Self {
-        let (sin, cos) = angle_deg.to_radians().sin_cos();
-        let machine_from_feed: Matrix3<f64> = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
+        let machine_from_feed = feed_axes(angle_deg);
         Self {
             a: self.a.clone(),
             b: &self.b * machine_from_feed,

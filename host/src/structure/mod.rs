@@ -9,7 +9,7 @@ mod modal;
 mod modes;
 
 pub use definiteness::{Indefinite, Remedy};
-pub use direction::Direction;
+pub use direction::{Direction, feed_axes};
 pub use error::StructureError;
 pub use first_order::FirstOrder;
 pub use matrices::Matrices;

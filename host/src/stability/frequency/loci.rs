@@ -1,0 +1,320 @@
+//! Characteristic loci: eigenvalues followed along the frequency, where they cross the positive real axis, and how often
+//! a determinant turns about zero.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex64;
+
+/// How often an interval of frequencies is halved where its loci cannot be followed.
+const LEVELS: u32 = 16;
+
+/// Share of a locus by which its middle may be off the straight line between the ends of an interval.
+const BEND: f64 = 0.1;
+
+/// Eigenvalues at one frequency.
+#[derive(Clone, Debug)]
+pub(super) struct Sample {
+    pub(super) omega: f64,
+    pub(super) values: Vec<Complex64>,
+}
+
+/// A locus on the positive real axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing {
+    /// Frequency, rad/s.
+    pub(super) omega: f64,
+    /// Where on the axis.
+    pub(super) value: f64,
+    /// True where the imaginary part rises with the frequency.
+    pub(super) rises: bool,
+}
+
+/// A function of frequency, rad/s, that gives its eigenvalues of absolute value `floor` and above.
+pub(super) trait Loci: Fn(f64) -> Option<Vec<Complex64>> {}
+impl<F: Fn(f64) -> Option<Vec<Complex64>>> Loci for F {}
+
+/// Samples over a grid, so dense that every locus of at least `floor` can be told from the others from one to the next,
+/// and is nearly straight in between: its middle is off by `bend` times a tenth of its size at most.
+///
+/// `None` where the function is.
+pub(super) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Option<Vec<Sample>> {
+    let sample = |omega: f64| {
+        Some(Sample {
+            omega,
+            values: loci(omega)?,
+        })
+    };
+    let mut samples = Vec::with_capacity(2 * grid.len());
+    let Some((&first, rest)) = grid.split_first() else {
+        return Some(samples);
+    };
+    let mut low = sample(first)?;
+    for &omega in rest {
+        let high = sample(omega)?;
+        samples.push(low.clone());
+        divide(&sample, &low, &high, (floor, bend * BEND), 0, &mut samples)?;
+        low = high;
+    }
+    samples.push(low);
+    Some(samples)
+}
+
+/// Adds the samples between two.
+fn divide(
+    sample: &impl Fn(f64) -> Option<Sample>,
+    low: &Sample,
+    high: &Sample,
+    limits: (f64, f64),
+    level: u32,
+    samples: &mut Vec<Sample>,
+) -> Option<()> {
+    if level == LEVELS || is_nothing(low, limits.0) && is_nothing(high, limits.0) && level > 0 {
+        return Some(());
+    }
+    let middle = sample(0.5 * (low.omega + high.omega))?;
+    if is_straight(low, &middle, high, limits) {
+        samples.push(middle);
+        return Some(());
+    }
+    divide(sample, low, &middle, limits, level + 1, samples)?;
+    samples.push(middle.clone());
+    divide(sample, &middle, high, limits, level + 1, samples)
+}
+
+fn is_nothing(sample: &Sample, floor: f64) -> bool {
+    sample.values.iter().all(|value| value.norm() < 0.5 * floor)
+}
+
+fn is_straight(low: &Sample, middle: &Sample, high: &Sample, (floor, bend): (f64, f64)) -> bool {
+    let (Some(first), Some(second)) = (pairs(low, middle, floor), pairs(middle, high, floor)) else {
+        return false;
+    };
+    middle.values.iter().enumerate().all(|(index, value)| {
+        if value.norm() < 0.5 * floor {
+            return true;
+        }
+        let from = first
+            .iter()
+            .find(|pair| pair.1 == index)
+            .map(|pair| low.values[pair.0]);
+        let to = second
+            .iter()
+            .find(|pair| pair.0 == index)
+            .map(|pair| high.values[pair.1]);
+        match (from, to) {
+            (Some(from), Some(to)) => {
+                let size = from.norm().max(to.norm());
+                (value - (from + to) * 0.5).norm() <= bend * size && (to - from).norm() <= 6.0 * bend * size
+            }
+            // Only what is small can come from or go to nowhere.
+            _ => value.norm() < floor,
+        }
+    })
+}
+
+/// Which value of one sample is which of the next: nearest first. `None` where a value of at least `floor` is left over.
+fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
+    let mut near: Vec<(f64, usize, usize)> = Vec::with_capacity(a.values.len() * b.values.len());
+    for (i, p) in a.values.iter().enumerate() {
+        for (j, q) in b.values.iter().enumerate() {
+            near.push(((p - q).norm(), i, j));
+        }
+    }
+    near.sort_by(|x, y| x.0.total_cmp(&y.0));
+    let mut pairs: Vec<(usize, usize)> = Vec::with_capacity(a.values.len());
+    for (_, i, j) in near {
+        if pairs.iter().all(|pair| pair.0 != i && pair.1 != j) {
+            pairs.push((i, j));
+        }
+    }
+    let is_left = |sample: &Sample, index: usize, used: bool| !used && sample.values[index].norm() >= floor;
+    let left = (0..a.values.len()).any(|i| is_left(a, i, pairs.iter().any(|pair| pair.0 == i)))
+        || (0..b.values.len()).any(|j| is_left(b, j, pairs.iter().any(|pair| pair.1 == j)));
+    (!left).then_some(pairs)
+}
+
+/// The steps from each sample to the next, locus by locus: both samples and both values.
+pub(super) fn steps(samples: &[Sample]) -> impl Iterator<Item = [(f64, Complex64); 2]> {
+    samples.windows(2).flat_map(|pair| {
+        // Whatever is left over is below every floor that matters, or was halved in vain.
+        pairs(&pair[0], &pair[1], f64::INFINITY)
+            .unwrap_or_default()
+            .into_iter()
+            .map(|(i, j)| {
+                [
+                    (pair[0].omega, pair[0].values[i]),
+                    (pair[1].omega, pair[1].values[j]),
+                ]
+            })
+            .collect::<Vec<_>>()
+    })
+}
+
+/// Where loci of at least `floor` cross the positive real axis, largest first: solved for to 1e-12 of the value.
+pub(super) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Option<Vec<Crossing>> {
+    let mut found = Vec::new();
+    for [low, high] in steps(samples) {
+        if (low.1.im > 0.0) == (high.1.im > 0.0) || low.1.re.max(high.1.re) < 0.5 * floor {
+            continue;
+        }
+        let mark = |(omega, value): (f64, Complex64)| Mark {
+            omega,
+            value,
+            miss: value.im,
+        };
+        let tolerance = 1e-12 * low.1.norm().max(high.1.norm());
+        let (omega, value) = zero(mark(low), mark(high), tolerance, |omega| {
+            Some(loci(omega)?.into_iter().map(|value| (value, value.im)).collect())
+        })?;
+        if value.re >= floor {
+            found.push(Crossing {
+                omega,
+                value: value.re,
+                rises: high.1.im > 0.0,
+            });
+        }
+    }
+    found.sort_by(|a, b| b.value.total_cmp(&a.value));
+    Some(found)
+}
+
+/// A point of a locus, and by how much it misses what is looked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mark {
+    pub(super) omega: f64,
+    pub(super) value: Complex64,
+    pub(super) miss: f64,
+}
+
+/// Where the miss is zero between two points of a locus with misses of either sign: the frequency, and the locus there.
+///
+/// `at` gives all loci at a frequency with their misses; the one nearest to the straight line counts. Regula falsi with
+/// halving (Illinois), until the miss is below the tolerance.
+pub(super) fn zero(
+    mut low: Mark,
+    mut high: Mark,
+    tolerance: f64,
+    at: impl Fn(f64) -> Option<Vec<(Complex64, f64)>>,
+) -> Option<(f64, Complex64)> {
+    let (ends, width) = ([low, high], high.omega - low.omega);
+    let mut last_side = 0;
+    for _ in 0..80 {
+        let omega = low.omega + (high.omega - low.omega) * low.miss / (low.miss - high.miss);
+        let share = (omega - ends[0].omega) / width;
+        let expected = ends[0].value + (ends[1].value - ends[0].value) * share;
+        let (value, miss) = at(omega)?
+            .into_iter()
+            .min_by(|p, q| (p.0 - expected).norm().total_cmp(&(q.0 - expected).norm()))?;
+        if miss.abs() <= tolerance || (high.omega - low.omega).abs() <= 1e-15 * high.omega {
+            return Some((omega, value));
+        }
+        let mark = Mark { omega, value, miss };
+        if (miss > 0.0) == (low.miss > 0.0) {
+            low = mark;
+            high.miss *= if last_side == 1 { 0.5 } else { 1.0 };
+            last_side = 1;
+        } else {
+            high = mark;
+            low.miss *= if last_side == -1 { 0.5 } else { 1.0 };
+            last_side = -1;
+        }
+    }
+    Some((high.omega, high.value))
+}
+
+/// By how much the argument of a function, rad, grows over a grid; steps are halved until each turns it by a fifth of a
+/// half turn at most, and its middle agrees.
+///
+/// `None` where the function is, or vanishes.
+pub(super) fn turning(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
+    let mut sum = 0.0;
+    let Some((&first, rest)) = grid.split_first() else {
+        return Some(sum);
+    };
+    let mut low = (first, function(first)?);
+    for &omega in rest {
+        let high = (omega, function(omega)?);
+        sum += turning_between(function, low, high, 0)?;
+        low = high;
+    }
+    sum.is_finite().then_some(sum)
+}
+
+fn turning_between(
+    function: &impl Fn(f64) -> Option<Complex64>,
+    low: (f64, Complex64),
+    high: (f64, Complex64),
+    level: u32,
+) -> Option<f64> {
+    let middle_omega = 0.5 * (low.0 + high.0);
+    let middle = (middle_omega, function(middle_omega)?);
+    let (first, second) = ((middle.1 / low.1).arg(), (high.1 / middle.1).arg());
+    if !(first.is_finite() && second.is_finite()) {
+        return None;
+    }
+    // Twenty halvings are a millionth of a step: a function that turns there has its zero on the path.
+    if first.abs().max(second.abs()) < 0.2 * PI || level == 20 {
+        return Some(first + second);
+    }
+    Some(
+        turning_between(function, low, middle, level + 1)?
+            + turning_between(function, middle, high, level + 1)?,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two loci of one pole each, turned by a delay.
+    fn two(omega: f64) -> Option<Vec<Complex64>> {
+        let mode = |natural: f64, size: f64| {
+            size / Complex64::new(natural * natural - omega * omega, 0.04 * natural * omega)
+                * (Complex64::ONE - Complex64::cis(-omega))
+        };
+        Some(vec![mode(10.0, 1.0), mode(23.0, 5.0)])
+    }
+
+    #[test]
+    fn crossings_are_on_the_axis_and_a_coarse_grid_finds_the_same() {
+        let find = |step: f64| {
+            let grid: Vec<f64> = (0..=(60.0 / step) as usize).map(|i| step * i as f64).collect();
+            let samples = trace(&two, &grid, 1e-4, 1.0).unwrap();
+            crossings(&two, &samples, 1e-4).unwrap()
+        };
+        let (fine, coarse) = (find(0.01), find(0.5));
+        assert!(fine.len() > 4);
+        assert_eq!(fine.len(), coarse.len());
+        for (a, b) in fine.iter().zip(&coarse) {
+            assert!(
+                (a.value - b.value).abs() < 1e-9 * a.value && a.rises == b.rises,
+                "{a:?} {b:?}"
+            );
+            let nearest = two(a.omega)
+                .unwrap()
+                .into_iter()
+                .map(|value| (value - a.value).norm())
+                .fold(f64::INFINITY, f64::min);
+            assert!(nearest < 1e-10 * a.value);
+        }
+    }
+
+    #[test]
+    fn a_polynomial_turns_by_half_a_turn_for_each_root_to_the_left() {
+        // (s + 1)(s² + 0.02 s + 4)(s − 3)(s² − 0.01 s + 9): three roots left, three right.
+        let function = |omega: f64| {
+            let s = Complex64::new(0.0, omega);
+            Some((s + 1.0) * (s * s + s * 0.02 + 4.0) * (s - 3.0) * (s * s - s * 0.01 + 9.0))
+        };
+        let grid = [0.0, 1.9, 2.1, 2.95, 3.05, 1e4];
+        let turned = turning(&function, &grid).unwrap();
+        // From 0 to infinity a root left adds a quarter turn, one right takes it away; the rest at 1e4 is 1e-3.
+        assert!(turned.abs() < 1e-2, "{turned}");
+        let stable = |omega: f64| {
+            let s = Complex64::new(0.0, omega);
+            Some((s + 1.0) * (s * s + s * 0.02 + 4.0))
+        };
+        let turned = turning(&stable, &grid).unwrap();
+        assert!((turned - 1.5 * PI).abs() < 1e-2, "{turned}");
+    }
+}
