@@ -89,6 +89,11 @@ fn wrong_numbers_of_a_cut() {
     simulate("900", "-2").refused(&["--depth-mm", "-2", "greater than 0"]);
     simulate("0", "2").refused(&["--rpm", "0", "greater than 0"]);
     simulate("fast", "2").refused(&["--rpm", "fast", "not a number"]);
+    run(&["table", "case.toml", "--depth-mm", "-1", "--out", "a.qct"]).refused(&[
+        "--depth-mm",
+        "-1",
+        "greater than 0",
+    ]);
     run(&["lobes", "case.toml", "--at", "900,-2"]).refused(&["-2"]);
     run(&["lobes", "case.toml", "--at", "900"]).refused(&["900", "RPM,MM"]);
     run(&["lobes", "case.toml", "--rpm", "600:900:4", "--depth-mm=-1:2:5"])
@@ -134,6 +139,63 @@ fn wrong_recordings() {
     .refused(&["a.csv", "tacho", "--rpm"]);
     replay(RECORDING, &["--teeth", "2", "--table", "a.csv"]).refused(&["a.csv", "QCLT"]);
     replay(RECORDING, &["--teeth", "2", "--port", "/dev/no-such-port"]).refused(&["/dev/no-such-port"]);
+}
+
+#[test]
+fn wrong_sidecars_of_recordings() {
+    let folder = folder();
+    let replay = |sidecar: &str| {
+        let sidecar = format!("kind = \"cutting\"\n{sidecar}");
+        fs::write(folder.path().join("a.csv"), RECORDING).expect("a file can be written");
+        fs::write(folder.path().join("a.toml"), sidecar).expect("a file can be written");
+        quietcut(folder.path(), &["replay", "a.csv"])
+    };
+    replay("[cut]\nteeth = 0").refused(&["a.toml", "cut.teeth = 0", "greater than 0"]);
+    replay("[cut]\nteeth = 2\naxial_depth_mm = -2").refused(&[
+        "a.toml",
+        "cut.axial_depth_mm = -2",
+        "0 or more",
+    ]);
+    replay("[cut]\nflutes = 2").refused(&["a.toml", "line", "flutes"]);
+}
+
+#[test]
+fn tables_that_are_none() {
+    let folder = folder();
+    let run = |arguments: &[&str]| quietcut(folder.path(), arguments);
+    let good = quietcut_tests::cut::table("good", 1.5, 20);
+    fs::write(folder.path().join("a.csv"), RECORDING).expect("a file can be written");
+    let changed = |at: usize| {
+        let mut bytes = good.clone();
+        bytes[at] ^= 4;
+        bytes
+    };
+    for (content, words) in [
+        (changed(good.len() / 2), ["CRC-32", "the bytes have changed"]),
+        (changed(4), ["schema 5", "known is 1"]),
+        (changed(0), ["a.qct", "QCLT"]),
+        (good[..good.len() - 7].to_vec(), ["bytes", "header"]),
+        (Vec::new(), ["a.qct", "bytes"]),
+    ] {
+        fs::write(folder.path().join("a.qct"), content).expect("a file can be written");
+        for arguments in [
+            &["table", "--show", "a.qct"][..],
+            &["upload", "simulated", "a.qct"],
+            &["replay", "a.csv", "--teeth", "2", "--table", "a.qct"],
+            &[
+                "replay",
+                "a.csv",
+                "--teeth",
+                "2",
+                "--table",
+                "a.qct",
+                "--port",
+                "simulated",
+            ],
+        ] {
+            run(arguments).refused(&["a.qct", words[0], words[1]]);
+        }
+    }
 }
 
 #[test]

@@ -1,16 +1,22 @@
 //! The command against devices with faults: each its own message and exit status 2.
 #![allow(clippy::expect_used)]
 
+use std::fs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use quietcut::device::pseudo_terminal::PseudoTerminal;
+use quietcut_core::acceleration::Sensor;
 use quietcut_core::protocol::{
-    Decoder, FrameError, Info, MAX_FRAME, Reply, Request, Response, Sequence, Slot, VERSION, encode,
+    Decoder, FrameError, FrameErrors, Info, MAX_FRAME, Reply, Request, Response, Sequence, Slot, Status,
+    Subscription, Upload, VERSION, encode,
 };
+use quietcut_core::units::Nanoseconds;
+use quietcut_firmware::defaults;
 use quietcut_tests::command::{Outcome, alone, folder, quietcut, start};
+use quietcut_tests::cut::table;
 
 /// A device at a pseudo-terminal that answers each request with what a script makes of it.
 struct FaultyDevice {
@@ -86,6 +92,21 @@ fn info() -> Info {
         slot_capacity: 4096,
         slots: [Slot::Empty, Slot::Empty],
         table: None,
+    }
+}
+
+fn status() -> Status {
+    Status {
+        uptime: Nanoseconds(0),
+        blocks: 0,
+        clipped: 0,
+        lost: 0,
+        is_fed: false,
+        working_point: None,
+        subscription: Subscription::default(),
+        frames: 0,
+        frame_errors: FrameErrors::default(),
+        dropped: 0,
     }
 }
 
@@ -219,6 +240,39 @@ fn a_port_that_is_unplugged() {
     });
     let monitor = start(folder().path(), &["monitor", &device.path, "--seconds", "1"]);
     monitor.finish().refused(&[&device.path, "unplugged"]);
+}
+
+/// A device that does what the command asks until the first request that `is_last`, and then is gone.
+fn unplugged_at(is_last: fn(&Request) -> bool) -> FaultyDevice {
+    let mut sequence = Sequence::default();
+    FaultyDevice::new(move |request, asked| {
+        let reply = match asked {
+            ref last if is_last(last) => return Act::Unplug,
+            Request::Hello | Request::Info => Reply::Info(info()),
+            Request::Settings => Reply::Settings(defaults::settings(Sensor::IIS3DWB_16G)),
+            Request::Status => Reply::Status(status()),
+            Request::UploadBegin(header) => Reply::Upload(Upload { header, received: 32 }),
+            _ => Reply::Done,
+        };
+        Act::Send(frame(sequence.take(), &Response::Reply { request, reply }))
+    })
+}
+
+#[test]
+fn a_plug_pulled_in_the_middle_of_an_upload_or_a_replay() {
+    let folder = folder();
+    let run = |arguments: &[&str]| quietcut(folder.path(), arguments);
+    fs::write(folder.path().join("a.qct"), table("good", 1.5, 50)).expect("a file");
+    let device = unplugged_at(|request| matches!(request, Request::UploadChunk { .. }));
+    run(&["upload", &device.path, "a.qct"]).refused(&[&device.path, "unplugged"]);
+
+    let samples: String = (0..200)
+        .map(|n| format!("{},0.1,{}\n", f64::from(n) * 1e-4, n % 2))
+        .collect();
+    let recording = format!("t [s],ax [m/s^2],tacho [1]\n{samples}");
+    fs::write(folder.path().join("a.csv"), recording).expect("a file");
+    let device = unplugged_at(|request| matches!(request, Request::Feed(_)));
+    run(&["replay", "a.csv", "--teeth", "2", "--port", &device.path]).refused(&[&device.path, "unplugged"]);
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub struct Args {
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "cases")]
     rpm: Option<Range>,
     /// The largest axial depth in mm. Default: four times the lowest limit.
-    #[arg(long, value_name = "MM", value_parser = super::positive, requires = "cases")]
+    #[arg(long, value_name = "MM", value_parser = super::positive, allow_negative_numbers = true, requires = "cases")]
     depth_mm: Option<f64>,
     /// Feeds per tooth in mm, one layer each, where limits depend on the feed; separated by commas.
     #[arg(long, value_name = "MM", value_parser = super::positive, value_delimiter = ',', requires = "cases")]
@@ -110,7 +110,7 @@ pub fn run(args: Args) -> Result<(), Error> {
 }
 
 fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
-    let wrong = |error| Error::input(format!("{}: not a lobe table: {error:?}", path.display()));
+    let wrong = |error| Error::input(format!("{}: this is no lobe table: {error}", path.display()));
     let table = LobeTable::parse(bytes).map_err(wrong)?;
     let header = table.header().map_err(wrong)?;
     let (from, to) = table.depths();
