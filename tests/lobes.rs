@@ -249,3 +249,44 @@ fn methods_refuse_what_they_are_not_defined_for_and_options_of_others() {
     refused(linear, &["--method", "sdm", "--steps", "0"], &["0", "from 1"]);
     refused(linear, &["--method", "sdm", "--order", "2"], &["2", "0 or 1"]);
 }
+
+#[test]
+fn cells_answer_with_a_grid_and_are_written_in_every_format() {
+    let folder = folder();
+    let kuka = case("kuka-kr90-acetal");
+    let arguments = [
+        "lobes",
+        &kuka,
+        "--rpm",
+        "1030:1060:4",
+        "--depth-mm",
+        "0:4:41",
+        "--cells",
+    ];
+    let answer = json(&[&arguments[..], &["--json"]].concat());
+    assert_eq!(answer["depths_mm"].as_array().expect("depths").len(), 41);
+    let line = &answer["speeds"][1];
+    assert_eq!(line["rpm"], 1040.0);
+    for key in ["multiplier_abs", "error", "verdict"] {
+        assert_eq!(line[key].as_array().expect("cells").len(), 41, "{key}");
+    }
+    // At 1040 rev/min stability is lost near 1.4 mm.
+    assert_eq!(line["verdict"][10], "stable");
+    assert_eq!(line["verdict"][20], "unstable");
+    for (out, start) in [
+        ("a.svg", "<svg"),
+        ("a.html", "<!DOCTYPE html>"),
+        (
+            "a.csv",
+            "rpm [rev/min],depth [mm],multiplier_abs [1],error [1],verdict",
+        ),
+        ("a.json", "{\"method\":\"collocation\",\"depths_mm\":[0.0,"),
+    ] {
+        let answer = quietcut(folder.path(), &[&arguments[..], &["--out", out]].concat());
+        assert_eq!(answer.status, Some(0), "{answer:?}");
+        assert!(answer.stdout.contains("164 cells"), "{answer:?}");
+        let text = std::fs::read_to_string(folder.path().join(out)).expect("the file");
+        assert!(text.starts_with(start), "{out}: {}", &text[..60]);
+    }
+    quietcut(folder.path(), &[&arguments[..], &["--out", "a.png"]].concat()).refused(&["a.png", ".svg"]);
+}

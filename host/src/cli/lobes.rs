@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::method::MethodChoice;
-use super::{Error, Output, Range};
+use super::{Error, Output, Range, lobes_cells};
 use crate::case::Case;
 use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
@@ -16,7 +16,7 @@ use crate::stability::{Chart, Label, Method, Point, SpeedLine, chart};
 /// Stability limits over speed, or the dominant multiplier at points.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --rpm 900:1200:7 --depth-mm 0.1:4:40 --out lobes.svg\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --at 1045,2 --at 900,2"
+    after_help = "Example:\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --rpm 900:1200:7 --depth-mm 0.1:4:40 --out lobes.svg\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --rpm 600:2400:200 --depth-mm 0.05:5:100 --cells --out cells.svg\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --at 1045,2 --at 900,2"
 )]
 pub struct Args {
     /// The case file: structure, tool, material, cut.
@@ -26,10 +26,13 @@ pub struct Args {
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "depth_mm", required_unless_present = "at")]
     rpm: Option<Range>,
     /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
-    #[arg(long, value_name = "R", value_parser = Range::positive, requires = "rpm")]
+    #[arg(long, value_name = "R", value_parser = Range::non_negative, requires = "rpm")]
     depth_mm: Option<Range>,
     #[command(flatten)]
     method: MethodChoice,
+    /// The dominant multiplier of every speed and depth, with its error, instead of the limits.
+    #[arg(long, requires = "rpm")]
+    cells: bool,
     /// Chart or table to write: svg, html, csv or json by its ending.
     #[arg(long, value_name = "FILE", requires = "rpm")]
     out: Option<PathBuf>,
@@ -52,6 +55,10 @@ pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case).map_err(Error::input)?;
     let method = args.method.on(&case)?;
     match (args.rpm, args.depth_mm) {
+        (Some(rpm), Some(depth_mm)) if args.cells => {
+            let grid = (rpm, depth_mm);
+            lobes_cells::run(&case, method.as_ref(), grid, args.out, args.output)
+        }
         (Some(rpm), Some(depth_mm)) => {
             run_chart(&case, method.as_ref(), rpm, depth_mm, args.out, args.output)
         }

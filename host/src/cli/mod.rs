@@ -6,6 +6,7 @@ pub mod demo;
 mod error;
 pub mod info;
 pub mod lobes;
+mod lobes_cells;
 mod method;
 pub mod monitor;
 mod number;

@@ -55,6 +55,20 @@ impl Range {
     }
 }
 
+impl Range {
+    /// A value parser for ranges of numbers of which the first or the last may be 0.
+    pub fn non_negative(text: &str) -> Result<Self, String> {
+        let range: Self = text.parse()?;
+        if range.first >= 0.0 && range.last >= 0.0 && range.first.max(range.last) > 0.0 {
+            Ok(range)
+        } else {
+            Err(format!(
+                "`{text}` is not possible: no value may be below 0, and one must be greater than 0"
+            ))
+        }
+    }
+}
+
 impl FromStr for Range {
     type Err = String;
 

@@ -1,6 +1,7 @@
 //! What people read: words, pictures, the HTML report.
 
 pub mod answer;
+pub mod cell_map;
 pub mod lobe_chart;
 pub mod marks;
 pub mod page;

@@ -11,9 +11,13 @@
 use num_complex::Complex64;
 
 use super::period::{Element, Period};
+use super::root::Root;
 
 /// Coefficients are dropped once a whole term is below this share of the largest: rounding level.
 const TERM: f64 = 1e-17;
+
+/// How far beyond their scale polynomials may be used: 20 terms lose three digits more.
+const RADIUS: f64 = 1.5;
 
 /// The most terms of a polynomial: elements are so short that far fewer are needed.
 const TERMS_MAX: usize = 60;
@@ -165,6 +169,27 @@ impl Characteristic {
             }
         }
         None
+    }
+
+    /// The multiplier near a guess, with its derivative, by one step of Newton; real guesses stay real.
+    ///
+    /// Its error is about the square of that of the guess, which must be below a hundredth. `None` where it is not, or where
+    /// κ is too large for the polynomials.
+    pub(super) fn root_near(&self, guess: Complex64, depth_m: f64, work: &mut Workspace) -> Option<Root> {
+        // At the root itself both logarithmic derivatives are infinite; their ratio is smooth.
+        let beside = guess + Complex64::new(1e-7, 1e-7) * guess.norm();
+        if (Complex64::ONE - beside.inv()).norm() * depth_m > RADIUS * self.scale {
+            return None;
+        }
+        let logarithmic = self.logarithmic(beside, depth_m, work)?;
+        let mut multiplier = beside - logarithmic.by_multiplier.inv();
+        let mut slope = -logarithmic.by_depth / logarithmic.by_multiplier;
+        if guess.im == 0.0 {
+            (multiplier.im, slope.im) = (0.0, 0.0);
+        }
+        // A second root close by makes steps too short: the terms of two roots add up in the logarithmic derivative.
+        let step = (multiplier - guess).norm();
+        (step < 0.01 * guess.norm() && slope.is_finite()).then_some(Root { multiplier, slope })
     }
 
     /// dμ/dw, 1/m, along the branch of multipliers through (μ, w).

@@ -3,12 +3,14 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
+use super::cells::{Cell, cells_of};
 use super::characteristic::{Characteristic, Crossing, Workspace};
 use super::line::{SpeedLine, line};
 use super::method::Method;
 use super::multiplier::chatter_hz;
 use super::period::{Period, Resolution};
 use super::point::{Point, point};
+use super::root::Root;
 use super::spectrum::Spectrum;
 use super::{Problem, StabilityError};
 use crate::eigenvalues::eigenvalues;
@@ -31,6 +33,12 @@ impl Method for Collocation {
 
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
         line(&self.problem, rpm, depth_mm, samples)
+    }
+
+    fn cells(&self, rpm: f64, depths_mm: &[f64]) -> Result<Vec<Cell>, StabilityError> {
+        cells_of(rpm, depths_mm, |deepest_m| {
+            Collocated::new(&self.problem, rpm, deepest_m)
+        })
     }
 }
 
@@ -76,6 +84,10 @@ impl Spectrum for Collocated<'_> {
     fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64> {
         self.characteristic
             .sensitivity(multiplier, depth_m, &mut self.workspace)
+    }
+
+    fn root_near(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
+        self.characteristic.root_near(guess, depth_m, &mut self.workspace)
     }
 
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {

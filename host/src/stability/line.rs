@@ -7,6 +7,7 @@ use super::characteristic::Crossing;
 use super::collocation::Collocated;
 use super::multiplier::Kind;
 use super::point::{check_depth, check_speed};
+use super::root::Root;
 use super::spectrum::Spectrum;
 use super::{Problem, StabilityError};
 
@@ -117,29 +118,9 @@ pub(super) fn line_of<S: Spectrum>(
     Ok(scan.finish(start, depth_mm))
 }
 
-/// One multiplier at one depth, in the upper half plane or on the real axis.
-#[derive(Clone, Copy, Debug)]
-struct Root {
-    multiplier: Complex64,
-    /// dμ/dw, 1/m.
-    slope: Complex64,
-}
-
-impl Root {
-    /// Distance from the unit circle, positive outside.
-    fn excess(&self) -> f64 {
-        self.multiplier.norm() - 1.0
-    }
-
-    /// d|μ|/dw.
-    fn excess_slope(&self) -> f64 {
-        (self.multiplier.conj() * self.slope).re / self.multiplier.norm()
-    }
-
-    /// True where the circle may be reached within a step.
-    fn is_near(&self, step_m: f64) -> bool {
-        self.excess().abs() < (3.0 * self.slope.norm() * step_m + 0.02).min(FAR)
-    }
+/// True where the circle may be reached within a step.
+fn is_near(root: &Root, step_m: f64) -> bool {
+    root.excess().abs() < (3.0 * root.slope.norm() * step_m + 0.02).min(FAR)
 }
 
 #[derive(Clone, Debug)]
@@ -237,20 +218,8 @@ impl<S: Spectrum> Scan<S> {
         let step_m = high.depth_m - low.depth_m;
         let mut free: Vec<Root> = high.roots.clone();
         let mut found = Vec::new();
-        for from in low.roots.iter().filter(|root| root.is_near(step_m)) {
-            let middle = from.multiplier + from.slope * (0.5 * step_m);
-            let miss = |to: &Root| (middle - (to.multiplier - to.slope * (0.5 * step_m))).norm();
-            let (index, to) = free
-                .iter()
-                .copied()
-                .enumerate()
-                .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))?;
-            let travel = 0.5 * step_m * (from.slope.norm() + to.slope.norm());
-            // Both tangents meet half way to within a quarter of the way: the same branch.
-            if miss(&to) > 0.25 * travel + 1e-6 || Kind::of(from.multiplier) != Kind::of(to.multiplier) {
-                return None;
-            }
-            free.swap_remove(index);
+        for from in low.roots.iter().filter(|root| is_near(root, step_m)) {
+            let to = from.take_next(&mut free, step_m)?;
             if (from.excess() > 0.0) != (to.excess() > 0.0) {
                 found.push(self.cross(low, high, from, &to)?);
             } else if may_touch(from, &to, step_m) {
@@ -258,7 +227,7 @@ impl<S: Spectrum> Scan<S> {
             }
         }
         // What is left over must be far from the circle.
-        if free.iter().any(|root| root.is_near(step_m)) {
+        if free.iter().any(|root| is_near(root, step_m)) {
             return None;
         }
         found.sort_by(|a, b| a.crossing.depth_m.total_cmp(&b.crossing.depth_m));

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::StabilityError;
+use super::cells::Cell;
 use super::line::SpeedLine;
 use super::point::Point;
 
@@ -41,6 +42,17 @@ pub trait Method: Sync {
     /// # Errors
     /// As [`point()`](Self::point).
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError>;
+
+    /// The dominant multiplier at a speed and many depths, mm, in any order, each with its error.
+    ///
+    /// # Errors
+    /// As [`point()`](Self::point).
+    fn cells(&self, rpm: f64, depths_mm: &[f64]) -> Result<Vec<Cell>, StabilityError> {
+        depths_mm
+            .iter()
+            .map(|&depth_mm| self.point(rpm, depth_mm).map(|point| Cell::from(&point)))
+            .collect()
+    }
 
     /// The lines at many speeds, in their order; the same for any number of threads.
     ///

@@ -2,6 +2,7 @@
 //!
 //! Sign of the regenerative force: F = w K_tc α (u − u_τ), with α as in eq. 6.7, is stable at small depth w.
 
+mod cells;
 mod characteristic;
 mod chart;
 pub(crate) mod collocation;
@@ -23,11 +24,13 @@ pub(crate) mod period;
 mod pitched;
 mod point;
 mod problem;
+mod root;
 mod sdm;
 mod sensitivity;
 mod spectrum;
 mod stepped;
 
+pub use cells::{Cell, CellChart, CellLine, cell_chart};
 pub use chart::{Chart, Refinement, chart};
 pub use collocation::Collocation;
 pub use fdm::{Fdm, FullDiscretization};
@@ -44,6 +47,8 @@ pub use sensitivity::{Sensitivity, Slope, Tangent};
 
 #[cfg(test)]
 mod agreement;
+#[cfg(test)]
+mod cells_tests;
 #[cfg(test)]
 mod sensitivity_tests;
 #[cfg(test)]

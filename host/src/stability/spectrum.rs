@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::characteristic::Crossing;
+use super::root::Root;
 
 /// The multipliers of one method at one speed, as functions of depth.
 pub(super) trait Spectrum {
@@ -18,6 +19,15 @@ pub(super) trait Spectrum {
 
     /// dμ/dw, 1/m, along the branch of multipliers through (μ, w).
     fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64>;
+
+    /// A multiplier near a guess that is good to about 1e-4, with its derivative; real guesses stay real.
+    ///
+    /// What is left of the error is its square, and that of the equations. `None` where there is none.
+    fn root_near(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
+        let multiplier = self.multiplier_near(guess, depth_m, 0.05 * guess.norm())?;
+        let slope = self.sensitivity(multiplier, depth_m)?;
+        Some(Root { multiplier, slope })
+    }
 
     /// The depth between `low_m` and `high_m` where the multiplier of the guess crosses the unit circle.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing>;

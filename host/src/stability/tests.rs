@@ -6,7 +6,7 @@ use super::period::{Period, Resolution};
 use super::*;
 use crate::case::Case;
 
-fn case(name: &str) -> Case {
+pub(super) fn case(name: &str) -> Case {
     Case::read(format!(
         "{}/../tests/cases/{name}.toml",
         env!("CARGO_MANIFEST_DIR")
@@ -14,7 +14,7 @@ fn case(name: &str) -> Case {
     .unwrap()
 }
 
-fn problem(name: &str) -> Problem {
+pub(super) fn problem(name: &str) -> Problem {
     Problem::new(&case(name), CubicTerms::Refuse).unwrap()
 }
 
