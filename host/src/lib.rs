@@ -9,6 +9,7 @@ pub mod device;
 mod eigenvalues;
 pub mod file;
 pub mod frf;
+pub mod identify;
 pub mod milling;
 pub mod recording;
 pub mod report;

@@ -4,6 +4,7 @@
 
 pub mod demo;
 mod error;
+mod experiment;
 pub mod info;
 pub mod lobes;
 mod lobes_cells;

@@ -1,4 +1,4 @@
-//! `quietcut simulate`: a virtual cut.
+//! `quietcut simulate`: a virtual cut, or with `--experiment` a virtual test rig.
 
 use std::path::PathBuf;
 
@@ -6,32 +6,36 @@ use clap::ValueEnum;
 use quietcut_core::tachometer::Wheel;
 use serde::Serialize;
 
+use super::experiment::{self, Experiment};
 use super::{Error, Output, finite, non_negative, positive};
 use crate::case::Case;
 use crate::recording::Sidecar;
 use crate::simulate::{
-    Accelerometer, Effect, Entry, Recorder, SimulateError, Statistics, TachometerModel, VirtualCut,
+    Accelerometer, Effects, Entry, Recorder, SimulateError, Statistics, TachometerModel, VirtualCut,
     VirtualCutError,
 };
 
-/// A virtual cut: exact switching of the teeth, loss of contact, runout, and the sensor that hears it.
+/// A virtual cut: exact switching of the teeth, loss of contact, runout, and the sensor that hears it; with --experiment
+/// a virtual test rig.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv"
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n\nA test rig:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:27 --force-n 1.8,5.8,9.5 --noise-percent 1 --out steps.csv"
 )]
 pub struct Args {
     /// The case file: structure, tool, material, cut.
     #[arg(value_name = "CASE")]
     case: PathBuf,
     /// Spindle speed in rev/min.
-    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
-    rpm: f64,
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true, required_unless_present = "experiment")]
+    rpm: Option<f64>,
     /// Axial depth of cut in mm.
-    #[arg(long, value_name = "A", value_parser = positive, allow_negative_numbers = true)]
-    depth_mm: f64,
+    #[arg(long, value_name = "A", value_parser = positive, allow_negative_numbers = true, required_unless_present = "experiment")]
+    depth_mm: Option<f64>,
     /// Duration in s.
-    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
-    seconds: f64,
+    #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true, required_unless_present = "experiment")]
+    seconds: Option<f64>,
+    #[command(flatten)]
+    experiment: Experiment,
     /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated.
     #[arg(long, value_name = "NAME=VALUE")]
     effect: Vec<String>,
@@ -48,9 +52,10 @@ pub struct Args {
     /// Record the motion itself, without a sensor's faults.
     #[arg(long, conflicts_with_all = ["range_g", "noise_ug", "clock_error_percent", "tacho_jitter_us", "seed"])]
     ideal: bool,
-    /// Samples per second: nominal, where a sensor samples.
-    #[arg(long, value_name = "N", default_value_t = 26_667.0, value_parser = positive, allow_negative_numbers = true)]
-    sample_rate_hz: f64,
+    /// Samples per second: nominal, where a sensor samples. Without it 26 667 in a cut, and at a rig enough for the
+    /// harmonics of what it excites.
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
+    sample_rate_hz: Option<f64>,
     /// Range of the accelerometer in g: 2, 4, 8 or 16.
     #[arg(long, value_name = "G", default_value_t = 16.0, value_parser = range_g, allow_negative_numbers = true)]
     range_g: f64,
@@ -78,6 +83,9 @@ pub struct Args {
     #[command(flatten)]
     output: Output,
 }
+
+/// What the IIS3DWB samples at.
+const SAMPLE_RATE_HZ: f64 = 26_667.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum EntryKind {
@@ -115,19 +123,34 @@ pub fn run(args: Args) -> Result<(), Error> {
             sidecar.display()
         )));
     }
-    let effects = Effect::parse(args.effect.iter().map(String::as_str)).map_err(Error::input)?;
+    let effects = Effects::parse(args.effect.iter().map(String::as_str)).map_err(Error::input)?;
+    if let Some(kind) = args.experiment.experiment {
+        if args.rpm.is_some() || args.depth_mm.is_some() {
+            return Err(Error::input(
+                "--rpm and --depth-mm belong to a cut, not to this --experiment; leave them out",
+            ));
+        }
+        let common = experiment::Common {
+            seconds: args.seconds,
+            sample_rate_hz: args.sample_rate_hz,
+            seed: args.seed,
+            out: &args.out,
+        };
+        return experiment::run(&case, kind, &args.experiment, &effects, &common, args.output);
+    }
     let tachometer = tachometer(&args)?;
+    let sample_rate_hz = args.sample_rate_hz.unwrap_or(SAMPLE_RATE_HZ);
     let cut = cut(&args, &case, effects)?;
     let recorder = if args.ideal {
         Recorder::Ideal {
-            rate_hz: args.sample_rate_hz,
+            rate_hz: sample_rate_hz,
         }
     } else {
         Recorder::Sensor {
             accelerometer: Accelerometer {
                 range_g: args.range_g,
                 noise_g_per_root_hertz: 1e-6 * args.noise_ug,
-                nominal_rate_hz: args.sample_rate_hz,
+                nominal_rate_hz: sample_rate_hz,
                 clock_error: 0.01 * args.clock_error_percent,
                 ..Accelerometer::IIS3DWB_16G
             },
@@ -205,15 +228,20 @@ fn tachometer(args: &Args) -> Result<TachometerModel, Error> {
 }
 
 /// The cut that was asked for, with an entry that the case and the time allow.
-fn cut(args: &Args, case: &Case, effects: Vec<Effect>) -> Result<VirtualCut, Error> {
+fn cut(args: &Args, case: &Case, effects: Effects) -> Result<VirtualCut, Error> {
+    let (Some(rpm), Some(depth_mm), Some(seconds)) = (args.rpm, args.depth_mm, args.seconds) else {
+        return Err(Error::input(
+            "--rpm, --depth-mm and --seconds are needed for a cut",
+        ));
+    };
     let mut cut = VirtualCut {
         effects,
         entry: Entry::None,
-        air_s: args.air_s.unwrap_or((0.05 * args.seconds).min(0.2)),
-        ..VirtualCut::new(args.rpm, args.depth_mm, args.seconds)
+        air_s: args.air_s.unwrap_or((0.05 * seconds).min(0.2)),
+        ..VirtualCut::new(rpm, depth_mm, seconds)
     };
     let ramp = Entry::Ramp {
-        seconds: args.ramp_s.unwrap_or(0.1 * args.seconds),
+        seconds: args.ramp_s.unwrap_or(0.1 * seconds),
     };
     cut.entry = match args.entry {
         Some(EntryKind::None) => Entry::None,
@@ -238,7 +266,9 @@ fn named(args: &Args, error: VirtualCutError) -> Error {
     let case = args.case.display();
     match error {
         VirtualCutError::Case(error) => error.into(),
-        VirtualCutError::TooShort { .. } => Error::input(format!("--seconds {}: {error}", args.seconds)),
+        VirtualCutError::TooShort { .. } => {
+            Error::input(format!("--seconds {}: {error}", args.seconds.unwrap_or(0.0)))
+        }
         VirtualCutError::WheelTooFine { .. } => Error::input(format!("--tacho-positions: {error}")),
         other => Error::input(format!("{case}: {other}")),
     }

@@ -19,14 +19,19 @@ pub struct Dynamics {
     b: Vec<[f64; 3]>,
     c: [Vec<f64>; 3],
     ca: [Vec<f64>; 3],
+    /// C B, (m/s)/N: not zero where a jump of the force is one of the velocity.
+    cb: [[f64; 3]; 3],
+    /// C A B, 1/kg.
+    cab: [[f64; 3]; 3],
     cubic: Option<Cubic>,
     sizes: Vec<f64>,
     velocity_jumps: bool,
 }
 
-/// f₃ in the second half of the states: damping·v∘³ + stiffness·q∘³ with q the first and v the second half.
+/// f₃ in the rates of v: damping·v∘³ + stiffness·q∘³ with q the first `freedoms` states and v as many after them.
 #[derive(Clone, Debug)]
 struct Cubic {
+    freedoms: usize,
     damping: Vec<f64>,
     stiffness: Vec<f64>,
 }
@@ -58,16 +63,55 @@ impl Dynamics {
                 _ => 1.0,
             }
         };
-        Ok(Self {
+        let mut dynamics = Self {
             order,
             a: a.transpose().as_slice().to_vec(),
             b: b.row_iter().map(|row| [row[0], row[1], row[2]]).collect(),
             c: std::array::from_fn(|axis| row(&c, axis)),
+            cb: [[0.0; 3]; 3],
+            cab: [[0.0; 3]; 3],
             ca: std::array::from_fn(|axis| row(&ca, axis)),
             cubic,
             sizes: (0..order).map(size).collect(),
             velocity_jumps,
-        })
+        };
+        dynamics.note_products();
+        Ok(dynamics)
+    }
+
+    fn note_products(&mut self) {
+        let product = |rows: &[Vec<f64>; 3]| -> [[f64; 3]; 3] {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| rows[i].iter().zip(&self.b).map(|(c, b)| c * b[j]).sum())
+            })
+        };
+        (self.cb, self.cab) = (product(&self.c), product(&self.ca));
+    }
+
+    /// One more mode behind the states: η̈ + 2ζω η̇ + ω² η = F/m along `axis`, and the tool moves by η along it too.
+    pub fn add_mode(&mut self, axis: usize, frequency_hz: f64, damping_ratio: f64, modal_mass_kg: f64) {
+        let (order, omega) = (self.order, std::f64::consts::TAU * frequency_hz);
+        let wider = order + 2;
+        let mut a = vec![0.0; wider * wider];
+        for (new, old) in a.chunks_exact_mut(wider).zip(self.a.chunks_exact(order)) {
+            new[..order].copy_from_slice(old);
+        }
+        // States (η, η̇/ω).
+        a[order * wider + order + 1] = omega;
+        a[(order + 1) * wider + order] = -omega;
+        a[(order + 1) * wider + order + 1] = -2.0 * damping_ratio * omega;
+        self.a = a;
+        let mut force = [0.0; 3];
+        force[axis] = 1.0 / (modal_mass_kg * omega);
+        self.b.extend([[0.0; 3], force]);
+        for (index, (c, ca)) in self.c.iter_mut().zip(&mut self.ca).enumerate() {
+            let moved = f64::from(u8::from(index == axis));
+            c.extend([moved, 0.0]);
+            ca.extend([0.0, moved * omega]);
+        }
+        self.sizes.extend([1.0, 1.0]);
+        self.order = wider;
+        self.note_products();
     }
 
     /// Number of states.
@@ -113,18 +157,46 @@ impl Dynamics {
         (!self.velocity_jumps).then(|| std::array::from_fn(|axis| dot(&self.ca[axis], rate)))
     }
 
+    /// Velocity of the tool, m/s, under the force in N: C A x + C B F.
+    pub fn velocity_under(&self, x: &[f64], force: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let jump = if self.velocity_jumps {
+                dot(&self.cb[axis], &force)
+            } else {
+                0.0
+            };
+            dot(&self.ca[axis], x) + jump
+        })
+    }
+
+    /// C A B, 1/kg: acceleration of the tool per force on it.
+    pub fn acceleration_per_force(&self) -> [[f64; 3]; 3] {
+        self.cab
+    }
+
+    /// Puts the velocity of one axis to zero, as friction that begins to hold does: by an impulse along it.
+    pub fn halt(&self, axis: usize, x: &mut [f64]) {
+        let per_impulse = self.cab[axis][axis];
+        if per_impulse > 0.0 {
+            let impulse = dot(&self.ca[axis], x) / per_impulse;
+            for (x, b) in x.iter_mut().zip(&self.b) {
+                *x -= impulse * b[axis];
+            }
+        }
+    }
+
     /// ẋ under the force in N.
     pub fn rate(&self, x: &[f64], force: [f64; 3], rate: &mut [f64]) {
         for ((rate, a), b) in rate.iter_mut().zip(self.a.chunks_exact(self.order)).zip(&self.b) {
             *rate = dot(a, x) + b[0] * force[0] + b[1] * force[1] + b[2] * force[2];
         }
         if let Some(cubic) = &self.cubic {
-            let half = self.order / 2;
-            let (q, v) = x.split_at(half);
-            for ((rate, damping), stiffness) in rate[half..]
+            let freedoms = cubic.freedoms;
+            let (q, v) = (&x[..freedoms], &x[freedoms..2 * freedoms]);
+            for ((rate, damping), stiffness) in rate[freedoms..]
                 .iter_mut()
-                .zip(cubic.damping.chunks_exact(half))
-                .zip(cubic.stiffness.chunks_exact(half))
+                .zip(cubic.damping.chunks_exact(freedoms))
+                .zip(cubic.stiffness.chunks_exact(freedoms))
             {
                 *rate -= dot_cubes(damping, v) + dot_cubes(stiffness, q);
             }
@@ -153,6 +225,7 @@ fn cubic(matrices: &Matrices, a: &DMatrix<f64>) -> Result<Cubic, StructureError>
         Ok((divided.transpose() * factor).as_slice().to_vec())
     };
     Ok(Cubic {
+        freedoms,
         damping: of(&matrices.cubic_damping, scale * scale)?,
         stiffness: of(&matrices.cubic_stiffness, scale.recip())?,
     })

@@ -8,6 +8,9 @@ pub enum SimulateError {
     /// A structure that no machine has.
     #[error(transparent)]
     Structure(#[from] StructureError),
+    /// An effect that the structure cannot have.
+    #[error(transparent)]
+    Effect(#[from] super::EffectError),
     /// Pitches that do not fit the number of teeth or do not go once around.
     #[error(
         "{teeth} teeth with the pitches {pitch_deg:?} degrees: as many pitches as teeth are needed, with the sum 360"
@@ -42,5 +45,19 @@ pub enum SimulateError {
         time_s: f64,
         /// Which, from 1.
         tooth: usize,
+    },
+    /// A term of the equation of motion that finds no branch that goes on.
+    #[error(
+        "at {time_s:.6} s no branch of the added terms (friction, play) goes on: two of them act against each other"
+    )]
+    BranchUndecided {
+        /// When.
+        time_s: f64,
+    },
+    /// A rig drives a direction that the structure does not have.
+    #[error("the structure cannot be driven in {direction}: it has no such direction, or it is a rotation")]
+    NoDirection {
+        /// The direction.
+        direction: crate::structure::Direction,
     },
 }

@@ -1,8 +1,10 @@
 //! Steps of controlled error that end exactly where the right-hand side is not smooth.
 
 use super::contact::{Change, Contact};
+use super::crossing::first_below_zero;
 use super::dormand_prince::{DormandPrince, Quartic, at};
-use super::{Model, Settings, SimulateError};
+use super::term::{self, At, Branch, Branches};
+use super::{Model, Settings, SimulateError, Stretch};
 
 /// What a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,15 +15,16 @@ pub struct Statistics {
     pub rejected: u64,
     /// Times at which a tooth lost or found contact.
     pub contact_changes: u64,
+    /// Times at which a term of the equation of motion changed its branch.
+    pub branch_changes: u64,
 }
 
 /// A stretch of the motion, to be read while it is the newest one.
 pub struct Segment<'a> {
     model: &'a Model,
-    contact: Option<&'a Contact<'a>>,
+    stretch: Stretch<'a>,
     quartics: &'a [Quartic],
     displacement: &'a [Quartic; 3],
-    within: [f64; 2],
     from_s: f64,
     to_s: f64,
 }
@@ -40,7 +43,7 @@ pub struct Motion {
 }
 
 /// Room to compute a [`Motion`] in.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Room {
     state: Vec<f64>,
     rate: Vec<f64>,
@@ -49,7 +52,7 @@ pub struct Room {
 impl Room {
     /// Room for the states of `model`.
     pub fn new(model: &Model) -> Self {
-        let room = vec![0.0; model.dynamics.order()];
+        let room = vec![0.0; model.order()];
         Self {
             state: room.clone(),
             rate: room,
@@ -75,9 +78,10 @@ impl Segment<'_> {
             *state = at(quartic, u);
         }
         let displacement_m = std::array::from_fn(|axis| at(&self.displacement[axis], u));
-        let force_n = self.model.force_n(self.contact, self.within, t, displacement_m);
         let dynamics = &self.model.dynamics;
-        dynamics.rate(&room.state, force_n, &mut room.rate);
+        let force_n = self
+            .model
+            .rate(self.stretch, (t, displacement_m), &room.state, &mut room.rate);
         Motion {
             displacement_m,
             velocity_m_per_s: dynamics.velocity(&room.rate),
@@ -101,8 +105,29 @@ pub(super) struct Integrator<'a> {
     next_h: f64,
     statistics: Statistics,
     room: Room,
+    /// The branch of each term of the model.
+    branches: Vec<Branch>,
     /// The stretch looked at, a little shortened at both ends.
     within: [f64; 2],
+}
+
+/// What ends a step before its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Event {
+    /// A tooth loses or finds contact.
+    Contact(Change),
+    /// A term leaves its branch.
+    Term { index: usize, u: f64 },
+}
+
+impl Event {
+    /// When, as a fraction of the step.
+    fn u(self) -> f64 {
+        match self {
+            Self::Contact(change) => change.u,
+            Self::Term { u, .. } => u,
+        }
+    }
 }
 
 /// Changes of contact in a row without a step between them before a run is given up.
@@ -125,6 +150,7 @@ impl<'a> Integrator<'a> {
             displacement: [[0.0; 5]; 3],
             next_h: 0.0,
             statistics: Statistics::default(),
+            branches: vec![0; model.terms.len()],
             room: Room::new(model),
             within: [0.0; 2],
         }
@@ -138,45 +164,147 @@ impl<'a> Integrator<'a> {
     ) -> Result<Statistics, SimulateError> {
         // Small enough for anything; the first steps find out.
         self.next_h = 1e-3 * self.longest_step(end_s);
+        for index in 0..self.branches.len() {
+            self.branches[index] = self.next_branch(index, None);
+        }
         self.start();
         let mut stuck = 0;
         while self.t < end_s {
             let stop_s = self.next_stop(end_s);
-            let (h, change) = self.step_towards(stop_s)?;
+            let (h, event) = self.step_towards(stop_s)?;
             if h > 0.0 {
                 self.accept(h, &mut observe)?;
                 stuck = 0;
             }
-            let at_stop = change.is_none() && stop_s - self.t <= self.rounding_s();
-            if let (Some(change), Some(contact)) = (change, &mut self.contact) {
-                self.statistics.contact_changes += 1;
-                if !contact.change(change.tooth, self.t) {
-                    stuck += 1;
-                }
-                if stuck > STUCK {
-                    return Err(SimulateError::ContactUndecided {
-                        time_s: self.t,
-                        tooth: change.tooth + 1,
-                    });
-                }
+            let at_stop = event.is_none() && stop_s - self.t <= self.rounding_s();
+            if let Some(event) = event {
+                self.change(event, &mut stuck)?;
             }
             if at_stop {
                 self.t = stop_s;
                 self.switch();
             }
-            if at_stop || change.is_some() {
+            if at_stop || event.is_some() {
                 self.start();
             }
         }
         Ok(self.statistics)
     }
 
+    fn change(&mut self, event: Event, stuck: &mut u32) -> Result<(), SimulateError> {
+        match event {
+            Event::Contact(change) => {
+                self.statistics.contact_changes += 1;
+                if let Some(contact) = &mut self.contact
+                    && !contact.change(change.tooth, self.t)
+                {
+                    *stuck += 1;
+                }
+                if *stuck > STUCK {
+                    return Err(SimulateError::ContactUndecided {
+                        time_s: self.t,
+                        tooth: change.tooth + 1,
+                    });
+                }
+            }
+            Event::Term { index, .. } => {
+                self.statistics.branch_changes += 1;
+                self.branches[index] = self.next_branch(index, Some(self.branches[index]));
+                // A term that has just changed counts as within its branch (see `first_below_zero`): many changes
+                // without a step between them are a term whose branches exclude each other.
+                *stuck += 1;
+                if *stuck > 10 * STUCK {
+                    return Err(SimulateError::BranchUndecided { time_s: self.t });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The branch of a term here and now; an axis that begins to be held stands still from now on.
+    fn next_branch(&mut self, index: usize, before: Option<Branch>) -> Branch {
+        let term = &self.model.terms[index];
+        let (at, place) = (self.at(self.t, &self.y), self.place(index));
+        let holding_n = self.holding_n(index, self.t, &self.y.clone());
+        let branch = term.next(before, &at, &self.y[place], holding_n);
+        if let Some(axis) = term.holds().filter(|_| term.locked(branch)) {
+            let order = self.model.dynamics.order();
+            self.model.dynamics.halt(axis, &mut self.y[..order]);
+        }
+        branch
+    }
+
+    fn at(&self, t: f64, y: &[f64]) -> At {
+        let dynamics = &self.model.dynamics;
+        let structure = &y[..dynamics.order()];
+        At {
+            t,
+            x: dynamics.displacement(structure),
+            v: dynamics.velocity_under(structure, [0.0; 3]),
+        }
+    }
+
+    /// Where the states of a term stand in y.
+    fn place(&self, index: usize) -> std::ops::Range<usize> {
+        let terms = &self.model.terms;
+        let from = self.model.dynamics.order() + term::states(&terms[..index]);
+        from..from + terms[index].states()
+    }
+
+    /// f_r that would hold the axis of a term at `t`; 0 where it holds none.
+    fn holding_n(&mut self, index: usize, t: f64, y: &[f64]) -> f64 {
+        let Some(axis) = self.model.terms[index].holds() else {
+            return 0.0;
+        };
+        let mut rate = std::mem::take(&mut self.room.rate);
+        let holding = self.held_n(index, axis, (t, y), &mut rate);
+        self.room.rate = rate;
+        holding
+    }
+
+    fn held_n(&self, index: usize, axis: usize, (t, y): (f64, &[f64]), rate: &mut [f64]) -> f64 {
+        let model = self.model;
+        let x = model.dynamics.displacement(&y[..model.dynamics.order()]);
+        let stretch = self.stretch();
+        let force = model.force_n(stretch, t, x, y);
+        let held = term::rate(
+            &model.dynamics,
+            &model.terms,
+            stretch.branches,
+            (t, x),
+            force,
+            y,
+            rate,
+        );
+        if model.terms[index].locked(self.branches[index]) {
+            return held[axis];
+        }
+        // What slides now has its own force in the rate: what holds it is that force and what is left.
+        let at = self.at(t, y);
+        let sliding = model.terms[index].restoring_n(self.branches[index], &at, &y[self.place(index)]);
+        let locked = std::array::from_fn(|other| other == axis);
+        sliding[axis] + term::holding_n(&model.dynamics, locked, &rate[..model.dynamics.order()])[axis]
+    }
+
+    fn stretch(&self) -> Stretch<'_> {
+        Stretch {
+            contact: self.contact.as_ref(),
+            within: self.within,
+            branches: Branches(&self.branches),
+        }
+    }
+
     /// ẏ at the start of a smooth stretch.
     fn start(&mut self) {
         self.look_ahead(self.next_h);
-        let (model, contact, within) = (self.model, self.contact.as_ref(), self.within);
+        let model = self.model;
+        let stretch = Stretch {
+            contact: self.contact.as_ref(),
+            within: self.within,
+            branches: Branches(&self.branches),
+        };
         self.step.start(self.t, &self.y, |t, y, rate| {
-            model.rate(contact, within, t, y, rate)
+            model.rate(stretch, (t, model.dynamics.displacement(y)), y, rate);
         });
     }
 
@@ -189,10 +317,10 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Tries steps until one is good; its length, and the change of contact at its end. It is not taken yet.
+    /// Tries steps until one is good; its length, and the event at its end. It is not taken yet.
     ///
-    /// Length 0: contact changes here and now.
-    fn step_towards(&mut self, stop_s: f64) -> Result<(f64, Option<Change>), SimulateError> {
+    /// Length 0: the event is here and now.
+    fn step_towards(&mut self, stop_s: f64) -> Result<(f64, Option<Event>), SimulateError> {
         let mut h = self.next_h;
         loop {
             h = self.fitted(h, stop_s);
@@ -221,36 +349,76 @@ impl<'a> Integrator<'a> {
                 return Err(self.diverged());
             }
         }
-        let Some(change) = self.first_change(h) else {
+        let Some(event) = self.first_event(h) else {
             return Ok((h, None));
         };
-        let shorter = change.u * h;
+        let shorter = event.u() * h;
         if shorter <= self.rounding_s() {
-            return Ok((0.0, Some(change)));
+            return Ok((0.0, Some(event)));
         }
         // A shorter step of an accepted one is at least as exact.
         self.attempt(shorter);
-        Ok((shorter, Some(change)))
+        Ok((shorter, Some(event)))
     }
 
-    fn first_change(&self, h: f64) -> Option<Change> {
-        self.contact
+    /// The first thing that ends the step tried last before its time.
+    fn first_event(&mut self, h: f64) -> Option<Event> {
+        let contact = self
+            .contact
             .as_ref()
             .and_then(|contact| contact.first_change(self.t, h, &self.displacement))
+            .map(Event::Contact);
+        let mut room = std::mem::take(&mut self.room);
+        let terms: Option<Event> = (0..self.branches.len())
+            .filter_map(|index| self.end_of_branch(index, h, &mut room))
+            .min_by(|a, b| a.u().total_cmp(&b.u()));
+        self.room = room;
+        match (contact, terms) {
+            (Some(contact), Some(term)) if contact.u() > term.u() => Some(term),
+            (Some(contact), _) => Some(contact),
+            (None, term) => term,
+        }
+    }
+
+    fn end_of_branch(&self, index: usize, h: f64, room: &mut Room) -> Option<Event> {
+        let (term, branch) = (&self.model.terms[index], self.branches[index]);
+        let place = self.place(index);
+        let room = std::cell::RefCell::new(room);
+        let margin = |u: f64| {
+            let mut room = room.borrow_mut();
+            let Room { state, rate } = &mut **room;
+            for (state, quartic) in state.iter_mut().zip(&self.quartics) {
+                *state = at(quartic, u);
+            }
+            let t = self.t + u * h;
+            let holding_n = match term.holds().filter(|_| term.locked(branch)) {
+                Some(axis) => self.held_n(index, axis, (t, state), rate),
+                None => 0.0,
+            };
+            term.margin(branch, &self.at(t, state), &state[place.clone()], holding_n)
+        };
+        first_below_zero(margin).map(|u| Event::Term { index, u })
     }
 
     /// Tries one step and makes its interpolant; the error in units of what is allowed.
     fn attempt(&mut self, h: f64) -> f64 {
         self.look_ahead(h);
-        let (model, contact, within) = (self.model, self.contact.as_ref(), self.within);
+        let model = self.model;
+        let stretch = Stretch {
+            contact: self.contact.as_ref(),
+            within: self.within,
+            branches: Branches(&self.branches),
+        };
         self.step.attempt(self.t, h, &self.y, |t, y, rate| {
-            model.rate(contact, within, t, y, rate);
+            model.rate(stretch, (t, model.dynamics.displacement(y)), y, rate);
         });
         self.step.interpolant(h, &self.y, &mut self.quartics);
         self.displacement = model.dynamics.displacement_quartics(&self.quartics);
         let sizes = model.dynamics.sizes();
         let allowed_m = self.settings.absolute_m + self.settings.relative * self.amplitude_m();
-        self.step.error(h, |element| sizes[element] * allowed_m)
+        self.step.error(h, |element| {
+            sizes.get(element).copied().unwrap_or(1.0) * allowed_m
+        })
     }
 
     /// The largest element of y at the ends of the step tried last, as a displacement.
@@ -267,10 +435,9 @@ impl<'a> Integrator<'a> {
         }
         observe(&Segment {
             model: self.model,
-            contact: self.contact.as_ref(),
+            stretch: self.stretch(),
             quartics: &self.quartics,
             displacement: &self.displacement,
-            within: self.within,
             from_s: self.t,
             to_s: self.t + h,
         });
@@ -288,13 +455,13 @@ impl<'a> Integrator<'a> {
         let Some(contact) = &mut self.contact else { return };
         let x = self.model.dynamics.displacement(&self.y);
         self.room.state.copy_from_slice(&self.y);
-        self.model.rate(
-            Some(contact),
-            self.within,
-            self.t,
-            &self.room.state,
-            &mut self.room.rate,
-        );
+        let stretch = Stretch {
+            contact: Some(contact),
+            within: self.within,
+            branches: Branches(&self.branches),
+        };
+        self.model
+            .rate(stretch, (self.t, x), &self.room.state, &mut self.room.rate);
         let v = self.model.dynamics.velocity(&self.room.rate);
         contact.switch(self.t, x, v);
     }

@@ -9,32 +9,36 @@ mod crossing;
 mod cutter;
 mod dormand_prince;
 mod dynamics;
-mod effect;
+pub mod effect;
 mod error;
 mod integrator;
 mod passage;
 mod record;
+pub mod rig;
 mod sensor;
 mod spindle;
 mod surface;
+mod term;
 mod virtual_cut;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use cutter::{Cutter, Tooth};
 pub use dynamics::Dynamics;
-pub use effect::{Effect, EffectError};
+pub use effect::{Effect, EffectError, Effects};
 pub use error::SimulateError;
 pub use integrator::{Motion, Room, Segment, Statistics};
 pub use passage::Passage;
 pub use record::Recorder;
 pub use sensor::{Accelerometer, Sampler, TachometerModel};
 pub use spindle::Spindle;
+pub use term::{At, Branch, Term};
 pub use virtual_cut::{Entry, Heard, VirtualCut, VirtualCutError};
 
 use contact::Contact;
 use integrator::Integrator;
+use term::Branches;
 
 /// A machine, and what happens to it.
 pub struct Model {
@@ -44,6 +48,8 @@ pub struct Model {
     pub cutting: Option<Cutting>,
     /// A force from outside, besides that of the cut.
     pub drive: Option<Box<dyn Drive>>,
+    /// What the equation of motion has besides the structure.
+    pub terms: Vec<Box<dyn Term>>,
 }
 
 /// A turning tool on its way through a workpiece.
@@ -75,6 +81,12 @@ pub enum Regeneration {
 pub trait Drive: Send + Sync {
     /// The force at `t`, N, in the machine's x, y, z. It is never asked for within a billionth of a step of a knot.
     fn force_n(&self, t: f64) -> [f64; 3];
+
+    /// How much less the force is per velocity of the tool, N s/m: a shaker's armature generates a voltage against its
+    /// drive as it moves, so that the force drops where the structure resonates.
+    fn drop_ns_per_m(&self) -> [f64; 3] {
+        [0.0; 3]
+    }
 
     /// The first time after `t` at which the force or one of its lower derivatives jumps.
     fn next_knot_s(&self, _t: f64) -> f64 {
@@ -118,10 +130,15 @@ impl Model {
         settings: Settings,
         observe: impl FnMut(&Segment<'_>),
     ) -> Result<Statistics, SimulateError> {
-        self.run_from(vec![0.0; self.dynamics.order()], end_s, settings, observe)
+        self.run_from(vec![0.0; self.order()], end_s, settings, observe)
     }
 
-    /// As [`Self::run`], from the states `y` of [`Dynamics`]; before t = 0 the tool was at rest.
+    /// Number of states: those of [`Dynamics`], and behind them those of the terms in their order.
+    pub fn order(&self) -> usize {
+        self.dynamics.order() + term::states(&self.terms)
+    }
+
+    /// As [`Self::run`], from the states `y` (see [`Self::order`]); before t = 0 the tool was at rest.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -141,19 +158,52 @@ impl Model {
         Integrator::new(self, settings, y).run(end_s, observe)
     }
 
-    /// `within` are the ends of the smooth stretch that `t` belongs to: a drive may jump at either.
-    fn force_n(&self, contact: Option<&Contact<'_>>, within: [f64; 2], t: f64, x: [f64; 3]) -> [f64; 3] {
-        let mut force = contact.map_or([0.0; 3], |contact| contact.force_n(t, x));
+    /// Force on the tool from cut and drive, N; `v` is its velocity without what jumps with the force.
+    fn force_n(&self, stretch: Stretch<'_>, t: f64, x: [f64; 3], y: &[f64]) -> [f64; 3] {
+        let mut force = stretch.contact.map_or([0.0; 3], |contact| contact.force_n(t, x));
         if let Some(drive) = &self.drive {
-            for (force, driven) in force.iter_mut().zip(drive.force_n(t.clamp(within[0], within[1]))) {
+            let driven = drive.force_n(t.clamp(stretch.within[0], stretch.within[1]));
+            for (force, driven) in force.iter_mut().zip(driven) {
                 *force += driven;
+            }
+            let drop = drive.drop_ns_per_m();
+            if drop != [0.0; 3] {
+                let v = self
+                    .dynamics
+                    .velocity_under(&y[..self.dynamics.order()], [0.0; 3]);
+                for axis in 0..3 {
+                    force[axis] -= drop[axis] * v[axis];
+                }
             }
         }
         force
     }
 
-    fn rate(&self, contact: Option<&Contact<'_>>, within: [f64; 2], t: f64, y: &[f64], rate: &mut [f64]) {
-        let force = self.force_n(contact, within, t, self.dynamics.displacement(y));
-        self.dynamics.rate(y, force, rate);
+    /// ẏ at `t` with the tool at `x`; the force on the tool from cut and drive, N.
+    fn rate(&self, stretch: Stretch<'_>, (t, x): (f64, [f64; 3]), y: &[f64], rate: &mut [f64]) -> [f64; 3] {
+        let force = self.force_n(stretch, t, x, y);
+        if self.terms.is_empty() {
+            self.dynamics.rate(y, force, rate);
+        } else {
+            term::rate(
+                &self.dynamics,
+                &self.terms,
+                stretch.branches,
+                (t, x),
+                force,
+                y,
+                rate,
+            );
+        }
+        force
     }
+}
+
+/// What holds on a smooth stretch of the motion.
+#[derive(Clone, Copy)]
+struct Stretch<'a> {
+    contact: Option<&'a Contact<'a>>,
+    /// The ends of the stretch, shortened by rounding: a drive may jump at either.
+    within: [f64; 2],
+    branches: Branches<'a>,
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use quietcut_core::tachometer::Wheel;
 
+use super::effect::{EffectError, Effects, Pickup};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{Model, Room, Segment, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
 use crate::case::Case;
@@ -77,21 +78,34 @@ impl VirtualCut {
             _ => (truth.accelerations(), None),
         };
         let directions = &case.structure()?.directions;
+        let effects = Effects::of_case(case)?.and(&self.effects);
         let mut channels = Vec::new();
-        let series: [(&str, Quantity, &[[f64; 3]]); 3] = [
-            ("f", Quantity::Force, &truth.forces_n),
-            ("", Quantity::Displacement, &truth.displacements_m),
-            ("a", Quantity::Acceleration, &accelerations),
+        let series: [(Quantity, &[[f64; 3]]); 3] = [
+            (Quantity::Force, &truth.forces_n),
+            (Quantity::Displacement, &truth.displacements_m),
+            (Quantity::Acceleration, &accelerations),
         ];
-        for (prefix, quantity, values) in series {
+        for (quantity, values) in series {
             for direction in [Direction::X, Direction::Y, Direction::Z] {
                 let Some(axis) = direction.axis().filter(|_| directions.contains(&direction)) else {
                     continue;
                 };
+                let pickup = effects.pickup(Pickup::of_axis(quantity, axis));
+                if pickup.delay_s != 0.0 {
+                    return Err(EffectError::Structure {
+                        name: "sensor-delay",
+                        what: "the channels of a cut cannot be late yet; those of --experiment can".into(),
+                    }
+                    .into());
+                }
                 channels.push(Channel {
-                    name: format!("{prefix}{direction}"),
+                    name: pickup.name.clone(),
                     quantity,
-                    samples: values.iter().take(samples).map(|value| value[axis]).collect(),
+                    samples: values
+                        .iter()
+                        .take(samples)
+                        .map(|value| pickup.read(*value))
+                        .collect(),
                 });
             }
         }

@@ -4,9 +4,9 @@ use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 
 use super::Statistics;
-use super::effect::{Effect, EffectError};
+use super::effect::{EffectError, Effects};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
-use super::{Cutter, Cutting, Dynamics, Model, Passage, Regeneration, Settings, SimulateError, Spindle};
+use super::{Cutter, Cutting, Model, Passage, Regeneration, Settings, SimulateError, Spindle};
 use crate::case::{Case, CaseError};
 
 /// A cut of a case.
@@ -23,7 +23,7 @@ pub struct VirtualCut {
     /// Air before and after the cut, s.
     pub air_s: f64,
     /// What the case does not have, or has otherwise.
-    pub effects: Vec<Effect>,
+    pub effects: Effects,
 }
 
 /// How the tool comes into the workpiece, and out.
@@ -100,7 +100,7 @@ impl VirtualCut {
             seconds,
             entry: Entry::Feed,
             air_s: 0.2,
-            effects: Vec::new(),
+            effects: Effects::default(),
         }
     }
 
@@ -111,17 +111,15 @@ impl VirtualCut {
     /// size is needed and not known.
     pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
         let mut cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3 * self.depth_mm)?;
-        for effect in Effect::of_case(case)?
-            .into_iter()
-            .chain(self.effects.iter().copied())
-        {
-            effect.apply(&mut cutter)?;
+        let effects = Effects::of_case(case)?.and(&self.effects);
+        for effect in &effects.0 {
+            effect.alter_cutter(&mut cutter)?;
         }
         let spindle = Spindle::new(self.spindle_rpm);
         let passage = self.passage(&cutter, &spindle)?;
-        let structure = case.structure()?;
+        let (dynamics, terms) = effects.dynamics(case.structure()?)?;
         Ok(Model {
-            dynamics: Dynamics::new(structure).map_err(SimulateError::from)?,
+            dynamics,
             cutting: Some(Cutting {
                 cutter,
                 spindle,
@@ -129,6 +127,7 @@ impl VirtualCut {
                 regeneration: Regeneration::AllPasses,
             }),
             drive: None,
+            terms,
         })
     }
 

@@ -9,7 +9,7 @@ mod sensors;
 use super::*;
 use crate::case::Case;
 
-pub(super) fn case(name: &str) -> Case {
+pub(crate) fn case(name: &str) -> Case {
     Case::read(format!(
         "{}/../tests/cases/{name}.toml",
         env!("CARGO_MANIFEST_DIR")
@@ -49,6 +49,7 @@ fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
             regeneration: Regeneration::AllPasses,
         }),
         drive: None,
+        terms: Vec::new(),
     }
 }
 

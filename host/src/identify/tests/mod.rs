@@ -1,0 +1,3 @@
+//! Identification of what a virtual rig has measured.
+
+mod steady;

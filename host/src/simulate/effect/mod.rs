@@ -1,0 +1,264 @@
+//! What a simulation can have that the plain model has not: the causes that `diagnose` looks for, one file each.
+//!
+//! To add one: write its file with its equation and a [`Kind`], and name it in [`KINDS`].
+
+mod axial_depth_modulation;
+mod backlash;
+mod coulomb_friction;
+mod cross_axis;
+mod cubic_damping;
+mod cubic_stiffness;
+mod drift;
+mod error;
+mod hysteresis;
+mod linear;
+mod missing_mode;
+mod mode_coupling;
+mod parameters;
+mod place;
+mod quadratic_stiffness;
+mod runout;
+mod sensor_delay;
+mod sensor_gain;
+mod sensor_offset;
+mod softening_hardening;
+
+#[cfg(test)]
+mod tests;
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+pub use error::EffectError;
+pub use parameters::{Parameters, Value};
+
+use super::{Cutter, Dynamics, SimulateError, Term};
+use crate::case::{Case, EXTENSION_NAMES};
+use crate::recording::Quantity;
+use crate::structure::Structure;
+
+/// One effect with its parameters. It does what it does by one of these; the others leave things as they are.
+pub trait Effect: Debug + Send + Sync {
+    /// Its name, as in `CAUSES`: one of [`EXTENSION_NAMES`].
+    fn name(&self) -> &'static str;
+
+    /// Changes a parameter of the structure.
+    ///
+    /// # Errors
+    /// The structure has no such parameter.
+    fn alter_structure(&self, _structure: &mut Structure) -> Result<(), EffectError> {
+        Ok(())
+    }
+
+    /// Changes the equations of the `structure` beyond what a case can say.
+    ///
+    /// # Errors
+    /// The structure does not have the direction.
+    fn alter_dynamics(&self, _structure: &Structure, _dynamics: &mut Dynamics) -> Result<(), EffectError> {
+        Ok(())
+    }
+
+    /// Terms that the equation of motion of `structure` gets.
+    ///
+    /// # Errors
+    /// The structure does not have the direction, or cannot have the term.
+    fn terms(&self, _structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+        Ok(Vec::new())
+    }
+
+    /// Changes the tool or its cut.
+    ///
+    /// # Errors
+    /// What the cutter refuses.
+    fn alter_cutter(&self, _cutter: &mut Cutter) -> Result<(), SimulateError> {
+        Ok(())
+    }
+
+    /// Changes what a channel reads.
+    fn alter_channel(&self, _channel: &mut Pickup) {}
+}
+
+/// What a channel reads: a mix of axes, scaled, late.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pickup {
+    /// Its name: `ax`, `y`, `fx` …
+    pub name: String,
+    /// What it measures: force, displacement, velocity or acceleration.
+    pub quantity: Quantity,
+    /// How much of the machine's x, y and z it reads.
+    pub weights: [f64; 3],
+    /// How late it is, s.
+    pub delay_s: f64,
+}
+
+impl Pickup {
+    /// A channel of one axis (0, 1, 2), without a fault.
+    pub fn of_axis(quantity: Quantity, axis: usize) -> Self {
+        let prefix = match quantity {
+            Quantity::Force => "f",
+            Quantity::Velocity => "v",
+            Quantity::Acceleration => "a",
+            _ => "",
+        };
+        let mut weights = [0.0; 3];
+        weights[axis] = 1.0;
+        Self {
+            name: format!("{prefix}{}", ["x", "y", "z"][axis]),
+            quantity,
+            weights,
+            delay_s: 0.0,
+        }
+    }
+
+    /// What it reads of a quantity along x, y and z.
+    pub fn read(&self, value: [f64; 3]) -> f64 {
+        self.weights
+            .iter()
+            .zip(value)
+            .map(|(weight, value)| weight * value)
+            .sum()
+    }
+}
+
+/// A kind of effect, before it has parameters.
+#[derive(Clone, Copy)]
+pub struct Kind {
+    /// Its name.
+    pub name: &'static str,
+    /// The keys that it has, as people read them.
+    pub keys: &'static str,
+    /// Makes one; what it does not take of the parameters is a key that it does not have.
+    pub build: fn(&mut Parameters) -> Result<Arc<dyn Effect>, EffectError>,
+}
+
+/// All effects that can be simulated.
+pub const KINDS: [Kind; 19] = [
+    linear::MASS,
+    linear::STIFFNESS,
+    linear::DAMPING,
+    missing_mode::KIND,
+    cubic_stiffness::KIND,
+    quadratic_stiffness::KIND,
+    cubic_damping::KIND,
+    softening_hardening::KIND,
+    coulomb_friction::KIND,
+    backlash::KIND,
+    hysteresis::KIND,
+    mode_coupling::KIND,
+    drift::KIND,
+    runout::KIND,
+    axial_depth_modulation::KIND,
+    sensor_gain::KIND,
+    sensor_delay::KIND,
+    cross_axis::KIND,
+    sensor_offset::KIND,
+];
+
+/// The effects of one simulation, in the order in which they act.
+#[derive(Clone, Debug, Default)]
+pub struct Effects(pub Vec<Arc<dyn Effect>>);
+
+impl Effects {
+    /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE`, in any order.
+    ///
+    /// # Errors
+    /// A text of another form, a name or a key that is not known, a value that cannot be.
+    pub fn parse<'a>(texts: impl IntoIterator<Item = &'a str>) -> Result<Self, EffectError> {
+        let mut all: Vec<Parameters> = Vec::new();
+        for text in texts {
+            let (path, value) = text
+                .split_once('=')
+                .ok_or_else(|| EffectError::Form(text.into()))?;
+            let (name, key) = path.trim().split_once('.').unwrap_or((path.trim(), ""));
+            kind(name)?;
+            let parameters = match all.iter().position(|known| known.effect() == name) {
+                Some(index) => &mut all[index],
+                None => {
+                    all.push(Parameters::new(name));
+                    let last = all.len() - 1;
+                    &mut all[last]
+                }
+            };
+            parameters.put(key, Value::of_text(value));
+        }
+        Self::build(all)
+    }
+
+    /// The effects that a case has as extensions. A tool's runout is part of the tool and not among them.
+    ///
+    /// # Errors
+    /// An extension that cannot be simulated, or a key or value that it cannot have.
+    pub fn of_case(case: &Case) -> Result<Self, EffectError> {
+        let mut all = Vec::new();
+        for (name, table) in &case.extensions {
+            kind(name)?;
+            let mut parameters = Parameters::new(name);
+            // How well a parameter is known changes nothing here.
+            for (key, value) in table.iter().filter(|(key, _)| !key.ends_with("_std")) {
+                let value = Value::of_toml(value).ok_or_else(|| EffectError::Value {
+                    effect: format!("{name}.{key}"),
+                    found: value.to_string(),
+                    needed: "a number, a text or true or false",
+                })?;
+                parameters.put(if key == "on" { "" } else { key }, value);
+            }
+            all.push(parameters);
+        }
+        Self::build(all)
+    }
+
+    fn build(all: Vec<Parameters>) -> Result<Self, EffectError> {
+        all.into_iter()
+            .map(|mut parameters| {
+                let kind = kind(parameters.effect())?;
+                let effect = (kind.build)(&mut parameters)?;
+                parameters.finish(kind.keys)?;
+                Ok(effect)
+            })
+            .collect::<Result<Vec<_>, EffectError>>()
+            .map(Self)
+    }
+
+    /// Those of `self`, then those of `other`.
+    pub fn and(mut self, other: &Self) -> Self {
+        self.0.extend(other.0.iter().cloned());
+        self
+    }
+
+    /// The equations of `structure` with these effects.
+    ///
+    /// # Errors
+    /// What an effect cannot do to this structure, or an indefinite structure.
+    pub fn dynamics(&self, structure: &Structure) -> Result<(Dynamics, Vec<Box<dyn Term>>), SimulateError> {
+        let mut structure = structure.clone();
+        for effect in &self.0 {
+            effect.alter_structure(&mut structure)?;
+        }
+        let mut dynamics = Dynamics::new(&structure)?;
+        let mut terms = Vec::new();
+        for effect in &self.0 {
+            effect.alter_dynamics(&structure, &mut dynamics)?;
+            terms.extend(effect.terms(&structure)?);
+        }
+        if dynamics.velocity_jumps() && terms.iter().any(|term| term.holds().is_some()) {
+            return Err(EffectError::NoInertia.into());
+        }
+        Ok((dynamics, terms))
+    }
+
+    /// The channel as these effects make it.
+    pub fn pickup(&self, mut channel: Pickup) -> Pickup {
+        for effect in &self.0 {
+            effect.alter_channel(&mut channel);
+        }
+        channel
+    }
+}
+
+fn kind(name: &str) -> Result<&'static Kind, EffectError> {
+    match KINDS.iter().find(|kind| kind.name == name) {
+        Some(kind) => Ok(kind),
+        None if EXTENSION_NAMES.contains(&name) => Err(EffectError::NotSimulated(name.into())),
+        None => Err(EffectError::Unknown(name.into())),
+    }
+}

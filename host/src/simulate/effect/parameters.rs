@@ -1,0 +1,183 @@
+//! The parameters of an effect, from the command line or from a case.
+
+use std::collections::BTreeMap;
+
+use super::EffectError;
+use crate::structure::Direction;
+
+/// A value as it was given.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A number; true is 1 and false is 0.
+    Number(f64),
+    /// A word.
+    Text(String),
+    /// Several words.
+    List(Vec<String>),
+}
+
+impl Value {
+    /// A number where the text is one, several words where it has commas.
+    pub fn of_text(text: &str) -> Self {
+        let text = text.trim();
+        match text.parse() {
+            Ok(number) => Self::Number(number),
+            Err(_) if text.contains(',') => {
+                Self::List(text.split(',').map(|word| word.trim().into()).collect())
+            }
+            Err(_) => Self::Text(text.into()),
+        }
+    }
+
+    /// `None` for tables, dates and lists of anything but words.
+    pub fn of_toml(value: &toml::Value) -> Option<Self> {
+        match value {
+            toml::Value::Boolean(on) => Some(Self::Number(f64::from(u8::from(*on)))),
+            toml::Value::Integer(number) => Some(Self::Number(*number as f64)),
+            toml::Value::Float(number) => Some(Self::Number(*number)),
+            toml::Value::String(text) => Some(Self::Text(text.clone())),
+            toml::Value::Array(list) => list
+                .iter()
+                .map(|word| word.as_str().map(String::from))
+                .collect::<Option<_>>()
+                .map(Self::List),
+            _ => None,
+        }
+    }
+
+    fn said(&self) -> String {
+        match self {
+            Self::Number(number) => number.to_string(),
+            Self::Text(text) => text.clone(),
+            Self::List(words) => words.join(","),
+        }
+    }
+}
+
+/// What was given for one effect; an effect takes out what it knows.
+#[derive(Clone, Debug)]
+pub struct Parameters {
+    effect: String,
+    /// By key; the quantity that the effect is named for has the key "".
+    values: BTreeMap<String, Value>,
+}
+
+impl Parameters {
+    pub(super) fn new(effect: &str) -> Self {
+        Self {
+            effect: effect.into(),
+            values: BTreeMap::new(),
+        }
+    }
+
+    pub(super) fn effect(&self) -> &str {
+        &self.effect
+    }
+
+    pub(super) fn put(&mut self, key: &str, value: Value) {
+        self.values.insert(key.into(), value);
+    }
+
+    /// The number of a key; `None` where it is not given.
+    ///
+    /// # Errors
+    /// It is no finite number, or not one that `allowed` allows.
+    pub(super) fn number(
+        &mut self,
+        key: &str,
+        allowed: fn(f64) -> bool,
+        needed: &'static str,
+    ) -> Result<Option<f64>, EffectError> {
+        match self.values.remove(key) {
+            None => Ok(None),
+            Some(Value::Number(number)) if number.is_finite() && allowed(number) => Ok(Some(number)),
+            Some(other) => Err(self.wrong(key, &other, needed)),
+        }
+    }
+
+    /// Any finite number.
+    pub(super) fn finite(&mut self, key: &str) -> Result<Option<f64>, EffectError> {
+        self.number(key, |_| true, "a number")
+    }
+
+    /// A number greater than 0.
+    pub(super) fn positive(&mut self, key: &str) -> Result<Option<f64>, EffectError> {
+        self.number(key, |x| x > 0.0, "a number greater than 0")
+    }
+
+    /// The quantity that the effect is named for, by its own key or without one.
+    pub(super) fn main(&mut self, key: &'static str) -> Result<f64, EffectError> {
+        match self.finite("")? {
+            Some(number) => Ok(number),
+            None => self.needed(key),
+        }
+    }
+
+    /// A number that must be there.
+    pub(super) fn needed(&mut self, key: &'static str) -> Result<f64, EffectError> {
+        self.finite(key)?.ok_or_else(|| EffectError::Missing {
+            name: self.effect.clone(),
+            key,
+        })
+    }
+
+    /// A word.
+    pub(super) fn text(&mut self, key: &str) -> Result<Option<String>, EffectError> {
+        match self.values.remove(key) {
+            None => Ok(None),
+            Some(Value::Text(text)) => Ok(Some(text)),
+            Some(other) => Err(self.wrong(key, &other, "a name")),
+        }
+    }
+
+    /// A direction.
+    pub(super) fn direction(&mut self, key: &str) -> Result<Option<Direction>, EffectError> {
+        match self.text(key)? {
+            None => Ok(None),
+            Some(text) => match text.parse() {
+                Ok(direction) => Ok(Some(direction)),
+                Err(_) => Err(self.wrong(key, &Value::Text(text), "x, y or z")),
+            },
+        }
+    }
+
+    /// Two directions, as `directions = ["x", "y"]` or `x,y`.
+    pub(super) fn pair(&mut self, key: &str) -> Result<Option<[Direction; 2]>, EffectError> {
+        let Some(value) = self.values.remove(key) else {
+            return Ok(None);
+        };
+        if let Value::List(words) = &value
+            && let [a, b] = words.as_slice()
+            && let (Ok(a), Ok(b)) = (a.parse(), b.parse())
+            && a != b
+        {
+            return Ok(Some([a, b]));
+        }
+        Err(self.wrong(key, &value, "two of x, y and z, as in x,y"))
+    }
+
+    fn wrong(&self, key: &str, found: &Value, needed: &'static str) -> EffectError {
+        EffectError::Value {
+            effect: if key.is_empty() {
+                self.effect.clone()
+            } else {
+                format!("{}.{key}", self.effect)
+            },
+            found: found.said(),
+            needed,
+        }
+    }
+
+    /// # Errors
+    /// A key that nobody has taken.
+    pub(super) fn finish(self, known: &'static str) -> Result<(), EffectError> {
+        match self.values.into_keys().next() {
+            None => Ok(()),
+            Some(key) => Err(EffectError::Key {
+                name: self.effect,
+                key: if key.is_empty() { "a value".into() } else { key },
+                known,
+            }),
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Where an effect acts: the directions of a structure and its static stiffness along them.
+
+use nalgebra::{DMatrix, Matrix3};
+
+use super::EffectError;
+use crate::structure::{Direction, Structure};
+
+/// The axis of `direction`, or the only axis of the structure where none is given.
+pub(super) fn axis_of(
+    structure: &Structure,
+    direction: Option<Direction>,
+    name: &'static str,
+) -> Result<usize, EffectError> {
+    let wrong = |what: String| EffectError::Direction {
+        name,
+        what,
+        directions: structure
+            .directions
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join(", "),
+    };
+    match direction {
+        Some(direction) if !structure.directions.contains(&direction) => {
+            Err(wrong(format!("there is no direction {direction}")))
+        }
+        Some(direction) => direction
+            .axis()
+            .ok_or_else(|| wrong(format!("{direction} is a rotation; x, y or z is needed"))),
+        None => {
+            let axes: Vec<usize> = structure.directions.iter().filter_map(|d| d.axis()).collect();
+            match axes[..] {
+                [only] => Ok(only),
+                _ => Err(wrong("it must say its direction (direction = \"x\")".into())),
+            }
+        }
+    }
+}
+
+/// K along x, y and z, N/m: the inverse of the static receptance; the matrix K itself where there are no rotations.
+/// Axes that the structure does not have are zero.
+pub(super) fn static_stiffness(
+    structure: &Structure,
+    name: &'static str,
+) -> Result<Matrix3<f64>, EffectError> {
+    let unknown = || EffectError::Structure {
+        name,
+        what:
+            "the static stiffness of the structure is not known (it is free, or its matrices are indefinite)"
+                .into(),
+    };
+    let axes: Vec<usize> = structure.directions.iter().filter_map(|d| d.axis()).collect();
+    let receptance = structure
+        .first_order()
+        .ok()
+        .and_then(|first_order| first_order.receptance(0.0))
+        .ok_or_else(unknown)?;
+    let compliance = DMatrix::from_fn(axes.len(), axes.len(), |i, j| receptance[(axes[i], axes[j])].re);
+    let stiffness = compliance.try_inverse().ok_or_else(unknown)?;
+    let mut whole = Matrix3::zeros();
+    for (i, &row) in axes.iter().enumerate() {
+        for (j, &column) in axes.iter().enumerate() {
+            whole[(row, column)] = stiffness[(i, j)];
+        }
+    }
+    Ok(whole)
+}
+
+/// A force along one axis.
+pub(super) fn along(axis: usize, force_n: f64) -> [f64; 3] {
+    let mut force = [0.0; 3];
+    force[axis] = force_n;
+    force
+}

@@ -1,0 +1,37 @@
+//! Effects by name, and each term against the closed form of its motion.
+
+use super::*;
+
+#[test]
+fn a_value_and_its_keys_are_one_effect() {
+    let effects = Effects::parse(["runout=20", "axial-depth-modulation=1", "runout.angle_deg=-30"]).unwrap();
+    let names: Vec<&str> = effects.0.iter().map(|effect| effect.name()).collect();
+    assert_eq!(names, ["runout", "axial-depth-modulation"]);
+}
+
+#[test]
+fn what_cannot_be_is_told_apart() {
+    let error = |text| Effects::parse([text]).unwrap_err();
+    assert!(matches!(error("runout"), EffectError::Form(_)));
+    assert!(matches!(error("runout=lots"), EffectError::Value { .. }));
+    assert!(matches!(error("runout=inf"), EffectError::Value { .. }));
+    assert!(matches!(
+        error("axial-depth-modulation=2"),
+        EffectError::Value { .. }
+    ));
+    assert!(matches!(error("runout.angle_deg=2"), EffectError::Missing { .. }));
+    assert!(matches!(
+        Effects::parse(["runout=1", "runout.teeth=2"]).unwrap_err(),
+        EffectError::Key { .. }
+    ));
+    assert!(matches!(error("wear=0.1"), EffectError::NotSimulated(_)));
+    assert!(matches!(error("weather=1"), EffectError::Unknown(_)));
+    assert!(error("weather=1").to_string().contains("runout, axial-depth"));
+}
+
+#[test]
+fn every_kind_is_a_name_of_a_case() {
+    for kind in KINDS {
+        assert!(EXTENSION_NAMES.contains(&kind.name), "{}", kind.name);
+    }
+}

@@ -1,0 +1,216 @@
+//! Virtual test rigs: a shaker, a hammer or a hand on a structure, and the sensors that record it.
+
+mod noise;
+mod signal;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+pub use noise::Noise;
+pub use signal::{Impact, Signal, Step};
+
+use super::effect::{Effects, Pickup};
+use super::{Drive, Model, Room, Segment, Settings, SimulateError, Statistics};
+use crate::recording::{Channel, Kind, Quantity, Recording, Sidecar};
+use crate::structure::{Direction, Structure};
+
+/// A test of a structure.
+#[derive(Clone, Debug)]
+pub struct Rig {
+    /// The direction in which the force acts.
+    pub direction: Direction,
+    /// The force that is asked for.
+    pub signal: Signal,
+    /// How much less the force is per velocity of the tool, N s/m, at a shaker whose amplitude is not controlled: its
+    /// force drops where the structure resonates. The recorded force is the true one.
+    pub drop_ns_per_m: f64,
+    /// Samples per second.
+    pub sample_rate_hz: f64,
+    /// What is measured besides the force, in every direction of the structure.
+    pub measured: Vec<Quantity>,
+    /// What the structure or the sensors have that the case has not.
+    pub effects: Effects,
+}
+
+/// The force of a rig along one axis.
+struct Driven {
+    axis: usize,
+    signal: Signal,
+    drop_ns_per_m: f64,
+}
+
+impl Drive for Driven {
+    fn force_n(&self, t: f64) -> [f64; 3] {
+        let mut force = [0.0; 3];
+        force[self.axis] = self.signal.force_n(t);
+        force
+    }
+
+    fn drop_ns_per_m(&self) -> [f64; 3] {
+        let mut drop = [0.0; 3];
+        drop[self.axis] = self.drop_ns_per_m;
+        drop
+    }
+
+    fn next_knot_s(&self, t: f64) -> f64 {
+        self.signal.next_knot_s(t)
+    }
+}
+
+impl Rig {
+    /// A rig that measures displacement and acceleration.
+    pub fn new(direction: Direction, signal: Signal, sample_rate_hz: f64) -> Self {
+        Self {
+            direction,
+            signal,
+            drop_ns_per_m: 0.0,
+            sample_rate_hz,
+            measured: vec![Quantity::Displacement, Quantity::Acceleration],
+            effects: Effects::default(),
+        }
+    }
+
+    /// The recording without noise, from rest at t = 0; `path` is where it will be written.
+    ///
+    /// # Errors
+    /// The structure is indefinite or has not the direction, an effect cannot be, or the motion diverges.
+    pub fn record(
+        &self,
+        structure: &Structure,
+        path: &Path,
+    ) -> Result<(Recording, Statistics), SimulateError> {
+        let axis = self
+            .direction
+            .axis()
+            .filter(|_| structure.directions.contains(&self.direction))
+            .ok_or(SimulateError::NoDirection {
+                direction: self.direction,
+            })?;
+        let (dynamics, terms) = self.effects.dynamics(structure)?;
+        let model = Model {
+            dynamics,
+            cutting: None,
+            drive: Some(Box::new(Driven {
+                axis,
+                signal: self.signal.clone(),
+                drop_ns_per_m: self.drop_ns_per_m,
+            })),
+            terms,
+        };
+        let mut recorder = Recorder::new(&model, self, self.pickups(structure, axis));
+        let statistics = model.run(self.signal.duration_s(), Settings::default(), |segment| {
+            recorder.observe(segment);
+        })?;
+        let recording = Recording {
+            path: path.into(),
+            sample_rate_hz: self.sample_rate_hz,
+            start_s: 0.0,
+            channels: recorder.channels(),
+            sidecar: Sidecar {
+                kind: Some(self.signal.kind()),
+                input: Some(vec![format!("f{}", self.direction)]),
+                ..Sidecar::default()
+            },
+        };
+        Ok((recording, statistics))
+    }
+
+    /// The force channel, then what is measured, by quantity and direction.
+    fn pickups(&self, structure: &Structure, driven: usize) -> Vec<Pickup> {
+        let mut pickups = vec![Pickup::of_axis(Quantity::Force, driven)];
+        for quantity in &self.measured {
+            for axis in structure
+                .directions
+                .iter()
+                .filter_map(|direction| direction.axis())
+            {
+                pickups.push(Pickup::of_axis(*quantity, axis));
+            }
+        }
+        pickups
+            .into_iter()
+            .map(|pickup| self.effects.pickup(pickup))
+            .collect()
+    }
+}
+
+/// Samples of each channel, each at its own delay.
+struct Recorder {
+    rate_hz: f64,
+    count: usize,
+    pickups: Vec<(Pickup, Vec<f64>)>,
+    room: Room,
+}
+
+impl Recorder {
+    fn new(model: &Model, rig: &Rig, pickups: Vec<Pickup>) -> Self {
+        let count = (rig.signal.duration_s() * rig.sample_rate_hz).floor() as usize;
+        Self {
+            rate_hz: rig.sample_rate_hz,
+            count,
+            pickups: pickups
+                .into_iter()
+                .map(|pickup| (pickup, Vec::with_capacity(count)))
+                .collect(),
+            room: Room::new(model),
+        }
+    }
+
+    fn observe(&mut self, segment: &Segment<'_>) {
+        for (pickup, samples) in &mut self.pickups {
+            while samples.len() < self.count {
+                let t = samples.len() as f64 / self.rate_hz - pickup.delay_s;
+                if t > segment.to_s() {
+                    break;
+                }
+                // Before the test all was at rest.
+                if t < 0.0 {
+                    samples.push(0.0);
+                    continue;
+                }
+                let motion = segment.motion(t, &mut self.room);
+                samples.push(pickup.read(match pickup.quantity {
+                    Quantity::Force => motion.force_n,
+                    Quantity::Velocity => motion.velocity_m_per_s,
+                    Quantity::Acceleration => motion.acceleration_m_per_s2.unwrap_or([0.0; 3]),
+                    _ => motion.displacement_m,
+                }));
+            }
+        }
+    }
+
+    fn channels(self) -> Vec<Channel> {
+        let shortest = self
+            .pickups
+            .iter()
+            .map(|(_, samples)| samples.len())
+            .min()
+            .unwrap_or(0);
+        self.pickups
+            .into_iter()
+            .map(|(pickup, mut samples)| {
+                samples.truncate(shortest);
+                Channel {
+                    name: pickup.name,
+                    quantity: pickup.quantity,
+                    samples,
+                }
+            })
+            .collect()
+    }
+}
+
+impl Signal {
+    /// What kind of recording it makes.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Tones { .. } => Kind::Shaker,
+            Self::StepSine { .. } => Kind::StepSine,
+            Self::Sweep { .. } => Kind::Sweep,
+            Self::Impacts { .. } => Kind::Hammer,
+            Self::Release { .. } => Kind::FreeDecay,
+        }
+    }
+}
