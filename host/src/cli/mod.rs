@@ -45,7 +45,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Demo(demo::Args),
-    Simulate(simulate::Args),
+    Simulate(Box<simulate::Args>),
     Lobes(lobes::Args),
     Table(table::Args),
     Upload(upload::Args),
@@ -77,7 +77,7 @@ pub fn main() -> ExitCode {
 fn run(verb: Verb) -> Result<(), Error> {
     match verb {
         Verb::Demo(args) => demo::run(args),
-        Verb::Simulate(args) => simulate::run(args),
+        Verb::Simulate(args) => simulate::run(*args),
         Verb::Lobes(args) => lobes::run(args),
         Verb::Table(args) => table::run(args),
         Verb::Upload(args) => upload::run(args),

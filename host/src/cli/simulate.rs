@@ -19,7 +19,7 @@ use crate::simulate::{
 /// a virtual test rig.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n\nA test rig:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:27 --force-n 1.8,5.8,9.5 --noise-percent 1 --out steps.csv"
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 20 --sample-rate-hz 128 --noise-percent 1 --out steps.csv"
 )]
 pub struct Args {
     /// The case file: structure, tool, material, cut.

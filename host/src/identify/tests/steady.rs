@@ -187,9 +187,20 @@ fn judge(seeds: std::ops::Range<u64>) -> (f64, f64, BTreeMap<String, f64>) {
     (worst, pooled, by_parameter)
 }
 
-/// Every parameter within 2 %, intervals cover as they say, with the thesis's levels and 1 % noise per time sample.
+/// Every parameter within 2 %, intervals that cover what they say, with the thesis's levels and 1 % noise per sample.
 #[test]
-fn modes_come_back_within_two_percent_and_intervals_cover() {
+fn modes_come_back_within_two_percent() {
+    let (worst, pooled, _) = judge(0..12);
+    assert!(worst < 0.02, "{worst}");
+    // 60 fits of 5 parameters that hang together: the share scatters by about 3 %, three times that is allowed.
+    assert!((0.81..=0.97).contains(&pooled), "{pooled}");
+}
+
+/// As above with 200 seeds, and each parameter for itself:
+/// `cargo test --release -p quietcut --lib intervals_cover -- --ignored --nocapture`
+#[test]
+#[ignore = "half a minute; the command is in its documentation"]
+fn intervals_cover_the_truth_in_nine_of_ten_cases() {
     let (worst, pooled, by_parameter) = judge(0..200);
     println!(
         "pooled {:.2} %, worst error {:.3} %",
