@@ -130,8 +130,11 @@ fn examples_run() {
                 let folder = folder();
                 let there = folder.path().join("tests/cases");
                 std::fs::create_dir_all(&there).expect("a folder can be made");
-                let name = "kuka-kr90-acetal.toml";
-                std::fs::copy(cases().join(name), there.join(name)).expect("the case can be copied");
+                for case in std::fs::read_dir(cases()).expect("the cases are there") {
+                    let case = case.expect("a case can be listed").path();
+                    let name = case.file_name().expect("a case has a name");
+                    std::fs::copy(&case, there.join(name)).expect("the case can be copied");
+                }
                 for example in examples(verb) {
                     let ran = quietcut(folder.path(), &example);
                     assert_eq!(ran.status, Some(0), "{example:?}: {ran:?}");
