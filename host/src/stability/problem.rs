@@ -71,6 +71,20 @@ pub enum StabilityError {
     /// A table of frequency response functions cannot be used.
     #[error(transparent)]
     Frf(#[from] FrfError),
+    /// A table ends before the loop has become small.
+    #[error(
+        "depths from {deepest_mm:.3} mm on cannot be judged, and {depth_mm} mm was asked for: the frequency response \
+         functions end at {last_hz} Hz, where the gain of the loop then reaches 1; measure to higher frequencies, or ask \
+         for less depth"
+    )]
+    EndsEarly {
+        /// The depth asked for, mm.
+        depth_mm: f64,
+        /// The largest depth that can be judged, mm.
+        deepest_mm: f64,
+        /// Last frequency of the table, Hz.
+        last_hz: f64,
+    },
     /// What was asked depends on frequencies that a table does not have.
     #[error(
         "at {rpm} rev/min and {depth_mm:.4} mm the cut vibrates at {frequency_hz:.3} Hz, but the frequency response \

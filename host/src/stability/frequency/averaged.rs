@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::FrequencyProblem;
 use crate::complex_eigenvalues;
-use crate::stability::Kind;
+use crate::stability::{Kind, StabilityError};
 
 /// u = H (κ α₀ − β₀) u with the averages α₀ (times K_tc) and β₀ = β_e + β_f over a tooth period.
 ///
@@ -45,6 +45,34 @@ impl<'a> AveragedLoop<'a> {
             },
             axes: (0..3).filter(|&axis| moves[axis] && is_seen(axis)).collect(),
         }
+    }
+
+    /// Refuses depths at which a table ends before the loop has become smaller than 1.
+    ///
+    /// Beyond its last line a table is continued as inertia: that nothing becomes unstable there can be said only where
+    /// the gain of the loop is below 1 at the last line already. A mode above the table is not seen, however small the
+    /// loop is.
+    ///
+    /// # Errors
+    /// The gain at the last line, with the displacement and its past in opposition, is 1 or more at that depth.
+    pub(super) fn check_reach(problem: &FrequencyProblem, depth_mm: f64) -> Result<(), StabilityError> {
+        let Some((_, last_hz)) = problem.band_hz() else {
+            return Ok(());
+        };
+        let last = Complex64::new(0.0, std::f64::consts::TAU * last_hz);
+        let loci = AveragedLoop::new(problem, None)
+            .eigenvalues(last, 0.0)
+            .unwrap_or_default();
+        let largest = loci.iter().map(|locus| locus.norm()).fold(0.0, f64::max);
+        let deepest_mm = 1e3 / (2.0 * largest);
+        if depth_mm < deepest_mm {
+            return Ok(());
+        }
+        Err(StabilityError::EndsEarly {
+            depth_mm,
+            deepest_mm,
+            last_hz,
+        })
     }
 
     /// 1 + (Hβ₀)_zz, which is det(I + Hβ₀).

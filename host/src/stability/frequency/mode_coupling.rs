@@ -54,6 +54,7 @@ impl Method for ModeCoupling {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         root::averaged_point(&self.problem, rpm, depth_mm, |problem| {
             AveragedLoop::new(problem, None)
         })
@@ -62,6 +63,7 @@ impl Method for ModeCoupling {
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         let open_loop = AveragedLoop::new(&self.problem, None);
         let found = limits(&open_loop, depth_mm * 1e-3).ok_or(StabilityError::BrokeDown {
             rpm,

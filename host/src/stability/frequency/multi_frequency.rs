@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::FrequencyProblem;
+use super::averaged::AveragedLoop;
 use super::harmonic::HarmonicLoop;
 use super::limits::{Limit, limits, speed_line};
 use super::root::{point_of, polish, rightmost};
@@ -105,14 +106,11 @@ impl Method for MultiFrequency {
         "multi-frequency"
     }
 
-    fn blind_to(&self) -> Option<&'static str> {
-        (self.harmonics == Some(0)).then_some("much of the period: hardly any harmonics")
-    }
-
     /// The error is what changes with twice the harmonics; the multiplier is that with twice the harmonics.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
         let not_found = broke_down("the rightmost root cannot be found by receptances; limits can");
         let depth_m = depth_mm * 1e-3;
@@ -139,6 +137,7 @@ impl Method for MultiFrequency {
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         let (open_loop, limits) = self.settled(rpm, depth_mm)?;
         speed_line(&open_loop, rpm, depth_mm, &limits, |limit| {
             open_loop.chatter_hz(limit)

@@ -31,6 +31,7 @@ impl Nyquist {
     pub fn unstable_roots(&self, rpm: f64, depth_mm: f64) -> Result<i32, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         let depth_m = depth_mm * 1e-3;
         let count = if self.harmonics == 0 {
             unstable_roots(&self.averaged(rpm), depth_m, 0.0)
@@ -95,6 +96,7 @@ impl Method for Nyquist {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         if self.harmonics == 0 {
             return root::averaged_point(&self.problem, rpm, depth_mm, |problem| {
                 AveragedLoop::new(problem, Some(rpm))
@@ -110,6 +112,7 @@ impl Method for Nyquist {
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         if self.harmonics == 0 {
             let open_loop = self.averaged(rpm);
             let found = confirmed(&open_loop, rpm, depth_mm)?;

@@ -127,6 +127,7 @@ impl Method for Zoa {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         root::averaged_point(&self.problem, rpm, depth_mm, |problem| {
             AveragedLoop::new(problem, Some(rpm))
         })
@@ -148,6 +149,7 @@ impl Method for Zoa {
         _samples: usize,
     ) -> Result<Vec<SpeedLine>, StabilityError> {
         check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
         let rpm = speeds_rpm.first().copied().unwrap_or_default();
         let samples = self.samples(depth_mm * 1e-3).ok_or(StabilityError::BrokeDown {
             rpm,
