@@ -50,6 +50,8 @@ mod agreement;
 #[cfg(test)]
 mod cells_tests;
 #[cfg(test)]
+mod properties;
+#[cfg(test)]
 mod sensitivity_tests;
 #[cfg(test)]
 mod tests;
