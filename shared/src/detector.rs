@@ -1,7 +1,13 @@
 //! The verdict: what the machine is doing.
 
+pub mod evidence;
+pub mod finding;
+mod frequency;
 pub mod growth;
+mod held;
 pub mod judge;
+mod lone_tone;
+pub mod presence;
 pub mod tone;
 
 use serde::{Deserialize, Serialize};

@@ -8,8 +8,10 @@ use crate::advice::{self, Advice};
 use crate::decimation::{
     self, Decimation, FRACTION_BITS, MAX_RATE, MIN_RATE, STRUCTURE_BAND, Sample, TOOL_BAND,
 };
-use crate::detector::growth::{Finding, Growth};
-use crate::detector::judge::{Detector, Evidence};
+use crate::detector::evidence::Evidence;
+use crate::detector::finding::Finding;
+use crate::detector::growth::{Growth, Look};
+use crate::detector::judge::Detector;
 use crate::detector::tone::{Background, Tone};
 use crate::detector::{Judgement, Verdict};
 use crate::lobes::LobeTable;
@@ -239,6 +241,12 @@ impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
         (*fresh, *tone, *passed, *floor, *since_look) = (false, None, false, 0.0, 0);
     }
 
+    /// Takes a sample towards the next spectrum, one of which is due every `hop` samples.
+    fn take(&mut self, sample: Sample, hop: usize) {
+        self.fresh |= self.overlap.push(sample, hop);
+        self.since_look = self.since_look.saturating_add(1);
+    }
+
     /// Forgets the signal, but not what is usual.
     fn interrupt(&mut self) {
         self.overlap.reset();
@@ -362,7 +370,7 @@ const STRUCTURE_SAMPLES_PER_TOOTH: f32 = 8.0;
 const TOOL_SAMPLES_PER_TOOTH: f32 = 2.5;
 /// The angle must be known to this part of a tooth period.
 const LARGEST_ANGLE_DEVIATION: f32 = 0.03;
-/// Growth is looked at with each passing, but not more often than after so many samples of the tool band: 4 ms.
+/// In the tool band growth is looked at not more often than after so many of its samples, 4 ms: what it costs.
 const LOOK_SAMPLES: u32 = 53;
 /// A speed that changes by more than this part per turn makes passings that cannot be compared.
 const LARGEST_CHANGE_PER_TURN: f32 = 0.02;
@@ -544,8 +552,7 @@ impl Monitor {
 
     fn take_tool(&self, state: &mut State, sample: Sample, n: usize, angles: Option<&Angles>) {
         let path = &mut state.tool;
-        path.fresh |= path.overlap.push(sample, TOOL_HOP);
-        path.since_look = path.since_look.saturating_add(1);
+        path.take(sample, TOOL_HOP);
         let Some(angles) =
             angles.filter(|a| self.can_sample(a, self.decimation.tool_divisor(), TOOL_SAMPLES_PER_TOOTH))
         else {
@@ -562,7 +569,13 @@ impl Monitor {
         };
         let rate = self.settings.sensor.nominal_rate.0 / self.decimation.tool_divisor() as f32;
         let noise = self.noise_density() * 0.5 * rate;
-        let look = path.since_look >= LOOK_SAMPLES;
+        // Not closely: samples between the samples are as good as a cubic, and what that leaves of the forced vibration turns by the samples per
+        // tooth period, a tone that beats with its own harmonics.
+        let look = if path.since_look >= LOOK_SAMPLES {
+            Look::Quick
+        } else {
+            Look::None
+        };
         self.take_passing(path, &passed, noise, look);
         // Slower teeth than the structure band needs are shown from there.
         if !self.can_sample(
@@ -576,7 +589,7 @@ impl Monitor {
 
     fn take_structure(&self, state: &mut State, sample: Sample, n: usize, angles: Option<&Angles>) {
         let path = &mut state.structure;
-        path.fresh |= path.overlap.push(sample, STRUCTURE_HOP);
+        path.take(sample, STRUCTURE_HOP);
         let divisor = self.decimation.structure_divisor();
         let Some(angles) = angles.filter(|a| self.can_sample(a, divisor, STRUCTURE_SAMPLES_PER_TOOTH)) else {
             return;
@@ -594,7 +607,7 @@ impl Monitor {
         let rate = self.settings.sensor.nominal_rate.0;
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
-        self.take_passing(path, &passed, noise, true);
+        self.take_passing(path, &passed, noise, Look::Close);
         show(&mut state.strobes, Band::Structure, &passed);
     }
 
@@ -603,7 +616,7 @@ impl Monitor {
         path: &mut Path<POINTS, BINS>,
         passed: &Passed,
         noise: f32,
-        look: bool,
+        look: Look,
     ) {
         path.floor = math::sqrt(noise);
         path.growth.push(
@@ -613,9 +626,9 @@ impl Monitor {
             self.settings.tool.teeth,
             look,
         );
-        // Without a look there is nothing new to judge.
-        path.passed |= look;
-        if look {
+        if look >= Look::Quick {
+            // Without a look there is nothing new to judge.
+            path.passed = true;
             path.since_look = 0;
         }
     }

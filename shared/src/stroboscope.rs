@@ -6,11 +6,13 @@
 //! each channel and class, which is estimated *jointly* with the multipliers, so that runout, which alternates
 //! like a flip when the number of teeth is even, cannot pass for one: only growth can.
 //!
-//! Two estimators look at the last passings:
-//! - [`prediction`]: linear prediction with coefficients common to all channels, over several strides;
+//! Three estimators look at the last passings:
+//! - [`prediction`]: linear prediction with coefficients common to all channels, over several strides, for fast growth;
+//! - [`exponential`]: one complex pair fitted to a whole window, for slow growth that noise hides;
 //! - [`alternation`]: the growth of an alternating part, where an offset lies next to the multiplier −1.
 
 pub mod alternation;
+pub mod exponential;
 pub mod prediction;
 mod roots;
 mod shape;
@@ -18,6 +20,7 @@ mod shape;
 use crate::synchronous::{CHANNELS, MAX_CLASSES, Passing, clamp_classes};
 
 pub use alternation::Alternation;
+pub use exponential::{Exponential, Guess};
 pub use prediction::{Plan, Prediction};
 
 /// Passings remembered.

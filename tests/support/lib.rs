@@ -14,5 +14,6 @@ pub mod pty;
 pub mod raw_host;
 pub mod said;
 pub mod scenario;
+pub mod shaking;
 pub mod table_bits;
 pub mod virtual_cut;

@@ -3,12 +3,16 @@
 use std::fmt;
 
 use quietcut::case::Case;
-use quietcut::simulate::{Accelerometer, Model, Regeneration, Room, Settings, TachometerModel, VirtualCut};
+use quietcut::simulate::{
+    Accelerometer, Heard, Model, Regeneration, Room, Sampler, Segment, Settings, Spindle, Statistics,
+    TachometerModel, VirtualCut,
+};
 use quietcut_core::detector::Verdict;
-use quietcut_core::monitor::{Monitor, State};
+use quietcut_core::monitor::{self, Monitor, State};
 
-use crate::acceptance::settings;
+use crate::acceptance::{AcceptanceCut, settings};
 use crate::said::steps;
+use crate::shaking::Shaking;
 
 /// What came of a cut.
 #[derive(Clone, Debug)]
@@ -27,10 +31,10 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// The first chatter that was called: when, what.
-    pub fn first_alarm(&self) -> Option<(f64, Verdict)> {
+    /// The first chatter that was called: when, what, and the frequency in Hz that was told with it.
+    pub fn first_alarm(&self) -> Option<(f64, Verdict, f64)> {
         let alarm = self.verdicts.iter().find(|(_, verdict, _)| verdict.is_chatter());
-        alarm.map(|(t, verdict, _)| (*t, *verdict))
+        alarm.map(|(t, verdict, hz)| (*t, *verdict, hz.map_or(f64::NAN, f64::from)))
     }
 
     /// When the vibration first was this many times the forced one, s.
@@ -57,7 +61,7 @@ impl fmt::Display for Outcome {
         )?;
         match self.first_alarm() {
             None => write!(f, "no alarm")?,
-            Some((t, verdict)) => write!(f, "{verdict:?} at {t:.2} s, ratio {:.2}", self.ratio_at(t))?,
+            Some((t, verdict, _)) => write!(f, "{verdict:?} at {t:.2} s, ratio {:.2}", self.ratio_at(t))?,
         }
         let largest = self.growth.iter().fold(0.0_f64, |a, turn| a.max(turn.1));
         write!(
@@ -76,86 +80,153 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// Cuts `case`, with these sensors, and lets the pipeline judge.
-pub fn judged(
-    case: &Case,
-    cut: &VirtualCut,
-    accelerometer: Accelerometer,
+/// A cut that is simulated once, to be heard with many seeds of the sensors' noise.
+pub struct SimulatedCut {
+    settings: monitor::Settings,
+    cut: VirtualCut,
+    full_cut_s: [f64; 2],
+    growth: Vec<(f64, f64)>,
     tachometer: TachometerModel,
-    seed: u64,
-) -> Outcome {
-    let heard = cut
-        .hear(case, accelerometer, tachometer, seed)
-        .expect("the cut can be simulated");
-    let monitor = Monitor::new(settings(case, accelerometer, tachometer)).expect("settings that can be");
-    let mut state = State::default();
-    let mut verdicts: Vec<(f64, Verdict, Option<f32>)> = Vec::new();
-    for (block, edges) in &steps(heard) {
-        let report = monitor.step(&mut state, block, edges, None, None);
-        let judgement = report.judgement;
-        if verdicts.last().is_none_or(|last| last.1 != judgement.verdict) {
-            verdicts.push((
-                report.time.0 as f64 * 1e-9,
-                judgement.verdict,
-                judgement.chatter.map(|chatter| chatter.0),
-            ));
+    sampler: Sampler,
+    statistics: Statistics,
+}
+
+impl SimulatedCut {
+    /// One of the cuts that must be judged right.
+    pub fn of(acceptance: &AcceptanceCut) -> Self {
+        let AcceptanceCut {
+            case,
+            cut,
+            accelerometer,
+            tachometer,
+            ..
+        } = acceptance;
+        Self::new(case, cut, *accelerometer, *tachometer, None)
+    }
+
+    /// Cuts `case` in front of these sensors, with a force that shakes the structure beside that of the cut.
+    pub fn new(
+        case: &Case,
+        cut: &VirtualCut,
+        accelerometer: Accelerometer,
+        tachometer: TachometerModel,
+        shaking: Option<Shaking>,
+    ) -> Self {
+        let mut model = cut.model(case).expect("a model");
+        let full_cut_s = cut.full_cut_s(case).expect("a cut that can be");
+        let forced_m = forced_m(case, cut, full_cut_s);
+        model.drive = shaking.map(|shaking| shaking.for_seconds(cut.seconds + 1.0));
+        let mut sampler = Sampler::new(&model, accelerometer);
+        let mut sizes = Sizes::new(&model, cut.spindle_rpm);
+        let end_s = cut.seconds + sampler.tail_s();
+        let statistics = model
+            .run(end_s, Settings::default(), |segment| {
+                sampler.observe(segment);
+                sizes.observe(segment);
+            })
+            .expect("the cut can be simulated");
+        let growth = sizes.turns.into_iter().map(|(t, size_m)| (t, size_m / forced_m));
+        Self {
+            settings: settings(case, accelerometer, tachometer),
+            cut: cut.clone(),
+            full_cut_s,
+            growth: growth.collect(),
+            tachometer,
+            sampler,
+            statistics,
         }
     }
-    Outcome {
-        rpm: cut.spindle_rpm,
-        depth_mm: cut.depth_mm,
-        full_cut_s: cut.full_cut_s(case).expect("a cut that can be"),
-        verdicts,
-        growth: growth(case, cut),
+
+    /// What the pipeline says of it. `seed` is that of the sensors' noise.
+    pub fn judged(&self, seed: u64) -> Outcome {
+        let Self { cut, tachometer, .. } = self;
+        let heard = Heard {
+            blocks: self.sampler.blocks(seed),
+            edges: tachometer.edges(&Spindle::new(cut.spindle_rpm), cut.seconds, seed),
+            statistics: self.statistics,
+        };
+        let monitor = Monitor::new(self.settings).expect("settings that can be");
+        let mut state = State::default();
+        let mut verdicts: Vec<(f64, Verdict, Option<f32>)> = Vec::new();
+        for (block, edges) in &steps(heard) {
+            let report = monitor.step(&mut state, block, edges, None, None);
+            let judgement = report.judgement;
+            if verdicts.last().is_none_or(|last| last.1 != judgement.verdict) {
+                verdicts.push((
+                    report.time.0 as f64 * 1e-9,
+                    judgement.verdict,
+                    judgement.chatter.map(|chatter| chatter.0),
+                ));
+            }
+        }
+        Outcome {
+            rpm: cut.spindle_rpm,
+            depth_mm: cut.depth_mm,
+            full_cut_s: self.full_cut_s,
+            verdicts,
+            growth: self.growth.clone(),
+        }
     }
 }
 
-/// Displacement in each turn over that of the forced motion.
-fn growth(case: &Case, cut: &VirtualCut) -> Vec<(f64, f64)> {
-    let model = cut.model(case).expect("a model");
+/// Size of the forced motion in full cut, m.
+fn forced_m(case: &Case, cut: &VirtualCut, [from, to]: [f64; 2]) -> f64 {
     let mut forced = cut.model(case).expect("a model");
     if let Some(cutting) = &mut forced.cutting {
         cutting.regeneration = Regeneration::None;
     }
-    let [from, to] = cut.full_cut_s(case).expect("a cut that can be");
-    let forced_m = sizes(&forced, cut)
-        .into_iter()
+    let mut sizes = Sizes::new(&forced, cut.spindle_rpm);
+    forced
+        .run(to, Settings::default(), |segment| sizes.observe(segment))
+        .expect("the cut can be simulated");
+    let settled = sizes
+        .turns
+        .iter()
         // In the second half of the full cut the entry has rung down.
-        .filter(|(t, _)| (0.5 * (from + to)..to).contains(t))
-        .fold(0.0_f64, |a, turn| a.max(turn.1));
-    sizes(&model, cut)
-        .into_iter()
-        .map(|(t, size_m)| (t, size_m / forced_m))
-        .collect()
+        .filter(|(t, _)| (0.5 * (from + to)..to).contains(t));
+    settled.fold(0.0, |largest, turn| largest.max(turn.1))
 }
 
 /// Half the largest peak-to-peak displacement of any axis, turn by turn.
-fn sizes(model: &Model, cut: &VirtualCut) -> Vec<(f64, f64)> {
-    let turn_s = 60.0 / cut.spindle_rpm;
-    let every_s = turn_s / 64.0;
-    let mut room = Room::new(model);
-    let mut taken = 0_usize;
-    let mut turns: Vec<(f64, f64)> = Vec::new();
-    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-    model
-        .run(cut.seconds, Settings::default(), |segment| {
-            while taken as f64 * every_s <= segment.to_s() {
-                let t = taken as f64 * every_s;
-                let x = segment.motion(t, &mut room).displacement_m;
-                for axis in 0..3 {
-                    low[axis] = low[axis].min(x[axis]);
-                    high[axis] = high[axis].max(x[axis]);
-                }
-                taken += 1;
-                if taken.is_multiple_of(64) {
-                    let size = (0..3)
-                        .map(|axis| 0.5 * (high[axis] - low[axis]))
-                        .fold(0.0, f64::max);
-                    turns.push((t, size));
-                    (low, high) = ([f64::MAX; 3], [f64::MIN; 3]);
-                }
+struct Sizes {
+    every_s: f64,
+    room: Room,
+    taken: usize,
+    low: [f64; 3],
+    high: [f64; 3],
+    /// End of the turn in s, size in m.
+    turns: Vec<(f64, f64)>,
+}
+
+impl Sizes {
+    /// Displacements taken per turn.
+    const PER_TURN: usize = 64;
+
+    fn new(model: &Model, rpm: f64) -> Self {
+        Self {
+            every_s: 60.0 / rpm / Self::PER_TURN as f64,
+            room: Room::new(model),
+            taken: 0,
+            low: [f64::MAX; 3],
+            high: [f64::MIN; 3],
+            turns: Vec::new(),
+        }
+    }
+
+    fn observe(&mut self, segment: &Segment<'_>) {
+        while self.taken as f64 * self.every_s <= segment.to_s() {
+            let t = self.taken as f64 * self.every_s;
+            let x = segment.motion(t, &mut self.room).displacement_m;
+            for ((low, high), x) in self.low.iter_mut().zip(&mut self.high).zip(x) {
+                *low = low.min(x);
+                *high = high.max(x);
             }
-        })
-        .expect("the cut can be simulated");
-    turns
+            self.taken += 1;
+            if self.taken.is_multiple_of(Self::PER_TURN) {
+                let ranges = self.low.iter().zip(&self.high).map(|(low, high)| high - low);
+                self.turns.push((t, 0.5 * ranges.fold(0.0, f64::max)));
+                (self.low, self.high) = ([f64::MAX; 3], [f64::MIN; 3]);
+            }
+        }
+    }
 }

@@ -42,6 +42,7 @@ impl Window<'_> {
     ///
     /// `noise` is the mean square of white noise in one channel, `deviations` the z of the interval. Returns `None` for odd numbers of teeth, short windows
     /// and where nothing alternates.
+    #[inline(never)]
     pub fn alternation(&self, noise: f32, deviations: f32) -> Option<Alternation> {
         let (length, classes) = (self.length(), self.classes());
         if classes % 2 == 1 || length < classes + 6 {
@@ -111,7 +112,7 @@ impl Window<'_> {
     }
 
     /// e^(rate·k) for every row, 1 at the end that is largest, class means taken off; for rate 0 its limit, a straight line.
-    fn exponential(&self, length: usize, rate: f32) -> [f32; CAPACITY] {
+    fn curve(&self, length: usize, rate: f32) -> [f32; CAPACITY] {
         let mut curve = [0.0; CAPACITY];
         let curve_part = curve.get_mut(..length).unwrap_or_default();
         let factor = exp(if rate > 0.0 { -rate } else { rate });
@@ -129,7 +130,7 @@ impl Window<'_> {
 
     /// Power of the series that the exponential explains.
     fn explained(&self, series: &[f32], rate: f32) -> f32 {
-        let curve = self.exponential(series.len(), rate);
+        let curve = self.curve(series.len(), rate);
         let (mut with, mut own) = (0.0, 0.0);
         for (value, curve) in series.iter().zip(&curve) {
             with += value * curve;
@@ -140,7 +141,7 @@ impl Window<'_> {
 
     /// Correlation of neighbouring residuals of the fit with this rate.
     fn correlation(&self, series: &[f32], rate: f32) -> f32 {
-        let curve = self.exponential(series.len(), rate);
+        let curve = self.curve(series.len(), rate);
         let (mut with, mut own) = (0.0, 0.0);
         for (value, curve) in series.iter().zip(&curve) {
             with += value * curve;

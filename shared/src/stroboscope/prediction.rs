@@ -71,6 +71,7 @@ impl Window<'_> {
         }
     }
 
+    #[inline(never)]
     fn fit<const P: usize>(&self, plan: Plan, noise: f32) -> Option<Prediction> {
         let skipped = P.checked_mul(plan.stride)?;
         let first = self.length().checked_sub(plan.window)? + skipped;

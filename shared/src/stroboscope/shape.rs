@@ -95,8 +95,9 @@ impl Window<'_> {
     }
 }
 
-/// k + `angle_turns` of the integer k with the most power within the tooth period.
-fn strongest(shape: &[[f32; 2]; CHANNELS], angle_turns: f32) -> Option<f32> {
+/// Cycles per tooth period, k + `angle_turns`, of the integer k with the most power within the tooth period. `shape` has the complex amplitude of
+/// each channel.
+pub(super) fn strongest(shape: &[[f32; 2]; CHANNELS], angle_turns: f32) -> Option<f32> {
     let mut best = (0.0, None);
     let half = SLOTS as i32 / 2;
     for k in -half..half {
