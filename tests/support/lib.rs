@@ -4,6 +4,7 @@
 #![allow(clippy::expect_used, clippy::panic)]
 
 pub mod acceptance;
+pub mod campaign;
 pub mod chain_bits;
 pub mod command;
 pub mod cut;

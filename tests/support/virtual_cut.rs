@@ -137,6 +137,12 @@ impl SimulatedCut {
         }
     }
 
+    /// The same, where the signal chain is told of another accelerometer than the one that listens.
+    pub fn told(mut self, case: &Case, accelerometer: Accelerometer) -> Self {
+        self.settings = settings(case, accelerometer, self.tachometer);
+        self
+    }
+
     /// What the pipeline says of it. `seed` is that of the sensors' noise.
     pub fn judged(&self, seed: u64) -> Outcome {
         let Self { cut, tachometer, .. } = self;

@@ -1,0 +1,55 @@
+//! How often the detector is right, over many seeds of noise.
+//!
+//! The whole table, with N seeds for each line (20 take some minutes):
+//!
+//! ```text
+//! QUIETCUT_SEEDS=20 cargo test --release -p quietcut-tests --test detector_rates -- --ignored --nocapture
+//! ```
+
+#![allow(clippy::unwrap_used)]
+
+use quietcut_tests::acceptance::LIMITS;
+use quietcut_tests::campaign::{Line, Rates, run};
+
+/// By when chatter must be called: the vibration over the forced one.
+const IN_TIME: f64 = 5.0;
+
+/// How well the frequency must be told with the first alarm: at 1100 rev/min, where the aliases lie closest together, they are 1.3 Hz apart.
+const SAME_HZ: f64 = 0.5;
+
+fn print(rates: &[Rates]) {
+    for line in rates {
+        println!("{line}");
+    }
+}
+
+#[test]
+fn hard_cuts_are_judged_right_with_other_seeds() {
+    // The flip, the slow torus beside it, and the largest forced vibration.
+    let lines = [3, 4, 9].into_iter().flat_map(Line::pair);
+    let rates = run(lines.collect(), 4);
+    print(&rates);
+    for line in rates {
+        assert_eq!(line.wrong(), 0, "{line}");
+        if line.has_chatter() {
+            assert_eq!(line.in_time(IN_TIME), line.cuts(), "{line}");
+            assert!(line.frequency_error_hz() < SAME_HZ, "{line}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "takes minutes: see the head of the file"]
+fn table() {
+    let seeds = std::env::var("QUIETCUT_SEEDS").map_or(20, |text| text.parse().unwrap());
+    let mut lines: Vec<Line> = (0..LIMITS.len()).flat_map(Line::pair).collect();
+    for teeth in [2, 4, 6] {
+        lines.extend([10.0, 50.0].map(|offset_um| Line::runout(teeth, offset_um)));
+    }
+    lines.extend([2, 3, 6].map(|index| Line::ramp(index, 40.0)));
+    for index in [2, 3, 7, 9] {
+        lines.extend([0.02, 0.1].map(|force| Line::shaken(index, force)));
+    }
+    lines.extend([2, 3, 9].map(|index| Line::noisy(index, 2.0)));
+    print(&run(lines, seeds));
+}
