@@ -5,8 +5,7 @@ use std::fmt;
 use std::sync::Mutex;
 
 use quietcut::case::Case;
-use quietcut::milling::Runout;
-use quietcut::simulate::{Accelerometer, Effect, Entry, TachometerModel, VirtualCut};
+use quietcut::simulate::{Accelerometer, Effects, Entry, TachometerModel, VirtualCut};
 use quietcut_core::detector::Verdict;
 use quietcut_core::tachometer::Wheel;
 
@@ -70,10 +69,8 @@ impl Line {
         let mut line = Self::new(&name, None, rpm, depth_mm);
         line.teeth = teeth;
         line.cut.entry = Entry::Ramp { seconds: 0.3 };
-        line.cut.effects = vec![Effect::Runout(Runout {
-            offset_um,
-            angle_deg: 30.0,
-        })];
+        let runout = [format!("runout={offset_um}"), "runout.angle_deg=30".to_owned()];
+        line.cut.effects = Effects::parse(runout.iter().map(String::as_str)).expect("an effect");
         line
     }
 
