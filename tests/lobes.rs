@@ -290,3 +290,37 @@ fn cells_answer_with_a_grid_and_are_written_in_every_format() {
     }
     quietcut(folder.path(), &[&arguments[..], &["--out", "a.png"]].concat()).refused(&["a.png", ".svg"]);
 }
+
+#[test]
+fn tools_with_variable_pitch_have_limits_by_methods_that_agree_and_no_table() {
+    let folder = folder();
+    let text = std::fs::read_to_string(case("insperger-2dof-ad0.5")).expect("the case");
+    let text = text.replacen("teeth = 2", "teeth = 2\npitch_deg = [170, 190]", 1);
+    std::fs::write(folder.path().join("pitch.toml"), text).expect("a file");
+    let point = |method: &str| {
+        let arguments = [
+            "lobes",
+            "pitch.toml",
+            "--at",
+            "6200,0.2",
+            "--json",
+            "--method",
+            method,
+        ];
+        let answer = quietcut(folder.path(), &arguments);
+        assert_eq!(answer.status, Some(0), "{answer:?}");
+        let answer: Value = serde_json::from_str(&answer.stdout).expect("one JSON object");
+        let of = |key: &str| answer["points"][0][key].as_f64().expect("a number");
+        (answer["method"].clone(), of("multiplier_abs"), of("error"))
+    };
+    let (method, size, error) = point("collocation");
+    assert_eq!(method, "collocation over the revolution");
+    assert!(error < 1e-5, "{error}");
+    for (_, other, error) in [point("sdm"), point("fdm")] {
+        assert!(
+            (other - size).abs() < error && error < 0.1,
+            "{other} {size} {error}"
+        );
+    }
+    quietcut(folder.path(), &["table", "pitch.toml", "--out", "t.qct"]).refused(&["pitch_deg"]);
+}

@@ -8,7 +8,7 @@ use crate::continuation::ForcedProblem;
 use crate::frf::{FrfTable, Interpolation};
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
-    Nyquist, Pitched, Problem, Sdm, SdmOrder, SemiDiscretization, Zoa,
+    Nyquist, Pitched, Problem, RevolutionCollocation, Sdm, SdmOrder, SemiDiscretization, Zoa,
 };
 
 /// Steps per tooth period where none are asked for.
@@ -49,7 +49,8 @@ pub(super) struct MethodChoice {
 /// The methods that can be asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 enum MethodName {
-    /// Collocation of the one-period map; with cubic terms about the forced orbit.
+    /// Collocation of the one-period map; with variable pitch over the revolution, with cubic terms about the forced
+    /// orbit.
     #[default]
     Collocation,
     /// Semi-discretization with a fixed number of steps.
@@ -88,6 +89,11 @@ impl MethodChoice {
         let steps = self.steps.unwrap_or(STEPS);
         Ok(match self.name() {
             MethodName::Collocation if has_cubic_terms => Box::new(ForcedProblem::new(case)?),
+            MethodName::Collocation if case.tool().map_err(Error::input)?.has_variable_pitch() => {
+                Box::new(RevolutionCollocation {
+                    pitched: Pitched::new(case, cubic)?,
+                })
+            }
             MethodName::Collocation => Box::new(Collocation {
                 problem: Problem::new(case, cubic)?,
             }),

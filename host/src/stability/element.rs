@@ -32,6 +32,15 @@ pub(crate) struct Port {
     pub(crate) force: Vector3<f64>,
 }
 
+/// A tooth that cuts throughout an element.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CuttingTooth {
+    /// Its immersion angle at phase 0, rad.
+    pub(super) immersion: f64,
+    /// How far the tool feeds between the tooth before and this one, m.
+    pub(super) feed_m: f64,
+}
+
 /// What all elements of one duration share: the structure between the nodes.
 pub(super) struct Step<'a> {
     gauss: &'a Gauss,
@@ -68,8 +77,26 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// The element that begins at `phase` and turns by `turn`, rad.
+    /// The element of a tooth period that begins at `phase` and turns by `turn`, rad, while `teeth` teeth cut.
     pub(super) fn element(&self, problem: &Problem, teeth: usize, phase: f64, turn: f64) -> Element {
+        let process = &problem.process;
+        let cutting: Vec<CuttingTooth> = (0..teeth)
+            .map(|tooth| CuttingTooth {
+                immersion: process.engagement.angle(tooth, 0.0),
+                feed_m: process.feed_per_tooth_m,
+            })
+            .collect();
+        self.element_of(problem, &cutting, phase, turn)
+    }
+
+    /// The element that begins at `phase` and turns by `turn`, rad, while these teeth cut.
+    pub(super) fn element_of(
+        &self,
+        problem: &Problem,
+        teeth: &[CuttingTooth],
+        phase: f64,
+        turn: f64,
+    ) -> Element {
         let seconds_per_radian = self.duration / turn;
         let process = &problem.process;
         let nodes = self.gauss.nodes.len();
@@ -134,24 +161,26 @@ struct Ports {
 }
 
 impl Ports {
-    fn new(problem: &Problem, gauss: &Gauss, teeth: usize, phase: f64, turn: f64) -> Self {
+    fn new(problem: &Problem, gauss: &Gauss, teeth: &[CuttingTooth], phase: f64, turn: f64) -> Self {
         let process = &problem.process;
-        let per_node = teeth + usize::from(process.axial_depth_modulation);
+        let per_node = teeth.len() + usize::from(process.axial_depth_modulation);
         let mut ports = Self {
             per_node,
             seen: Vec::with_capacity(per_node * gauss.nodes.len()),
             force: Vec::with_capacity(per_node * gauss.nodes.len()),
         };
         for node in &gauss.nodes {
-            let angles = (0..teeth).map(|tooth| process.engagement.angle(tooth, phase + turn * node));
-            for angle in angles.clone() {
+            let angle = |tooth: &CuttingTooth| tooth.immersion + (phase + turn * node);
+            for tooth in teeth {
+                let angle = angle(tooth);
                 ports.seen.push(process.force.normal.at(angle));
                 ports.force.push(process.force.cutting.at(angle));
             }
             if process.axial_depth_modulation {
                 ports.seen.push(Vector3::z());
-                let forced: Vector3<f64> = angles
-                    .map(|angle| process.force.forced(angle, process.feed_per_tooth_m))
+                let forced: Vector3<f64> = teeth
+                    .iter()
+                    .map(|tooth| process.force.forced(angle(tooth), tooth.feed_m))
                     .sum();
                 ports.force.push(-forced);
             }

@@ -24,11 +24,13 @@ pub(crate) mod period;
 mod pitched;
 mod point;
 mod problem;
+mod revolution;
 mod root;
 mod sdm;
 mod sensitivity;
 mod spectrum;
 mod stepped;
+mod variable_pitch;
 
 pub use cells::{Cell, CellChart, CellLine, cell_chart};
 pub use chart::{Chart, Refinement, chart};
@@ -44,6 +46,7 @@ pub use point::{LEAST_ERROR, Point, point};
 pub use problem::{CubicTerms, Problem, StabilityError};
 pub use sdm::{Sdm, SdmOrder, SemiDiscretization};
 pub use sensitivity::{Sensitivity, Slope, Tangent};
+pub use variable_pitch::RevolutionCollocation;
 
 #[cfg(test)]
 mod agreement;
@@ -55,3 +58,5 @@ mod properties;
 mod sensitivity_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod variable_pitch_tests;

@@ -433,7 +433,7 @@ fn the_dominant_multiplier_is_the_growth_rate_of_the_map() {
 }
 
 /// A random machine, tool, material and cut: 1 to 4 modes, 1 to 8 teeth, any immersion.
-fn random_case(rng: &mut impl rand::Rng) -> Case {
+pub(super) fn random_case(rng: &mut impl rand::Rng) -> Case {
     use crate::milling::{Cut, Material, Tool};
     use crate::structure::{Direction, Form, Mode, Structure};
     use rand::RngExt;

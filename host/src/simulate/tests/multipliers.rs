@@ -4,6 +4,7 @@
 //! Newton, which agree to 2e-8.
 
 use super::*;
+use crate::stability::{CubicTerms, Method, Pitched, RevolutionCollocation};
 
 /// The force of a cut without vibration, thesis eq. 3.6, turned round: with it a tool at rest stays at rest.
 struct Counterforce {
@@ -43,6 +44,19 @@ impl Drive for Counterforce {
 
 /// The largest multiplier per tooth of the linear model, from the motion that grows out of a push.
 fn multiplier(case: &Case, spindle_rpm: f64, depth_mm: f64, periods: usize, order: usize) -> f64 {
+    let period_s = case.tool().unwrap().tooth_period_s(spindle_rpm);
+    multiplier_over(period_s, case, spindle_rpm, depth_mm, periods, order)
+}
+
+/// The same over any period of the equations.
+fn multiplier_over(
+    period_s: f64,
+    case: &Case,
+    spindle_rpm: f64,
+    depth_mm: f64,
+    periods: usize,
+    order: usize,
+) -> f64 {
     let mut model = steady(case, spindle_rpm, depth_mm);
     let cutting = model.cutting.as_mut().unwrap();
     cutting.regeneration = Regeneration::LastPass;
@@ -56,7 +70,6 @@ fn multiplier(case: &Case, spindle_rpm: f64, depth_mm: f64, periods: usize, orde
     } else {
         cutting.cutter = cutting.cutter.clone().with_feed_per_tooth_m(0.0);
     }
-    let period_s = case.tool().unwrap().tooth_period_s(spindle_rpm);
     // A push in all states, so small that the square of z in chapter 3 is nothing.
     let push = (0..model.dynamics.order())
         .map(|i| 1e-10 * (1.0 + 0.3 * i as f64))
@@ -233,6 +246,40 @@ fn a_small_disturbance_of_a_real_cut_grows_as_the_multiplier_says() {
         assert!(
             (found - expected).abs() < 1e-4,
             "{name} {spindle_rpm}: {found}, not {expected}"
+        );
+    }
+}
+
+#[test]
+fn small_motions_of_tools_with_variable_pitch_grow_as_collocation_over_the_revolution_says() {
+    // Case, pitches, rev/min, mm, order of the recurrence.
+    let rows: [(&str, &[f64], f64, f64, usize); 4] = [
+        ("insperger-1dof-ad1", &[170.0, 190.0], 5000.0, 0.5, 2),
+        ("insperger-1dof-ad0.1", &[100.0, 125.0, 135.0], 7500.0, 2.0, 2),
+        (
+            "insperger-2dof-ad0.5",
+            &[70.0, 110.0, 70.0, 110.0],
+            6200.0,
+            0.2,
+            4,
+        ),
+        ("insperger-2dof-ad1", &[62.0, 71.0, 93.0, 134.0], 7500.0, 0.1, 4),
+    ];
+    for (name, pitch_deg, spindle_rpm, depth_mm, order) in rows {
+        let mut case = case(name);
+        let tool = case.tool.as_mut().unwrap();
+        tool.teeth = pitch_deg.len();
+        tool.pitch_deg = pitch_deg.to_vec();
+        let method = RevolutionCollocation {
+            pitched: Pitched::new(&case, CubicTerms::Refuse).unwrap(),
+        };
+        let expected = method.point(spindle_rpm, depth_mm).unwrap().multiplier_abs;
+        let found = multiplier_over(60.0 / spindle_rpm, &case, spindle_rpm, depth_mm, 60, order);
+        println!("{name} {pitch_deg:?}: {found} {expected}");
+        // Integration to 1e-9 per step over some hundred steps in a revolution.
+        assert!(
+            (found / expected - 1.0).abs() < 1e-5,
+            "{name} {pitch_deg:?}: {found} {expected}"
         );
     }
 }

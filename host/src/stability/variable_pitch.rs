@@ -1,0 +1,79 @@
+//! The default method for tools with variable pitch: collocation of the map over one revolution.
+
+use std::rc::Rc;
+
+use num_complex::Complex64;
+
+use super::StabilityError;
+use super::krylov::Dominant;
+use super::line::{SpeedLine, line_of};
+use super::method::Method;
+use super::multiplier::{Kind, Verdict};
+use super::one_period::{MapSpectrum, PeriodMap};
+use super::pitched::Pitched;
+use super::point::{LEAST_ERROR, Point, check_depth, check_speed};
+use super::revolution::{Fineness, Revolution};
+
+/// Collocation over the revolution, for teeth at any angles.
+///
+/// Multipliers are over the revolution: with N equal pitches they are the N-th power of those over the tooth period, and
+/// Hopf, flip and fold are meant with respect to the revolution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RevolutionCollocation {
+    /// The problem that it solves.
+    pub pitched: Pitched,
+}
+
+impl Method for RevolutionCollocation {
+    fn name(&self) -> &'static str {
+        "collocation over the revolution"
+    }
+
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        let depth_m = depth_mm * 1e-3;
+        let broke_down = || StabilityError::BrokeDown {
+            rpm,
+            depth_mm,
+            what: "the collocation equations of the revolution have no finite solution",
+        };
+        let map = |fineness| {
+            let revolution = Revolution::new(&self.pitched, rpm, depth_m, fineness)?;
+            Rc::new(revolution).map(depth_m)
+        };
+        let coarse = map(Fineness::WORKING)
+            .and_then(|map| Dominant::any(&map)?.eigenvalues.first().copied())
+            .ok_or_else(broke_down)?;
+        let fine = map(Fineness::FINE).ok_or_else(broke_down)?;
+        let dominant = Dominant::any(&fine).ok_or_else(broke_down)?;
+        let distance = |value: &Complex64| (value - coarse).norm();
+        let values = dominant.eigenvalues.iter().copied();
+        let multiplier = values
+            .min_by(|p, q| distance(p).total_cmp(&distance(q)))
+            .ok_or_else(broke_down)?;
+        let chatter_hz = dominant
+            .vector(multiplier)
+            .and_then(|vector| fine.chatter_hz(multiplier, &vector));
+        let multiplier_abs = multiplier.norm();
+        // The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
+        let error = (10.0 * (coarse - multiplier).norm()).max(LEAST_ERROR * multiplier_abs.max(1.0));
+        Ok(Point {
+            rpm,
+            depth_mm,
+            multiplier,
+            multiplier_abs,
+            error,
+            verdict: Verdict::of(multiplier_abs, error),
+            kind: Kind::of(multiplier),
+            chatter_hz,
+        })
+    }
+
+    fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+        line_of(rpm, depth_mm, samples, |deepest_m| {
+            let revolution = Revolution::new(&self.pitched, rpm, deepest_m, Fineness::WORKING).map(Rc::new);
+            MapSpectrum::new(deepest_m, move |depth_m| revolution.clone()?.map(depth_m))
+        })
+    }
+}
