@@ -163,7 +163,7 @@ fn wrong_sidecars_of_recordings() {
 fn tables_that_are_none() {
     let folder = folder();
     let run = |arguments: &[&str]| quietcut(folder.path(), arguments);
-    let good = quietcut_tests::cut::table("good", 1.5, 20);
+    let good = quietcut_tests::small_table::table("good", 1.5, 20);
     fs::write(folder.path().join("a.csv"), RECORDING).expect("a file can be written");
     let changed = |at: usize| {
         let mut bytes = good.clone();

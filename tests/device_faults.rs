@@ -16,7 +16,7 @@ use quietcut_core::protocol::{
 use quietcut_core::units::Nanoseconds;
 use quietcut_firmware::defaults;
 use quietcut_tests::command::{Outcome, alone, folder, quietcut, start};
-use quietcut_tests::cut::table;
+use quietcut_tests::small_table::table;
 
 /// A device at a pseudo-terminal that answers each request with what a script makes of it.
 struct FaultyDevice {

@@ -8,11 +8,12 @@ use quietcut::device::Client;
 use quietcut::simulate::Entry;
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::protocol::{Info, Slot, VERSION};
-use quietcut_tests::cut::{Cut, table};
+use quietcut_tests::cut::Cut;
 use quietcut_tests::emulator::{self, Cost, Emulator, Memory, PATIENCE};
 use quietcut_tests::firmware_image;
 use quietcut_tests::said::{ALL, Said, Step, stimuli};
 use quietcut_tests::scenario::{self, name_in_use, upload};
+use quietcut_tests::small_table::table;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -24,6 +24,15 @@ fn worst<T: std::fmt::Debug>(errors: impl Iterator<Item = (T, f64)>) -> f64 {
 }
 
 #[test]
+fn these_tests_find_overflow() {
+    let one = std::hint::black_box(1_u8);
+    assert!(
+        std::panic::catch_unwind(|| u8::MAX + one).is_err(),
+        "the profile must have overflow checks"
+    );
+}
+
+#[test]
 fn sqrt_is_within_one_ulp() {
     // Two octaves in full: the algorithm depends on the exponent's parity only.
     let two_octaves = (1f32.to_bits()..4f32.to_bits()).step_by(3).map(f32::from_bits);

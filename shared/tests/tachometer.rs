@@ -260,8 +260,10 @@ fn a_record_may_begin_anywhere_on_a_pulse() {
         let start = f64::from(step) / 200.0;
         let edges = pulse_edges(start, 0.02, seed);
         let because = format!("begun at {start} of a turn: {edges:?}");
-        // From the middle of the rising side to its end the first edge may have been before the record.
-        assert!((19..=20).contains(&edges.len()), "{because}");
+        // Twenty turns: a record that begins on a rising side may hold a part of it at both ends, or at none.
+        let is_on_side = (0.5..0.52).contains(&start);
+        let possible = if is_on_side { 19..=21 } else { 20..=20 };
+        assert!(possible.contains(&edges.len()), "{because}");
         // The first edge is found near the foot of the side, the second where a part of the swing was seen: 4 samples of side.
         for pair in edges.windows(2) {
             assert!((pair[1] - pair[0] - 200.0).abs() < 4.0, "{because}");

@@ -16,5 +16,6 @@ pub mod raw_host;
 pub mod said;
 pub mod scenario;
 pub mod shaking;
+pub mod small_table;
 pub mod table_bits;
 pub mod virtual_cut;

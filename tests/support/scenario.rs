@@ -7,8 +7,8 @@ use quietcut_core::protocol::message::MAX_CHUNK;
 use quietcut_core::protocol::{FrameError, Info, Refusal, Reply, Request, Response, Slot};
 
 use crate::command::{cases, folder, quietcut};
-use crate::cut::table;
 use crate::raw_host::{RawHost, frame, frame_of_version};
+use crate::small_table::table;
 
 /// Opens the line to the device of a test; one line is open at a time.
 pub type Open<'a> = &'a dyn Fn() -> Box<dyn Port>;

@@ -1,6 +1,6 @@
 //! A picture: an SVG drawing with the house's paper, fonts and colours.
 
-use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
@@ -43,6 +43,18 @@ pub(super) fn text(size: u32, color: RGBColor) -> TextStyle<'static> {
     let mut style = TextStyle::from(("sans-serif", size).into_font());
     style.color = color.to_backend_color();
     style
+}
+
+/// Draws the legend of an axis' series into its upper right corner.
+pub(super) fn legend<'a: 'c, 'c>(chart: &mut Axes<'a, 'c>) -> Result<(), PictureError> {
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .border_style(GRID)
+        .label_font(text(12, INK))
+        .draw()?;
+    Ok(())
 }
 
 /// Draws on white paper of `size` pixels and returns the SVG text.

@@ -1,10 +1,9 @@
 //! A spectrum, with the harmonics of the tooth passing and the chatter frequency marked.
 
-use plotters::chart::SeriesLabelPosition;
-use plotters::prelude::{LineSeries, PathElement, Polygon, WHITE};
+use plotters::prelude::{LineSeries, PathElement, Polygon};
 use plotters::style::Color;
 
-use super::picture::{BLUE, CHATTER, GRID, INK, Labels, ORANGE, PictureError, axes, draw, label, span, text};
+use super::picture::{BLUE, CHATTER, Labels, ORANGE, PictureError, axes, draw, label, legend, span};
 
 const SIZE: (u32, u32) = (470, 330);
 
@@ -74,13 +73,7 @@ pub fn spectrum(
             )?;
         }
         if marks.tooth_passing_hz.is_some() {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.8))
-                .border_style(GRID)
-                .label_font(text(12, INK))
-                .draw()?;
+            legend(&mut chart)?;
         }
         Ok(())
     })

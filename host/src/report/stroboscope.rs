@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use plotters::chart::SeriesLabelPosition;
-use plotters::prelude::{Circle, PathElement, WHITE};
+use plotters::prelude::{Circle, PathElement};
 use plotters::style::{Color, RGBColor};
 
-use super::picture::{BLUE, GRID, INK, Labels, ORANGE, PictureError, axes, draw, span, text};
+use super::picture::{BLUE, Labels, ORANGE, PictureError, axes, draw, legend, span};
 
 const SIZE: (u32, u32) = (470, 330);
 
@@ -45,14 +44,7 @@ pub fn samples_per_tooth(
                 .label(name)
                 .legend(move |(x, y)| PathElement::new([(x + 4, y), (x + 14, y)], color.stroke_width(4)));
         }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.8))
-            .border_style(GRID)
-            .label_font(text(12, INK))
-            .draw()?;
-        Ok(())
+        legend(&mut chart)
     })
 }
 

@@ -1,0 +1,95 @@
+//! How the sensor is to be set up.
+
+use quietcut_core::acceleration::MAX_BLOCK_SAMPLES;
+
+/// The acceleration at which an axis clips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Range {
+    /// ±2 g, 0.061 mg per count.
+    G2,
+    /// ±4 g, 0.122 mg per count.
+    G4,
+    /// ±8 g, 0.244 mg per count.
+    G8,
+    /// ±16 g, 0.488 mg per count.
+    #[default]
+    G16,
+}
+
+impl Range {
+    pub(super) fn code(self) -> u8 {
+        match self {
+            Self::G2 => 0b00,
+            Self::G16 => 0b01,
+            Self::G4 => 0b10,
+            Self::G8 => 0b11,
+        }
+    }
+
+    pub(super) fn milli_g_per_count(self) -> f32 {
+        match self {
+            Self::G2 => 0.061,
+            Self::G4 => 0.122,
+            Self::G8 => 0.244,
+            Self::G16 => 0.488,
+        }
+    }
+}
+
+/// What is in the path of the samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Filter {
+    /// The first filter only: flat from DC to 6 kHz.
+    #[default]
+    Wide,
+    /// A second low-pass filter whose corner is the sampling rate over a divisor.
+    LowPass(Divisor),
+}
+
+/// Divisor of the sampling rate that gives the corner of the second low-pass filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum Divisor {
+    /// 6.7 kHz.
+    By4 = 0,
+    /// 2.7 kHz.
+    By10 = 1,
+    /// 1.3 kHz.
+    By20 = 2,
+    /// 593 Hz.
+    By45 = 3,
+    /// 267 Hz.
+    By100 = 4,
+    /// 133 Hz.
+    By200 = 5,
+    /// 67 Hz.
+    By400 = 6,
+    /// 33 Hz.
+    By800 = 7,
+}
+
+/// How the sensor is to be set up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Configuration {
+    /// Where the axes clip.
+    pub range: Range,
+    /// What is in the path of the samples.
+    pub filter: Filter,
+    /// Samples in the queue that raise pin INT1, 1 to 511.
+    pub watermark: u16,
+}
+
+impl Default for Configuration {
+    /// The full range and band; the watermark leaves 17 ms until the queue is full.
+    fn default() -> Self {
+        Self {
+            range: Range::default(),
+            filter: Filter::default(),
+            watermark: MAX_BLOCK_SAMPLES as u16,
+        }
+    }
+}

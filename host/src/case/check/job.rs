@@ -1,0 +1,104 @@
+//! The job: material, cut, the machine's limits and the posture.
+
+use toml::Spanned;
+
+use super::Check;
+use crate::case::file::{CutFile, LimitsFile, MaterialFile, PostureFile};
+use crate::case::{CaseError, MachineLimits, Parameter, Posture};
+use crate::milling::{Cut, Material};
+
+impl Check<'_> {
+    pub(super) fn material(&mut self, file: &MaterialFile) -> Result<Material, CaseError> {
+        let material = Material {
+            ktc_mpa: self.positive(&file.ktc_mpa, "material.ktc_mpa")?,
+            krc_mpa: self.finite(&file.krc_mpa, "material.krc_mpa")?,
+            kac_mpa: self.finite(&file.kac_mpa, "material.kac_mpa")?,
+            kte_n_per_mm: self.finite_or(&file.kte_n_per_mm, "material.kte_n_per_mm", 0.0)?,
+            kre_n_per_mm: self.finite_or(&file.kre_n_per_mm, "material.kre_n_per_mm", 0.0)?,
+            kae_n_per_mm: self.finite_or(&file.kae_n_per_mm, "material.kae_n_per_mm", 0.0)?,
+        };
+        self.deviation(&file.ktc_mpa_std, "material.ktc_mpa", Parameter::Ktc)?;
+        self.deviation(&file.krc_mpa_std, "material.krc_mpa", Parameter::Krc)?;
+        self.deviation(&file.kac_mpa_std, "material.kac_mpa", Parameter::Kac)?;
+        self.deviation(&file.kte_n_per_mm_std, "material.kte_n_per_mm", Parameter::Kte)?;
+        self.deviation(&file.kre_n_per_mm_std, "material.kre_n_per_mm", Parameter::Kre)?;
+        self.deviation(&file.kae_n_per_mm_std, "material.kae_n_per_mm", Parameter::Kae)?;
+        Ok(material)
+    }
+
+    pub(super) fn cut(&mut self, file: &CutFile) -> Result<Cut, CaseError> {
+        let start_deg = self.number(
+            &file.start_deg,
+            "cut.start_deg",
+            |x| (0.0..180.0).contains(&x),
+            "an angle from 0 to below 180",
+        )?;
+        let exit_deg = self.number(
+            &file.exit_deg,
+            "cut.exit_deg",
+            |x| x > start_deg && x <= 180.0,
+            &format!("an angle above cut.start_deg ({start_deg}) and up to 180"),
+        )?;
+        let feed_per_tooth_mm = self.number(
+            &file.feed_per_tooth_mm,
+            "cut.feed_per_tooth_mm",
+            |x| x >= 0.0,
+            "a feed of 0 or more",
+        )?;
+        let feed_direction_deg = self.finite_or(&file.feed_direction_deg, "cut.feed_direction_deg", 0.0)?;
+        self.deviation(&file.start_deg_std, "cut.start_deg", Parameter::Start)?;
+        self.deviation(&file.exit_deg_std, "cut.exit_deg", Parameter::Exit)?;
+        self.deviation(
+            &file.feed_per_tooth_mm_std,
+            "cut.feed_per_tooth_mm",
+            Parameter::FeedPerTooth,
+        )?;
+        self.deviation(
+            &file.feed_direction_deg_std,
+            "cut.feed_direction_deg",
+            Parameter::FeedDirection,
+        )?;
+        Ok(Cut {
+            start_deg,
+            exit_deg,
+            feed_per_tooth_mm,
+            feed_direction_deg,
+        })
+    }
+
+    pub(super) fn limits(&self, file: &LimitsFile) -> Result<MachineLimits, CaseError> {
+        let rpm_min = self.number(&file.rpm_min, "limits.rpm_min", |x| x >= 0.0, "0 or more")?;
+        let rpm_max = self.number(
+            &file.rpm_max,
+            "limits.rpm_max",
+            |x| x > rpm_min,
+            &format!("a speed above limits.rpm_min ({rpm_min})"),
+        )?;
+        let power_w = match &file.power_w {
+            Some(power) => Some(self.positive(power, "limits.power_w")?),
+            None => None,
+        };
+        Ok(MachineLimits {
+            rpm_min,
+            rpm_max,
+            power_w,
+        })
+    }
+
+    pub(super) fn posture(&self, file: PostureFile) -> Result<Posture, CaseError> {
+        let index = match &file.index {
+            None => 0,
+            Some(index) => u8::try_from(*index.get_ref())
+                .map_err(|_| self.wrong(index, "posture.index", index.get_ref(), "0 to 255"))?,
+        };
+        if let Some(joints) = &file.joints_deg
+            && let Some(angle) = joints.get_ref().iter().find(|angle| !angle.is_finite())
+        {
+            return Err(self.wrong(joints, "posture.joints_deg", angle, "finite angles"));
+        }
+        Ok(Posture {
+            index,
+            joints_deg: file.joints_deg.map_or_else(Vec::new, Spanned::into_inner),
+        })
+    }
+}
