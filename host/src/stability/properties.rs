@@ -320,6 +320,38 @@ fn turning(omega: f64, zeta: f64, mass: f64, krc_ratio: f64) -> (Problem, f64) {
     (problem, alpha)
 }
 
+/// Two loci that pass close by each other near the axis: taken for one another they cross it elsewhere.
+#[test]
+fn loci_that_nearly_meet_are_told_apart() {
+    let machine = Machine {
+        omega: [50.0, 54.70051932559452],
+        zeta: [0.01, 0.012826296196247138],
+        mass: [188.0502585507614, 108.44058118579443],
+        lean: 1.5447941011783048,
+        teeth: 6,
+        start_deg: 0.0,
+        exit_deg: 68.47244169041558,
+        ktc_mpa: 50.0,
+        krc_ratio: 0.5533631694821489,
+        vibrations: 2.765409410830729,
+    };
+    let (problem, rpm, depth_mm) = (machine.problem(), machine.rpm(), machine.depth_mm());
+    let method = MultiFrequency {
+        problem: FrequencyProblem::of_model(&problem).unwrap(),
+        harmonics: Some(20),
+    };
+    let exact = depths(&problem, rpm, depth_mm);
+    let found = method.line(rpm, depth_mm, 40).unwrap().switches;
+    assert_eq!(found.len(), exact.len());
+    for (found, exact) in found.iter().zip(&exact) {
+        // What 20 harmonics leave out.
+        assert!(
+            (found.depth_mm - exact.0).abs() < 2e-5 * exact.0,
+            "{found:?} {exact:?}"
+        );
+    }
+}
+
 proptest! {
     #![proptest_config(config(12))]
 

@@ -104,12 +104,27 @@ fn is_straight(low: &Sample, middle: &Sample, high: &Sample, (floor, bend): (f64
         match (from, to) {
             (Some(from), Some(to)) => {
                 let size = from.norm().max(to.norm());
-                (value - (from + to) * 0.5).norm() <= bend * size && (to - from).norm() <= 6.0 * bend * size
+                (value - (from + to) * 0.5).norm() <= bend * size
+                    && (to - from).norm() <= 6.0 * bend * size
+                    && is_alone(middle, index, (to - from).norm())
             }
             // Only what is small can come from or go to nowhere.
             _ => value.norm() < floor,
         }
     })
+}
+
+/// True where a locus that moves by `travel` cannot be taken for another, or where that would not matter: away from the
+/// positive real axis.
+fn is_alone(sample: &Sample, index: usize, travel: f64) -> bool {
+    let value = sample.values[index];
+    let is_near_axis = |value: Complex64| value.re > -travel && value.im.abs() <= 2.0 * travel;
+    let mut others = sample
+        .values
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != index);
+    others.all(|(_, other)| (other - value).norm() > travel || !is_near_axis(value) || !is_near_axis(*other))
 }
 
 /// Which value of one sample is which of the next: nearest first. `None` where a value of at least `floor` is left over.
@@ -133,29 +148,71 @@ fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
     (!left).then_some(pairs)
 }
 
-/// The steps from each sample to the next, locus by locus: both samples and both values.
-pub(super) fn steps(samples: &[Sample]) -> impl Iterator<Item = [(f64, Complex64); 2]> {
-    samples.windows(2).flat_map(|pair| {
-        // Whatever is left over is below every floor that matters, or was halved in vain.
-        pairs(&pair[0], &pair[1], f64::INFINITY)
-            .unwrap_or_default()
-            .into_iter()
-            .map(|(i, j)| {
-                [
-                    (pair[0].omega, pair[0].values[i]),
-                    (pair[1].omega, pair[1].values[j]),
-                ]
-            })
-            .collect::<Vec<_>>()
-    })
+/// A step from one sample to the next along a locus: frequency and value at both ends.
+pub(super) type Step = [(f64, Complex64); 2];
+
+/// The steps from one sample to another, locus by locus.
+fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
+    // Whatever is left over is below every floor that matters.
+    let pairs = pairs(low, high, f64::INFINITY).unwrap_or_default();
+    pairs
+        .into_iter()
+        .map(|(i, j)| [(low.omega, low.values[i]), (high.omega, high.values[j])])
+        .collect()
+}
+
+/// The steps from each sample to the next.
+pub(super) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
+    samples
+        .windows(2)
+        .flat_map(|pair| steps_between(&pair[0], &pair[1]))
+}
+
+/// All that `solve` finds on the steps between samples.
+///
+/// Where it gives up on a step, because loci so near to each other were taken for one another, the samples are halved
+/// and all steps between them solved anew. `None` where it gives up however short the steps.
+pub(super) fn solve_steps<T>(
+    loci: &impl Loci,
+    samples: &[Sample],
+    solve: &impl Fn(Step) -> Option<Vec<T>>,
+) -> Option<Vec<T>> {
+    let mut found = Vec::new();
+    for pair in samples.windows(2) {
+        found.extend(solve_between(loci, &pair[0], &pair[1], solve, 0)?);
+    }
+    Some(found)
+}
+
+fn solve_between<T>(
+    loci: &impl Loci,
+    low: &Sample,
+    high: &Sample,
+    solve: &impl Fn(Step) -> Option<Vec<T>>,
+    level: u32,
+) -> Option<Vec<T>> {
+    let whole: Option<Vec<Vec<T>>> = steps_between(low, high).into_iter().map(solve).collect();
+    if let Some(found) = whole {
+        return Some(found.into_iter().flatten().collect());
+    }
+    if level == 2 * LEVELS {
+        return None;
+    }
+    let omega = 0.5 * (low.omega + high.omega);
+    let middle = Sample {
+        omega,
+        values: loci(omega)?,
+    };
+    let mut found = solve_between(loci, low, &middle, solve, level + 1)?;
+    found.extend(solve_between(loci, &middle, high, solve, level + 1)?);
+    Some(found)
 }
 
 /// Where loci of at least `floor` cross the positive real axis, largest first: solved for to 1e-12 of the value.
 pub(super) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Option<Vec<Crossing>> {
-    let mut found = Vec::new();
-    for [low, high] in steps(samples) {
+    let mut found = solve_steps(loci, samples, &|[low, high]: Step| {
         if (low.1.im > 0.0) == (high.1.im > 0.0) || low.1.re.max(high.1.re) < 0.5 * floor {
-            continue;
+            return Some(Vec::new());
         }
         let mark = |(omega, value): (f64, Complex64)| Mark {
             omega,
@@ -166,14 +223,18 @@ pub(super) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Opt
         let (omega, value) = zero(mark(low), mark(high), tolerance, |omega| {
             Some(loci(omega)?.into_iter().map(|value| (value, value.im)).collect())
         })?;
-        if value.re >= floor {
-            found.push(Crossing {
-                omega,
-                value: value.re,
-                rises: high.1.im > 0.0,
-            });
-        }
-    }
+        let crossing = Crossing {
+            omega,
+            value: value.re,
+            rises: high.1.im > 0.0,
+        };
+        Some(
+            Some(crossing)
+                .filter(|crossing| crossing.value >= floor)
+                .into_iter()
+                .collect(),
+        )
+    })?;
     found.sort_by(|a, b| b.value.total_cmp(&a.value));
     Some(found)
 }
@@ -189,7 +250,8 @@ pub(super) struct Mark {
 /// Where the miss is zero between two points of a locus with misses of either sign: the frequency, and the locus there.
 ///
 /// `at` gives all loci at a frequency with their misses; the one nearest to the straight line counts. Regula falsi with
-/// halving (Illinois), until the miss is below the tolerance.
+/// halving (Illinois), until the miss is below the tolerance. `None` where it jumps over zero: then two loci were taken for
+/// one.
 pub(super) fn zero(
     mut low: Mark,
     mut high: Mark,
@@ -205,8 +267,13 @@ pub(super) fn zero(
         let (value, miss) = at(omega)?
             .into_iter()
             .min_by(|p, q| (p.0 - expected).norm().total_cmp(&(q.0 - expected).norm()))?;
-        if miss.abs() <= tolerance || (high.omega - low.omega).abs() <= 1e-15 * high.omega {
+        // Rounding of the eigenvalues may keep the miss from falling further.
+        let is_narrow = (high.omega - low.omega).abs() <= 1e-15 * high.omega;
+        if miss.abs() <= tolerance || is_narrow && miss.abs() <= 1e3 * tolerance {
             return Some((omega, value));
+        }
+        if is_narrow {
+            return None;
         }
         let mark = Mark { omega, value, miss };
         if (miss > 0.0) == (low.miss > 0.0) {
@@ -219,7 +286,7 @@ pub(super) fn zero(
             last_side = -1;
         }
     }
-    Some((high.omega, high.value))
+    None
 }
 
 /// By how much the argument of a function, rad, grows over a grid; steps are halved until each turns it by a fifth of a

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::FrequencyProblem;
 use super::averaged::AveragedLoop;
 use super::limits::{Limit, hertz, speed_line};
-use super::loci::{Mark, Sample, steps, trace, zero};
+use super::loci::{Mark, Sample, Step, solve_steps, trace, zero};
 use super::open_loop::OpenLoop;
 use super::root;
 use crate::stability::point::{check_depth, check_speed};
@@ -67,11 +67,12 @@ impl Zoa {
     /// All limits at a delay, s, up to a depth, m.
     fn limits(&self, samples: &[Sample], delay_s: f64, depth_m: f64) -> Option<Vec<Limit>> {
         let open_loop = AveragedLoop::new(&self.problem, None);
-        let mut limits = Vec::new();
-        for [(low, from), (high, to)] in steps(samples) {
+        let loci = |omega: f64| open_loop.eigenvalues(Complex64::new(0.0, omega), 0.0);
+        let mut limits = solve_steps(&loci, samples, &|[(low, from), (high, to)]: Step| {
+            let mut limits = Vec::new();
             // Only a positive real part makes a depth, and only a large one a depth within reach.
             if from.re.max(to.re) <= 0.0 || from.norm().max(to.norm()) < 0.45 / depth_m {
-                continue;
+                return Some(limits);
             }
             let start = phase(low, from, delay_s);
             // Along the locus the phase is continuous, whatever branch the argument is on.
@@ -85,8 +86,7 @@ impl Zoa {
                     miss: phase - lobe,
                 };
                 let (omega, value) = zero(mark(low, from, start), mark(high, to, end), CLOSED, |omega| {
-                    let values = open_loop.eigenvalues(Complex64::new(0.0, omega), 0.0)?;
-                    let with_miss = values.into_iter().map(|value| {
+                    let with_miss = loci(omega)?.into_iter().map(|value| {
                         let miss = phase(omega, value, delay_s) - lobe;
                         (value, miss - (miss / TAU).round() * TAU)
                     });
@@ -104,7 +104,8 @@ impl Zoa {
                     });
                 }
             }
-        }
+            Some(limits)
+        })?;
         limits.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
         Some(limits)
     }
