@@ -5,6 +5,7 @@
 pub mod demo;
 mod error;
 mod experiment;
+pub mod identify;
 pub mod info;
 pub mod lobes;
 mod lobes_cells;
@@ -46,6 +47,7 @@ struct Cli {
 enum Verb {
     Demo(demo::Args),
     Simulate(Box<simulate::Args>),
+    Identify(Box<identify::Args>),
     Lobes(lobes::Args),
     Table(table::Args),
     Upload(upload::Args),
@@ -78,6 +80,7 @@ fn run(verb: Verb) -> Result<(), Error> {
     match verb {
         Verb::Demo(args) => demo::run(args),
         Verb::Simulate(args) => simulate::run(*args),
+        Verb::Identify(args) => identify::run(*args),
         Verb::Lobes(args) => lobes::run(args),
         Verb::Table(args) => table::run(args),
         Verb::Upload(args) => upload::run(args),

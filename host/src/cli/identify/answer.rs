@@ -1,0 +1,192 @@
+//! What `identify` answers.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::Error;
+use crate::identify::case_file::{self, Estimate};
+use crate::identify::homogeneity::Region;
+use crate::identify::linearity::Verdict;
+use crate::identify::ncma::Map;
+use crate::identify::steady_fit::NINETY_PERCENT;
+use crate::structure::Direction;
+
+/// The answer of the verb.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Answer {
+    pub(super) method: &'static str,
+    /// Parameters by the directions that they belong to.
+    pub(super) models: Vec<Model>,
+    /// Root mean square of what is left over that of the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) fit_error: Option<f64>,
+    /// Sum of squares over degrees of freedom in units of the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) misfit: Option<f64>,
+    /// Steady motions that were used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) dwells: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) linearity: Option<Linearity>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) maps: Option<Maps>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) slices: Option<Slices>,
+    pub(super) warnings: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) case: Option<PathBuf>,
+    /// What becomes a case.
+    #[serde(skip)]
+    pub(super) estimates: Vec<Estimate>,
+    #[serde(skip)]
+    pub(super) directions: Vec<Direction>,
+    /// Lines for people.
+    #[serde(skip)]
+    pub(super) said: Vec<String>,
+}
+
+/// Parameters of one direction, or of a pair.
+#[derive(Debug, Serialize)]
+pub(super) struct Model {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) direction: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) directions: Option<Vec<&'static str>>,
+    pub(super) parameters: BTreeMap<&'static str, Figure>,
+}
+
+/// A value and its 90 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(super) struct Figure {
+    pub(super) value: f64,
+    pub(super) ci90: [f64; 2],
+}
+
+/// What `--method linearity` finds.
+#[derive(Debug, Serialize)]
+pub(super) struct Linearity {
+    #[serde(flatten)]
+    pub(super) verdict: Verdict,
+    /// Of a tone with rising force: regions of X(F), and where it jumps, N.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) regions: Vec<Region>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) jumps_n: Vec<f64>,
+}
+
+/// Empirical maps: coefficients of a(F), b(F), c(F) in a·(X/F)² + b·(X/F) + c, each from the highest power of F down.
+#[derive(Debug, Serialize)]
+pub(super) struct Maps {
+    pub(super) frequency_hz: Coefficients,
+    pub(super) loss_factor: Coefficients,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Coefficients {
+    pub(super) coefficients: Vec<f64>,
+    pub(super) ci90: Vec<[f64; 2]>,
+    pub(super) fit_error: f64,
+    pub(super) force_n: [f64; 2],
+    pub(super) receptance_m_per_n: [f64; 2],
+}
+
+/// What the slices of the restoring-force surface give.
+#[derive(Debug, Serialize)]
+pub(super) struct Slices {
+    pub(super) stiffness: BTreeMap<&'static str, Figure>,
+    pub(super) damping: BTreeMap<&'static str, Figure>,
+}
+
+impl Figure {
+    pub(super) fn new(value: f64, deviation: f64) -> Self {
+        let half = NINETY_PERCENT * deviation;
+        Self {
+            value,
+            ci90: [value - half, value + half],
+        }
+    }
+}
+
+impl Coefficients {
+    pub(super) fn new(map: &Map) -> Self {
+        Self {
+            coefficients: map.coefficients.clone(),
+            ci90: map
+                .coefficients
+                .iter()
+                .zip(&map.deviations)
+                .map(|(value, deviation)| Figure::new(*value, *deviation).ci90)
+                .collect(),
+            fit_error: map.relative_error,
+            force_n: map.range[0],
+            receptance_m_per_n: map.range[1],
+        }
+    }
+}
+
+impl Model {
+    pub(super) fn place(&self) -> String {
+        match (&self.direction, &self.directions) {
+            (Some(direction), _) => (*direction).into(),
+            (None, Some(pair)) => pair.join("-"),
+            (None, None) => String::new(),
+        }
+    }
+}
+
+impl Answer {
+    /// An answer whose parameters are `estimates`.
+    pub(super) fn of(method: &'static str, directions: Vec<Direction>, estimates: Vec<Estimate>) -> Self {
+        let mut models: Vec<Model> = Vec::new();
+        for estimate in &estimates {
+            let names: Vec<&'static str> = estimate
+                .directions
+                .iter()
+                .map(|direction| direction.name())
+                .collect();
+            let (direction, pair) = match names[..] {
+                [one] => (Some(one), None),
+                _ => (None, Some(names)),
+            };
+            let index = models
+                .iter()
+                .position(|model| model.direction == direction && model.directions == pair)
+                .unwrap_or_else(|| {
+                    models.push(Model {
+                        direction,
+                        directions: pair,
+                        parameters: BTreeMap::new(),
+                    });
+                    models.len() - 1
+                });
+            models[index]
+                .parameters
+                .insert(estimate.key, Figure::new(estimate.value, estimate.deviation));
+        }
+        Self {
+            method,
+            models,
+            estimates,
+            directions,
+            ..Self::default()
+        }
+    }
+
+    /// The case file of the model.
+    pub(super) fn case(&self, path: &Path) -> Result<String, Error> {
+        if self.estimates.is_empty() {
+            return Err(Error::input(format!(
+                "--out {}: --method {} gives no equation of motion that a case could hold",
+                path.display(),
+                self.method
+            )));
+        }
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        case_file::text(&name, &self.directions, &self.estimates)
+            .map_err(|error| Error::input(format!("--out {}: {error}", path.display())))
+    }
+}

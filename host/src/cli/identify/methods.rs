@@ -1,0 +1,323 @@
+//! Answers from steady tones, method by method.
+
+use std::f64::consts::TAU;
+
+use nalgebra::DVector;
+
+use super::answer::{Answer, Coefficients, Linearity, Maps};
+use super::{Args, Error, records};
+use crate::identify::case_file::Estimate;
+use crate::identify::dwell::Dwell;
+use crate::identify::harmonic_balance::Grid;
+use crate::identify::homogeneity::regions;
+use crate::identify::law::{Extra, Law, Role};
+use crate::identify::ncma::{Curve, Map};
+use crate::identify::steady::{Settling, slowest_decay, steady, windows};
+use crate::identify::steady_fit::{Data, Fit, FitError};
+use crate::identify::{hfrf as higher_order, linearity as linear};
+use crate::recording::{Kind, Recording};
+use crate::structure::Direction;
+
+/// Steps of one frequency differ by noise only; steps of a test by more than this.
+const SAME_FREQUENCY: f64 = 1e-3;
+
+pub(super) fn harmonic_balance(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    if let Some(samples) = args.period_samples {
+        return records::multisine(args, recordings, samples as usize);
+    }
+    let found = fit_steady(args, recordings, &args.terms)?;
+    let Found {
+        law,
+        directions,
+        fit,
+        dwells,
+        mut warnings,
+    } = found;
+    if fit.robust {
+        warnings.push(format!(
+            "the law leaves {:.1} times the noise: it is not the whole truth, and the intervals are those of the scatter between dwells; other --terms may fit better",
+            fit.misfit.sqrt()
+        ));
+    }
+    let deviations: Vec<f64> = (0..law.parameters.len())
+        .map(|p| fit.covariance[(p, p)].max(0.0).sqrt())
+        .collect();
+    let estimates = estimates(&law, &directions, &fit.theta, &deviations);
+    Ok(Answer {
+        fit_error: Some(fit.relative_error),
+        misfit: Some(fit.misfit),
+        dwells: Some(dwells.len()),
+        warnings,
+        ..Answer::of("harmonic-balance", directions, estimates)
+    })
+}
+
+struct Found {
+    law: Law,
+    directions: Vec<Direction>,
+    fit: Fit,
+    dwells: Vec<Dwell>,
+    warnings: Vec<String>,
+}
+
+/// Directions in which both a force and a motion was measured, or a motion where others are driven too.
+fn directions(dwells: &[Dwell]) -> Vec<Direction> {
+    Direction::ALL
+        .into_iter()
+        .filter(|direction| {
+            dwells
+                .iter()
+                .all(|dwell| dwell.motions.iter().any(|line| line.direction == *direction))
+        })
+        .filter(|direction| {
+            dwells
+                .iter()
+                .any(|dwell| dwell.forces.iter().any(|line| line.direction == *direction))
+        })
+        .collect()
+}
+
+fn settling(args: &Args) -> Settling {
+    args.settle_s.map_or(Settling::Half, Settling::Seconds)
+}
+
+fn fit_steady(args: &Args, recordings: &[Recording], extras: &[Extra]) -> Result<Found, Error> {
+    let harmonics = usize::from(args.harmonics);
+    let first = steady(recordings, harmonics, settling(args));
+    let directions = directions(&first.dwells);
+    if directions.is_empty() {
+        let why = first.warnings.join("; ");
+        return Err(Error::input(format!(
+            "no direction has both a measured force and a measured motion that is held at some frequency{}{why}",
+            if why.is_empty() { "" } else { ": " }
+        )));
+    }
+    let law = Law::new(directions.len(), extras);
+    let grid = Grid::new(harmonics, law.degree());
+    let data = |dwells: &[Dwell]| -> Result<Fit, FitError> {
+        let data = Data {
+            law: &law,
+            directions: &directions,
+            dwells,
+            grid: &grid,
+        };
+        data.fit(data.first_guess()?)
+    };
+    let refused = |error: FitError| Error::input(error.to_string());
+    let mut fit = data(&first.dwells).map_err(refused)?;
+    let mut taken = first;
+    if args.settle_s.is_none() {
+        let diagonal = |of: fn(usize) -> Role| -> Vec<f64> {
+            (0..directions.len())
+                .filter_map(|i| law.index(of(i)).map(|index| fit.theta[index]))
+                .collect()
+        };
+        let decay = slowest_decay(
+            &diagonal(|i| Role::Mass(i, i)),
+            &diagonal(|i| Role::Damping(i, i)),
+        );
+        let settled = steady(recordings, harmonics, Settling::Decay(decay));
+        fit = data(&settled.dwells).map_err(refused)?;
+        taken = settled;
+    }
+    Ok(Found {
+        law,
+        directions,
+        fit,
+        dwells: taken.dwells,
+        warnings: taken.warnings,
+    })
+}
+
+fn estimates(law: &Law, directions: &[Direction], theta: &DVector<f64>, deviations: &[f64]) -> Vec<Estimate> {
+    law.parameters
+        .iter()
+        .enumerate()
+        .map(|(index, parameter)| Estimate {
+            key: parameter.role.key(),
+            directions: parameter
+                .role
+                .dofs()
+                .into_iter()
+                .map(|dof| directions[dof])
+                .collect(),
+            value: theta[index],
+            deviation: deviations[index],
+        })
+        .collect()
+}
+
+pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    let found = fit_steady(args, recordings, &[Extra::CubicStiffness, Extra::CubicDamping])?;
+    let [direction] = found.directions[..] else {
+        return Err(Error::input(
+            "higher-order FRF are for one direction at a time (eq. 5.5); give recordings of one",
+        ));
+    };
+    let responses = higher_order::responses(&found.dwells, SAME_FREQUENCY);
+    let fit = higher_order::fit(&responses).map_err(|error| Error::input(error.to_string()))?;
+    let grid = Grid::new(usize::from(args.harmonics), fit.law.degree());
+    let data = Data {
+        law: &fit.law,
+        directions: &found.directions,
+        dwells: &found.dwells,
+        grid: &grid,
+    };
+    let predicted = data.relative_error(&fit.theta);
+    let mut warnings = found.warnings;
+    // A model that is right within the noise predicts the data about as well as the best fit does.
+    if predicted > 2.0 * found.fit.relative_error + 1e-3 {
+        let mut shifts = Vec::new();
+        for role in [Role::CubicDamping(0), Role::CubicStiffness(0)] {
+            if let (Some(i), Some(j)) = (fit.law.index(role), found.law.index(role)) {
+                let other = found.fit.theta[j];
+                shifts.push(format!(
+                    "{} {:+.0} %",
+                    role.key(),
+                    100.0 * (fit.theta[i] / other - 1.0)
+                ));
+            }
+        }
+        warnings.push(format!(
+            "these parameters mispredict the very data they come from by {:.1} % (harmonic balance: {:.2} %): eqs 5.15 to 5.17 are exact only as the force goes to zero and biased at these levels (against harmonic balance: {}); use --method harmonic-balance",
+            100.0 * predicted,
+            100.0 * found.fit.relative_error,
+            shifts.join(", ")
+        ));
+    }
+    let deviations: Vec<f64> = fit.deviations.iter().copied().collect();
+    let estimates = estimates(&fit.law, &[direction], &fit.theta, &deviations);
+    Ok(Answer {
+        fit_error: Some(predicted),
+        dwells: Some(found.dwells.len()),
+        warnings,
+        ..Answer::of("hfrf", vec![direction], estimates)
+    })
+}
+
+pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    let taken = steady(recordings, usize::from(args.harmonics), settling(args));
+    let curves = curves(&taken.dwells);
+    let points: Vec<_> = curves.iter().flat_map(|curve| curve.linearized(0.4)).collect();
+    // A parabola over force needs three of them; two give a line, the form of eqs 4.8 and 4.9.
+    let degree = if curves.len() >= 3 { args.degree.into() } else { 1 };
+    let maps = Map::fit(&points, degree, |point| point.omega / TAU)
+        .zip(Map::fit(&points, degree, |point| point.loss_factor));
+    let Some((frequency, loss)) = maps else {
+        return Err(Error::input(format!(
+            "{} pairs of points on both sides of a peak were found at {} force levels; at least 6 at 2 levels are needed: step finely through the resonance at several forces",
+            points.len(),
+            curves.len()
+        )));
+    };
+    let said = [("frequency_hz", &frequency), ("loss_factor", &loss)]
+        .map(|(name, map)| {
+            let polynomials: Vec<String> = map
+                .coefficients
+                .chunks(degree + 1)
+                .map(|polynomial| {
+                    let powers = polynomial.iter().zip((0..=degree).rev());
+                    let terms: Vec<String> = powers.map(|(c, power)| format!("{c:+.4e} F^{power}")).collect();
+                    format!("({})", terms.join(" "))
+                })
+                .collect();
+            format!(
+                "{name} = {} (X/F)^2 + {} (X/F) + {}, within {:.3} %",
+                polynomials[0],
+                polynomials[1],
+                polynomials[2],
+                100.0 * map.relative_error
+            )
+        })
+        .to_vec();
+    Ok(Answer {
+        dwells: Some(taken.dwells.len()),
+        maps: Some(Maps {
+            frequency_hz: Coefficients::new(&frequency),
+            loss_factor: Coefficients::new(&loss),
+        }),
+        warnings: taken.warnings,
+        said,
+        ..Answer::of("ncma", Vec::new(), Vec::new())
+    })
+}
+
+/// Receptances at constant force: dwells grouped by force.
+fn curves(dwells: &[Dwell]) -> Vec<Curve> {
+    let mut curves: Vec<Curve> = Vec::new();
+    for response in higher_order::responses(dwells, 0.0) {
+        for (force, q) in response.levels {
+            let point = (response.omega, q / force);
+            // Levels of a test differ by more than a twentieth; a controlled shaker keeps its own within that.
+            match curves
+                .iter_mut()
+                .find(|curve| (curve.force_n / force - 1.0).abs() < 0.05)
+            {
+                Some(curve) => curve.points.push(point),
+                None => curves.push(Curve {
+                    force_n: force,
+                    points: vec![point],
+                }),
+            }
+        }
+    }
+    for curve in &mut curves {
+        curve.points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+    curves
+}
+
+pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    let harmonics = usize::from(args.harmonics).max(3);
+    let (tones, steps): (Vec<_>, Vec<_>) = recordings
+        .iter()
+        .cloned()
+        .partition(|recording| recording.sidecar.kind == Some(Kind::Shaker));
+    let taken = steady(&steps, harmonics, settling(args));
+    let mut dwells = taken.dwells;
+    let mut rising = Vec::new();
+    for tone in &tones {
+        let windows = windows(tone, harmonics, 10.0);
+        rising.extend(windows.iter().filter_map(|dwell| {
+            let force = dwell.force()?;
+            let motion = dwell
+                .motions
+                .iter()
+                .find(|line| line.direction == force.direction)?;
+            Some((force.amplitude(1), motion.amplitude(1)))
+        }));
+        dwells.extend(windows);
+    }
+    let verdict = linear::judge(&dwells).map_err(|error| Error::input(error.to_string()))?;
+    let (regions, jumps_n) = if rising.is_empty() {
+        (Vec::new(), Vec::new())
+    } else {
+        regions(&rising)
+    };
+    let said = if verdict.linear {
+        "linear: the response follows the force at every level".to_owned()
+    } else {
+        let kinds: Vec<&str> = verdict.kinds.iter().map(|kind| kind.name()).collect();
+        format!(
+            "not linear: {}; F/X changes by up to {:.1} % with the level",
+            if kinds.is_empty() {
+                "of no kind that is known".into()
+            } else {
+                kinds.join(" and ")
+            },
+            100.0 * verdict.level_dependence
+        )
+    };
+    Ok(Answer {
+        dwells: Some(dwells.len()),
+        misfit: Some(verdict.linear_misfit),
+        warnings: taken.warnings,
+        said: vec![said],
+        linearity: Some(Linearity {
+            verdict,
+            regions,
+            jumps_n,
+        }),
+        ..Answer::of("linearity", Vec::new(), Vec::new())
+    })
+}

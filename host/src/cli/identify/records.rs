@@ -1,0 +1,240 @@
+//! Answers from any record of force and motion, without steady tones.
+
+use super::answer::{Answer, Figure, Slices};
+use super::{Args, Error, SurfaceTerm};
+use crate::identify::case_file::Estimate;
+use crate::identify::law::Extra;
+use crate::identify::periodic_fit::{self, Period};
+use crate::identify::restoring_force::{Options, Record, Slice, Surface, Term};
+use crate::recording::{Quantity, Recording};
+use crate::structure::Direction;
+
+/// Harmonic balance of whole periods.
+pub(super) fn multisine(args: &Args, recordings: &[Recording], samples: usize) -> Result<Answer, Error> {
+    let mut taken = Vec::new();
+    for recording in recordings {
+        let Along {
+            direction,
+            force,
+            motion,
+            quantity,
+        } = along(recording)?;
+        if quantity != Quantity::Displacement {
+            return Err(Error::input(
+                recording.lacks("a displacement along the force, which --period-samples needs"),
+            ));
+        }
+        let from = recording.len().checked_sub(samples).ok_or_else(|| {
+            Error::input(format!(
+                "{}: {} samples are fewer than the {samples} of a period",
+                recording.path.display(),
+                recording.len()
+            ))
+        })?;
+        taken.push((direction, force[from..].to_vec(), &motion[from..]));
+    }
+    let (Some(first), Some((direction, ..))) = (recordings.first(), taken.first()) else {
+        return Err(Error::input("a recording is needed"));
+    };
+    let other = taken.iter().any(|(other, ..)| other != direction);
+    if other
+        || recordings
+            .iter()
+            .any(|recording| recording.sample_rate_hz != first.sample_rate_hz)
+    {
+        return Err(Error::input(
+            "the recordings of a multisine must have one direction and one sample rate",
+        ));
+    }
+    let mut terms = vec![Term::Mass, Term::Damping, Term::Stiffness];
+    for extra in &args.terms {
+        match extra {
+            Extra::QuadraticStiffness => terms.push(Term::QuadraticStiffness),
+            Extra::CubicStiffness => terms.push(Term::CubicStiffness),
+            Extra::SofteningHardening => terms.extend([Term::CubicStiffness, Term::QuinticStiffness]),
+            Extra::CubicDamping => terms.push(Term::CubicDamping),
+            Extra::ModeCoupling => {
+                return Err(Error::input(
+                    "--terms mode-coupling: a multisine is taken in one direction",
+                ));
+            }
+        }
+    }
+    terms.sort_unstable();
+    terms.dedup();
+    let periods: Vec<Period<'_>> = taken
+        .iter()
+        .map(|(_, force, displacement)| Period { force, displacement })
+        .collect();
+    let fit = periodic_fit::fit(&periods, first.sample_rate_hz, &terms)
+        .map_err(|error| Error::input(error.to_string()))?;
+    let estimates = fit
+        .law
+        .iter()
+        .zip(&fit.deviations)
+        .map(|((term, value), deviation)| Estimate {
+            key: term.key(),
+            directions: vec![*direction],
+            value: *value,
+            deviation: *deviation,
+        })
+        .collect();
+    Ok(Answer {
+        fit_error: Some(fit.relative_error),
+        ..Answer::of("harmonic-balance", vec![*direction], estimates)
+    })
+}
+
+pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    let [recording] = recordings else {
+        return Err(Error::input(format!(
+            "{} recordings: the restoring-force surface is that of one recording; give one",
+            recordings.len()
+        )));
+    };
+    let Along {
+        direction,
+        force,
+        motion,
+        quantity,
+    } = along(recording)?;
+    let band_hz = match args.band_hz[..] {
+        [] => None,
+        [low, high] if low < high => Some([low, high]),
+        _ => {
+            return Err(Error::input(
+                "--band-hz: two frequencies are needed, the lower first, as in 5,60",
+            ));
+        }
+    };
+    let options = Options {
+        terms: args.surface.iter().map(|term| term.term()).collect(),
+        mass_kg: args.mass_kg,
+        band_hz,
+        // Two seconds, or a tenth of a short record: several periods of the slowest that is kept.
+        trim_s: (0.1 * recording.len() as f64 / recording.sample_rate_hz).min(2.0),
+    };
+    let record = Record {
+        force: &force,
+        motion,
+        quantity,
+        rate_hz: recording.sample_rate_hz,
+    };
+    let surface = record
+        .surface(&options)
+        .map_err(|error| Error::input(format!("{}: {error}", recording.path.display())))?;
+    let slices = slices(&surface, args.slice);
+    let mut warnings = Vec::new();
+    if slices.is_none() {
+        warnings.push(format!(
+            "fewer than 12 samples lie within {} of the largest velocity or displacement; a larger --slice shows the slices",
+            args.slice
+        ));
+    }
+    let mut estimates: Vec<Estimate> = surface
+        .terms
+        .iter()
+        .zip(surface.theta.iter().zip(surface.deviations.iter()))
+        .map(|(term, (value, deviation))| Estimate {
+            key: term.key(),
+            directions: vec![direction],
+            value: *value,
+            deviation: *deviation,
+        })
+        .collect();
+    if let Some(mass) = args.mass_kg {
+        estimates.push(Estimate {
+            key: Term::Mass.key(),
+            directions: vec![direction],
+            value: mass,
+            deviation: 0.0,
+        });
+    }
+    let [low, high] = surface.band_hz;
+    Ok(Answer {
+        fit_error: Some(surface.force_error),
+        slices,
+        warnings,
+        said: vec![format!("band {low:.2} to {high:.2} Hz")],
+        ..Answer::of("restoring-force", vec![direction], estimates)
+    })
+}
+
+fn slices(surface: &Surface, share: f64) -> Option<Slices> {
+    let figures = |slice: &Slice, linear, cubic| {
+        [
+            (linear, Figure::new(slice.linear.0, slice.linear.1)),
+            (cubic, Figure::new(slice.cubic.0, slice.cubic.1)),
+        ]
+        .into()
+    };
+    Some(Slices {
+        stiffness: figures(
+            &surface.stiffness_slice(share)?,
+            Term::Stiffness.key(),
+            Term::CubicStiffness.key(),
+        ),
+        damping: figures(
+            &surface.damping_slice(share)?,
+            Term::Damping.key(),
+            Term::CubicDamping.key(),
+        ),
+    })
+}
+
+/// Force and motion along one direction.
+struct Along<'a> {
+    direction: Direction,
+    force: Vec<f64>,
+    motion: &'a [f64],
+    quantity: Quantity,
+}
+
+/// The first motion that has a force beside it; where no force was recorded, none acted.
+fn along(recording: &Recording) -> Result<Along<'_>, Error> {
+    // Displacement first: its derivatives keep what is slow, integrals lose it.
+    let order = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
+    for quantity in order {
+        for direction in Direction::ALL {
+            let prefix = match quantity {
+                Quantity::Velocity => "v",
+                Quantity::Acceleration => "a",
+                _ => "",
+            };
+            let Some(motion) = recording.channel(&format!("{prefix}{direction}")) else {
+                continue;
+            };
+            let force = recording.channel(&format!("f{direction}"));
+            let driven = force.is_some();
+            let any_force = recording.channels.iter().any(|c| c.quantity == Quantity::Force);
+            if driven || !any_force {
+                let force = force.map_or_else(|| vec![0.0; motion.samples.len()], |c| c.samples.clone());
+                return Ok(Along {
+                    direction,
+                    force,
+                    motion: &motion.samples,
+                    quantity,
+                });
+            }
+        }
+    }
+    Err(Error::input(recording.lacks(
+        "a displacement, velocity or acceleration along a force, such as x beside fx",
+    )))
+}
+
+impl SurfaceTerm {
+    fn term(self) -> Term {
+        match self {
+            Self::Mass => Term::Mass,
+            Self::Damping => Term::Damping,
+            Self::Stiffness => Term::Stiffness,
+            Self::QuadraticStiffness => Term::QuadraticStiffness,
+            Self::CubicStiffness => Term::CubicStiffness,
+            Self::QuinticStiffness => Term::QuinticStiffness,
+            Self::CubicDamping => Term::CubicDamping,
+            Self::CoulombFriction => Term::CoulombFriction,
+            Self::Offset => Term::Offset,
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Higher-order FRF as in thesis eqs 5.15 to 5.17: exact as F → 0 and biased at finite force.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::dwell::Dwell;
+use super::law::{Extra, Law, Role};
+use super::steady_fit::{derivative, scaled_inverse, scaled_least_squares};
+
+/// H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) at one frequency, m/N, m/N³, m/N⁵.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HigherOrder {
+    /// rad/s.
+    pub omega: f64,
+    /// H₁, H₃, H₅.
+    pub h: [Complex64; 3],
+}
+
+/// Response at one frequency: force amplitude in N and the displacement phasor against the force, m.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Response {
+    /// rad/s.
+    pub omega: f64,
+    /// (F_n, Q_n).
+    pub levels: Vec<(f64, Complex64)>,
+}
+
+/// Parameters by eqs 5.16 and 5.17 with the deviations of their linear regressions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HfrfFit {
+    /// The law m, c, k, k3, c3.
+    pub law: Law,
+    /// θ of the law.
+    pub theta: DVector<f64>,
+    /// Standard deviations from the scatter over frequency: they do not hold the bias of the method.
+    pub deviations: DVector<f64>,
+    /// The estimates over frequency.
+    pub estimates: Vec<HigherOrder>,
+}
+
+/// Why eq. 5.15 cannot be solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HfrfError {
+    /// Fewer than three levels at every frequency, or fewer than two such frequencies.
+    #[error(
+        "{frequencies} frequencies were measured at three or more force levels; higher-order FRF need at least 2 of them"
+    )]
+    Levels {
+        /// Frequencies with three levels.
+        frequencies: usize,
+    },
+    /// The regression is singular.
+    #[error("the responses do not determine the parameters")]
+    Undetermined,
+}
+
+/// Groups dwells by frequency: those within `tolerance` (relative) of each other are one step of the test.
+pub fn responses(dwells: &[Dwell], tolerance: f64) -> Vec<Response> {
+    let mut points: Vec<(f64, f64, Complex64)> = dwells
+        .iter()
+        .filter_map(|dwell| {
+            let force = dwell.force()?;
+            let motion = dwell
+                .motions
+                .iter()
+                .find(|line| line.direction == force.direction)?;
+            let iomega = Complex64::new(0.0, dwell.omega);
+            let q = motion.phasor(1) / iomega.powi(i32::from(derivative(motion.quantity)));
+            let f = force.phasor(1);
+            Some((dwell.omega, f.norm(), q * f.conj() / f.norm()))
+        })
+        .collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut groups: Vec<Response> = Vec::new();
+    for (omega, force, q) in points {
+        match groups.last_mut() {
+            Some(group) if omega <= group.omega * (1.0 + tolerance) => group.levels.push((force, q)),
+            _ => groups.push(Response {
+                omega,
+                levels: vec![(force, q)],
+            }),
+        }
+    }
+    groups
+}
+
+/// Eq. 5.15 by least squares at one frequency; `None` with fewer than three levels.
+pub fn higher_order(response: &Response) -> Option<HigherOrder> {
+    if response.levels.len() < 3 {
+        return None;
+    }
+    let count = response.levels.len();
+    let powers = DMatrix::from_fn(count, 3, |n, order| {
+        let force = response.levels[n].0;
+        [force, 0.75 * force.powi(3), 0.625 * force.powi(5)][order]
+    });
+    let part = |of: fn(&Complex64) -> f64| {
+        let right = DVector::from_iterator(count, response.levels.iter().map(|(_, q)| of(q)));
+        scaled_least_squares(&powers, &right)
+    };
+    let (re, im) = (part(|q| q.re)?, part(|q| q.im)?);
+    Some(HigherOrder {
+        omega: response.omega,
+        h: std::array::from_fn(|order| Complex64::new(re[order], im[order])),
+    })
+}
+
+/// Eqs 5.16 and 5.17 over all frequencies.
+///
+/// # Errors
+/// Too few levels or frequencies.
+pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
+    let estimates: Vec<HigherOrder> = responses.iter().filter_map(higher_order).collect();
+    if estimates.len() < 2 {
+        return Err(HfrfError::Levels {
+            frequencies: estimates.len(),
+        });
+    }
+    let rows = 2 * estimates.len();
+    let (mut linear, mut cubic) = (DMatrix::zeros(rows, 3), DMatrix::zeros(rows, 2));
+    let (mut linear_right, mut cubic_right) = (DVector::zeros(rows), DVector::zeros(rows));
+    for (index, HigherOrder { omega, h }) in estimates.iter().enumerate() {
+        let (re, im) = (2 * index, 2 * index + 1);
+        // [m, k1, c1]
+        (linear[(re, 0)], linear[(re, 1)], linear[(im, 2)]) = (-omega * omega, 1.0, *omega);
+        let inverse = h[0].inv();
+        (linear_right[re], linear_right[im]) = (inverse.re, inverse.im);
+        // [c3, k3]
+        (cubic[(re, 1)], cubic[(im, 0)]) = (-1.0, -omega.powi(3));
+        let ratio = h[1] / (h[0].powi(3) * h[0].conj());
+        (cubic_right[re], cubic_right[im]) = (ratio.re, ratio.im);
+    }
+    let (of_linear, linear_std) = regression(&linear, &linear_right)?;
+    let (of_cubic, cubic_std) = regression(&cubic, &cubic_right)?;
+    let law = Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping]);
+    let mut theta = DVector::zeros(law.parameters.len());
+    let mut deviations = DVector::zeros(law.parameters.len());
+    let found = [
+        (Role::Mass(0, 0), of_linear[0], linear_std[0]),
+        (Role::Stiffness(0, 0), of_linear[1], linear_std[1]),
+        (Role::Damping(0, 0), of_linear[2], linear_std[2]),
+        (Role::CubicDamping(0), of_cubic[0], cubic_std[0]),
+        (Role::CubicStiffness(0), of_cubic[1], cubic_std[1]),
+    ];
+    for (role, value, deviation) in found {
+        if let Some(index) = law.index(role) {
+            (theta[index], deviations[index]) = (value, deviation);
+        }
+    }
+    Ok(HfrfFit {
+        law,
+        theta,
+        deviations,
+        estimates,
+    })
+}
+
+/// Least squares, and the standard deviations that its residual gives.
+fn regression(
+    matrix: &DMatrix<f64>,
+    right: &DVector<f64>,
+) -> Result<(DVector<f64>, DVector<f64>), HfrfError> {
+    let solution = scaled_least_squares(matrix, right).ok_or(HfrfError::Undetermined)?;
+    let free = matrix.nrows().saturating_sub(matrix.ncols()).max(1) as f64;
+    let variance = (matrix * &solution - right).norm_squared() / free;
+    let inverse = scaled_inverse(&matrix.tr_mul(matrix)).ok_or(HfrfError::Undetermined)?;
+    let deviations = inverse.diagonal().map(|entry| (entry * variance).sqrt());
+    Ok((solution, deviations))
+}

@@ -1,0 +1,113 @@
+//! Homogeneity at constant frequency: does the response follow a rising force in proportion (thesis section 4.2.3)?
+
+/// A stretch of force over which the response grows in proportion.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Region {
+    /// From which force, N.
+    pub from_n: f64,
+    /// To which force, N.
+    pub to_n: f64,
+    /// dX/dF, m/N.
+    pub slope: f64,
+}
+
+/// Regions of X(F) at constant frequency under a slowly changing force, and the forces at which X jumps (Fig. 4.8).
+///
+/// `points` are (F, X) in the order in which they were measured. A line is split in two where that explains much more than
+/// noise; a jump is where two neighbouring lines miss each other by more than their scatter.
+pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // The scatter of second differences of white noise of deviation σ is √6·σ.
+    let mut bends: Vec<f64> = sorted
+        .windows(3)
+        .map(|w| (w[2].1 - 2.0 * w[1].1 + w[0].1).abs())
+        .collect();
+    bends.sort_by(f64::total_cmp);
+    let noise = bends.get(bends.len() / 2).copied().unwrap_or(0.0) / (0.6745 * 6.0_f64.sqrt());
+    // A fifth of a percent of the largest response is less than a region's bend.
+    let largest = sorted.iter().fold(0.0_f64, |a, (_, x)| a.max(x.abs()));
+    let noise = noise.max(2e-3 * largest);
+    let mut cuts = vec![0, sorted.len()];
+    split_line(&sorted, 0, sorted.len(), noise.max(f64::MIN_POSITIVE), &mut cuts);
+    cuts.sort_unstable();
+    join_lines(&sorted, noise, &mut cuts);
+    let lines: Vec<(usize, usize, [f64; 2])> = cuts
+        .windows(2)
+        .filter(|pair| pair[1] > pair[0] + 1)
+        .map(|pair| (pair[0], pair[1], line(&sorted[pair[0]..pair[1]])))
+        .collect();
+    let regions = lines
+        .iter()
+        .map(|&(from, to, [_, slope])| Region {
+            from_n: sorted[from].0,
+            to_n: sorted[to - 1].0,
+            slope,
+        })
+        .collect();
+    let jumps = lines
+        .windows(2)
+        .filter_map(|pair| {
+            let at = 0.5 * (sorted[pair[0].1 - 1].0 + sorted[pair[1].0].0);
+            let value = |[level, slope]: [f64; 2]| level + slope * at;
+            let miss = (value(pair[1].2) - value(pair[0].2)).abs();
+            // More than noise, and a share of the response that no bend of a smooth curve gives between two windows.
+            (miss > 6.0 * noise && miss > 0.05 * value(pair[0].2).abs()).then_some(at)
+        })
+        .collect();
+    (regions, jumps)
+}
+
+/// By how much the sum of squares over the noise must fall for a line to be two.
+const EVIDENCE: f64 = 50.0;
+
+/// Least points of a region.
+const REGION: usize = 6;
+
+fn split_line(points: &[(f64, f64)], from: usize, to: usize, noise: f64, cuts: &mut Vec<usize>) {
+    if to < from + 2 * REGION {
+        return;
+    }
+    let whole = misfit(&points[from..to]);
+    let best = (from + REGION..=to - REGION)
+        .map(|cut| (misfit(&points[from..cut]) + misfit(&points[cut..to]), cut))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((sum, cut)) = best
+        && (whole - sum) / (noise * noise) > EVIDENCE
+    {
+        cuts.push(cut);
+        split_line(points, from, cut, noise, cuts);
+        split_line(points, cut, to, noise, cuts);
+    }
+}
+
+/// Takes out cuts between lines that are one: the first cut of three lines may lie within one of them.
+fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
+    let mut index = 1;
+    while index + 1 < cuts.len() {
+        let (from, cut, to) = (cuts[index - 1], cuts[index], cuts[index + 1]);
+        let gain = misfit(&points[from..to]) - misfit(&points[from..cut]) - misfit(&points[cut..to]);
+        if gain <= EVIDENCE * noise * noise {
+            cuts.remove(index);
+        } else {
+            index += 1;
+        }
+    }
+}
+
+/// Level and slope of the line through the points, by least squares.
+pub(super) fn line(points: &[(f64, f64)]) -> [f64; 2] {
+    let n = points.len() as f64;
+    let (sx, sy) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+    let (mx, my) = (sx / n, sy / n);
+    let (sxx, sxy) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| {
+        (a + (x - mx) * (x - mx), b + (x - mx) * (y - my))
+    });
+    let slope = if sxx > 0.0 { sxy / sxx } else { 0.0 };
+    [my - slope * mx, slope]
+}
+
+fn misfit(points: &[(f64, f64)]) -> f64 {
+    let [level, slope] = line(points);
+    points.iter().map(|(x, y)| (y - level - slope * x).powi(2)).sum()
+}

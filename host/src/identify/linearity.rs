@@ -1,0 +1,472 @@
+//! Is the structure linear, and if not, of what kind is it? (Thesis section 4.2 as tests with error rates.)
+//!
+//! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X at one frequency does not depend on the level.
+//! Each candidate kind explains its change by a describing function; a kind is named only where it explains much
+//! more than chance does. *Harmonics*: the response at 2ω and 3ω stays within noise and what the force's own harmonics cause.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::describing::{self, Kind};
+use super::dwell::{Dwell, Line};
+use super::homogeneity::line;
+use super::steady_fit::derivative;
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Verdict {
+    /// True where nothing speaks against a linear structure.
+    pub linear: bool,
+    /// The kinds that explain what was found, strongest first; empty where none does or all is linear.
+    pub kinds: Vec<Kind>,
+    /// Sum of squares over degrees of freedom of a linear structure: near 1 for one.
+    pub linear_misfit: f64,
+    /// That of the kinds named.
+    pub explained_misfit: f64,
+    /// The largest change of |X/F| over level at one frequency, as a share.
+    pub level_dependence: f64,
+    /// Response at 2ω and 3ω against ω, by force level: how the figures 5.4 (b) and (c) of the thesis show them.
+    pub harmonics: Vec<Harmonics>,
+}
+
+/// Share of the second and third harmonic in the response at one force level.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Harmonics {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Force amplitude, N.
+    pub force_n: f64,
+    /// |X(2ω)|/|X(ω)|.
+    pub second: f64,
+    /// |X(3ω)|/|X(ω)|.
+    pub third: f64,
+    /// The size of either that noise alone has.
+    pub noise: f64,
+}
+
+/// Why nothing can be said.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LinearityError {
+    /// No frequency was measured at two levels.
+    #[error(
+        "no frequency was measured at two or more force levels ({dwells} dwells were found); a step-sine test at several levels, or a tone of rising force, is needed"
+    )]
+    OneLevel {
+        /// Dwells found.
+        dwells: usize,
+    },
+}
+
+/// One measured point.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    group: usize,
+    omega: f64,
+    amplitude: f64,
+    stiffness: Complex64,
+    /// Variance of real or imaginary part.
+    variance: f64,
+}
+
+/// By how much a sum of squares must fall per parameter to name a kind. Chance lets it fall by 25 in 6e-7 of cases.
+const EVIDENCE: f64 = 25.0;
+
+/// A choice that leaves less than this share of what the level does to F/X explains it: a describing function leaves out
+/// higher harmonics, and is wrong by up to a tenth of its effect.
+const EXPLAINED: f64 = 0.01;
+
+/// Judges dwells of one direction, force and motion alike.
+///
+/// # Errors
+/// No frequency at two levels.
+pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
+    let points = points(dwells);
+    let several = points
+        .iter()
+        .any(|a| points.iter().any(|b| a.group == b.group && differ(a, b)));
+    if !several {
+        return Err(LinearityError::OneLevel { dwells: dwells.len() });
+    }
+    let base = Base::new(&points);
+    let alone = base.sum_of_squares(&[]);
+    let free = base.free();
+    let mut best = Choice {
+        kinds: Vec::new(),
+        parameters: 0,
+        sum: alone,
+    };
+    // A linear rig's sum is within chance of its degrees of freedom: then there is nothing to explain.
+    let chance = free + 4.0 * (2.0 * free).sqrt();
+    let (second, third) = (harmonic(dwells, 2), harmonic(dwells, 3));
+    if alone > chance {
+        best = choose(&base, &points, best);
+    }
+    let mut kinds = best.kinds;
+    if second {
+        if is_shadow_of_quadratic(&points, dwells) {
+            kinds.retain(|kind| {
+                !matches!(
+                    kind,
+                    Kind::CubicStiffness | Kind::SofteningHardening | Kind::Backlash | Kind::Hysteresis
+                )
+            });
+        }
+        kinds.push(Kind::QuadraticStiffness);
+    }
+    Ok(Verdict {
+        linear: alone <= chance && !second && !third,
+        kinds,
+        linear_misfit: alone / free.max(1.0),
+        explained_misfit: best.sum / (free - best.parameters as f64).max(1.0),
+        level_dependence: level_dependence(&points),
+        harmonics: harmonics(dwells),
+    })
+}
+
+fn differ(a: &Point, b: &Point) -> bool {
+    (a.amplitude / b.amplitude - 1.0).abs() > 0.05
+}
+
+fn pair(dwell: &Dwell) -> Option<(&Line, &Line)> {
+    let force = dwell.force()?;
+    let motion = dwell
+        .motions
+        .iter()
+        .find(|line| line.direction == force.direction)?;
+    Some((force, motion))
+}
+
+fn points(dwells: &[Dwell]) -> Vec<Point> {
+    let mut points: Vec<Point> = dwells
+        .iter()
+        .filter_map(|dwell| {
+            let (force, motion) = pair(dwell)?;
+            let per_unit = dwell.gram_inverse[(1, 1)];
+            let (f, y) = (force.phasor(1), motion.phasor(1));
+            let x = y / Complex64::new(0.0, dwell.omega).powi(i32::from(derivative(motion.quantity)));
+            let stiffness = f / x;
+            let relative = per_unit * (force.variance / f.norm_sqr() + motion.variance / y.norm_sqr());
+            Some(Point {
+                group: 0,
+                omega: dwell.omega,
+                amplitude: x.norm(),
+                stiffness,
+                variance: stiffness.norm_sqr() * relative,
+            })
+        })
+        .filter(|point| point.stiffness.is_finite() && point.variance > 0.0)
+        .collect();
+    points.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+    let mut group = 0;
+    for index in 1..points.len() {
+        // Steps of one frequency scatter by their noise only; a thousandth is closer than steps of a test are.
+        if points[index].omega > points[index - 1].omega * 1.001 {
+            group += 1;
+        }
+        points[index].group = group;
+    }
+    points
+}
+
+/// The dynamic stiffness of each frequency is free; kinds explain how it changes with the level.
+struct Base<'a> {
+    points: &'a [Point],
+    groups: usize,
+}
+
+impl<'a> Base<'a> {
+    fn new(points: &'a [Point]) -> Self {
+        Self {
+            points,
+            groups: points.last().map_or(0, |point| point.group + 1),
+        }
+    }
+
+    fn free(&self) -> f64 {
+        2.0 * (self.points.len() - self.groups) as f64
+    }
+
+    /// What is left after the features and a free complex stiffness per frequency, over the noise.
+    fn sum_of_squares(&self, features: &[Vec<Complex64>]) -> f64 {
+        let rows = 2 * self.points.len();
+        let mut matrix = DMatrix::zeros(rows, features.len().max(1));
+        let mut right = DVector::zeros(rows);
+        for part in 0..2 {
+            let pick = |value: Complex64| if part == 0 { value.re } else { value.im };
+            let column = |values: &dyn Fn(usize) -> f64| self.centered(values);
+            let of_data = column(&|i| pick(self.points[i].stiffness));
+            for (i, value) in of_data.into_iter().enumerate() {
+                right[2 * i + part] = value;
+            }
+            for (index, feature) in features.iter().enumerate() {
+                for (i, value) in column(&|i| pick(feature[i])).into_iter().enumerate() {
+                    matrix[(2 * i + part, index)] = value;
+                }
+            }
+        }
+        if features.is_empty() {
+            return right.norm_squared();
+        }
+        match super::steady_fit::scaled_least_squares(&matrix, &right) {
+            Some(solution) => (&right - matrix * solution).norm_squared(),
+            None => right.norm_squared(),
+        }
+    }
+
+    /// Over its deviation, less the weighted mean of its frequency.
+    fn centered(&self, value: &dyn Fn(usize) -> f64) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.groups];
+        for (i, point) in self.points.iter().enumerate() {
+            let weight = 1.0 / point.variance;
+            sums[point.group].0 += weight * value(i);
+            sums[point.group].1 += weight;
+        }
+        self.points
+            .iter()
+            .enumerate()
+            .map(|(i, point)| (value(i) - sums[point.group].0 / sums[point.group].1) / point.variance.sqrt())
+            .collect()
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Choice {
+    kinds: Vec<Kind>,
+    parameters: usize,
+    sum: f64,
+}
+
+/// The simplest set of one or two candidate kinds that explains what the level does.
+fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
+    let candidates = candidates(base, points);
+    let mut all: Vec<Choice> = candidates
+        .iter()
+        .map(|candidate| Choice {
+            kinds: vec![candidate.kind],
+            parameters: candidate.parameters,
+            sum: base.sum_of_squares(&candidate.features),
+        })
+        .collect();
+    all.retain(|choice| nothing.sum - choice.sum > EVIDENCE * choice.parameters as f64);
+    for (i, a) in candidates.iter().enumerate() {
+        for b in candidates[i + 1..].iter().filter(|b| a.goes_with(b)) {
+            let features: Vec<_> = a.features.iter().chain(&b.features).cloned().collect();
+            let sum = base.sum_of_squares(&features);
+            let needs = |other: &Candidate, parameters: usize| {
+                base.sum_of_squares(&other.features) - sum > EVIDENCE * parameters as f64
+            };
+            if needs(a, b.parameters) && needs(b, a.parameters) {
+                all.push(Choice {
+                    kinds: vec![a.kind, b.kind],
+                    parameters: a.parameters + b.parameters,
+                    sum,
+                });
+            }
+        }
+    }
+    all.sort_by(|a, b| a.sum.total_cmp(&b.sum));
+    let Some(least) = all.first().cloned() else {
+        return nothing;
+    };
+    // The simplest that explains all but a small share, or about as much as the best; of equally simple ones the best.
+    let enough = (least.sum + EVIDENCE).max(EXPLAINED * nothing.sum);
+    all.into_iter()
+        .filter(|choice| choice.sum <= enough)
+        .min_by_key(|choice| choice.parameters)
+        .unwrap_or(least)
+}
+
+impl Candidate {
+    /// A spring and a damping may be there together. Hysteresis is both by itself.
+    fn goes_with(&self, other: &Self) -> bool {
+        self.spring != other.spring && self.kind != Kind::Hysteresis && other.kind != Kind::Hysteresis
+    }
+}
+
+struct Candidate {
+    kind: Kind,
+    spring: bool,
+    parameters: usize,
+    features: Vec<Vec<Complex64>>,
+}
+
+fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
+    let feature = |of: &dyn Fn(&Point) -> Complex64| -> Vec<Complex64> { points.iter().map(of).collect() };
+    let cubic = feature(&|p| describing::cubic_stiffness(p.amplitude));
+    let quintic = feature(&|p| describing::quintic_stiffness(p.amplitude));
+    let candidate = |kind, spring, parameters, features| Candidate {
+        kind,
+        spring,
+        parameters,
+        features,
+    };
+    // A gap or a yield is looked for over the amplitudes that were measured, and a bit beyond.
+    let sizes = points.iter().map(|point| point.amplitude);
+    let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
+    let scan = |of: &dyn Fn(&Point, f64) -> Complex64| {
+        let features = |size: f64| {
+            vec![
+                points
+                    .iter()
+                    .map(|point| of(point, size.exp()))
+                    .collect::<Vec<_>>(),
+            ]
+        };
+        let sum = |size: f64| base.sum_of_squares(&features(size));
+        let (mut from, mut to) = ((0.05 * least).ln(), (1.5 * largest).ln());
+        // A coarse look at all, then finer ones around the best.
+        for _ in 0..4 {
+            let step = (to - from) / 40.0;
+            let mut best = (f64::INFINITY, from);
+            for k in 0..=40 {
+                let size = from + step * f64::from(k);
+                let found = sum(size);
+                if found < best.0 {
+                    best = (found, size);
+                }
+            }
+            (from, to) = (best.1 - step, best.1 + step);
+        }
+        features(0.5 * (from + to))
+    };
+    vec![
+        candidate(Kind::CubicStiffness, true, 1, vec![cubic.clone()]),
+        candidate(
+            Kind::CubicDamping,
+            false,
+            1,
+            vec![feature(&|p| describing::cubic_damping(p.amplitude, p.omega))],
+        ),
+        candidate(
+            Kind::CoulombFriction,
+            false,
+            1,
+            vec![feature(&|p| describing::coulomb_friction(p.amplitude))],
+        ),
+        candidate(Kind::SofteningHardening, true, 2, vec![cubic, quintic]),
+        candidate(
+            Kind::Backlash,
+            true,
+            2,
+            scan(&|point, gap| describing::backlash(point.amplitude, gap)),
+        ),
+        candidate(
+            Kind::Hysteresis,
+            true,
+            2,
+            scan(&|point, yield_m| describing::hysteresis(point.amplitude, yield_m)),
+        ),
+    ]
+}
+
+/// True where the change of stiffness with the level is what a quadratic spring alone makes of itself.
+///
+/// Balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k, so that the stiffness changes by
+/// k₂(2a₀ + X₂) = −(5/6)k₂²X²/k = −30·k·(X₂/X)². k comes from how F/X changes with frequency at the lowest level.
+fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
+    let shares: Vec<(f64, f64, f64)> = dwells
+        .iter()
+        .filter_map(|dwell| {
+            let (_, motion) = pair(dwell)?;
+            // Displacement shares: a derivative makes the second harmonic larger by 2 each time.
+            let larger = f64::from(1 << derivative(motion.quantity));
+            let share = at_harmonic(motion, dwell, 2)?.0 / motion.amplitude(1) / larger;
+            let size = motion.amplitude(1) / dwell.omega.powi(i32::from(derivative(motion.quantity)));
+            Some((dwell.omega, size, share))
+        })
+        .collect();
+    let share_of = |point: &Point| {
+        shares
+            .iter()
+            .find(|(omega, size, _)| *omega == point.omega && (size / point.amplitude - 1.0).abs() < 1e-9)
+            .map(|(_, _, share)| share * share)
+    };
+    let mut lowest: Vec<&Point> = Vec::new();
+    for point in points {
+        match lowest.last_mut() {
+            Some(last) if last.group == point.group => {
+                if point.amplitude < last.amplitude {
+                    *last = point;
+                }
+            }
+            _ => lowest.push(point),
+        }
+    }
+    let by_frequency: Vec<(f64, f64)> = lowest
+        .iter()
+        .map(|p| (p.omega * p.omega, p.stiffness.re))
+        .collect();
+    let [stiffness, _] = line(&by_frequency);
+    // Change of stiffness over (X₂/X)², against the lowest level of the same frequency.
+    let (mut above, mut below) = (0.0, 0.0);
+    for point in points {
+        let Some(base) = lowest.iter().find(|base| base.group == point.group) else {
+            continue;
+        };
+        if let (Some(share), Some(at_base)) = (share_of(point), share_of(base)) {
+            above += (share - at_base) * (point.stiffness.re - base.stiffness.re);
+            below += (share - at_base) * (share - at_base);
+        }
+    }
+    // Within a half either way: damping, other modes and the next order of the balance move it.
+    let ratio = above / (below * stiffness);
+    (-45.0..-15.0).contains(&ratio)
+}
+
+fn level_dependence(points: &[Point]) -> f64 {
+    let mut largest = 0.0_f64;
+    for a in points {
+        for b in points.iter().filter(|b| b.group == a.group) {
+            largest = largest.max((a.stiffness.norm() / b.stiffness.norm() - 1.0).abs());
+        }
+    }
+    largest
+}
+
+/// |X(hω)| of the motion and the deviation that noise gives it.
+fn at_harmonic(line: &Line, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
+    let place = 2 * h - 1;
+    if line.coefficients.len() <= place + 1 {
+        return None;
+    }
+    let variance = line.variance * dwell.gram_inverse[(place, place)];
+    Some((line.amplitude(h), variance.sqrt()))
+}
+
+/// True where harmonic h of the motion is more than noise and than the force's own harmonic can cause.
+fn harmonic(dwells: &[Dwell], h: usize) -> bool {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for dwell in dwells {
+        let Some((force, motion)) = pair(dwell) else {
+            continue;
+        };
+        let (Some((x, noise)), Some((f, force_noise))) =
+            (at_harmonic(motion, dwell, h), at_harmonic(force, dwell, h))
+        else {
+            continue;
+        };
+        // Off resonance at hω a structure gives way to a force no more than it does at ω near its resonance.
+        let caused = (f - 3.0 * force_noise).max(0.0) * motion.amplitude(1) / force.amplitude(1);
+        sum += ((x - caused).max(0.0) / noise).powi(2);
+        count += 2.0;
+    }
+    // χ² of `count` degrees of freedom: five of its deviations above its mean.
+    count > 0.0 && sum > count + 5.0 * (2.0_f64 * count).sqrt()
+}
+
+fn harmonics(dwells: &[Dwell]) -> Vec<Harmonics> {
+    dwells
+        .iter()
+        .filter_map(|dwell| {
+            let (force, motion) = pair(dwell)?;
+            let first = motion.amplitude(1);
+            Some(Harmonics {
+                frequency_hz: dwell.omega / std::f64::consts::TAU,
+                force_n: force.amplitude(1),
+                second: at_harmonic(motion, dwell, 2)?.0 / first,
+                third: at_harmonic(motion, dwell, 3)?.0 / first,
+                noise: at_harmonic(motion, dwell, 2)?.1 / first,
+            })
+        })
+        .collect()
+}

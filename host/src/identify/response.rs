@@ -1,0 +1,94 @@
+//! The motion of an identified law under a recorded force: what it predicts of a record that it was not fitted to.
+
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+
+use super::restoring_force::Term;
+
+/// Instants between two samples at which the force is interpolated: even, two to a step of the integration.
+const FINER: usize = 8;
+
+/// Why a law predicts nothing.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ResponseError {
+    /// No mass.
+    #[error("a law without mass has no motion of its own")]
+    NoMass,
+    /// The motion left every bound.
+    #[error("the motion of the law grows without bound after {time_s:.3} s: it means nothing at this force")]
+    Diverged {
+        /// When.
+        time_s: f64,
+    },
+}
+
+/// Displacement of the law Σ θ φ = F from rest, m, at the samples of `force` (N, at `rate_hz`).
+///
+/// Between samples the force is interpolated without changing its band (sampled signals that came through an
+/// anti-aliasing filter have no other shape); the classical Runge–Kutta method takes four steps per sample.
+///
+/// # Errors
+/// No mass, or a motion without bound.
+pub fn displacement(law: &[(Term, f64)], force: &[f64], rate_hz: f64) -> Result<Vec<f64>, ResponseError> {
+    let mass: f64 = law
+        .iter()
+        .filter(|(term, _)| *term == Term::Mass)
+        .map(|(_, m)| m)
+        .sum();
+    if mass == 0.0 || !mass.is_finite() {
+        return Err(ResponseError::NoMass);
+    }
+    let fine = finer(force);
+    let step = 2.0 / (FINER as f64 * rate_hz);
+    let acceleration = |x: f64, v: f64, f: f64| {
+        let restoring: f64 = law
+            .iter()
+            .filter(|(term, _)| *term != Term::Mass)
+            .map(|(term, theta)| theta * term.value(x, v, 0.0))
+            .sum();
+        (f - restoring) / mass
+    };
+    let (mut x, mut v) = (0.0, 0.0);
+    let mut found = Vec::with_capacity(force.len());
+    for index in 0..force.len() {
+        found.push(x);
+        for part in 0..FINER / 2 {
+            let at = index * FINER + 2 * part;
+            let f = [0, 1, 2].map(|ahead| fine[(at + ahead).min(fine.len() - 1)]);
+            let (v1, a1) = (v, acceleration(x, v, f[0]));
+            let (v2, a2) = (
+                v + 0.5 * step * a1,
+                acceleration(x + 0.5 * step * v1, v + 0.5 * step * a1, f[1]),
+            );
+            let (v3, a3) = (
+                v + 0.5 * step * a2,
+                acceleration(x + 0.5 * step * v2, v + 0.5 * step * a2, f[1]),
+            );
+            let (v4, a4) = (v + step * a3, acceleration(x + step * v3, v + step * a3, f[2]));
+            x += step / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4);
+            v += step / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+        }
+        if !x.is_finite() {
+            return Err(ResponseError::Diverged {
+                time_s: index as f64 / rate_hz,
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// [`FINER`] times as many samples of the same band.
+fn finer(samples: &[f64]) -> Vec<f64> {
+    let count = samples.len();
+    let mut planner = FftPlanner::new();
+    let mut spectrum: Vec<Complex64> = samples.iter().map(|x| Complex64::new(*x, 0.0)).collect();
+    planner.plan_fft_forward(count).process(&mut spectrum);
+    let mut wide = vec![Complex64::ZERO; FINER * count];
+    let half = count.div_ceil(2);
+    wide[..half].copy_from_slice(&spectrum[..half]);
+    let lower = count - half;
+    let end = wide.len();
+    wide[end - lower..].copy_from_slice(&spectrum[half..]);
+    planner.plan_fft_inverse(FINER * count).process(&mut wide);
+    wide.into_iter().map(|x| x.re / count as f64).collect()
+}
