@@ -11,7 +11,7 @@ use crate::case::Case;
 use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::page::{figure, page};
-use crate::stability::{Chart, Label, Method, Point, SpeedLine, chart};
+use crate::stability::{Chart, Label, LimitSpread, Method, Point, SpeedLine, Uncertainty, chart};
 
 /// Stability limits over speed, or the dominant multiplier at points.
 #[derive(Debug, clap::Args)]
@@ -33,6 +33,15 @@ pub struct Args {
     /// The dominant multiplier of every speed and depth, with its error, instead of the limits.
     #[arg(long, requires = "rpm")]
     cells: bool,
+    /// Leave out what the deviations of the case (keys that end in _std) make of the limits.
+    #[arg(long, requires = "rpm")]
+    nominal: bool,
+    /// The share of machines that are stable at every speed and depth of the ranges, where the case has deviations.
+    #[arg(long, requires = "rpm", conflicts_with = "nominal")]
+    probability: bool,
+    /// Where the draws of the deviations begin.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
     /// Chart or table to write: svg, html, csv or json by its ending.
     #[arg(long, value_name = "FILE", requires = "rpm")]
     out: Option<PathBuf>,
@@ -60,7 +69,25 @@ pub fn run(args: Args) -> Result<(), Error> {
             lobes_cells::run(&case, method.as_ref(), grid, args.out, args.output)
         }
         (Some(rpm), Some(depth_mm)) => {
-            run_chart(&case, method.as_ref(), rpm, depth_mm, args.out, args.output)
+            let maker = |case: &Case| args.method.on(case).ok();
+            let uncertainty = if args.nominal {
+                None
+            } else {
+                Uncertainty::new(&case, &maker, args.seed)
+            };
+            let ranges = Ranges {
+                rpm,
+                depth_mm,
+                probability: args.probability,
+            };
+            run_chart(
+                &case,
+                method.as_ref(),
+                uncertainty.as_ref(),
+                ranges,
+                args.out,
+                args.output,
+            )
         }
         _ => run_points(method.as_ref(), &args.at, args.output),
     }
@@ -92,14 +119,32 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
     output.answer(&Points { label, points }, text)
 }
 
+/// What a chart covers.
+struct Ranges {
+    rpm: Range,
+    depth_mm: Range,
+    probability: bool,
+}
+
 fn run_chart(
     case: &Case,
     method: &dyn Method,
-    rpm: Range,
-    depth_mm: Range,
+    uncertainty: Option<&Uncertainty<'_>>,
+    ranges: Ranges,
     out: Option<PathBuf>,
     output: Output,
 ) -> Result<(), Error> {
+    let Ranges {
+        rpm,
+        depth_mm,
+        probability,
+    } = ranges;
+    if probability && uncertainty.is_none() {
+        return Err(Error::input(format!(
+            "{}: --probability needs deviations, keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa",
+            case.path.display()
+        )));
+    }
     let deepest_mm = depth_mm.first().max(depth_mm.last());
     let widest_step_mm = (depth_mm.last() - depth_mm.first()).abs() / depth_mm.count().max(2) as f64;
     let samples = if widest_step_mm > 0.0 {
@@ -107,7 +152,15 @@ fn run_chart(
     } else {
         depth_mm.count()
     };
-    let chart = chart(method, &rpm.values(), deepest_mm, samples)?;
+    let mut chart = chart(method, &rpm.values(), deepest_mm, samples)?;
+    if let Some(uncertainty) = uncertainty {
+        let cells_mm = if probability {
+            depth_mm.values()
+        } else {
+            Vec::new()
+        };
+        chart = chart.with_spread(uncertainty, deepest_mm, &cells_mm)?;
+    }
     if let Some(path) = &out {
         write_chart(case, &chart, deepest_mm, path)?;
     }
@@ -143,8 +196,22 @@ fn limits_as_text(chart: &Chart) -> String {
             line.rpm,
             stable.join(", ")
         );
+        if let Some(spread) = &line.spread {
+            let [low, median, high] = percentiles(spread, "beyond");
+            let _ = write!(
+                text,
+                "; limit of 5, 50, 95 % of the machines: {low}, {median}, {high}"
+            );
+        }
     }
     text
+}
+
+/// The percentiles as text, mm; `beyond` for what lies beyond the last depth.
+fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
+    let percentiles = spread.limit_percentiles_mm;
+    [percentiles.low, percentiles.median, percentiles.high]
+        .map(|depth_mm| depth_mm.map_or_else(|| beyond.into(), |depth_mm| format!("{depth_mm:.4}")))
 }
 
 fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, path: &Path) -> Result<(), Error> {
@@ -177,7 +244,8 @@ fn picture(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
 fn as_page(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
     let svg = picture(case, chart, depth_mm)?;
     let caption = format!(
-        "Stable depths over spindle speed, by {}. Lines: where stability is first lost.",
+        "Stable depths over spindle speed, by {}. Lines: where stability is first lost. A grey band, where there is one: \
+         the first limits of 5 to 95 % of the machines that the deviations of the case describe, with their median.",
         chart.label
     );
     let body = maud::html! {
@@ -185,7 +253,12 @@ fn as_page(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
         (figure(&svg, &caption))
         h2 { "Limits" }
         table {
-            tr { th { "rev/min" } th { "first limit [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" } }
+            tr {
+                th { "rev/min" } th { "first limit [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
+                @if chart.speeds.iter().any(|line| line.spread.is_some()) {
+                    th { "limit of 5 % [mm]" } th { "of 50 %" } th { "of 95 % of the machines" }
+                }
+            }
             @for line in &chart.speeds { (row(line)) }
         }
     };
@@ -209,6 +282,9 @@ fn row(line: &SpeedLine) -> maud::Markup {
                 td { "none" } td {} td {}
             }
             td { (stable.join(", ")) }
+            @if let Some(spread) = &line.spread {
+                @for depth in percentiles(spread, "beyond") { td { (depth) } }
+            }
         }
     }
 }
@@ -216,36 +292,46 @@ fn row(line: &SpeedLine) -> maud::Markup {
 /// One row per switch; a speed without any has one row with nothing but its speed.
 fn as_csv(chart: &Chart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer
-        .write_record([
-            "rpm [rev/min]",
-            "depth [mm]",
-            "kind",
-            "gain",
-            "chatter [Hz]",
-            "first",
-        ])
-        .map_err(Error::other)?;
+    let mut header = vec![
+        "rpm [rev/min]",
+        "depth [mm]",
+        "kind",
+        "gain",
+        "chatter [Hz]",
+        "first",
+    ];
+    if chart.speeds.iter().any(|line| line.spread.is_some()) {
+        header.extend(["limit_5 [mm]", "limit_50 [mm]", "limit_95 [mm]"]);
+    }
+    writer.write_record(&header).map_err(Error::other)?;
     for line in &chart.speeds {
         let rpm = line.rpm.to_string();
+        let spread: Vec<String> = line
+            .spread
+            .iter()
+            .flat_map(|spread| percentiles(spread, ""))
+            .collect();
+        let spread = spread.iter().map(String::as_str);
         if line.switches.is_empty() {
+            let row = [rpm.as_str(), "", "", "", "", ""];
             writer
-                .write_record([&rpm, "", "", "", "", ""])
+                .write_record(row.into_iter().chain(spread.clone()))
                 .map_err(Error::other)?;
         }
         for switch in &line.switches {
             let first = line
                 .first_limit
                 .is_some_and(|limit| limit.depth_mm == switch.depth_mm);
+            let row = [
+                rpm.as_str(),
+                &switch.depth_mm.to_string(),
+                switch.kind.name(),
+                &switch.gain.to_string(),
+                &switch.chatter_hz.map_or_else(String::new, |hz| hz.to_string()),
+                &first.to_string(),
+            ];
             writer
-                .write_record([
-                    rpm.as_str(),
-                    &switch.depth_mm.to_string(),
-                    switch.kind.name(),
-                    &switch.gain.to_string(),
-                    &switch.chatter_hz.map_or_else(String::new, |hz| hz.to_string()),
-                    &first.to_string(),
-                ])
+                .write_record(row.into_iter().chain(spread.clone()))
                 .map_err(Error::other)?;
         }
     }

@@ -475,6 +475,7 @@ impl Branch {
             bistable_mm: self.bistable_mm(),
             first_limit,
             switches,
+            spread: None,
         }
     }
 }

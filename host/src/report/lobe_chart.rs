@@ -32,6 +32,9 @@ pub struct Column {
     pub undecided_mm: Vec<(f64, f64)>,
     /// Where stability is first lost; `None` where nothing is lost up to the last depth.
     pub first_limit: Option<FirstLimit>,
+    /// Depths below which the first limit lies with 5, 50 and 95 %; `None` beyond the last depth. Nothing where the
+    /// parameters have no deviations.
+    pub percentiles_mm: Option<[Option<f64>; 3]>,
 }
 
 impl Column {
@@ -68,6 +71,7 @@ impl Column {
                 .map(|interval| pair(interval.from, interval.to))
                 .collect(),
             first_limit,
+            percentiles_mm: None,
         }
     }
 }
@@ -81,6 +85,10 @@ impl From<&SpeedLine> for Column {
             first_limit: line.first_limit.map(|limit| FirstLimit {
                 depth_mm: limit.depth_mm,
                 kind: limit.kind,
+            }),
+            percentiles_mm: line.spread.as_ref().map(|spread| {
+                let percentiles = spread.limit_percentiles_mm;
+                [percentiles.low, percentiles.median, percentiles.high]
             }),
         }
     }
@@ -127,6 +135,7 @@ pub fn lobe_chart(
         chart.draw_series(stable.into_iter().map(|area| Polygon::new(area, STABLE)))?;
         let undecided = areas(columns, |column| &column.undecided_mm);
         chart.draw_series(undecided.into_iter().map(|area| Polygon::new(area, UNDECIDED)))?;
+        draw_percentiles(&mut chart, columns, depth_max_mm)?;
         for kind in [LimitKind::Hopf, LimitKind::Flip, LimitKind::Fold] {
             draw_limits(&mut chart, columns, depth_max_mm, kind)?;
         }
@@ -140,6 +149,37 @@ pub fn lobe_chart(
             .draw()?;
         Ok(())
     })
+}
+
+/// The band from the 5 to the 95 % limit, and the median in it.
+fn draw_percentiles(
+    chart: &mut Axes<'_, '_>,
+    columns: &[Column],
+    depth_max_mm: f64,
+) -> Result<(), PictureError> {
+    let known: Vec<(f64, [f64; 3])> = columns
+        .iter()
+        .filter_map(|column| {
+            let percentiles = column.percentiles_mm?;
+            Some((
+                column.rpm,
+                percentiles.map(|depth| depth.unwrap_or(depth_max_mm).min(depth_max_mm)),
+            ))
+        })
+        .collect();
+    if known.len() < 2 {
+        return Ok(());
+    }
+    let along = |index: usize| known.iter().map(move |&(rpm, depths)| (rpm, depths[index]));
+    let band: Vec<(f64, f64)> = along(0).chain(along(2).rev()).collect();
+    chart
+        .draw_series([Polygon::new(band, INK.mix(0.12))])?
+        .label("limit of 5 to 95 % of the machines")
+        .legend(|(x, y)| Rectangle::new([(x, y - 4), (x + 18, y + 4)], INK.mix(0.12).filled()));
+    for (index, width) in [(0, 1), (1, 2), (2, 1)] {
+        chart.draw_series(LineSeries::new(along(index), INK.mix(0.5).stroke_width(width)))?;
+    }
+    Ok(())
 }
 
 fn limit_look(kind: LimitKind) -> (RGBColor, &'static str) {
@@ -236,6 +276,7 @@ mod tests {
             stable_mm: stable_mm.to_vec(),
             undecided_mm: Vec::new(),
             first_limit,
+            percentiles_mm: None,
         }
     }
 

@@ -1,10 +1,11 @@
 //! Charts: the line of every speed, by any method.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
-use super::StabilityError;
 use super::line::SpeedLine;
 use super::method::{Label, Method};
+use super::{LimitSpread, StabilityError, Uncertainty};
 
 /// The fewest steps in depth at which multipliers are followed, however coarse the chart.
 const SAMPLES_MIN: usize = 40;
@@ -17,6 +18,9 @@ pub struct Chart {
     pub label: Label,
     /// One line per speed, in the order asked for.
     pub speeds: Vec<SpeedLine>,
+    /// The depths, mm, at which lines have a share of stable machines; empty where that was not asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cells_mm: Vec<f64>,
 }
 
 /// The lines at given speeds, from depth 0 to `depth_mm`, with at least `samples` steps in depth.
@@ -34,6 +38,7 @@ pub fn chart<M: Method + ?Sized>(
     Ok(Chart {
         label: Label::of(method),
         speeds: method.lines(speeds_rpm, depth_mm, samples.max(SAMPLES_MIN))?,
+        cells_mm: Vec::new(),
     })
 }
 
@@ -49,6 +54,30 @@ pub struct Refinement {
 }
 
 impl Chart {
+    /// Adds to every line how far its limit may lie from there: see [`Uncertainty::spread`].
+    ///
+    /// The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// Those of [`Uncertainty::spread`], of the first speed that fails.
+    pub fn with_spread(
+        mut self,
+        uncertainty: &Uncertainty<'_>,
+        depth_mm: f64,
+        cells_mm: &[f64],
+    ) -> Result<Self, StabilityError> {
+        let spreads: Vec<Result<LimitSpread, StabilityError>> = self
+            .speeds
+            .par_iter()
+            .map(|line| uncertainty.spread(line, depth_mm, cells_mm))
+            .collect();
+        for (line, spread) in self.speeds.iter_mut().zip(spreads) {
+            line.spread = Some(spread?);
+        }
+        self.cells_mm = cells_mm.to_vec();
+        Ok(self)
+    }
+
     /// Adds speeds where limits bend, kinds change, and islands begin or end; speeds must be ascending.
     ///
     /// # Errors

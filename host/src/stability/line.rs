@@ -9,7 +9,7 @@ use super::multiplier::Kind;
 use super::point::{check_depth, check_speed};
 use super::root::Root;
 use super::spectrum::Spectrum;
-use super::{Problem, StabilityError};
+use super::{LimitSpread, Problem, StabilityError};
 
 /// How often an interval of depths is halved where its multipliers cannot be followed from end to end.
 const LEVELS: u32 = 12;
@@ -66,6 +66,9 @@ pub struct SpeedLine {
     pub first_limit: Option<Limit>,
     /// Every crossing of the unit circle, also while another multiplier is outside, by depth.
     pub switches: Vec<Switch>,
+    /// How far the limit may lie from here; `None` where the case has no deviations, or it was not asked for.
+    #[serde(flatten)]
+    pub spread: Option<LimitSpread>,
 }
 
 /// All crossings from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where needed.
@@ -328,6 +331,7 @@ impl SpeedLine {
             bistable_mm: Vec::new(),
             first_limit,
             switches,
+            spread: None,
         }
     }
 }

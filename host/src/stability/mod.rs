@@ -26,10 +26,12 @@ mod point;
 mod problem;
 mod revolution;
 mod root;
+mod sampling;
 mod sdm;
 mod sensitivity;
 mod spectrum;
 mod stepped;
+mod uncertainty;
 mod variable_pitch;
 
 pub use cells::{Cell, CellChart, CellLine, cell_chart};
@@ -44,8 +46,10 @@ pub use multiplier::{Kind, Verdict};
 pub use pitched::Pitched;
 pub use point::{LEAST_ERROR, Point, point};
 pub use problem::{CubicTerms, Problem, StabilityError};
+pub use sampling::Variable;
 pub use sdm::{Sdm, SdmOrder, SemiDiscretization};
 pub use sensitivity::{Sensitivity, Slope, Tangent};
+pub use uncertainty::{LimitSpread, Maker, Percentiles, Uncertainty};
 pub use variable_pitch::RevolutionCollocation;
 
 #[cfg(test)]
@@ -58,5 +62,7 @@ mod properties;
 mod sensitivity_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod uncertainty_tests;
 #[cfg(test)]
 mod variable_pitch_tests;

@@ -102,6 +102,18 @@ pub enum StabilityError {
         /// Last frequency of the table, Hz.
         last_hz: f64,
     },
+    /// Deviations so large that much of what they describe does not exist.
+    #[error(
+        "{}: with its deviations (keys that end in _std) {percent:.0} % of the machines are impossible: a damping ratio \
+         or a frequency below 0, or indefinite matrices; smaller deviations are needed",
+        path.display()
+    )]
+    Deviations {
+        /// The case file.
+        path: PathBuf,
+        /// How many machines of a hundred.
+        percent: f64,
+    },
     /// A speed or depth that no cut has.
     #[error("{quantity} {value}: {expected} is needed")]
     Argument {
