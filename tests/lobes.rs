@@ -248,6 +248,65 @@ fn methods_refuse_what_they_are_not_defined_for_and_options_of_others() {
     refused(linear, &["--method", "fdm", "--order", "0"], &["--order", "sdm"]);
     refused(linear, &["--method", "sdm", "--steps", "0"], &["0", "from 1"]);
     refused(linear, &["--method", "sdm", "--order", "2"], &["2", "0 or 1"]);
+fn deviations_of_a_case_give_percentiles_a_band_and_probabilities() {
+    let folder = folder();
+    let text = std::fs::read_to_string(case("kuka-kr90-acetal")).expect("the case");
+    let text = text
+        .replacen("ktc_mpa = 119.0", "ktc_mpa = 119.0\nktc_mpa_std = 6.0", 1)
+        .replacen(
+            "frequency_hz = 16.99",
+            "frequency_hz = 16.99\nfrequency_hz_std = 0.1",
+            1,
+        );
+    std::fs::write(folder.path().join("k.toml"), text).expect("written");
+    let run = |more: &[&str]| {
+        let chart = [
+            "lobes",
+            "k.toml",
+            "--rpm",
+            "900:1300:2",
+            "--depth-mm",
+            "1:3:3",
+            "--json",
+        ];
+        quietcut(folder.path(), &[&chart, more].concat())
+    };
+    let answer = run(&["--probability", "--out", "k.svg"]);
+    assert_eq!(answer.status, Some(0), "{answer:?}");
+    let json: Value = serde_json::from_str(&answer.stdout).expect("JSON");
+    for line in json["speeds"].as_array().expect("speeds") {
+        let percentile = |name: &str| line["limit_percentiles_mm"][name].as_f64().expect("a depth");
+        let limit = line["first_limit"]["depth_mm"].as_f64().expect("a limit");
+        assert!(percentile("5") < limit && limit < percentile("95"), "{line}");
+        assert!((percentile("50") - limit).abs() < 0.02 * limit, "{line}");
+        let shares = line["stable_share"].as_array().expect("shares");
+        let shares: Vec<f64> = shares.iter().filter_map(Value::as_f64).collect();
+        assert!(
+            shares.len() == 3 && shares[0] == 1.0 && shares[2] == 0.0,
+            "{line}"
+        );
+    }
+    assert_eq!(json["cells_mm"], serde_json::json!([1.0, 2.0, 3.0]));
+    let svg = std::fs::read_to_string(folder.path().join("k.svg")).expect("the picture");
+    assert!(svg.contains("95 % of the machines"));
+    // The same draws again; without the deviations the answer that a case without them has.
+    let again = run(&["--probability"]);
+    assert_eq!(again.stdout, answer.stdout);
+    let nominal = run(&["--nominal"]);
+    assert!(!nominal.stdout.contains("limit_percentiles_mm"), "{nominal:?}");
+    quietcut(
+        folder.path(),
+        &[
+            "lobes",
+            &case("kuka-kr90-acetal"),
+            "--rpm",
+            "900",
+            "--depth-mm",
+            "2",
+            "--probability",
+        ],
+    )
+    .refused(&["kuka-kr90-acetal.toml", "ktc_mpa_std"]);
 }
 
 #[test]
