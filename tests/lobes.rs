@@ -248,6 +248,9 @@ fn methods_refuse_what_they_are_not_defined_for_and_options_of_others() {
     refused(linear, &["--method", "fdm", "--order", "0"], &["--order", "sdm"]);
     refused(linear, &["--method", "sdm", "--steps", "0"], &["0", "from 1"]);
     refused(linear, &["--method", "sdm", "--order", "2"], &["2", "0 or 1"]);
+}
+
+#[test]
 fn deviations_of_a_case_give_percentiles_a_band_and_probabilities() {
     let folder = folder();
     let text = std::fs::read_to_string(case("kuka-kr90-acetal")).expect("the case");

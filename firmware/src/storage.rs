@@ -124,7 +124,7 @@ impl<M: TableMemory> Storage<M> {
     /// # Errors
     /// [`Refusal::Table`], [`Refusal::TableTooLong`], [`Refusal::Flash`].
     pub fn begin(&mut self, header: Header) -> Result<Upload, Refusal> {
-        if header.schema != SCHEMA {
+        if !Header::knows(header.schema) {
             return Err(Refusal::Table(TableError::Schema {
                 found: header.schema,
                 known: SCHEMA,

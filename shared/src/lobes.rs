@@ -17,8 +17,14 @@
 //!   same kinds, ends and chatter frequencies are interpolated linearly; where they differ (an island begins, a
 //!   kind changes), a depth is unstable where it is unstable in either column.
 //! - *Feed per tooth*: the same between the two neighbouring layers. A layer may hold for a range of feeds.
+//! - *Feed direction*: where layers are for some directions, the same between the two around it, if they are at most
+//!   [`FEED_DIRECTION_SPAN`] apart and their feeds need no interpolation. A direction that was not told is that of the layers where
+//!   they have only one.
 //! - *Immersion and posture*: never interpolated. Immersion may differ by [`IMMERSION_TOLERANCE`], posture must be the same.
 //! - Outside, the answer is [`Answer::NotKnown`] with the reason, never a guess.
+//!
+//! A table may say how large the [`InterpolationError`] is, and how its limits move with what the device learns:
+//! [`LobeTable::slopes`], [`corrected_limit`].
 //!
 //! Linear interpolation lies above a limit that is convex between two grid speeds by up to h²·b″/8 (h the
 //! step of the grid, b″ the curvature of the limit): who computes a table chooses the grid so that this is small
@@ -26,6 +32,7 @@
 //!
 //! [`format`] documents the bytes.
 
+mod additions;
 mod answer;
 mod check;
 mod column;
@@ -33,16 +40,20 @@ mod cut;
 mod encode;
 mod error;
 pub mod format;
+mod half;
+mod slopes;
 
 use serde::{Deserialize, Serialize};
 
+pub use additions::{Additions, InterpolationError};
 pub use answer::{Answer, NotKnown};
 pub use column::Column;
 pub use cut::CutLobes;
 pub(crate) use cut::FEW;
-pub use encode::{Content, Layer, encode, encoded_length};
+pub use encode::{Content, Layer, encode, encode_with, encoded_length, encoded_length_with};
 pub use error::TableError;
 pub use format::Header;
+pub use slopes::{IntervalSlopes, LayerMode, Learned, MODES_MAX, Slopes, corrected_limit};
 
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::{Limits, WorkingPoint};
@@ -56,6 +67,12 @@ pub const IMMERSION_TOLERANCE: Degrees = Degrees(0.5);
 
 /// How far the feed per tooth of the cut may be outside of a layer, relative to it: rounding, nothing more.
 pub const FEED_TOLERANCE: f32 = 1e-4;
+
+/// How far apart the feed directions of two layers may be for interpolation between them, in degrees.
+pub const FEED_DIRECTION_SPAN: Degrees = Degrees(45.0);
+
+/// How far the feed direction of the cut may be from that of a layer to be the same, in degrees.
+pub const FEED_DIRECTION_TOLERANCE: Degrees = Degrees(0.5);
 
 /// What a depth interval is, if it is not stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -231,7 +248,16 @@ impl<'a> LobeTable<'a> {
 
     /// The columns of one cut; its axial depth is not used.
     pub fn cut(&self, working_point: &WorkingPoint) -> Result<CutLobes<'a>, NotKnown> {
-        CutLobes::new(*self, working_point)
+        CutLobes::new(*self, working_point, None)
+    }
+
+    /// The columns of one cut whose feed has a known direction, from the machine's x towards its y.
+    pub fn cut_towards(
+        &self,
+        working_point: &WorkingPoint,
+        feed_direction: Degrees,
+    ) -> Result<CutLobes<'a>, NotKnown> {
+        CutLobes::new(*self, working_point, Some(feed_direction))
     }
 
     /// The column at any speed and working point; its axial depth is not used.

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 use quietcut_core::checksum::Crc32;
-use quietcut_core::lobes::format::{HEADER_LENGTH, SCHEMA};
+use quietcut_core::lobes::format::HEADER_LENGTH;
 use quietcut_core::lobes::{Header, TableError};
 use quietcut_core::protocol::message::SLOTS;
 use quietcut_core::protocol::{Refusal, Upload};
@@ -85,7 +85,7 @@ impl<M: TableMemory> Storage<M> {
         let empty = |&slot: &usize| matches!(self.contents_of(slot), Contents::Empty);
         (0..SLOTS).filter(empty).find_map(|slot| {
             let (header, received) = self.journal(slot).read(self.memory.mapped())?;
-            let fits = header.schema == SCHEMA && header.length <= self.slot_capacity();
+            let fits = Header::knows(header.schema) && header.length <= self.slot_capacity();
             let payload = self.slot_bytes(slot).get(HEADER_LENGTH..received as usize)?;
             fits.then(|| Progress::resumed(slot, header, self.next_generation(), payload))
         })

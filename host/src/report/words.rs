@@ -214,6 +214,9 @@ pub fn not_known(why: &NotKnown) -> String {
         NotKnown::Teeth { asked, table } => format!("it is for {table} teeth, the tool has {asked}"),
         NotKnown::Undecided => "its computation could not decide here".into(),
         NotKnown::Damaged => "its bytes are damaged".into(),
+        NotKnown::FeedDirection { .. } => {
+            "it depends on the direction of the feed, and has no layers around that of the cut".into()
+        }
     }
 }
 

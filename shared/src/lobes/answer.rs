@@ -59,6 +59,11 @@ pub enum NotKnown {
     Undecided,
     /// The bytes of the table changed after they were checked.
     Damaged,
+    /// The table has layers for several feed directions, and none is near enough to the one asked for.
+    FeedDirection {
+        /// The direction asked for; not a number where none was told.
+        asked: Degrees,
+    },
 }
 
 /// What the table says of a point.

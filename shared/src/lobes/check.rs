@@ -1,13 +1,19 @@
 //! What must be true of the entries of a table, whoever made it.
 
+use super::additions::check_additions;
 use super::format::{MAX_INTERVALS, saturate};
 use super::{IMMERSION_TOLERANCE, LobeTable, TableError, Validity};
-use crate::units::Rpm;
+use crate::units::{Degrees, Rpm};
 
 /// Checks every speed, layer, column and interval.
 pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
     check_speeds(table.speeds())?;
-    check_layers(table.layers())?;
+    check_layers(
+        table
+            .layers()
+            .enumerate()
+            .map(|(layer, validity)| (validity, table.feed_direction(layer))),
+    )?;
     let LobeTable { bytes, shape } = table;
     let mut expected = 0;
     for layer in 0..shape.layers {
@@ -21,7 +27,7 @@ pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
             found: saturate(bytes.len()),
         });
     }
-    Ok(())
+    check_additions(table)
 }
 
 /// Checks a column whose intervals must begin at index `expected`; the index behind them.
@@ -72,11 +78,11 @@ pub(super) fn check_speeds(speeds: impl Iterator<Item = Rpm>) -> Result<(), Tabl
     Ok(())
 }
 
-/// Layers must hold for something, and no two for the same.
+/// Layers must hold for something, and no two for the same; each with its feed direction, `None` for any.
 pub(super) fn check_layers(
-    layers: impl ExactSizeIterator<Item = Validity> + Clone,
+    layers: impl Iterator<Item = (Validity, Option<Degrees>)> + Clone,
 ) -> Result<(), TableError> {
-    for (index, layer) in layers.clone().enumerate() {
+    for (index, (layer, direction)) in layers.clone().enumerate() {
         let error = TableError::Layer {
             layer: saturate(index),
         };
@@ -86,7 +92,10 @@ pub(super) fn check_layers(
             && layer.start.0.is_finite()
             && layer.start < layer.exit
             && layer.exit.0.is_finite();
-        let clashes = |other: Validity| match other.is_family_of(&layer) {
+        let clashes = |(other, other_direction): (Validity, Option<Degrees>)| match other.is_family_of(&layer)
+        {
+            // A layer for any direction and one for some hold both for the latter.
+            true if direction.zip(other_direction).is_some_and(|(a, b)| a != b) => false,
             true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
             // One cut must not belong to two families.
             false => other.posture == layer.posture && is_near(&other, &layer),

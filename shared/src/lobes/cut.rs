@@ -1,6 +1,9 @@
 //! The lobes of one cut: the layers of a table between which its feed lies.
 
-use super::{Column, FEED_TOLERANCE, IMMERSION_TOLERANCE, Interval, LobeTable, NotKnown};
+use super::{
+    Column, FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE, Interval,
+    LobeTable, NotKnown,
+};
 use crate::units::{Degrees, Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
@@ -27,8 +30,12 @@ pub struct CutLobes<'a> {
 }
 
 impl<'a> CutLobes<'a> {
-    pub(super) fn new(table: LobeTable<'a>, working_point: &WorkingPoint) -> Result<Self, NotKnown> {
-        let (near, far, weight) = bracket_feed(&table, working_point)?;
+    pub(super) fn new(
+        table: LobeTable<'a>,
+        working_point: &WorkingPoint,
+        feed_direction: Option<Degrees>,
+    ) -> Result<Self, NotKnown> {
+        let (near, far, weight) = bracket(&table, working_point, feed_direction)?;
         Ok(Self {
             table,
             near,
@@ -113,11 +120,105 @@ impl<'a> CutLobes<'a> {
     }
 }
 
+/// The two layers around the working point in feed or in feed direction, and the weight of the second.
+fn bracket(
+    table: &LobeTable<'_>,
+    working_point: &WorkingPoint,
+    feed_direction: Option<Degrees>,
+) -> Result<(usize, usize, f32), NotKnown> {
+    let mut directions = family(table, working_point).filter_map(|layer| table.feed_direction(layer));
+    let Some(first) = directions.next() else {
+        return bracket_feed(table, working_point, |_| true);
+    };
+    let Some(asked) = feed_direction else {
+        if directions.any(|other| other != first) {
+            return Err(NotKnown::FeedDirection {
+                asked: Degrees(f32::NAN),
+            });
+        }
+        return bracket_feed(table, working_point, |_| true);
+    };
+    let unknown = NotKnown::FeedDirection { asked };
+    let (below, above) = neighbours(table, working_point, asked).ok_or(unknown)?;
+    let at = |direction: Degrees| {
+        bracket_feed(table, working_point, |layer| {
+            table.feed_direction(layer).is_none_or(|other| other == direction)
+        })
+    };
+    let (to_below, to_above) = (turn(below, asked), turn(asked, above));
+    if below == above || to_below <= FEED_DIRECTION_TOLERANCE.0 {
+        return at(below);
+    }
+    if to_above <= FEED_DIRECTION_TOLERANCE.0 {
+        return at(above);
+    }
+    match (at(below)?, at(above)?) {
+        // Either interpolates in feed, or in direction: four layers at once are too many.
+        ((low, same_low, _), (high, same_high, _)) if low == same_low && high == same_high => {
+            Ok((low, high, to_below / (to_below + to_above)))
+        }
+        _ => Err(unknown),
+    }
+}
+
+/// The layers for the posture and immersion of the working point.
+fn family<'t>(table: &'t LobeTable<'_>, working_point: &'t WorkingPoint) -> impl Iterator<Item = usize> + 't {
+    table
+        .layers()
+        .enumerate()
+        .filter(|(_, layer)| {
+            layer.posture == working_point.posture
+                && is_close(layer.start, working_point.start)
+                && is_close(layer.exit, working_point.exit)
+        })
+        .map(|(index, _)| index)
+}
+
+/// The directions of layers next to one on both sides, if they are near enough; a layer for any direction counts as
+/// being there itself.
+fn neighbours(
+    table: &LobeTable<'_>,
+    working_point: &WorkingPoint,
+    asked: Degrees,
+) -> Option<(Degrees, Degrees)> {
+    let (mut below, mut above): (Option<Degrees>, Option<Degrees>) = (None, None);
+    for layer in family(table, working_point) {
+        let direction = table.feed_direction(layer).unwrap_or(asked);
+        if below.is_none_or(|best| turn(direction, asked) < turn(best, asked)) {
+            below = Some(direction);
+        }
+        if above.is_none_or(|best| turn(asked, direction) < turn(asked, best)) {
+            above = Some(direction);
+        }
+    }
+    let (below, above) = (below?, above?);
+    // A lone direction is its own neighbour on both sides: near only where it is the one asked for.
+    let (to_below, to_above) = (turn(below, asked), turn(asked, above));
+    let is_there = f32::min(to_below, to_above) <= FEED_DIRECTION_TOLERANCE.0;
+    (is_there || to_below + to_above <= FEED_DIRECTION_SPAN.0).then_some((below, above))
+}
+
+/// The angle from one direction to another, anticlockwise, from 0 to below 360; NaN where one is no angle.
+fn turn(from: Degrees, to: Degrees) -> f32 {
+    let mut turn = to.0 - from.0;
+    if !(turn > -1.0e6 && turn < 1.0e6) {
+        return f32::NAN;
+    }
+    while turn < 0.0 {
+        turn += 360.0;
+    }
+    while turn >= 360.0 {
+        turn -= 360.0;
+    }
+    turn
+}
+
 /// The two layers whose feeds are around that of the working point, and the weight of the second; the same
 /// layer twice where one holds for it.
 fn bracket_feed(
     table: &LobeTable<'_>,
     working_point: &WorkingPoint,
+    belongs: impl Fn(usize) -> bool,
 ) -> Result<(usize, usize, f32), NotKnown> {
     let feed_mm = working_point.feed_per_tooth.0;
     let mut posture_known = false;
@@ -125,7 +226,7 @@ fn bracket_feed(
     let mut below: Option<(usize, f32)> = None;
     let mut above: Option<(usize, f32)> = None;
     for (index, layer) in table.layers().enumerate() {
-        if layer.posture != working_point.posture {
+        if layer.posture != working_point.posture || !belongs(index) {
             continue;
         }
         posture_known = true;

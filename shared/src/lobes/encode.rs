@@ -1,10 +1,12 @@
 //! Content to the bytes of a table, into the caller's buffer.
 
+use super::additions::{Additions, ERROR_GIVEN, MODES_SHIFT, direction_code};
 use super::check::{check_layers, check_speeds, interval_order};
 use super::format::{
-    HEADER_LENGTH, Header, MAX_INTERVALS, NAME_CAPACITY, SCHEMA, STEPS, Shape, kind_code, saturate,
+    HEADER_LENGTH, Header, MAX_INTERVALS, NAME_CAPACITY, SCHEMA, SCHEMA_PLAIN, STEPS, Shape, kind_code,
+    saturate,
 };
-use super::{Interval, LobeTable, TableError, Validity};
+use super::{Interval, LobeTable, TableError, Validity, half};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::Limits;
 
@@ -39,15 +41,33 @@ pub struct Layer<'a> {
 
 /// Bytes that [`encode`] needs.
 pub fn encoded_length(content: &Content<'_>) -> u64 {
-    shape_of(content).length()
+    encoded_length_with(content, &Additions::default())
+}
+
+/// Bytes that [`encode_with`] needs.
+pub fn encoded_length_with(content: &Content<'_>, additions: &Additions<'_>) -> u64 {
+    shape_of(content, additions).length()
 }
 
 /// Writes the table into `buffer` and returns its bytes: header with generation 0, CRC-32, content.
 pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], TableError> {
-    let shape = shape_of(content);
+    encode_with(content, &Additions::default(), buffer)
+}
+
+/// [`encode`] with what schema 2 adds; without any addition the bytes are those of schema 1.
+pub fn encode_with<'b>(
+    content: &Content<'_>,
+    additions: &Additions<'_>,
+    buffer: &'b mut [u8],
+) -> Result<&'b [u8], TableError> {
+    let shape = shape_of(content, additions);
     shape.check()?;
     check_speeds(content.speeds.iter().copied())?;
-    check_layers(content.layers.iter().map(|layer| layer.validity))?;
+    additions.check(shape.layers, shape.intervals)?;
+    check_layers(content.layers.iter().enumerate().map(|(index, layer)| {
+        let direction = additions.feed_directions.get(index).copied().flatten();
+        (layer.validity, direction)
+    }))?;
     if content.name.len() > NAME_CAPACITY {
         return Err(TableError::Name {
             length: saturate(content.name.len()),
@@ -63,9 +83,9 @@ pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8
     let (head, payload) = bytes
         .split_at_mut_checked(HEADER_LENGTH)
         .ok_or(TableError::Buffer { needed, found })?;
-    write_payload(content, &shape, payload)?;
+    write_payload(content, additions, &shape, payload)?;
     let header = Header {
-        schema: SCHEMA,
+        schema: if shape.is_extended { SCHEMA } else { SCHEMA_PLAIN },
         length: needed as u32,
         generation: 0,
         crc: 0,
@@ -75,7 +95,7 @@ pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8
     LobeTable::parse(bytes).map(|table| table.bytes())
 }
 
-fn shape_of(content: &Content<'_>) -> Shape {
+fn shape_of(content: &Content<'_>, additions: &Additions<'_>) -> Shape {
     let intervals = || {
         content
             .layers
@@ -94,10 +114,18 @@ fn shape_of(content: &Content<'_>) -> Shape {
         speeds: content.speeds.len(),
         intervals: intervals().count(),
         name_length: content.name.len(),
+        is_extended: !additions.is_empty(),
+        error_given: additions.interpolation_error.is_some(),
+        modes: additions.mode_count(),
     }
 }
 
-fn write_payload(content: &Content<'_>, shape: &Shape, payload: &mut [u8]) -> Result<(), TableError> {
+fn write_payload(
+    content: &Content<'_>,
+    additions: &Additions<'_>,
+    shape: &Shape,
+    payload: &mut [u8],
+) -> Result<(), TableError> {
     let mut writer = Writer { rest: payload };
     let limits = content.limits.unwrap_or(Limits {
         rpm_min: Rpm(0.0),
@@ -106,7 +134,13 @@ fn write_payload(content: &Content<'_>, shape: &Shape, payload: &mut [u8]) -> Re
     writer.put(&[content.teeth, content.name.len() as u8]);
     writer.put(&(content.layers.len() as u16).to_le_bytes());
     writer.put(&(content.speeds.len() as u16).to_le_bytes());
-    writer.put(&u16::from(content.limits.is_some()).to_le_bytes());
+    let mut flags = u16::from(content.limits.is_some());
+    if shape.error_given {
+        flags |= ERROR_GIVEN;
+    }
+    // At most `MODES_MAX`, as `Additions::check` has made sure.
+    flags |= (shape.modes as u16) << MODES_SHIFT;
+    writer.put(&flags.to_le_bytes());
     for value in [
         limits.rpm_min.0,
         limits.rpm_max.0,
@@ -122,7 +156,7 @@ fn write_payload(content: &Content<'_>, shape: &Shape, payload: &mut [u8]) -> Re
         *slot = byte;
     }
     writer.put(&name);
-    write_layers(content, &mut writer)?;
+    write_layers(content, additions, &mut writer)?;
     for speed in content.speeds {
         writer.put(&speed.0.to_le_bytes());
     }
@@ -134,10 +168,34 @@ fn write_payload(content: &Content<'_>, shape: &Shape, payload: &mut [u8]) -> Re
             write_column(shape, (index, speed), column, &mut writer)?;
         }
     }
+    write_additions(additions, shape, &mut writer);
     Ok(())
 }
 
-fn write_layers(content: &Content<'_>, writer: &mut Writer<'_>) -> Result<(), TableError> {
+fn write_additions(additions: &Additions<'_>, shape: &Shape, writer: &mut Writer<'_>) {
+    if let Some(error) = additions.interpolation_error {
+        writer.put(&error.depth.0.to_le_bytes());
+        writer.put(&error.speed.to_le_bytes());
+    }
+    for mode in additions.modes.iter().copied().flatten() {
+        writer.put(&mode.frequency.0.to_le_bytes());
+        writer.put(&mode.damping_ratio.to_le_bytes());
+    }
+    for slopes in additions.slopes {
+        for number in [&slopes.from, &slopes.to]
+            .into_iter()
+            .flat_map(|end| end.numbers(shape.modes))
+        {
+            writer.put(&half::encode(number).to_le_bytes());
+        }
+    }
+}
+
+fn write_layers(
+    content: &Content<'_>,
+    additions: &Additions<'_>,
+    writer: &mut Writer<'_>,
+) -> Result<(), TableError> {
     let mut first_interval = 0;
     for (index, layer) in content.layers.iter().enumerate() {
         if layer.columns.len() != content.speeds.len() {
@@ -156,7 +214,10 @@ fn write_layers(content: &Content<'_>, writer: &mut Writer<'_>) -> Result<(), Ta
         ] {
             writer.put(&value.to_le_bytes());
         }
-        writer.put(&[validity.posture, 0, 0, 0]);
+        let direction = additions.feed_directions.get(index).copied().flatten();
+        let code = direction.and_then(direction_code);
+        writer.put(&[validity.posture, u8::from(code.is_some())]);
+        writer.put(&code.unwrap_or(0).to_le_bytes());
         writer.put(&saturate(first_interval).to_le_bytes());
         first_interval += layer.columns.iter().map(|column| column.len()).sum::<usize>();
     }

@@ -25,7 +25,7 @@ pub enum TableError {
     Schema {
         /// The schema of the table.
         found: u16,
-        /// The schema that this code knows.
+        /// The latest schema that this code knows.
         known: u16,
     },
     /// The header says another length than there are bytes.
@@ -136,6 +136,35 @@ pub enum TableError {
         /// Bytes there are.
         found: u64,
     },
+    /// Flags that this code does not know, or more modes than a table can have.
+    Flags {
+        /// The flags of the description.
+        found: u16,
+    },
+    /// A feed direction that is none, or not one for each layer.
+    FeedDirection {
+        /// Index of the layer, or how many directions there are.
+        layer: u32,
+    },
+    /// A mode whose frequency is not positive or whose damping ratio is not from 0 to below 1.
+    Mode {
+        /// Index of the layer.
+        layer: u32,
+        /// Index of the mode in it.
+        mode: u32,
+    },
+    /// An interpolation error that is negative or not finite.
+    InterpolationError {
+        /// In depth.
+        depth: Millimeters,
+        /// In speed, relative; below 1.
+        speed: f32,
+    },
+    /// A derivative that is not finite, or not as many of them as there are intervals, or layers with different numbers of modes.
+    Slopes {
+        /// Index of the interval in the table, or how many derivatives there are.
+        index: u32,
+    },
 }
 
 impl core::fmt::Display for TableError {
@@ -150,7 +179,9 @@ impl core::fmt::Display for TableError {
                 found.escape_ascii(),
                 MAGIC.escape_ascii()
             ),
-            Self::Schema { found, known } => write!(f, "schema {found} of lobe tables: known is {known}"),
+            Self::Schema { found, known } => {
+                write!(f, "schema {found} of lobe tables: known are 1 to {known}")
+            }
             Self::Length { header, found } => {
                 write!(f, "{found} bytes where the header of the table says {header}")
             }
@@ -222,6 +253,26 @@ impl core::fmt::Display for TableError {
                  depths of the table, not behind the one before, or of unknown kind"
             ),
             Self::Buffer { needed, found } => write!(f, "{found} bytes of memory: the table needs {needed}"),
+            Self::Flags { found } => write!(f, "flags {found:#06x}: not all of them are known"),
+            Self::FeedDirection { layer } => {
+                write!(
+                    f,
+                    "layer number {layer} has no feed direction, or one that is no angle"
+                )
+            }
+            Self::Mode { layer, mode } => write!(
+                f,
+                "mode number {mode} of layer number {layer}: its frequency must be positive, its damping ratio from 0 to \
+                 below 1"
+            ),
+            Self::InterpolationError { depth, speed } => write!(
+                f,
+                "an interpolation error of {depth} and {speed} of the speed: both must be at least 0, the second below 1"
+            ),
+            Self::Slopes { index } => write!(
+                f,
+                "the derivatives of interval number {index} are no numbers, or not as many as there are intervals"
+            ),
         }
     }
 }

@@ -1,9 +1,9 @@
-//! The bytes of a table, schema 1. All numbers little-endian, no alignment needed.
+//! The bytes of a table, schemas 1 and 2. All numbers little-endian, no alignment needed.
 //!
 //! | offset | bytes | header |
 //! |---|---|---|
 //! | 0 | 4 | magic `QCLT` |
-//! | 4 | 2 | schema, [`SCHEMA`] |
+//! | 4 | 2 | schema: [`SCHEMA_PLAIN`] or [`SCHEMA`] |
 //! | 6 | 2 | zero |
 //! | 8 | 4 | length of the whole table in bytes, header included |
 //! | 12 | 4 | generation: 0 in a file; the device counts it up to know the newer of its two slots |
@@ -16,16 +16,19 @@
 //! | 33 | 1 | length of the name in bytes |
 //! | 34 | 2 | L, number of layers |
 //! | 36 | 2 | S, number of speeds |
-//! | 38 | 2 | flags: bit 0, the machine's limits are given |
+//! | 38 | 2 | flags: bit 0, the machine's limits are given; schema 2: bit 1, the interpolation error is given; bits 8–15 M, number of modes |
 //! | 40 | 4+4 | slowest and fastest speed of the machine, f32, rev/min |
 //! | 48 | 4+4 | smallest and largest depth of the table, f32, mm |
 //! | 56 | 4 | largest chatter frequency, f32, Hz: the scale of all of them |
 //! | 60 | 4 | I, number of intervals |
 //! | 64 | 32 | name of the case, UTF-8, padded with zeros |
-//! | 96 | 24·L | layers: feed from, feed to (f32, mm), start, exit (f32, degrees), posture (1 byte), 3 zeros, index of its first interval (u32) |
+//! | 96 | 24·L | layers: feed from, feed to (f32, mm), start, exit (f32, degrees), posture (1 byte), 3 zeros, index of its first interval (u32); schema 2 instead of the zeros: 1 where a feed direction is given, and it (u16, 1/100 degree) |
 //! | … | 4·S | speeds, f32, rev/min, strictly ascending, steps of any size |
 //! | … | 2·L·(S+1) | per layer: where the intervals of each speed begin, relative to the layer's first, u16; one more for the end |
 //! | … | 8·I | intervals: from, to, chatter (u16 each), kind (1 byte: 0 Hopf, 1 flip, 2 fold, 3 undecided), 1 zero |
+//! | … | 4+4 | schema 2, where flagged: interpolation error in depth (f32, mm) and in speed (f32, relative) |
+//! | … | 8·L·M | schema 2: per layer its modes: natural frequency (f32, Hz), damping ratio (f32) |
+//! | … | 4·(2M+1)·I | schema 2, where M > 0: per interval for `from`, then for `to`: derivatives by frequency and by damping ratio of each mode, by cutting force (IEEE binary16, mm per relative change) |
 //!
 //! A depth is smallest + q·(largest − smallest)/65535, a chatter frequency q·largest/65535 with 0 for "not known".
 //! `from` is rounded down and `to` up, so that an entry errs by less than one step and to the unstable side only
@@ -33,17 +36,18 @@
 //! the nearest, but never to 0. With 10 mm and 5 000 Hz a step is 0.15 µm and 0.08 Hz. 600 speeds, 6 layers and
 //! 2 intervals per column are 67 KB; 3 are 96 KB.
 //!
-//! # Adding to the schema
+//! # Schemas
 //!
-//! A reader refuses every schema but its own with [`TableError::Schema`], before it looks at anything behind the header; the
-//! header itself never changes. Whoever adds something (say, per interval the derivatives of the limit with respect to ω,
-//! ζ and Ktc) raises [`SCHEMA`], puts it behind the intervals as one more array with one entry per interval, and lets
-//! the reader find it; reading the older schema too is then a choice of array or none.
+//! The header never changes. Schema 1 is a table without additions; its bytes stay readable, and what needs no addition is
+//! written in it, so that devices with older firmware take it. Schema 2 has the additions marked above. A reader refuses every
+//! other schema with [`TableError::Schema`], before it looks at anything behind the header, and within schema 2 every flag that it
+//! does not know. Whoever adds something raises [`SCHEMA`], puts it behind what is there, and freezes its bytes in the tests.
 
 use core::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::additions::{ERROR_GIVEN, MODES_SHIFT, check_flags};
 use super::{Interval, Kind, TableError, Validity};
 use crate::checksum::{Crc32, crc32};
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
@@ -51,8 +55,10 @@ use crate::working_point::Limits;
 
 /// The first four bytes of a table.
 pub const MAGIC: [u8; 4] = *b"QCLT";
-/// The schema that this code reads and writes.
-pub const SCHEMA: u16 = 1;
+/// The latest schema that this code reads and writes.
+pub const SCHEMA: u16 = 2;
+/// The schema of tables without additions.
+pub const SCHEMA_PLAIN: u16 = 1;
 /// Length of the header in bytes.
 pub const HEADER_LENGTH: usize = 32;
 /// The most bytes in the name of a case.
@@ -62,16 +68,17 @@ pub const MAX_INTERVALS: usize = 12;
 
 const CRC_OFFSET: usize = 28;
 const NAME_OFFSET: usize = 64;
-const LAYERS_OFFSET: usize = 96;
-const LAYER_LENGTH: usize = 24;
-const INTERVAL_LENGTH: usize = 8;
+const FLAGS_OFFSET: usize = 38;
+pub(super) const LAYERS_OFFSET: usize = 96;
+pub(super) const LAYER_LENGTH: usize = 24;
+pub(super) const INTERVAL_LENGTH: usize = 8;
 pub(super) const STEPS: f32 = 65_535.0;
 
 /// The first [`HEADER_LENGTH`] bytes of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Schema; after [`read`](Self::read) always [`SCHEMA`].
+    /// Schema; after [`read`](Self::read) one that this code [`knows`](Self::knows).
     pub schema: u16,
     /// Length of the table in bytes, header included.
     pub length: u32,
@@ -82,6 +89,11 @@ pub struct Header {
 }
 
 impl Header {
+    /// True for the schemas that this code reads.
+    pub const fn knows(schema: u16) -> bool {
+        schema == SCHEMA_PLAIN || schema == SCHEMA
+    }
+
     /// The header at the beginning of `bytes`; refuses a wrong magic, an unknown schema and a length that cannot be.
     ///
     /// More may follow in `bytes` than the length says; whether the CRC is right is for [`check`](Self::check) to say.
@@ -95,7 +107,7 @@ impl Header {
             return Err(TableError::Magic { found: magic });
         }
         let schema = u16_at(bytes, 4).ok_or(too_short)?;
-        if schema != SCHEMA {
+        if !Self::knows(schema) {
             return Err(TableError::Schema {
                 found: schema,
                 known: SCHEMA,
@@ -208,6 +220,12 @@ pub(super) struct Shape {
     pub(super) speeds: usize,
     pub(super) intervals: usize,
     pub(super) name_length: usize,
+    /// True for schema 2.
+    pub(super) is_extended: bool,
+    /// True where the interpolation error is given.
+    pub(super) error_given: bool,
+    /// Number of modes of each layer whose derivatives are given; 0 for none.
+    pub(super) modes: usize,
 }
 
 impl Shape {
@@ -218,6 +236,7 @@ impl Shape {
             needed: LAYERS_OFFSET as u32,
             found,
         })?;
+        check_flags(u16_at(bytes, FLAGS_OFFSET).unwrap_or(0), shape.is_extended)?;
         let needed = shape.length();
         if needed != u64::from(found) {
             return Err(TableError::Arrays { needed, found });
@@ -237,9 +256,11 @@ impl Shape {
             rpm_min: Rpm(f32_at(bytes, 40)?),
             rpm_max: Rpm(f32_at(bytes, 44)?),
         };
+        let flags = u16_at(bytes, FLAGS_OFFSET)?;
+        let is_extended = u16_at(bytes, 4)? == SCHEMA;
         Some(Self {
             teeth: *bytes.get(32)?,
-            limits: (u16_at(bytes, 38)? & 1 != 0).then_some(limits),
+            limits: (flags & 1 != 0).then_some(limits),
             depth_from_mm: f32_at(bytes, 48)?,
             depth_to_mm: f32_at(bytes, 52)?,
             chatter_max_hz: f32_at(bytes, 56)?,
@@ -247,6 +268,13 @@ impl Shape {
             speeds: usize::from(u16_at(bytes, 36)?),
             intervals: u32_at(bytes, 60)? as usize,
             name_length: usize::from(*bytes.get(33)?),
+            is_extended,
+            error_given: is_extended && flags & ERROR_GIVEN != 0,
+            modes: if is_extended {
+                usize::from(flags >> MODES_SHIFT)
+            } else {
+                0
+            },
         })
     }
 
@@ -287,7 +315,8 @@ impl Shape {
 
     /// Length of the whole table in bytes.
     pub(super) fn length(&self) -> u64 {
-        self.intervals_offset() as u64 + (INTERVAL_LENGTH as u64) * (self.intervals as u64)
+        let intervals = (INTERVAL_LENGTH as u64) * (self.intervals as u64);
+        self.intervals_offset() as u64 + intervals + self.additions_length()
     }
 
     pub(super) fn depth_step_mm(&self) -> f32 {
@@ -315,7 +344,7 @@ impl Shape {
         self.speeds_offset() + 4 * self.speeds
     }
 
-    fn intervals_offset(&self) -> usize {
+    pub(super) fn intervals_offset(&self) -> usize {
         self.columns_offset()
             .saturating_add((2 * self.layers).saturating_mul(self.speeds + 1))
     }
@@ -411,7 +440,7 @@ fn array_at<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
     bytes.get(offset..offset.checked_add(N)?)?.try_into().ok()
 }
 
-fn u16_at(bytes: &[u8], offset: usize) -> Option<u16> {
+pub(super) fn u16_at(bytes: &[u8], offset: usize) -> Option<u16> {
     array_at(bytes, offset).map(u16::from_le_bytes)
 }
 
@@ -419,6 +448,6 @@ fn u32_at(bytes: &[u8], offset: usize) -> Option<u32> {
     array_at(bytes, offset).map(u32::from_le_bytes)
 }
 
-fn f32_at(bytes: &[u8], offset: usize) -> Option<f32> {
+pub(super) fn f32_at(bytes: &[u8], offset: usize) -> Option<f32> {
     array_at(bytes, offset).map(f32::from_le_bytes)
 }
