@@ -10,6 +10,7 @@ mod eigenvalues;
 pub mod file;
 pub mod frf;
 pub mod identify;
+pub mod lobe_table;
 pub mod milling;
 pub mod recording;
 pub mod report;

@@ -14,9 +14,9 @@ use super::{Error, Output};
 use crate::demo::{Bench, BenchError, Story, Trial, page};
 use crate::device::VirtualCell;
 use crate::file;
+use crate::lobe_table::{TableRequest, build_table};
 use crate::report::answer::{VerdictAnswer, seconds};
 use crate::report::words;
-use crate::stability::{TableRequest, build_table};
 
 /// The whole chain on a virtual robot cell, no hardware: lobes, upload, cut, chatter, advice, quiet.
 #[derive(Debug, clap::Args)]

@@ -6,7 +6,8 @@ use std::io;
 use crate::case::CaseError;
 use crate::device::DeviceError;
 use crate::file::FileError;
-use crate::stability::{BuildError, StabilityError};
+use crate::lobe_table::BuildError;
+use crate::stability::StabilityError;
 
 type Cause = Box<dyn StdError + Send + Sync>;
 

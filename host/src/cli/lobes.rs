@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::method::MethodChoice;
+use super::varied::{self, Varied};
 use super::{Error, Output, Range, lobes_cells};
 use crate::case::Case;
 use crate::file;
@@ -33,11 +34,13 @@ pub struct Args {
     /// The dominant multiplier of every speed and depth, with its error, instead of the limits.
     #[arg(long, requires = "rpm")]
     cells: bool,
+    #[command(flatten)]
+    varied: Varied,
     /// Leave out what the deviations of the case (keys that end in _std) make of the limits.
     #[arg(long, requires = "rpm")]
     nominal: bool,
     /// The share of machines that are stable at every speed and depth of the ranges, where the case has deviations.
-    #[arg(long, requires = "rpm", conflicts_with = "nominal")]
+    #[arg(long, requires = "rpm", conflicts_with_all = ["nominal", "cells"])]
     probability: bool,
     /// Where the draws of the deviations begin.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -62,6 +65,9 @@ struct Points {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case).map_err(Error::input)?;
+    if let (Some(variation), Some(rpm), Some(depth_mm)) = (args.varied.variation(), args.rpm, args.depth_mm) {
+        return varied::run(&case, &args.method, &variation, rpm, depth_mm, args.output);
+    }
     let method = args.method.on(&case)?;
     match (args.rpm, args.depth_mm) {
         (Some(rpm), Some(depth_mm)) if args.cells => {

@@ -19,6 +19,7 @@ pub mod replay;
 pub mod simulate;
 pub mod table;
 pub mod upload;
+mod varied;
 pub mod work;
 
 use std::io::IsTerminal;

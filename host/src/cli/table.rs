@@ -3,13 +3,13 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use quietcut_core::lobes::{Kind, LobeTable};
+use quietcut_core::lobes::{IntervalSlopes, Kind, LobeTable};
 use serde::Serialize;
 
 use super::{Error, Output, Range};
 use crate::case::Case;
 use crate::file;
-use crate::stability::{TableRequest, build_table};
+use crate::lobe_table::{TableRequest, build_table};
 
 /// Builds a lobe table for the device from cases, or shows one.
 #[derive(Debug, clap::Args)]
@@ -30,9 +30,21 @@ pub struct Args {
     /// The largest axial depth in mm. Default: four times the lowest limit.
     #[arg(long, value_name = "MM", value_parser = super::positive, allow_negative_numbers = true, requires = "cases")]
     depth_mm: Option<f64>,
-    /// Feeds per tooth in mm, one layer each, where limits depend on the feed; separated by commas.
+    /// Feeds per tooth in mm, one layer each and more between them where limits bend, where limits depend on the feed; separated by
+    /// commas.
     #[arg(long, value_name = "MM", value_parser = super::positive, value_delimiter = ',', requires = "cases")]
     feed: Vec<f64>,
+    /// Feed directions in degrees from the machine's x towards its y, one layer each and more between them where limits
+    /// bend; separated by commas. Default: that of each case, which the table then does not state.
+    #[arg(long, value_name = "DEG", value_parser = super::finite, value_delimiter = ',', allow_negative_numbers = true, requires = "cases")]
+    feed_direction_deg: Vec<f64>,
+    /// Write how each limit moves with frequencies, damping ratios and cutting force, for a device that learns them.
+    #[arg(long, requires = "cases")]
+    derivatives: bool,
+    /// Write the first limit of all but so many percent of the machines that the deviations of a case (keys that end in _std)
+    /// describe, instead of its own; takes minutes.
+    #[arg(long, value_name = "P", value_parser = percent, requires = "cases")]
+    percentile: Option<f64>,
     /// A table to read back.
     #[arg(long, value_name = "FILE.qct", conflicts_with_all = ["cases", "out"])]
     show: Option<PathBuf>,
@@ -49,7 +61,16 @@ struct Shown {
     crc: String,
     rpm_limits: Option<[f32; 2]>,
     depth_mm: [f32; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interpolation_error: Option<ShownError>,
     layers: Vec<ShownLayer>,
+}
+
+/// How far answers between the entries may be off: in depth, or in speed relative to it.
+#[derive(Serialize)]
+struct ShownError {
+    depth_mm: f32,
+    speed: f32,
 }
 
 #[derive(Serialize)]
@@ -58,7 +79,25 @@ struct ShownLayer {
     start_deg: f32,
     exit_deg: f32,
     posture: u8,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    feed_direction_deg: Option<f32>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    modes: Vec<ShownMode>,
     speeds: Vec<ShownColumn>,
+}
+
+#[derive(Serialize)]
+struct ShownMode {
+    frequency_hz: f32,
+    damping_ratio: f32,
+}
+
+/// Change of both ends of an interval, mm per relative change.
+#[derive(Serialize)]
+struct ShownSlopes {
+    by_frequency_mm: [Vec<f32>; 2],
+    by_damping_ratio_mm: [Vec<f32>; 2],
+    by_cutting_force_mm: [f32; 2],
 }
 
 #[derive(Serialize)]
@@ -73,6 +112,8 @@ struct ShownInterval {
     to_mm: f32,
     kind: &'static str,
     chatter_hz: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    derivatives: Option<ShownSlopes>,
 }
 
 /// Runs the verb.
@@ -96,6 +137,9 @@ pub fn run(args: Args) -> Result<(), Error> {
             .map(|rpm| (rpm.first().min(rpm.last()), rpm.first().max(rpm.last()))),
         depth_mm: args.depth_mm,
         feeds_per_tooth_mm: args.feed,
+        feed_directions_deg: args.feed_direction_deg,
+        derivatives: args.derivatives,
+        percentile: args.percentile,
     };
     if let Some((first, last)) = request.rpm
         && first == last
@@ -122,6 +166,14 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
             start_deg: validity.start.0,
             exit_deg: validity.exit.0,
             posture: validity.posture,
+            feed_direction_deg: table.feed_direction(index).map(|direction| direction.0),
+            modes: table
+                .modes(index)
+                .map(|mode| ShownMode {
+                    frequency_hz: mode.frequency.0,
+                    damping_ratio: mode.damping_ratio,
+                })
+                .collect(),
             speeds: columns(&table, index),
         })
         .collect();
@@ -133,6 +185,10 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
         crc: format!("{:08x}", header.crc),
         rpm_limits: table.limits().map(|limits| [limits.rpm_min.0, limits.rpm_max.0]),
         depth_mm: [from.0, to.0],
+        interpolation_error: table.interpolation_error().map(|error| ShownError {
+            depth_mm: error.depth.0,
+            speed: error.speed,
+        }),
         layers,
     };
     let text = as_text(path, &shown);
@@ -146,19 +202,42 @@ fn columns(table: &LobeTable<'_>, layer: usize) -> Vec<ShownColumn> {
         .map(|(index, rpm)| ShownColumn {
             rpm: rpm.0,
             unstable: table.entry(layer, index).map_or_else(Vec::new, |column| {
-                column
-                    .intervals()
-                    .iter()
-                    .map(|interval| ShownInterval {
+                let intervals = column.intervals().iter().enumerate();
+                intervals
+                    .map(|(position, interval)| ShownInterval {
                         from_mm: interval.from.0,
                         to_mm: interval.to.0,
                         kind: kind_name(interval.kind),
                         chatter_hz: interval.chatter.0,
+                        derivatives: table
+                            .slopes(layer, index, position)
+                            .map(|slopes| shown_slopes(&slopes, table.modes(layer).len())),
                     })
                     .collect()
             }),
         })
         .collect()
+}
+
+fn shown_slopes(slopes: &IntervalSlopes, modes: usize) -> ShownSlopes {
+    let ends = [&slopes.from, &slopes.to];
+    ShownSlopes {
+        by_frequency_mm: ends.map(|end| end.by_frequency.iter().take(modes).copied().collect()),
+        by_damping_ratio_mm: ends.map(|end| end.by_damping_ratio.iter().take(modes).copied().collect()),
+        by_cutting_force_mm: ends.map(|end| end.by_cutting_force),
+    }
+}
+
+/// A percentage between 0 and 100, both excluded.
+fn percent(text: &str) -> Result<f64, String> {
+    let percent = super::positive(text)?;
+    if percent < 100.0 {
+        Ok(percent)
+    } else {
+        Err(format!(
+            "`{text}` is not possible: a percentage below 100 is needed"
+        ))
+    }
 }
 
 fn kind_name(kind: Kind) -> &'static str {
@@ -185,6 +264,14 @@ fn as_text(path: &Path, shown: &Shown) -> String {
     if let Some([slowest, fastest]) = shown.rpm_limits {
         let _ = write!(text, ", machine {slowest} to {fastest} rev/min");
     }
+    if let Some(error) = &shown.interpolation_error {
+        let _ = write!(
+            text,
+            ", good to {:.4} mm or {:.2} % of the speed between the entries",
+            error.depth_mm,
+            100.0 * error.speed
+        );
+    }
     for (index, layer) in shown.layers.iter().enumerate() {
         let ends = (layer.speeds.first(), layer.speeds.last());
         let (slowest, fastest) = match ends {
@@ -210,6 +297,21 @@ fn as_text(path: &Path, shown: &Shown) -> String {
             layer.posture,
             layer.speeds.len(),
         );
+        if let Some(degrees) = layer.feed_direction_deg {
+            let _ = write!(text, ", feed towards {degrees} degrees");
+        }
+        if !layer.modes.is_empty() {
+            let modes: Vec<String> = layer
+                .modes
+                .iter()
+                .map(|mode| format!("{:.2} Hz", mode.frequency_hz))
+                .collect();
+            let _ = write!(
+                text,
+                ", with derivatives by cutting force and modes of {}",
+                modes.join(", ")
+            );
+        }
         if let Some((interval, rpm)) = lowest {
             let _ = write!(
                 text,

@@ -1,4 +1,4 @@
-//! Stability of the cut: multipliers, limits, charts, lobe tables.
+//! Stability of the cut: multipliers, limits, their derivatives and spread, charts.
 //!
 //! Sign of the regenerative force: F = w K_tc α (u − u_τ), with α as in eq. 6.7, is stable at small depth w.
 
@@ -15,7 +15,6 @@ mod frequency;
 pub(crate) mod gauss;
 mod krylov;
 mod line;
-mod lobe_table;
 mod method;
 pub(crate) mod multiplier;
 mod one_period;
@@ -40,7 +39,6 @@ pub use collocation::Collocation;
 pub use fdm::{Fdm, FullDiscretization};
 pub use frequency::{FrequencyProblem, ModeCoupling, MultiFrequency, Nyquist, Zoa};
 pub use line::{Limit, SpeedLine, Switch, line};
-pub use lobe_table::{BuildError, TableRequest, build_table};
 pub use method::{Label, Method};
 pub use multiplier::{Kind, Verdict};
 pub use pitched::Pitched;

@@ -359,6 +359,7 @@ fn a_chart_is_the_same_for_any_number_of_threads_and_refinement_finds_the_notch(
 
 #[test]
 fn the_lobe_table_says_what_the_direct_solution_says() {
+    use crate::lobe_table::{TableRequest, build_table};
     use quietcut_core::lobes::{Answer, LobeTable};
     use quietcut_core::units::{Degrees, Millimeters, Rpm};
     use quietcut_core::working_point::WorkingPoint;
@@ -367,7 +368,7 @@ fn the_lobe_table_says_what_the_direct_solution_says() {
     let request = TableRequest {
         rpm: Some((600.0, 2400.0)),
         depth_mm: Some(5.0),
-        feeds_per_tooth_mm: Vec::new(),
+        ..TableRequest::default()
     };
     let bytes = build_table(std::slice::from_ref(&case), &request).unwrap();
     let table = LobeTable::parse(&bytes).unwrap();

@@ -23,8 +23,11 @@ const BATCH: u32 = 64;
 /// Batches that are drawn at least, so that their scatter can be told, and at most: 2 048 machines.
 const BATCHES: std::ops::RangeInclusive<u32> = 4..=32;
 
-/// Standard error of a percentile, relative to it, with which no further batch is drawn.
+/// Standard error of every percentile, relative to it, with which no further batch is drawn.
 const SETTLED: f64 = 3e-3;
+
+/// The shares of machines whose limits are told.
+const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 
 /// Steps in depth up to the limit that derivatives predict, with some room; where nothing is found the whole depth is searched.
 const SAMPLES_NEAR: usize = 16;
@@ -132,6 +135,54 @@ impl<'a> Uncertainty<'a> {
         depth_mm: f64,
         cells_mm: &[f64],
     ) -> Result<LimitSpread, StabilityError> {
+        let least = if cells_mm.is_empty() {
+            *BATCHES.start()
+        } else {
+            BATCHES_OF_CELLS
+        };
+        let batches = self.batches(nominal, depth_mm, !cells_mm.is_empty(), least, &SHARES)?;
+        let all = Sorted::new(batches.iter().flatten().flatten());
+        let lines: Vec<&SpeedLine> = batches.iter().flatten().flatten().collect();
+        let stable = |cell_mm: &f64| {
+            let is_stable = |line: &&&SpeedLine| is_stable(line, *cell_mm);
+            lines.iter().filter(is_stable).count() as f64 / lines.len() as f64
+        };
+        let [low, median, high] = SHARES.map(|share| all.quantile(share));
+        Ok(LimitSpread {
+            limit_percentiles_mm: Percentiles { low, median, high },
+            limit_percentiles_error_mm: SHARES
+                .into_iter()
+                .map(|share| error(&batches, share))
+                .fold(0.0, f64::max),
+            machines: batches.iter().map(Vec::len).sum(),
+            stable_share: cells_mm.iter().map(stable).collect(),
+        })
+    }
+
+    /// The depth, mm, below which this share of all machines has its first limit at the speed of a line; `None` where it lies
+    /// beyond `depth_mm`.
+    ///
+    /// # Errors
+    /// As [`spread`](Self::spread).
+    pub fn percentile(
+        &self,
+        nominal: &SpeedLine,
+        depth_mm: f64,
+        share: f64,
+    ) -> Result<Option<f64>, StabilityError> {
+        let batches = self.batches(nominal, depth_mm, false, *BATCHES.start(), &[share])?;
+        Ok(Sorted::new(batches.iter().flatten().flatten()).quantile(share))
+    }
+
+    /// Lines of batches of machines, at least `least`, until the percentiles of these shares have settled.
+    fn batches(
+        &self,
+        nominal: &SpeedLine,
+        depth_mm: f64,
+        whole: bool,
+        least: u32,
+        shares: &[f64],
+    ) -> Result<Vec<Vec<Option<SpeedLine>>>, StabilityError> {
         let planes = self.planes(nominal);
         let gradients: Vec<DVector<f64>> = planes.iter().map(|plane| plane.gradient.clone()).collect();
         let basis = Basis::new(self.variables.len(), &gradients);
@@ -142,19 +193,35 @@ impl<'a> Uncertainty<'a> {
             let machines = basis.points(BATCH, self.seed, stream, batch);
             let lines: Vec<Result<Option<SpeedLine>, StabilityError>> = machines
                 .par_iter()
-                .map(|machine| self.line(machine, nominal.rpm, depth_mm, &planes, !cells_mm.is_empty()))
+                .map(|machine| self.line(machine, nominal.rpm, depth_mm, &planes, whole))
                 .collect();
             batches.push(lines.into_iter().collect::<Result<_, _>>()?);
-            if batch + 1 >= *BATCHES.start() {
-                let spread = self.told(&batches, cells_mm)?;
-                let reference_mm = spread.limit_percentiles_mm.low.unwrap_or(depth_mm);
-                let enough = batch + 1 >= BATCHES_OF_CELLS || cells_mm.is_empty();
-                if enough && spread.limit_percentiles_error_mm <= SETTLED * reference_mm {
-                    return Ok(spread);
+            if batch + 1 >= least {
+                self.check_possible(&batches)?;
+                let all = Sorted::new(batches.iter().flatten().flatten());
+                let is_settled = |share: &f64| {
+                    let value = all.quantile(*share).unwrap_or(depth_mm);
+                    error(&batches, *share) <= SETTLED * value
+                };
+                if shares.iter().all(is_settled) {
+                    break;
                 }
             }
         }
-        self.told(&batches, cells_mm)
+        Ok(batches)
+    }
+
+    fn check_possible(&self, batches: &[Vec<Option<SpeedLine>>]) -> Result<(), StabilityError> {
+        let drawn = batches.iter().map(Vec::len).sum::<usize>();
+        let possible = batches.iter().flatten().flatten().count();
+        let impossible = 1.0 - possible as f64 / drawn as f64;
+        if impossible > IMPOSSIBLE_MAX {
+            return Err(StabilityError::Deviations {
+                path: self.case.path.clone(),
+                percent: 100.0 * impossible,
+            });
+        }
+        Ok(())
     }
 
     /// The losses of stability along the nominal line with their gradients, the first limit first.
@@ -209,49 +276,20 @@ impl<'a> Uncertainty<'a> {
         }
         method.line(rpm, depth_mm, SAMPLES).map(Some)
     }
+}
 
-    fn told(
-        &self,
-        batches: &[Vec<Option<SpeedLine>>],
-        cells_mm: &[f64],
-    ) -> Result<LimitSpread, StabilityError> {
-        let lines: Vec<&SpeedLine> = batches.iter().flatten().flatten().collect();
-        let drawn = batches.iter().map(Vec::len).sum::<usize>();
-        let impossible = 1.0 - lines.len() as f64 / drawn as f64;
-        if impossible > IMPOSSIBLE_MAX {
-            return Err(StabilityError::Deviations {
-                path: self.case.path.clone(),
-                percent: 100.0 * impossible,
-            });
-        }
-        let all = Sorted::new(lines.iter().copied());
-        let of_batches: Vec<Sorted> = batches
-            .iter()
-            .map(|batch| Sorted::new(batch.iter().flatten()))
-            .collect();
-        let error = |share: f64| {
-            let values: Option<Vec<f64>> = of_batches.iter().map(|batch| batch.quantile(share)).collect();
-            match (all.quantile(share), values) {
-                (None, _) => 0.0,
-                (Some(_), Some(values)) => standard_error(&values),
-                // Some batches see no limit where others do: not settled.
-                (Some(value), None) => value,
-            }
-        };
-        let stable = |cell_mm: &f64| {
-            let is_stable = |line: &&&SpeedLine| is_stable(line, *cell_mm);
-            lines.iter().filter(is_stable).count() as f64 / lines.len() as f64
-        };
-        Ok(LimitSpread {
-            limit_percentiles_mm: Percentiles {
-                low: all.quantile(0.05),
-                median: all.quantile(0.5),
-                high: all.quantile(0.95),
-            },
-            limit_percentiles_error_mm: [0.05, 0.5, 0.95].into_iter().map(error).fold(0.0, f64::max),
-            machines: drawn,
-            stable_share: cells_mm.iter().map(stable).collect(),
-        })
+/// The standard error of a percentile, mm, from the scatter of the batches; 0 where it lies beyond the last depth.
+fn error(batches: &[Vec<Option<SpeedLine>>], share: f64) -> f64 {
+    let all = Sorted::new(batches.iter().flatten().flatten()).quantile(share);
+    let each: Option<Vec<f64>> = batches
+        .iter()
+        .map(|batch| Sorted::new(batch.iter().flatten()).quantile(share))
+        .collect();
+    match (all, each) {
+        (None, _) => 0.0,
+        (Some(_), Some(values)) => standard_error(&values),
+        // Some batches see no limit where others do: not settled.
+        (Some(value), None) => value,
     }
 }
 

@@ -97,7 +97,7 @@ impl Additions<'_> {
 /// Hundredths of a degree from 0 to below a full turn; `None` for what is no angle.
 pub(super) fn direction_code(direction: Degrees) -> Option<u16> {
     let turns = direction.0 / 360.0;
-    if !(turns >= -1.0e3 && turns <= 1.0e3) {
+    if !(-1.0e3..=1.0e3).contains(&turns) {
         return None;
     }
     // The cast truncates towards zero; one more turn for negative angles.

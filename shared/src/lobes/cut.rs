@@ -201,7 +201,7 @@ fn neighbours(
 /// The angle from one direction to another, anticlockwise, from 0 to below 360; NaN where one is no angle.
 fn turn(from: Degrees, to: Degrees) -> f32 {
     let mut turn = to.0 - from.0;
-    if !(turn > -1.0e6 && turn < 1.0e6) {
+    if !(-1.0e6..=1.0e6).contains(&turn) {
         return f32::NAN;
     }
     while turn < 0.0 {

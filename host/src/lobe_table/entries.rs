@@ -1,0 +1,76 @@
+//! The entries of a column: a line of the method as the table wants it.
+
+use quietcut_core::lobes::{Interval, Kind as TableKind, format::MAX_INTERVALS};
+use quietcut_core::units::{Hertz, Millimeters};
+
+use crate::stability::{Kind, SpeedLine};
+
+/// Depths that are not stable, with their ends in full precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Entry {
+    pub(super) interval: Interval,
+    pub(super) from_mm: f64,
+    pub(super) to_mm: f64,
+}
+
+/// The depths that are surely stable: with two stable orbits it depends on how the cut began.
+pub(super) fn surely_stable(line: &SpeedLine) -> Vec<[f64; 2]> {
+    let mut stable = line.stable_mm.clone();
+    for &[from, to] in &line.bistable_mm {
+        stable = stable
+            .into_iter()
+            .flat_map(|[low, high]| [[low, high.min(from)], [low.max(to), high]])
+            .filter(|[low, high]| low < high)
+            .collect();
+    }
+    stable
+}
+
+/// The depths that are not stable, ascending.
+pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut from_mm = 0.0;
+    let ends = surely_stable(line).into_iter().chain([[depth_mm, depth_mm]]);
+    for [stable_from, stable_to] in ends {
+        if stable_from > from_mm {
+            let switch = line.switches.iter().find(|switch| switch.depth_mm == from_mm);
+            // Where a second orbit begins there is no switch on the line: the jump to it is a fold.
+            let is_jump = line.bistable_mm.iter().any(|interval| interval[0] == from_mm);
+            let kind = match switch {
+                Some(switch) => table_kind(switch.kind),
+                None if is_jump => TableKind::Fold,
+                None => TableKind::Undecided,
+            };
+            entries.push(Entry {
+                interval: Interval {
+                    from: Millimeters(from_mm as f32),
+                    to: Millimeters(stable_from as f32),
+                    kind,
+                    chatter: Hertz(switch.and_then(|switch| switch.chatter_hz).unwrap_or(0.0) as f32),
+                },
+                from_mm,
+                to_mm: stable_from,
+            });
+        }
+        from_mm = stable_to;
+    }
+    // A column holds so many: the narrowest stable gap is given up, which is on the safe side.
+    while entries.len() > MAX_INTERVALS {
+        let gap = |i: usize| entries[i + 1].from_mm - entries[i].to_mm;
+        let narrowest = (0..entries.len() - 1)
+            .min_by(|&a, &b| gap(a).total_cmp(&gap(b)))
+            .unwrap_or(0);
+        let upper = entries.remove(narrowest + 1);
+        entries[narrowest].to_mm = upper.to_mm;
+        entries[narrowest].interval.to = upper.interval.to;
+    }
+    entries
+}
+
+fn table_kind(kind: Kind) -> TableKind {
+    match kind {
+        Kind::Hopf => TableKind::Hopf,
+        Kind::Flip => TableKind::Flip,
+        Kind::Fold => TableKind::Fold,
+    }
+}
