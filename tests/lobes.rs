@@ -386,3 +386,93 @@ fn tools_with_variable_pitch_have_limits_by_methods_that_agree_and_no_table() {
     }
     quietcut(folder.path(), &["table", "pitch.toml", "--out", "t.qct"]).refused(&["pitch_deg"]);
 }
+
+#[test]
+fn limits_over_the_feed_direction_are_those_of_cases_turned_so() {
+    let kuka = case("kuka-kr90-acetal");
+    let chart = ["--rpm", "1300", "--depth-mm", "1:5:5", "--json"];
+    let answer = json(&[&["lobes", &kuka, "--feed-direction-deg", "0:40:2"][..], &chart].concat());
+    assert_eq!(answer["varied"], "feed_direction_deg");
+    let folder = folder();
+    let text = std::fs::read_to_string(&kuka).expect("the case");
+    let turned = text.replacen(
+        "feed_per_tooth_mm = 0.15",
+        "feed_per_tooth_mm = 0.15\nfeed_direction_deg = 40.0",
+        1,
+    );
+    let path = folder.path().join("turned.toml");
+    std::fs::write(&path, turned).expect("written");
+    for (index, path) in [kuka.clone(), path.display().to_string()].iter().enumerate() {
+        let alone = json(&[&["lobes", path][..], &chart].concat());
+        assert_eq!(answer["charts"][index]["speeds"], alone["speeds"]);
+    }
+    assert_eq!(answer["charts"][1]["value"], 40.0);
+}
+
+#[test]
+fn a_table_states_its_error_its_directions_and_its_derivatives() {
+    let folder = folder();
+    let kuka = case("kuka-kr90-acetal");
+    let built = quietcut(
+        folder.path(),
+        &[
+            "table",
+            &kuka,
+            "--rpm",
+            "1250:1300:2",
+            "--depth-mm",
+            "4",
+            "--feed-direction-deg",
+            "0,2",
+            "--derivatives",
+            "--out",
+            "k.qct",
+            "--json",
+        ],
+    );
+    assert_eq!(built.status, Some(0), "{built:?}");
+    let shown: Value = serde_json::from_str(&built.stdout).expect("JSON");
+    let error = shown["interpolation_error"]["depth_mm"]
+        .as_f64()
+        .expect("an error");
+    assert!(error > 0.0 && error < 0.1, "{error}");
+    assert!(shown["bytes"].as_f64().expect("bytes") < 40_000.0);
+    let layers = shown["layers"].as_array().expect("layers");
+    assert_eq!(
+        layers.first().map(|layer| &layer["feed_direction_deg"]),
+        Some(&Value::from(0.0))
+    );
+    assert_eq!(
+        layers.last().map(|layer| &layer["feed_direction_deg"]),
+        Some(&Value::from(2.0))
+    );
+    for layer in layers {
+        assert_eq!(layer["modes"].as_array().expect("modes").len(), 2);
+        for speed in layer["speeds"].as_array().expect("speeds") {
+            let limit = &speed["unstable"][0];
+            // Without axial depth modulation a harder material lowers every limit in proportion.
+            let by_force = limit["derivatives"]["by_cutting_force_mm"][0]
+                .as_f64()
+                .expect("mm");
+            let depth = limit["from_mm"].as_f64().expect("mm");
+            // Steps of the entries, and the 11 bits of a derivative.
+            assert!((by_force + depth).abs() < 2e-3 * depth, "{limit}");
+        }
+    }
+    quietcut(
+        folder.path(),
+        &["table", &kuka, "--percentile", "5", "--out", "p.qct"],
+    )
+    .refused(&["kuka-kr90-acetal.toml", "ktc_mpa_std"]);
+    quietcut(
+        folder.path(),
+        &[
+            "table",
+            &case("kuka-kr90-half-cubic"),
+            "--derivatives",
+            "--out",
+            "p.qct",
+        ],
+    )
+    .refused(&["kuka-kr90-half-cubic.toml", "cubic terms"]);
+}

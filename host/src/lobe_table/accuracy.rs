@@ -41,7 +41,7 @@ pub(super) fn interpolation_error(
                     .stable()
                     .map(|(from, to)| [f64::from(from.0), f64::from(to.0)])
                     .collect();
-                farthest(&surely_stable(line), &told, depth_mm)
+                farthest(&surely_stable(line, depth_mm), &told, depth_mm)
             });
             *miss = miss.max(off);
         }

@@ -13,9 +13,15 @@ pub(super) struct Entry {
     pub(super) to_mm: f64,
 }
 
-/// The depths that are surely stable: with two stable orbits it depends on how the cut began.
-pub(super) fn surely_stable(line: &SpeedLine) -> Vec<[f64; 2]> {
-    let mut stable = line.stable_mm.clone();
+/// The depths up to `depth_mm` that are surely stable: with two stable orbits it depends on how the cut began.
+pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
+    // A branch of orbits may have been followed a step beyond the last depth.
+    let mut stable: Vec<[f64; 2]> = line
+        .stable_mm
+        .iter()
+        .map(|&[from, to]| [from, to.min(depth_mm)])
+        .filter(|[from, to]| from < to)
+        .collect();
     for &[from, to] in &line.bistable_mm {
         stable = stable
             .into_iter()
@@ -30,7 +36,9 @@ pub(super) fn surely_stable(line: &SpeedLine) -> Vec<[f64; 2]> {
 pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut from_mm = 0.0;
-    let ends = surely_stable(line).into_iter().chain([[depth_mm, depth_mm]]);
+    let ends = surely_stable(line, depth_mm)
+        .into_iter()
+        .chain([[depth_mm, depth_mm]]);
     for [stable_from, stable_to] in ends {
         if stable_from > from_mm {
             let switch = line.switches.iter().find(|switch| switch.depth_mm == from_mm);

