@@ -17,6 +17,9 @@ pub mod prediction;
 mod roots;
 mod shape;
 
+#[cfg(test)]
+mod tests;
+
 use crate::synchronous::{CHANNELS, MAX_CLASSES, Passing, clamp_classes};
 
 pub use alternation::Alternation;

@@ -32,6 +32,9 @@ const STEADY: f32 = 0.15;
 const STEADY_AGAINST_DEVIATION: f32 = 0.3;
 /// Passings that differ from those of the turn before by so many times the usual mean an entry, an exit, a blow.
 const EVENT: f32 = 5.0;
+/// |μ| of growth that linear prediction may call where the fit of slow growth sees that angle too: this one e-folds in 33 passings, and
+/// over its few passings a vibration that noise drives looks like anything slower.
+const FAST: f32 = 1.03;
 /// A look that finds fast growth needs another within this many passings.
 const SECOND_LOOK: u32 = 4;
 /// Passings over which the constant part is learnt, and over which activity is.
@@ -177,6 +180,8 @@ impl Growth {
             growing,
             persistent,
         } = Predictions::new(&self.stroboscope, levels.forced, noise);
+        let growing =
+            growing.filter(|m| look < Look::Close || m.abs > FAST || !self.slow.sees(m.angle_turns));
         let decays = best.is_some_and(|best| best.abs + LIKELY * best.deviation < 1.0);
         let alternating = self.alternating.look(
             &self.stroboscope,

@@ -203,3 +203,77 @@ impl Tone {
         smallest > 0.6 * largest && self.amplitude() > 0.7 * self.largest
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::MetersPerSecond2;
+
+    const BINS: usize = 256;
+
+    /// Noise of about power 1, with the three bins of a Hann window for each tone (bin, power).
+    fn spectrum(seed: u32, tones: &[(usize, f32)]) -> [f32; BINS] {
+        let mut power: [f32; BINS] = std::array::from_fn(|k| {
+            0.5 + ((k as u32 + seed).wrapping_mul(2_654_435_761) % 1000) as f32 / 1000.0
+        });
+        for &(bin, height) in tones {
+            for (k, share) in [(bin - 1, 0.25), (bin, 1.0), (bin + 1, 0.25)] {
+                power[k] += share * height;
+            }
+        }
+        power
+    }
+
+    #[test]
+    fn only_what_is_new_is_a_tone() {
+        let mut background = Background::<BINS>::new();
+        for seed in 0..20 {
+            background.learn(&spectrum(seed, &[(60, 5000.0)]));
+        }
+        let power = spectrum(99, &[(60, 5000.0), (150, 300.0)]);
+        let spectrum = PowerSpectrum {
+            power: &power,
+            bin: Hertz(2.0),
+        };
+        let mut work = [0.0; BINS];
+        let mut find = |from, to| background.new_tone(&spectrum, None, Hertz(from), Hertz(to), &mut work);
+        // The hum at 120 Hz is far louder than the new tone at 300 Hz.
+        let found = find(10.0, 500.0).unwrap();
+        assert!((found.frequency.0 - 300.0).abs() < 0.2, "{found:?}");
+        assert_eq!(find(10.0, 280.0), None);
+    }
+
+    #[test]
+    fn tones_grow_last_or_fade() {
+        let power = [1.0; BINS];
+        let spectrum = PowerSpectrum {
+            power: &power,
+            bin: Hertz(2.0),
+        };
+        let follow = |amplitudes: &[f32]| {
+            let peaks = amplitudes.iter().map(|&amplitude| Peak {
+                frequency: Hertz(300.0),
+                amplitude: MetersPerSecond2(amplitude),
+                snr: 100.0,
+            });
+            let tone = peaks.fold(None, |tone, peak| Tone::follow(tone, Some(peak), &spectrum));
+            tone.unwrap()
+        };
+        let grows = follow(&[1.0, 1.2, 1.5, 1.8]);
+        assert!(grows.grows() && !grows.lasts());
+        let lasts = follow(&[1.0, 0.95, 1.02, 0.98, 1.0, 1.01]);
+        assert!(lasts.lasts() && !lasts.grows());
+        let fades = follow(&[1.0, 0.9, 0.8, 0.7, 0.6, 0.5]);
+        assert!(!fades.lasts() && !fades.grows());
+        // Another frequency is another tone.
+        let other = Peak {
+            frequency: Hertz(340.0),
+            amplitude: MetersPerSecond2(1.0),
+            snr: 100.0,
+        };
+        assert_eq!(
+            Tone::follow(Some(lasts), Some(other), &spectrum).unwrap().spectra,
+            1
+        );
+    }
+}

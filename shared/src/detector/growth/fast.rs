@@ -27,7 +27,7 @@ const fn plan(window: usize, order: usize, stride: usize) -> Plan {
 }
 
 /// Standard deviations between an estimate and the unit circle that make growth sure (together with a second look).
-const SURE: f32 = 3.5;
+const SURE: f32 = 5.0;
 /// A multiplier nearer to the positive real axis than this, in turns, is that of a forced orbit that is still moving.
 const LEAST_ANGLE: f32 = 0.03;
 /// Part of the noise of the sensor that is taken off: the data sheet's figure is typical, and more than is there would blow |μ| up.

@@ -47,6 +47,12 @@ impl SlowGrowth {
         }
     }
 
+    /// Whether what has this angle is what the last fit was about.
+    pub(super) fn sees(&self, angle_turns: f32) -> bool {
+        self.tracked
+            .is_some_and(|tracked| (tracked.angle_turns - angle_turns).abs() < SAME_ANGLE)
+    }
+
     /// Takes the window of all passings since the conditions last changed. `predicted` is the angle of the multiplier that linear
     /// prediction sees, `forced` the level of the forced vibration in m/s².
     ///
@@ -64,13 +70,9 @@ impl SlowGrowth {
             rate: RATE_TRIED,
             angle_turns: angle_turns.clamp(ANGLES.0, ANGLES.1),
         };
-        let new = |predicted: &f32| {
-            self.tracked
-                .is_none_or(|tracked| (tracked.angle_turns - predicted).abs() > SAME_ANGLE)
-        };
         let guesses = [
             self.tracked,
-            predicted.filter(new).map(guess),
+            predicted.filter(|angle| !self.sees(*angle)).map(guess),
             Some(guess(ANGLES.0 + part * (ANGLES.1 - ANGLES.0))),
         ];
         let found = window.exponential(guesses.into_iter().flatten());
