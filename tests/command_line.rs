@@ -4,8 +4,8 @@
 
 use quietcut_tests::command::{cases, folder, quietcut};
 
-const VERBS: [&str; 10] = [
-    "demo", "identify", "simulate", "lobes", "table", "upload", "info", "work", "monitor", "replay",
+const VERBS: [&str; 11] = [
+    "demo", "identify", "simulate", "frf", "lobes", "table", "upload", "info", "work", "monitor", "replay",
 ];
 
 /// The commands under "Example:" in the help of a verb.

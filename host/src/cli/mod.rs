@@ -5,6 +5,7 @@
 pub mod demo;
 mod error;
 mod experiment;
+pub mod frf;
 pub mod identify;
 pub mod info;
 pub mod lobes;
@@ -48,6 +49,7 @@ struct Cli {
 enum Verb {
     Demo(demo::Args),
     Simulate(Box<simulate::Args>),
+    Frf(frf::Args),
     Identify(Box<identify::Args>),
     Lobes(lobes::Args),
     Table(table::Args),
@@ -81,6 +83,7 @@ fn run(verb: Verb) -> Result<(), Error> {
     match verb {
         Verb::Demo(args) => demo::run(args),
         Verb::Simulate(args) => simulate::run(*args),
+        Verb::Frf(args) => frf::run(args),
         Verb::Identify(args) => identify::run(*args),
         Verb::Lobes(args) => lobes::run(args),
         Verb::Table(args) => table::run(args),

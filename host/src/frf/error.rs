@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::file::FileError;
+use crate::recording::RecordingError;
 
 /// Why a table of frequency response functions cannot be read, or is none.
 #[derive(Debug, thiserror::Error)]
@@ -10,6 +11,9 @@ pub enum FrfError {
     /// The file is not there or cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A recording is wrong, or does not have what is asked of it.
+    #[error(transparent)]
+    Recording(RecordingError),
     /// A line of the file is wrong.
     #[error("{}, line {line}: {what}", path.display())]
     Line {

@@ -44,7 +44,7 @@ struct Column {
 }
 
 impl FrfTable {
-    /// Reads a table.
+    /// Reads a table: CSV, or UFF 58 where the name ends so.
     ///
     /// Displacement (m, mm, um, nm), velocity or acceleration per force (N, kN): mobility and accelerance become
     /// receptance. A header without unit is m/N. Lines that begin with # are comments.
@@ -54,7 +54,15 @@ impl FrfTable {
     /// value that is no number, or whose frequency does not ascend.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FrfError> {
         let path = path.as_ref();
-        Self::parse(path, &crate::file::read_text(path)?)
+        let ending = path
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
+        match ending.as_str() {
+            "uff" | "unv" | "bunv" => super::table_uff::read(path),
+            _ => Self::parse(path, &crate::file::read_text(path)?),
+        }
     }
 
     /// A table from the text of a file; `path` is for messages.

@@ -35,7 +35,7 @@ pub(super) fn recording(path: &Path, raw: Raw, sidecar: Sidecar) -> Result<Recor
     }
     let (sample_rate_hz, start_s) = match (&time, raw.sample_rate_hz.or(sidecar.sample_rate_hz)) {
         (Some(time), _) => even_rate(path, time)?,
-        (None, Some(rate)) => (rate, 0.0),
+        (None, Some(rate)) => (rate, raw.start_s),
         (None, None) => {
             return Err(RecordingError::NoSampleRate {
                 path: path.into(),

@@ -1,54 +1,29 @@
 //! CSV: a header row with `name [unit]` per column, then numbers.
+//!
+//! A long record is text of a hundred megabytes, so it is read in pieces, and its numbers go straight to their columns.
+//! Lines that start with `#` are remarks, empty lines are nothing, numbers may stand in quotes.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use super::{Quantity, Raw, RawColumn, Recording, RecordingError};
+use crate::file::FileError;
 
 /// Significant digits of written numbers: what a 32-bit float holds, and more than any 16-bit sensor.
 const DIGITS: usize = 9;
 
+/// Bytes that are read at once.
+const PIECE: usize = 1 << 18;
+
 pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
-    let text = crate::file::read_text(path)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(text.as_bytes());
-    let header = reader.headers().map_err(|error| malformed(path, &error))?.clone();
-    let mut columns = Vec::with_capacity(header.len());
-    for title in &header {
-        columns.push(column(path, title)?);
-    }
-    let mut record = csv::StringRecord::new();
-    while reader
-        .read_record(&mut record)
-        .map_err(|error| malformed(path, &error))?
-    {
-        let line = record.position().map_or(0, csv::Position::line);
-        let wrong = |what: String| RecordingError::Line {
-            path: path.into(),
-            line,
-            what,
-        };
-        if record.len() != columns.len() {
-            return Err(wrong(format!(
-                "{} values, but the header has {} columns",
-                record.len(),
-                columns.len()
-            )));
-        }
-        for (column, field) in columns.iter_mut().zip(&record) {
-            match field.parse::<f64>() {
-                Ok(value) if value.is_finite() => column.samples.push(value),
-                _ => {
-                    return Err(wrong(format!(
-                        "\"{field}\" in column \"{}\": a number is needed",
-                        column.name
-                    )));
-                }
-            }
-        }
-    }
+    let unreadable = |cause| FileError::Read {
+        path: path.into(),
+        cause,
+    };
+    let file = File::open(path).map_err(unreadable)?;
+    let length = file.metadata().map_err(unreadable)?.len();
+    let columns = columns(path, file, length, PIECE)?;
     if columns.iter().all(|column| column.samples.is_empty()) {
         return Err(RecordingError::Content {
             path: path.into(),
@@ -58,47 +33,272 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     Ok(Raw {
         columns,
         sample_rate_hz: None,
+        start_s: 0.0,
     })
 }
 
-/// A column by its header, `name [unit]` or `name`.
-fn column(path: &Path, title: &str) -> Result<RawColumn, RecordingError> {
-    let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {
-        Some((name, unit)) => {
-            let unit = unit.parse().map_err(|cause| RecordingError::Unit {
-                path: path.into(),
-                column: title.into(),
-                cause,
-            })?;
-            (name.trim(), Some(unit))
-        }
-        None => (title, None),
+/// The columns of a text of `length` bytes, read in pieces of `piece` bytes.
+fn columns(
+    path: &Path,
+    mut text: impl Read,
+    length: u64,
+    piece: usize,
+) -> Result<Vec<RawColumn>, RecordingError> {
+    let mut table = Table {
+        path,
+        line: 0,
+        columns: Vec::new(),
+        bytes: length,
     };
-    let is_number = name.parse::<f64>().is_ok();
-    if name.is_empty() || is_number {
-        let what = if is_number {
-            format!("the header has the number {name}; a row of names is needed before the numbers")
-        } else {
-            "a column has no name; every column needs one, as in \"ax [m/s^2]\"".into()
+    // What has been read and is not yet a whole line stays at the front.
+    let mut buffer = vec![0; piece.max(1)];
+    let mut kept = 0;
+    loop {
+        if kept == buffer.len() {
+            buffer.resize(2 * kept, 0);
+        }
+        let read = match text.read(&mut buffer[kept..]) {
+            Ok(read) => read,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(cause) => {
+                return Err(FileError::Read {
+                    path: path.into(),
+                    cause,
+                }
+                .into());
+            }
         };
-        return Err(RecordingError::Line {
-            path: path.into(),
-            line: 1,
-            what,
-        });
+        let filled = &buffer[..kept + read];
+        let whole = if read == 0 {
+            filled.len()
+        } else {
+            filled
+                .iter()
+                .rposition(|&byte| byte == b'\n')
+                .map_or(0, |at| at + 1)
+        };
+        table.lines(&filled[..whole])?;
+        if read == 0 {
+            for column in &mut table.columns {
+                column.samples.shrink_to_fit();
+            }
+            return Ok(table.columns);
+        }
+        let end = kept + read;
+        buffer.copy_within(whole..end, 0);
+        kept = end - whole;
     }
-    Ok(RawColumn {
-        name: name.into(),
-        unit,
-        samples: Vec::new(),
-    })
 }
 
-fn malformed(path: &Path, error: &csv::Error) -> RecordingError {
-    RecordingError::Line {
-        path: path.into(),
-        line: error.position().map_or(1, csv::Position::line),
-        what: error.to_string(),
+/// A table that grows line by line.
+struct Table<'a> {
+    path: &'a Path,
+    /// Lines so far.
+    line: u64,
+    /// Empty before the header.
+    columns: Vec<RawColumn>,
+    /// Bytes of the whole text.
+    bytes: u64,
+}
+
+impl Table<'_> {
+    /// Takes whole lines; the last one may lack its end.
+    fn lines(&mut self, text: &[u8]) -> Result<(), RecordingError> {
+        let mut rest = text;
+        while !rest.is_empty() {
+            self.line += 1;
+            if self.columns.is_empty() || matches!(rest[0], b'#' | b'\n' | b'\r' | b' ' | b'\t') {
+                let end = rest.iter().position(|&byte| byte == b'\n');
+                let (line, after) = rest.split_at(end.map_or(rest.len(), |at| at + 1));
+                rest = after;
+                let line = line.trim_ascii();
+                match line.first() {
+                    None | Some(b'#') => {}
+                    Some(_) if self.columns.is_empty() => self.header(line)?,
+                    Some(_) => {
+                        self.row(line)?;
+                    }
+                }
+            } else {
+                rest = self.row(rest)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn header(&mut self, line: &[u8]) -> Result<(), RecordingError> {
+        // The mark of UTF-8 that some editors write.
+        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        let text = std::str::from_utf8(line).map_err(|error| {
+            self.wrong(format!(
+                "byte {} of the header is not UTF-8; a text file is needed",
+                error.valid_up_to() + 1
+            ))
+        })?;
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let mut titles = csv::StringRecord::new();
+        reader
+            .read_record(&mut titles)
+            .map_err(|error| self.wrong(error.to_string()))?;
+        for title in &titles {
+            let column = self.column(title)?;
+            self.columns.push(column);
+        }
+        Ok(())
+    }
+
+    /// A column by its header, `name [unit]` or `name`.
+    fn column(&self, title: &str) -> Result<RawColumn, RecordingError> {
+        let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {
+            Some((name, unit)) => {
+                let unit = unit.parse().map_err(|cause| RecordingError::Unit {
+                    path: self.path.into(),
+                    column: title.into(),
+                    cause,
+                })?;
+                (name.trim(), Some(unit))
+            }
+            None => (title, None),
+        };
+        let is_number = name.parse::<f64>().is_ok();
+        if name.is_empty() || is_number {
+            return Err(self.wrong(if is_number {
+                format!("the header has the number {name}; a row of names is needed before the numbers")
+            } else {
+                "a column has no name; every column needs one, as in \"ax [m/s^2]\"".into()
+            }));
+        }
+        Ok(RawColumn {
+            name: name.into(),
+            unit,
+            samples: Vec::new(),
+        })
+    }
+
+    /// Takes the numbers of the first line of `text`; what follows that line.
+    fn row<'t>(&mut self, text: &'t [u8]) -> Result<&'t [u8], RecordingError> {
+        let mut rest = text;
+        for index in 0..self.columns.len() {
+            let is_last = index + 1 == self.columns.len();
+            let parsed = number(rest).filter(|&(value, _, end)| {
+                value.is_finite() && end == if is_last { End::Line } else { End::Field }
+            });
+            let Some((value, length, _)) = parsed else {
+                return Err(self.row_error(text));
+            };
+            self.columns[index].samples.push(value);
+            rest = &rest[length..];
+        }
+        if self
+            .columns
+            .first()
+            .is_some_and(|column| column.samples.len() == 1)
+        {
+            self.make_room(text.len() - rest.len());
+        }
+        Ok(rest)
+    }
+
+    /// Makes room for as many samples as the text has lines as long as the first: growing by doubling would take up
+    /// to twice the memory.
+    fn make_room(&mut self, line: usize) {
+        let lines = usize::try_from(self.bytes).unwrap_or(0) / line.max(1);
+        // Later lines are often longer, as time gets more digits: little is lost, memory that is not used costs nothing.
+        for column in &mut self.columns {
+            column.samples.reserve_exact(lines);
+        }
+    }
+
+    /// What is wrong with the first line of `text`.
+    fn row_error(&self, text: &[u8]) -> RecordingError {
+        let end = text.iter().position(|&byte| byte == b'\n').unwrap_or(text.len());
+        let line = String::from_utf8_lossy(&text[..end]);
+        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+        if fields.len() != self.columns.len() {
+            return self.wrong(format!(
+                "{} values, but the header has {} columns",
+                fields.len(),
+                self.columns.len()
+            ));
+        }
+        let is_number = |field: &str| {
+            number(field.as_bytes())
+                .is_some_and(|(value, length, _)| value.is_finite() && length == field.len())
+        };
+        let wrong = fields
+            .iter()
+            .zip(&self.columns)
+            .find(|(field, _)| !is_number(field));
+        self.wrong(match wrong {
+            Some((field, column)) => {
+                // A damaged file may have a long line without commas.
+                let shown: String = field.chars().take(40).collect();
+                format!("\"{shown}\" in column \"{}\": a number is needed", column.name)
+            }
+            None => "a number for each column is needed, with commas between".into(),
+        })
+    }
+
+    fn wrong(&self, what: String) -> RecordingError {
+        RecordingError::Line {
+            path: self.path.into(),
+            line: self.line,
+            what,
+        }
+    }
+}
+
+/// What stands after a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    /// A comma.
+    Field,
+    /// The end of the line, or of the text.
+    Line,
+}
+
+/// The number at the start of `text`, with blanks and quotes around it: its value, the bytes it takes with what ends
+/// it, and what that is.
+#[inline]
+fn number(text: &[u8]) -> Option<(f64, usize, End)> {
+    // What nearly every number is: neither blanks nor quotes around it.
+    if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(text) {
+        match &text[length..] {
+            [b',', ..] => return Some((value, length + 1, End::Field)),
+            [b'\n', ..] => return Some((value, length + 1, End::Line)),
+            [] => return Some((value, length, End::Line)),
+            _ => {}
+        }
+    }
+    let blanks = |text: &[u8]| {
+        text.iter()
+            .take_while(|byte| matches!(byte, b' ' | b'\t' | b'\r'))
+            .count()
+    };
+    let mut at = blanks(text);
+    let is_quoted = text.get(at) == Some(&b'"');
+    if is_quoted {
+        at += 1;
+        at += blanks(&text[at..]);
+    }
+    let (value, length) = fast_float2::parse_partial::<f64, _>(&text[at..]).ok()?;
+    at += length;
+    at += blanks(&text[at..]);
+    if is_quoted {
+        if text.get(at) != Some(&b'"') {
+            return None;
+        }
+        at += 1;
+        at += blanks(&text[at..]);
+    }
+    match text.get(at) {
+        Some(b',') => Some((value, at + 1, End::Field)),
+        Some(b'\n') => Some((value, at + 1, End::Line)),
+        None => Some((value, at, End::Line)),
+        Some(_) => None,
     }
 }
 
@@ -119,7 +319,7 @@ pub(super) fn write(path: &Path, recording: &Recording) -> Result<(), RecordingE
                 recording
                     .channels
                     .iter()
-                    .map(|channel| number(channel.samples[sample])),
+                    .map(|channel| number_text(channel.samples[sample])),
             );
             writer.write_record(&row)?;
         }
@@ -129,7 +329,7 @@ pub(super) fn write(path: &Path, recording: &Recording) -> Result<(), RecordingE
 }
 
 /// A number in the fewest characters that keep [`DIGITS`] digits.
-fn number(value: f64) -> String {
+fn number_text(value: f64) -> String {
     let rounded: f64 = format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value);
     let plain = rounded.to_string();
     let exponent = format!("{rounded:e}");
@@ -137,5 +337,66 @@ fn number(value: f64) -> String {
         exponent
     } else {
         plain
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn parse(text: &[u8], piece: usize) -> Result<Vec<Vec<f64>>, String> {
+        columns(Path::new("a.csv"), text, text.len() as u64, piece)
+            .map(|columns| columns.into_iter().map(|column| column.samples).collect())
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn blanks_quotes_remarks_and_line_ends_are_read_as_meant() {
+        let text = "\u{feff}\n# made by hand\n\"a [N]\", b\r\n 1 ,\"2\"\r\n\r\n# later\n3,\t-4e0  \n+5,6.";
+        // Whatever the pieces are.
+        for piece in [1, 2, 7, 64, 4096] {
+            assert_eq!(
+                parse(text.as_bytes(), piece),
+                Ok(vec![vec![1.0, 3.0, 5.0], vec![2.0, -4.0, 6.0]]),
+                "{piece}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_wrong_row_is_said_with_its_line() {
+        for (row, words) in [
+            ("1", "1 values"),
+            ("1,2,3", "3 values"),
+            ("1,", "\"\" in column \"b\""),
+            ("1,2x", "\"2x\" in column \"b\""),
+            ("\"1,2", "\"\"1\" in column \"a\""),
+            ("1,inf", "\"inf\" in column \"b\""),
+            ("1;2", "1 values"),
+        ] {
+            let said = parse(format!("a,b\n1,2\n{row}\n3,4\n").as_bytes(), 4).unwrap_err();
+            assert!(said.contains("line 3") && said.contains(words), "{row}: {said}");
+        }
+        let said = parse(b"a,\xe4\n1,2\n", 64).unwrap_err();
+        assert!(said.contains("line 1") && said.contains("byte 3"), "{said}");
+    }
+
+    proptest! {
+        /// To the last bit as the standard library reads them.
+        #[test]
+        fn numbers_are_exact(values in prop::collection::vec(any::<f64>().prop_filter("finite", |v| v.is_finite()), 1..20), digits in 0usize..20) {
+            let texts: Vec<String> = values.iter().map(|value| format!("{value:.digits$e}")).collect();
+            let expected: Vec<f64> = texts.iter().map(|text| text.parse().unwrap()).collect();
+            prop_assert_eq!(parse(format!("a\n{}", texts.join("\n")).as_bytes(), 100), Ok(vec![expected]));
+        }
+
+        /// Whatever the bytes, there is an answer.
+        #[test]
+        fn damage_never_stops_the_program(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+            let _ = parse(&bytes, 16);
+            let _ = parse(&[b"a,b\n".as_slice(), &bytes].concat(), 16);
+        }
     }
 }

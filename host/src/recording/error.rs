@@ -12,7 +12,7 @@ pub enum RecordingError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The ending of the name says a format that is not read.
-    #[error("{}: \"{found}\" is no format that can be read; csv, wav and mat are (UFF 58 is not yet)", path.display())]
+    #[error("{}: \"{found}\" is no format that can be read; csv, uff, wav and mat are", path.display())]
     Format {
         /// The file.
         path: PathBuf,

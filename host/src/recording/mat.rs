@@ -45,6 +45,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     Ok(Raw {
         columns,
         sample_rate_hz: None,
+        start_s: 0.0,
     })
 }
 

@@ -8,6 +8,7 @@ mod csv;
 mod error;
 mod mat;
 mod sidecar;
+pub(crate) mod uff;
 mod unit;
 mod wav;
 
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 pub use blocks::{Sensed, Speed};
 pub use error::RecordingError;
 pub use sidecar::{Kind, RecordedChannel, RecordedCut, Sidecar};
+pub use uff::UffForm;
 pub use unit::{Quantity, Sensitivity, Unit, UnknownUnit};
 
 /// Channels that were sampled together, evenly.
@@ -49,6 +51,8 @@ struct Raw {
     columns: Vec<RawColumn>,
     /// Samples per second, where the format carries it.
     sample_rate_hz: Option<f64>,
+    /// Time of the first sample, s, where no column says so.
+    start_s: f64,
 }
 
 /// A column of a file.
@@ -75,6 +79,7 @@ impl Recording {
             "csv" => csv::read(path)?,
             "wav" => wav::read(path)?,
             "mat" => mat::read(path)?,
+            "uff" | "unv" | "bunv" => uff::read(path)?,
             _ => {
                 // A file that is not there is the first thing to mend.
                 crate::file::read(path)?;
@@ -93,6 +98,15 @@ impl Recording {
     /// A file cannot be written.
     pub fn write_csv(&self, path: &Path) -> Result<(), RecordingError> {
         csv::write(path, self)?;
+        self.sidecar.write_beside(path)
+    }
+
+    /// Writes it to `path` as UFF 58, with its sidecar: both whole, or as they were before.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write_uff(&self, path: &Path, form: UffForm) -> Result<(), RecordingError> {
+        uff::write(path, self, form)?;
         self.sidecar.write_beside(path)
     }
 

@@ -72,8 +72,8 @@ fn what_is_wrong_is_said_with_file_line_and_remedy() {
             assert!(message.contains(word), "{word}: {message}");
         }
     }
-    for name in ["a.uff", "a.xyz"] {
-        assert!(folder.refusal(name, good).contains("csv, wav and mat"));
+    for name in ["a.xyz", "a"] {
+        assert!(folder.refusal(name, good).contains("csv, uff, wav and mat"));
     }
     let missing = Recording::read(folder.0.path().join("no.csv")).unwrap_err();
     assert!(missing.to_string().contains("no.csv"));

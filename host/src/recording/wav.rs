@@ -1,41 +1,31 @@
 //! WAV: every channel is called ch1, ch2 …; the sidecar gives names and units. Full scale is 1.
 
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use super::{Raw, RawColumn, RecordingError};
+use crate::file::FileError;
 
 pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
-    let bytes = crate::file::read(path)?;
+    let file = File::open(path).map_err(|cause| FileError::Read {
+        path: path.into(),
+        cause,
+    })?;
     let wrong = |error: hound::Error| RecordingError::Content {
         path: path.into(),
         what: format!("not a WAV file of samples: {error}"),
     };
-    let mut reader = hound::WavReader::new(Cursor::new(bytes)).map_err(wrong)?;
+    let mut reader = hound::WavReader::new(BufReader::new(file)).map_err(wrong)?;
     let spec = reader.spec();
-    let samples: Result<Vec<f64>, hound::Error> = match spec.sample_format {
-        hound::SampleFormat::Float => reader
-            .samples::<f32>()
-            .map(|sample| sample.map(f64::from))
-            .collect(),
+    let columns = match spec.sample_format {
+        hound::SampleFormat::Float => columns::<f32>(&mut reader, 1.0),
         hound::SampleFormat::Int => {
-            let full_scale = 2f64.powi(i32::from(spec.bits_per_sample) - 1);
-            reader
-                .samples::<i32>()
-                .map(|sample| sample.map(|sample| f64::from(sample) / full_scale))
-                .collect()
+            columns::<i32>(&mut reader, 2f64.powi(i32::from(spec.bits_per_sample) - 1))
         }
-    };
-    let samples = samples.map_err(wrong)?;
-    let count = usize::from(spec.channels.max(1));
-    let columns = (0..count)
-        .map(|channel| RawColumn {
-            name: format!("ch{}", channel + 1),
-            unit: None,
-            samples: samples.iter().copied().skip(channel).step_by(count).collect(),
-        })
-        .collect();
-    if samples.len() < count {
+    }
+    .map_err(wrong)?;
+    if columns.iter().any(|column| column.samples.is_empty()) {
         return Err(RecordingError::Content {
             path: path.into(),
             what: "there are no samples".into(),
@@ -44,5 +34,27 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     Ok(Raw {
         columns,
         sample_rate_hz: Some(f64::from(spec.sample_rate)),
+        start_s: 0.0,
     })
+}
+
+/// The channels, whose samples are parts of `full_scale`.
+fn columns<S: hound::Sample + Into<f64>>(
+    reader: &mut hound::WavReader<impl Read>,
+    full_scale: f64,
+) -> Result<Vec<RawColumn>, hound::Error> {
+    let count = usize::from(reader.spec().channels.max(1));
+    let length = reader.duration() as usize;
+    let mut columns: Vec<RawColumn> = (0..count)
+        .map(|channel| RawColumn {
+            name: format!("ch{}", channel + 1),
+            unit: None,
+            // The header of a damaged file may say anything.
+            samples: Vec::with_capacity(length.min(1 << 24)),
+        })
+        .collect();
+    for (index, sample) in reader.samples::<S>().enumerate() {
+        columns[index % count].samples.push(sample?.into() / full_scale);
+    }
+    Ok(columns)
 }

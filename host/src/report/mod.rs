@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub mod cell_map;
+pub mod frf_chart;
 pub mod lobe_chart;
 pub mod marks;
 pub mod page;

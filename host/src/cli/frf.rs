@@ -1,0 +1,435 @@
+//! `quietcut frf`: receptances from recordings.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use maud::html;
+use serde::Serialize;
+
+use super::{Error, Output, finite, positive};
+use crate::file;
+use crate::frf::{
+    Estimator, Excitation, FrfError, FrfTable, HammerWindows, Measurement, MeasurementSettings, ModeRatio,
+    Part, Window, calibrate, measure,
+};
+use crate::recording::{Recording, UffForm};
+use crate::report::frf_chart::frf_chart;
+use crate::report::page::{figure, page};
+
+/// Receptances with their coherence, from recordings of a shaker, a hammer or a cut.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out hammer.csv\n  quietcut frf hammer.csv --band-hz 10:30 --out frf.csv --out frf.svg\n\n\
+                  Recordings of the same forces are averaged, those of other forces add columns. How a record is cut follows\n\
+                  from kind in the file beside it; --excitation goes before it. Forces that are not chosen count as noise."
+)]
+pub struct Args {
+    /// The recordings: CSV, UFF 58, WAV or MAT.
+    #[arg(value_name = "REC", required = true)]
+    recordings: Vec<PathBuf>,
+    /// Table or picture to write: csv, uff, svg or html by its ending; may be given again.
+    #[arg(long, value_name = "FILE", value_parser = Target::parse)]
+    out: Vec<Target>,
+    /// Which noise averages out: h1 that of the responses, h2 that of the forces, mean is (h1 + h2)/2; pseudo-inverse
+    /// is for several cuts whose forces are dependent each by itself.
+    #[arg(long, value_enum, default_value_t)]
+    method: Method,
+    /// How the structure was driven, where the file beside the recording does not say, or to go before it.
+    #[arg(long, value_enum)]
+    excitation: Option<Driving>,
+    /// First and last frequency in Hz.
+    #[arg(long, value_name = "FIRST:LAST", value_parser = band)]
+    band_hz: Option<(f64, f64)>,
+    /// Distance of the frequencies in Hz; by default eight segments, or eight averages of a sweep, for each force.
+    #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
+    resolution_hz: Option<f64>,
+    /// Window of the segments of random excitation.
+    #[arg(long, value_enum, default_value_t)]
+    window: WindowName,
+    /// Part by which these segments overlap.
+    #[arg(long, value_name = "PART", value_parser = overlap, default_value = "0.5", allow_negative_numbers = true)]
+    overlap: f64,
+    /// A channel that is meant, where a recording has several forces or several sensors of a direction; may be given
+    /// again.
+    #[arg(long, value_name = "NAME")]
+    channel: Vec<String>,
+    /// Time constant in s of the exponential window on hammer blows. It adds 1/τ to the decay of every mode.
+    #[arg(long, value_name = "TAU", value_parser = positive, allow_negative_numbers = true)]
+    exponential_window_s: Option<f64>,
+    /// Tool-tip calibration: FRF from the tool tip to the sensor on the housing.
+    #[arg(long, value_name = "FILE", requires = "tip")]
+    housing: Option<PathBuf>,
+    /// Tool-tip calibration: FRF from the tool tip to itself.
+    #[arg(long, value_name = "FILE", requires = "housing")]
+    tip: Option<PathBuf>,
+    /// Write uff files as binary (58b).
+    #[arg(long)]
+    uff_binary: bool,
+    #[command(flatten)]
+    output: Output,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum Method {
+    #[default]
+    H1,
+    H2,
+    Mean,
+    PseudoInverse,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Driving {
+    Random,
+    Sweep,
+    Hammer,
+    StepSine,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum WindowName {
+    #[default]
+    Hann,
+    Hamming,
+    Rectangular,
+}
+
+/// A file to write.
+#[derive(Clone, Debug)]
+struct Target {
+    path: PathBuf,
+    form: Form,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    Csv,
+    Uff,
+    Svg,
+    Html,
+}
+
+impl Target {
+    fn parse(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        let ending = path
+            .extension()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .to_lowercase();
+        let form = match ending.as_str() {
+            "csv" => Form::Csv,
+            "uff" | "unv" => Form::Uff,
+            "svg" => Form::Svg,
+            "html" => Form::Html,
+            _ => {
+                return Err(format!(
+                    "`{text}` ends in \"{ending}\"; csv, uff, svg or html is needed"
+                ));
+            }
+        };
+        Ok(Self { path, form })
+    }
+}
+
+fn band(text: &str) -> Result<(f64, f64), String> {
+    let wrong = || format!("`{text}` is no band; two frequencies are needed, such as 10:30");
+    let (first, last) = text.split_once(':').ok_or_else(wrong)?;
+    let (first, last) = (finite(first)?, finite(last)?);
+    if 0.0 <= first && first < last {
+        Ok((first, last))
+    } else {
+        Err(format!(
+            "`{text}` is not possible: the first frequency must be 0 or more, and the last greater"
+        ))
+    }
+}
+
+fn overlap(text: &str) -> Result<f64, String> {
+    let value = finite(text)?;
+    if (0.0..=0.95).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not possible: it must be from 0 to 0.95"))
+    }
+}
+
+impl Args {
+    fn settings(&self) -> MeasurementSettings {
+        MeasurementSettings {
+            excitation: self.excitation.map(|driving| match driving {
+                Driving::Random => Excitation::Random,
+                Driving::Sweep => Excitation::Sweep,
+                Driving::Hammer => Excitation::Hammer,
+                Driving::StepSine => Excitation::StepSine,
+            }),
+            estimator: match self.method {
+                Method::H1 => Estimator::H1,
+                Method::H2 => Estimator::H2,
+                Method::Mean => Estimator::Mean,
+                Method::PseudoInverse => Estimator::PseudoInverse,
+            },
+            resolution_hz: self.resolution_hz,
+            overlap: self.overlap,
+            window: match self.window {
+                WindowName::Hann => Window::Hann,
+                WindowName::Hamming => Window::Hamming,
+                WindowName::Rectangular => Window::Rectangular,
+            },
+            band_hz: self.band_hz,
+            channels: self.channel.clone(),
+            hammer: HammerWindows {
+                segment_s: None,
+                exponential_s: self.exponential_window_s,
+            },
+        }
+    }
+}
+
+/// Runs the verb.
+pub fn run(args: Args) -> Result<(), Error> {
+    let recordings = args
+        .recordings
+        .iter()
+        .map(Recording::read)
+        .collect::<Result<Vec<_>, _>>()?;
+    let measurement = measure(&recordings, &args.settings())?;
+    let (table, calibration) = match (&args.housing, &args.tip) {
+        (Some(housing), Some(tip)) => calibrate(
+            &measurement.table,
+            &FrfTable::read(housing)?,
+            &FrfTable::read(tip)?,
+        )?,
+        _ => (measurement.table.clone(), Vec::new()),
+    };
+    for warning in &measurement.warnings {
+        tracing::warn!("{warning}");
+    }
+    for target in &args.out {
+        write(target, &table, args.uff_binary)?;
+    }
+    let answer = Answer::new(&args, &measurement, &table, &calibration);
+    let text = answer.text();
+    args.output.answer(&answer, text)
+}
+
+fn write(target: &Target, table: &FrfTable, is_binary: bool) -> Result<(), Error> {
+    let title = "Frequency response functions";
+    let draw = || frf_chart(title, table).map_err(Error::input);
+    match target.form {
+        Form::Csv => table.write(&target.path)?,
+        Form::Uff => {
+            let form = if is_binary { UffForm::Binary } else { UffForm::Text };
+            table.write_uff(&target.path, form)?;
+        }
+        Form::Svg => file::write(&target.path, draw()?.as_bytes())?,
+        Form::Html => {
+            let body = html! {
+                h1 { (title) }
+                (figure(&draw()?, "Receptance of displacement (first letter) by force (second letter)."))
+            };
+            file::write(&target.path, page(title, &body).as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+/// What `--json` says.
+#[derive(Serialize)]
+struct Answer {
+    method: &'static str,
+    frequency_hz: [f64; 2],
+    lines: usize,
+    parts: Vec<PartAnswer>,
+    receptances: Vec<ReceptanceAnswer>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    calibration: Vec<RatioAnswer>,
+    warnings: Vec<String>,
+    out: Vec<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct PartAnswer {
+    forces: Vec<&'static str>,
+    excitation: &'static str,
+    recordings: usize,
+    averages: f64,
+    /// Smallest singular value of the forces, each divided by its root mean square; 1 where they are independent.
+    least_singular_value: f64,
+    left_out_hz: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blows: Option<Blows>,
+}
+
+#[derive(Serialize)]
+struct Blows {
+    used: usize,
+    double_s: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct ReceptanceAnswer {
+    name: String,
+    peak_hz: f64,
+    peak_m_per_n: Interval,
+    coherence: Option<CoherenceAnswer>,
+}
+
+#[derive(Serialize)]
+struct Interval {
+    value: f64,
+    ci90: [f64; 2],
+}
+
+#[derive(Serialize)]
+struct CoherenceAnswer {
+    median: f64,
+    at_peak: f64,
+}
+
+#[derive(Serialize)]
+struct RatioAnswer {
+    frequency_hz: f64,
+    response: &'static str,
+    tip_to_housing: f64,
+    misfit: f64,
+}
+
+/// 90 % of a normal distribution lie within so many standard deviations.
+const NORMAL_90: f64 = 1.644_853_626_951_472_7;
+
+impl Answer {
+    fn new(args: &Args, measurement: &Measurement, table: &FrfTable, calibration: &[ModeRatio]) -> Self {
+        let frequency_hz = table.frequency_hz();
+        let receptances = (0..table.entries().len())
+            .map(|index| ReceptanceAnswer::new(measurement, table, index))
+            .collect();
+        Self {
+            method: match args.method {
+                Method::H1 => "h1",
+                Method::H2 => "h2",
+                Method::Mean => "mean",
+                Method::PseudoInverse => "pseudo-inverse",
+            },
+            // A table has at least one line.
+            frequency_hz: [frequency_hz[0], frequency_hz[frequency_hz.len() - 1]],
+            lines: frequency_hz.len(),
+            parts: measurement.parts.iter().map(PartAnswer::new).collect(),
+            receptances,
+            calibration: calibration
+                .iter()
+                .map(|ratio| RatioAnswer {
+                    frequency_hz: ratio.frequency_hz,
+                    response: ratio.response.name(),
+                    tip_to_housing: ratio.ratio,
+                    misfit: ratio.misfit,
+                })
+                .collect(),
+            warnings: measurement.warnings.clone(),
+            out: args.out.iter().map(|target| target.path.clone()).collect(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "{} frequencies from {:.3} to {:.3} Hz",
+            self.lines, self.frequency_hz[0], self.frequency_hz[1]
+        );
+        for receptance in &self.receptances {
+            let Interval { value, ci90 } = &receptance.peak_m_per_n;
+            // Writing to a String cannot fail.
+            let _ = write!(
+                text,
+                "\nH{}: {:.4} µm/N at {:.3} Hz, 90 % from {:.4} to {:.4}",
+                receptance.name,
+                1e6 * value,
+                receptance.peak_hz,
+                1e6 * ci90[0],
+                1e6 * ci90[1]
+            );
+            if let Some(coherence) = &receptance.coherence {
+                let _ = write!(
+                    text,
+                    "; coherence {:.3} there, {:.3} in the middle",
+                    coherence.at_peak, coherence.median
+                );
+            }
+        }
+        for ratio in &self.calibration {
+            let _ = write!(
+                text,
+                "\ntool tip by housing at {:.3} Hz in {}: {:.4} (misfit {:.1} %)",
+                ratio.frequency_hz,
+                ratio.response,
+                ratio.tip_to_housing,
+                100.0 * ratio.misfit
+            );
+        }
+        for path in &self.out {
+            let _ = write!(text, "\nwritten: {}", path.display());
+        }
+        text
+    }
+}
+
+impl PartAnswer {
+    fn new(part: &Part) -> Self {
+        Self {
+            forces: part.forces.iter().map(|direction| direction.name()).collect(),
+            excitation: part.excitation.name(),
+            recordings: part.recordings,
+            averages: part.averages,
+            least_singular_value: part.least_singular,
+            left_out_hz: part.left_out_hz.clone(),
+            blows: part.blows.as_ref().map(|(used, double)| Blows {
+                used: used.len(),
+                double_s: double.iter().map(|blow| blow.time_s).collect(),
+            }),
+        }
+    }
+}
+
+impl ReceptanceAnswer {
+    /// The largest value of an entry, with the interval that the random error gives it.
+    fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
+        let entry = &table.entries()[index];
+        let size = |line: usize| entry.receptance[line].norm();
+        let at = (0..entry.receptance.len())
+            .max_by(|&a, &b| size(a).total_cmp(&size(b)))
+            .unwrap_or(0);
+        // Calibration scales error and value alike.
+        let before = measurement.table.entries()[index].receptance[at].norm();
+        let relative = if before > 0.0 {
+            measurement.deviation[index][at] / before
+        } else {
+            0.0
+        };
+        let half = NORMAL_90 * relative * size(at);
+        Self {
+            name: entry.name(),
+            peak_hz: table.frequency_hz()[at],
+            peak_m_per_n: Interval {
+                value: size(at),
+                ci90: [(size(at) - half).max(0.0), size(at) + half],
+            },
+            coherence: entry.coherence.as_ref().map(|coherence| {
+                let mut sorted = coherence.clone();
+                sorted.sort_by(f64::total_cmp);
+                CoherenceAnswer {
+                    median: sorted[sorted.len() / 2],
+                    at_peak: coherence[at],
+                }
+            }),
+        }
+    }
+}
+
+impl From<FrfError> for Error {
+    fn from(error: FrfError) -> Self {
+        match error {
+            FrfError::File(cause) => cause.into(),
+            FrfError::Recording(cause) => cause.into(),
+            other => Self::input(other),
+        }
+    }
+}

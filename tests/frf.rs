@@ -1,0 +1,212 @@
+//! `quietcut frf`: from recordings of a known structure to tables and pictures, and what it refuses.
+#![allow(clippy::expect_used)]
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use num_complex::Complex64;
+use quietcut::frf::FrfTable;
+use quietcut::recording::{Channel, Kind, Quantity, Recording, Sidecar};
+use quietcut::structure::Direction;
+use quietcut_tests::command::{folder, quietcut};
+
+const RATE: f64 = 1024.0;
+const FREQUENCY_HZ: f64 = 17.4;
+const DAMPING: f64 = 0.02;
+const MASS_KG: f64 = 60.0;
+
+/// Acceleration of the structure at the sensor, by blows along y: exact impulse responses, each of one sample.
+fn blows(ratio: f64) -> Recording {
+    let samples = (50.0 * RATE) as usize;
+    let mut force = vec![0.0; samples];
+    let mut acceleration = vec![0.0; samples];
+    let own = TAU * FREQUENCY_HZ;
+    let pole = own * Complex64::new(-DAMPING, (1.0 - DAMPING * DAMPING).sqrt());
+    for (at, newtons) in [(1.0, 300.0), (13.0, 400.0), (25.5, 350.0), (37.5, 500.0)] {
+        let first = (at * RATE) as usize;
+        // Eight samples as a raised cosine: of a blow, nothing is left beyond a fifth of the rate.
+        let pulse: Vec<f64> = (0..9)
+            .map(|k| newtons * 0.5 * (1.0 - (TAU * f64::from(k) / 8.0).cos()))
+            .collect();
+        for (k, value) in pulse.iter().enumerate() {
+            force[first + k] += value;
+            // x'' of 1/(m ω_d) e^{−ζωt} sin ω_d t, the direct part f/m apart.
+            for (n, sample) in acceleration[first + k..].iter_mut().enumerate() {
+                let t = n as f64 / RATE;
+                let modal = pole * pole * (pole * t).exp() / pole.im;
+                let half = if n == 0 { 0.5 } else { 1.0 };
+                *sample += ratio * half * value / RATE / MASS_KG * modal.im;
+            }
+            acceleration[first + k] += ratio * value / MASS_KG;
+        }
+    }
+    let channel = |name: &str, quantity, samples| Channel {
+        name: name.into(),
+        quantity,
+        samples,
+    };
+    Recording {
+        path: "hammer.csv".into(),
+        sample_rate_hz: RATE,
+        start_s: 0.0,
+        channels: vec![
+            channel("fy", Quantity::Force, force),
+            channel("ay", Quantity::Acceleration, acceleration),
+        ],
+        sidecar: Sidecar {
+            kind: Some(Kind::Hammer),
+            ..Sidecar::default()
+        },
+    }
+}
+
+fn truth(hertz: f64) -> Complex64 {
+    let (omega, own) = (TAU * hertz, TAU * FREQUENCY_HZ);
+    Complex64::new(own * own - omega * omega, 2.0 * DAMPING * own * omega).inv() / MASS_KG
+}
+
+#[test]
+fn a_hammer_test_becomes_tables_and_pictures() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    blows(1.0).write_csv(&at("hammer.csv")).expect("written");
+    blows(1.0)
+        .write_uff(&at("hammer.uff"), quietcut::recording::UffForm::Binary)
+        .expect("written");
+    let answer = quietcut(
+        folder.path(),
+        &[
+            "frf",
+            "hammer.csv",
+            "--band-hz",
+            "12:24",
+            "--json",
+            "--out",
+            "a.csv",
+            "--out",
+            "a.uff",
+            "--out",
+            "a.svg",
+            "--out",
+            "a.html",
+        ],
+    )
+    .json();
+    assert_eq!(answer["parts"][0]["blows"]["used"], 4);
+    assert_eq!(answer["parts"][0]["excitation"], "hammer");
+    let peak = &answer["receptances"][0];
+    assert_eq!(peak["name"], "yy");
+    let value = peak["peak_m_per_n"]["value"].as_f64().expect("a number");
+    // The peak lies up to half a line of 0.085 Hz from a line: 0.6 % of a mode 0.7 Hz wide.
+    let expected = truth(FREQUENCY_HZ).norm();
+    assert!((value / expected - 1.0).abs() < 0.012, "{value} {expected}");
+    let tables = ["a.csv", "a.uff"].map(|name| FrfTable::read(at(name)).expect("a table"));
+    for table in &tables {
+        let entry = table.entry(Direction::Y, Direction::Y).expect("hyy");
+        for (&hertz, h) in table.frequency_hz().iter().zip(&entry.receptance) {
+            // What the rate leaves of the impulse, and what rings at the end of a segment.
+            assert!(
+                (h - truth(hertz)).norm() < 0.01 * expected,
+                "{hertz}: {h} {}",
+                truth(hertz)
+            );
+        }
+        assert!(
+            entry
+                .coherence
+                .as_ref()
+                .expect("coherence")
+                .iter()
+                .all(|c| *c > 0.999)
+        );
+    }
+    for name in ["a.svg", "a.html"] {
+        let text = std::fs::read_to_string(at(name)).expect("text");
+        assert!(
+            text.contains("receptance [µm/N]") && text.contains("coherence"),
+            "{name}"
+        );
+    }
+    // The same from the binary file, without a sidecar of its own.
+    let from_uff = quietcut(
+        folder.path(),
+        &["frf", "hammer.uff", "--band-hz", "12:24", "--json"],
+    )
+    .json();
+    assert_eq!(from_uff["receptances"][0]["name"], "yy");
+    let again = from_uff["receptances"][0]["peak_m_per_n"]["value"]
+        .as_f64()
+        .expect("a number");
+    // Nine digits in the CSV file.
+    assert!((again / value - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_sensor_on_the_housing_is_calibrated_to_the_tool_tip() {
+    let folder = folder();
+    let ratio = 0.7;
+    for (name, ratio) in [("tip", 1.0), ("housing", ratio)] {
+        let path = folder.path().join(format!("{name}-test.csv"));
+        blows(ratio).write_csv(&path).expect("written");
+        let (record, out) = (format!("{name}-test.csv"), format!("{name}.csv"));
+        quietcut(
+            folder.path(),
+            &["frf", &record, "--band-hz", "12:24", "--out", &out, "--json"],
+        )
+        .json();
+    }
+    let answer = quietcut(
+        folder.path(),
+        &[
+            "frf",
+            "housing-test.csv",
+            "--band-hz",
+            "12:24",
+            "--housing",
+            "housing.csv",
+            "--tip",
+            "tip.csv",
+            "--out",
+            "calibrated.csv",
+            "--json",
+        ],
+    )
+    .json();
+    let found = answer["calibration"][0]["tip_to_housing"]
+        .as_f64()
+        .expect("a number");
+    assert!((found * ratio - 1.0).abs() < 1e-3, "{found}");
+    let read = |name: &str| FrfTable::read(folder.path().join(name)).expect("a table");
+    let (calibrated, tip) = (read("calibrated.csv"), read("tip.csv"));
+    let peak = |table: &FrfTable| {
+        let entry = &table.entries()[0];
+        entry.receptance.iter().map(|h| h.norm()).fold(0.0, f64::max)
+    };
+    assert!((peak(&calibrated) / peak(&tip) - 1.0).abs() < 0.02);
+}
+
+#[test]
+fn what_cannot_be_measured_is_refused_with_the_reason() {
+    let folder = folder();
+    let here: &Path = folder.path();
+    blows(1.0).write_csv(&here.join("hammer.csv")).expect("written");
+    std::fs::write(here.join("idle.csv"), "t [s],ax [m/s^2]\n0,0\n0.1,1\n0.2,0\n").expect("written");
+    quietcut(here, &["frf", "idle.csv"]).refused(&["idle.csv", "no force"]);
+    quietcut(here, &["frf", "none.csv"]).refused(&["none.csv"]);
+    quietcut(here, &["frf", "hammer.csv", "--channel", "fq"]).refused(&["hammer.csv", "\"fq\"", "fy"]);
+    quietcut(here, &["frf", "hammer.csv", "--out", "a.xyz"]).refused(&["a.xyz", "svg"]);
+    quietcut(here, &["frf", "hammer.csv", "--band-hz", "30:10"]).refused(&["30:10"]);
+    quietcut(here, &["frf", "hammer.csv", "--resolution-hz", "0.001"]).refused(&["hammer.csv"]);
+    quietcut(
+        here,
+        &[
+            "frf",
+            "hammer.csv",
+            "--housing",
+            "hammer.csv",
+            "--tip",
+            "hammer.csv",
+        ],
+    )
+    .refused(&["hammer.csv"]);
+}
