@@ -1,6 +1,7 @@
 //! `quietcut identify`: a model of the structure from recordings.
 
 mod answer;
+mod checks;
 mod methods;
 mod records;
 
@@ -109,7 +110,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         Method::Hfrf => methods::hfrf(&args, &recordings)?,
         Method::RestoringForce => records::restoring_force(&args, &recordings)?,
         Method::Ncma => methods::ncma(&args, &recordings)?,
-        Method::Linearity => methods::linearity(&args, &recordings)?,
+        Method::Linearity => checks::linearity(&args, &recordings)?,
     };
     if let Some(path) = &args.out {
         let text = answer.case(path)?;

@@ -14,11 +14,13 @@ pub mod law;
 pub mod linearity;
 pub mod ncma;
 pub mod periodic_fit;
+pub mod reciprocity;
 pub mod response;
 pub mod restoring_force;
 pub mod spectrum;
 pub mod steady;
 pub mod steady_fit;
+pub mod sweep;
 
 #[cfg(test)]
 mod tests;

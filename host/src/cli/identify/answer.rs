@@ -10,7 +10,9 @@ use crate::identify::case_file::{self, Estimate};
 use crate::identify::homogeneity::Region;
 use crate::identify::linearity::Verdict;
 use crate::identify::ncma::Map;
+use crate::identify::reciprocity::Reciprocity;
 use crate::identify::steady_fit::NINETY_PERCENT;
+use crate::identify::sweep::Comparison;
 use crate::structure::Direction;
 
 /// The answer of the verb.
@@ -65,8 +67,20 @@ pub(super) struct Figure {
 }
 
 /// What `--method linearity` finds.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct Linearity {
+    /// True where no check speaks against a linear structure.
+    pub(super) linear: bool,
+    /// Steady tones, by the direction of the force.
+    pub(super) tones: Vec<OfTones>,
+    /// Pairs of sweeps.
+    pub(super) sweeps: Vec<OfSweeps>,
+    pub(super) reciprocity: Vec<Reciprocity>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct OfTones {
+    pub(super) direction: &'static str,
     #[serde(flatten)]
     pub(super) verdict: Verdict,
     /// Of a tone with rising force: regions of X(F), and where it jumps, N.
@@ -74,6 +88,14 @@ pub(super) struct Linearity {
     pub(super) regions: Vec<Region>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) jumps_n: Vec<f64>,
+}
+
+/// Two sweeps that were compared.
+#[derive(Debug, Serialize)]
+pub(super) struct OfSweeps {
+    pub(super) recordings: [PathBuf; 2],
+    #[serde(flatten)]
+    pub(super) comparison: Comparison,
 }
 
 /// Empirical maps: coefficients of a(F), b(F), c(F) in a·(X/F)² + b·(X/F) + c, each from the highest power of F down.

@@ -4,18 +4,17 @@ use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 
-use super::answer::{Answer, Coefficients, Linearity, Maps};
+use super::answer::{Answer, Coefficients, Maps};
 use super::{Args, Error, records};
 use crate::identify::case_file::Estimate;
 use crate::identify::dwell::Dwell;
 use crate::identify::harmonic_balance::Grid;
-use crate::identify::homogeneity::regions;
+use crate::identify::hfrf as higher_order;
 use crate::identify::law::{Extra, Law, Role};
 use crate::identify::ncma::{Curve, Map};
-use crate::identify::steady::{Settling, slowest_decay, steady, windows};
+use crate::identify::steady::{Settling, slowest_decay, steady};
 use crate::identify::steady_fit::{Data, Fit, FitError};
-use crate::identify::{hfrf as higher_order, linearity as linear};
-use crate::recording::{Kind, Recording};
+use crate::recording::Recording;
 use crate::structure::Direction;
 
 /// Steps of one frequency differ by noise only; steps of a test by more than this.
@@ -77,7 +76,7 @@ fn directions(dwells: &[Dwell]) -> Vec<Direction> {
         .collect()
 }
 
-fn settling(args: &Args) -> Settling {
+pub(super) fn settling(args: &Args) -> Settling {
     args.settle_s.map_or(Settling::Half, Settling::Seconds)
 }
 
@@ -265,59 +264,4 @@ fn curves(dwells: &[Dwell]) -> Vec<Curve> {
         curve.points.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
     curves
-}
-
-pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
-    let harmonics = usize::from(args.harmonics).max(3);
-    let (tones, steps): (Vec<_>, Vec<_>) = recordings
-        .iter()
-        .cloned()
-        .partition(|recording| recording.sidecar.kind == Some(Kind::Shaker));
-    let taken = steady(&steps, harmonics, settling(args));
-    let mut dwells = taken.dwells;
-    let mut rising = Vec::new();
-    for tone in &tones {
-        let windows = windows(tone, harmonics, 10.0);
-        rising.extend(windows.iter().filter_map(|dwell| {
-            let force = dwell.force()?;
-            let motion = dwell
-                .motions
-                .iter()
-                .find(|line| line.direction == force.direction)?;
-            Some((force.amplitude(1), motion.amplitude(1)))
-        }));
-        dwells.extend(windows);
-    }
-    let verdict = linear::judge(&dwells).map_err(|error| Error::input(error.to_string()))?;
-    let (regions, jumps_n) = if rising.is_empty() {
-        (Vec::new(), Vec::new())
-    } else {
-        regions(&rising)
-    };
-    let said = if verdict.linear {
-        "linear: the response follows the force at every level".to_owned()
-    } else {
-        let kinds: Vec<&str> = verdict.kinds.iter().map(|kind| kind.name()).collect();
-        format!(
-            "not linear: {}; F/X changes by up to {:.1} % with the level",
-            if kinds.is_empty() {
-                "of no kind that is known".into()
-            } else {
-                kinds.join(" and ")
-            },
-            100.0 * verdict.level_dependence
-        )
-    };
-    Ok(Answer {
-        dwells: Some(dwells.len()),
-        misfit: Some(verdict.linear_misfit),
-        warnings: taken.warnings,
-        said: vec![said],
-        linearity: Some(Linearity {
-            verdict,
-            regions,
-            jumps_n,
-        }),
-        ..Answer::of("linearity", Vec::new(), Vec::new())
-    })
 }

@@ -183,15 +183,15 @@ fn slices(surface: &Surface, share: f64) -> Option<Slices> {
 }
 
 /// Force and motion along one direction.
-struct Along<'a> {
-    direction: Direction,
-    force: Vec<f64>,
-    motion: &'a [f64],
-    quantity: Quantity,
+pub(super) struct Along<'a> {
+    pub(super) direction: Direction,
+    pub(super) force: Vec<f64>,
+    pub(super) motion: &'a [f64],
+    pub(super) quantity: Quantity,
 }
 
 /// The first motion that has a force beside it; where no force was recorded, none acted.
-fn along(recording: &Recording) -> Result<Along<'_>, Error> {
+pub(super) fn along(recording: &Recording) -> Result<Along<'_>, Error> {
     // Displacement first: its derivatives keep what is slow, integrals lose it.
     let order = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
     for quantity in order {

@@ -196,3 +196,108 @@ fn a_tone_of_rising_force_shows_homogeneity() {
     // A damper that grows bends the line over.
     assert!(slopes(&points(&["cubic-damping=3e7"])[10..]) > 1.3);
 }
+
+#[test]
+fn forward_and_backward_sweeps_of_a_linear_rig_agree_and_of_others_do_not() {
+    use crate::identify::sweep::{Spectra, compare};
+    let sweep = |effects: &[&str], ends: [f64; 2], amplitude_n: f64| {
+        // 6 Hz per minute, as in the thesis.
+        let signal = Signal::Sweep {
+            first_hz: ends[0],
+            last_hz: ends[1],
+            amplitude_n,
+            seconds: 50.0,
+        };
+        let rig = Rig {
+            effects: Effects::parse(effects.iter().copied()).unwrap(),
+            measured: vec![Quantity::Displacement],
+            ..Rig::new(Direction::Y, signal, 128.0)
+        };
+        rig.record(&linear(), Path::new("a.csv")).unwrap().0
+    };
+    let noise = Noise {
+        relative: 0.01,
+        ..Noise::default()
+    };
+    let spectra = |recording: &Recording, seed: u64| {
+        let mut noisy = recording.clone();
+        noise.add(&mut noisy, seed);
+        let samples = |name: &str| noisy.channel(name).unwrap().samples.clone();
+        Spectra::new(&samples("fy"), &samples("y"), 128.0)
+    };
+    let (up, down) = ([15.0, 20.0], [20.0, 15.0]);
+    let plain = [sweep(&[], up, 9.0), sweep(&[], down, 9.0), sweep(&[], up, 3.0)];
+    let same: usize = (0..100)
+        .map(|seed| {
+            let [a, b, c] = [0, 1, 2].map(|i| spectra(&plain[i], 3 * seed + i as u64));
+            let both = compare(&a, &b).unwrap().same && compare(&a, &c).unwrap().same;
+            usize::from(both)
+        })
+        .sum();
+    println!("sweeps of a linear rig agree {same} times");
+    assert!(same >= 98, "{same}");
+    for effects in [
+        ["cubic-stiffness=-3e12"],
+        ["cubic-damping=3e6"],
+        ["coulomb-friction=0.8"],
+    ] {
+        let (a, b) = (sweep(&effects, up, 9.0), sweep(&effects, down, 3.0));
+        let found = compare(&spectra(&a, 1), &spectra(&b, 2)).unwrap();
+        println!("{effects:?}: {found:?}");
+        assert!(!found.same, "{effects:?}");
+    }
+    // A softening spring shows in the direction alone.
+    let (a, b) = (
+        sweep(&["cubic-stiffness=-3e12"], up, 9.0),
+        sweep(&["cubic-stiffness=-3e12"], down, 9.0),
+    );
+    let found = compare(&spectra(&a, 1), &spectra(&b, 2)).unwrap();
+    println!("forward and backward: {found:?}");
+    assert!(!found.same);
+}
+
+#[test]
+fn cross_receptances_of_symmetric_matrices_are_reciprocal() {
+    use crate::identify::reciprocity::compare;
+    let record = |asymmetry: f64, seed: u64| -> Vec<Dwell> {
+        let mut structure = case("kuka-kr90-half").structure.unwrap();
+        if let Form::Matrices(m) = &mut structure.form {
+            for matrix in [&mut m.mass, &mut m.damping, &mut m.stiffness] {
+                *matrix = 0.5 * (matrix.clone() + matrix.transpose());
+            }
+            m.stiffness[(0, 1)] += 4e4 + asymmetry;
+            m.stiffness[(1, 0)] += 4e4 - asymmetry;
+        }
+        let frequencies: Vec<f64> = (0..6).map(|k| 16.6 + 0.4 * f64::from(k)).collect();
+        let mut dwells = Vec::new();
+        for (index, direction) in [Direction::X, Direction::Y].into_iter().enumerate() {
+            let rig = Rig {
+                measured: vec![Quantity::Displacement],
+                ..Rig::new(
+                    direction,
+                    Signal::step_sine(&frequencies, &[5.0], 24.0, 1.0),
+                    256.0,
+                )
+            };
+            let mut recording = rig.record(&structure, Path::new("a.csv")).unwrap().0;
+            let noise = Noise {
+                relative: 0.01,
+                ..Noise::default()
+            };
+            noise.add(&mut recording, 2 * seed + index as u64);
+            dwells.extend(stretches(&recording).into_iter().filter_map(|mut stretch| {
+                stretch.from = stretch.to.saturating_sub(1024);
+                Dwell::fit(&recording, stretch, 3)
+            }));
+        }
+        dwells
+    };
+    let directions = [Direction::X, Direction::Y];
+    for seed in 0..10 {
+        let found = compare(&record(0.0, seed), directions).unwrap();
+        assert!(found.reciprocal, "{seed}: {found:?}");
+    }
+    let found = compare(&record(1e4, 1), directions).unwrap();
+    println!("{found:?}");
+    assert!(!found.reciprocal);
+}

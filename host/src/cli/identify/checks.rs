@@ -1,0 +1,187 @@
+//! `--method linearity`: everything that speaks against a linear structure.
+
+use std::path::PathBuf;
+
+use super::answer::{Answer, Linearity, OfSweeps, OfTones};
+use super::methods::settling;
+use super::records::along;
+use super::{Args, Error};
+use crate::identify::dwell::Dwell;
+use crate::identify::homogeneity::regions;
+use crate::identify::linearity::judge;
+use crate::identify::reciprocity;
+use crate::identify::steady::{steady, windows};
+use crate::identify::sweep::{Spectra, compare};
+use crate::recording::{Kind, Quantity, Recording};
+use crate::structure::Direction;
+
+/// Checks tones (by level, harmonics, homogeneity, reciprocity) and sweeps (against each other).
+pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    let harmonics = usize::from(args.harmonics).max(3);
+    let of_kind = |kind| {
+        recordings
+            .iter()
+            .filter(move |recording| recording.sidecar.kind == Some(kind))
+    };
+    let steps: Vec<Recording> = recordings
+        .iter()
+        .filter(|recording| !matches!(recording.sidecar.kind, Some(Kind::Shaker | Kind::Sweep)))
+        .cloned()
+        .collect();
+    let taken = steady(&steps, harmonics, settling(args));
+    let rising: Vec<Dwell> = of_kind(Kind::Shaker)
+        .flat_map(|tone| windows(tone, harmonics, PERIODS))
+        .collect();
+    let sweeps: Vec<&Recording> = of_kind(Kind::Sweep).collect();
+    let mut found = Linearity {
+        sweeps: compare_sweeps(&sweeps)?,
+        ..Linearity::default()
+    };
+    let mut refused = None;
+    for direction in Direction::ALL {
+        let driven = |dwell: &&Dwell| dwell.force().is_some_and(|force| force.direction == direction);
+        let tones: Vec<Dwell> = taken
+            .dwells
+            .iter()
+            .chain(&rising)
+            .filter(driven)
+            .cloned()
+            .collect();
+        if tones.is_empty() {
+            continue;
+        }
+        match judge(&tones) {
+            Ok(verdict) => {
+                let points: Vec<(f64, f64)> = rising.iter().filter(driven).filter_map(response).collect();
+                let (regions, jumps_n) = if points.is_empty() {
+                    (Vec::new(), Vec::new())
+                } else {
+                    regions(&points)
+                };
+                found.tones.push(OfTones {
+                    direction: direction.name(),
+                    verdict,
+                    regions,
+                    jumps_n,
+                });
+            }
+            Err(error) => refused = Some(error),
+        }
+    }
+    for (index, i) in Direction::ALL.into_iter().enumerate() {
+        for j in Direction::ALL.into_iter().skip(index + 1) {
+            found
+                .reciprocity
+                .extend(reciprocity::compare(&taken.dwells, [i, j]));
+        }
+    }
+    if found.tones.is_empty() && found.sweeps.is_empty() && found.reciprocity.is_empty() {
+        let why = refused.map_or_else(
+            || "no steady tones, and no two sweeps with a common band, were found".into(),
+            |error| error.to_string(),
+        );
+        return Err(Error::input(why));
+    }
+    found.linear = found.tones.iter().all(|tones| tones.verdict.linear)
+        && found.sweeps.iter().all(|sweeps| sweeps.comparison.same)
+        && found.reciprocity.iter().all(|pair| pair.reciprocal);
+    Ok(Answer {
+        dwells: Some(taken.dwells.len() + rising.len()),
+        warnings: taken.warnings,
+        said: said(&found),
+        linearity: Some(found),
+        ..Answer::of("linearity", Vec::new(), Vec::new())
+    })
+}
+
+/// Periods of a window of a tone whose force rises.
+const PERIODS: f64 = 10.0;
+
+fn response(dwell: &Dwell) -> Option<(f64, f64)> {
+    let force = dwell.force()?;
+    let motion = dwell
+        .motions
+        .iter()
+        .find(|line| line.direction == force.direction)?;
+    Some((force.amplitude(1), motion.amplitude(1)))
+}
+
+/// Every sweep against the first of its direction and quantity.
+fn compare_sweeps(sweeps: &[&Recording]) -> Result<Vec<OfSweeps>, Error> {
+    let mut known: Vec<((Direction, Quantity), PathBuf, Spectra)> = Vec::new();
+    let mut found = Vec::new();
+    for sweep in sweeps {
+        let record = along(sweep)?;
+        let spectra = Spectra::new(&record.force, record.motion, sweep.sample_rate_hz);
+        let place = (record.direction, record.quantity);
+        match known.iter().find(|(other, ..)| *other == place) {
+            Some((_, path, first)) => {
+                if let Some(comparison) = compare(first, &spectra) {
+                    found.push(OfSweeps {
+                        recordings: [path.clone(), sweep.path.clone()],
+                        comparison,
+                    });
+                }
+            }
+            None => known.push((place, sweep.path.clone(), spectra)),
+        }
+    }
+    Ok(found)
+}
+
+fn said(found: &Linearity) -> Vec<String> {
+    let mut said = Vec::new();
+    for OfTones {
+        direction,
+        verdict,
+        regions,
+        jumps_n,
+    } in &found.tones
+    {
+        said.push(if verdict.linear {
+            format!("{direction}: linear, the response follows the force at every level")
+        } else {
+            let kinds: Vec<&str> = verdict.kinds.iter().map(|kind| kind.name()).collect();
+            let kinds = if kinds.is_empty() {
+                "of no kind that is known".into()
+            } else {
+                kinds.join(" and ")
+            };
+            let change = 100.0 * verdict.level_dependence;
+            format!("{direction}: not linear: {kinds}; F/X changes by up to {change:.1} % with the level")
+        });
+        if regions.len() > 1 {
+            said.push(format!(
+                "{direction}: the response rises in {} regions, with {} jumps",
+                regions.len(),
+                jumps_n.len()
+            ));
+        }
+    }
+    for OfSweeps {
+        recordings,
+        comparison,
+    } in &found.sweeps
+    {
+        let verdict = if comparison.same {
+            "agree"
+        } else {
+            "differ: not linear"
+        };
+        said.push(format!(
+            "sweeps {} and {} {verdict}, by up to {:.2} % of the peak",
+            recordings[0].display(),
+            recordings[1].display(),
+            100.0 * comparison.largest_change
+        ));
+    }
+    for pair in &found.reciprocity {
+        let [i, j] = pair.directions;
+        let verdict = if pair.reciprocal { "are one" } else { "differ" };
+        said.push(format!(
+            "H_{i}{j} and H_{j}{i} {verdict}, by up to {:.2} % of the larger",
+            100.0 * pair.largest_change
+        ));
+    }
+    said
+}

@@ -1,0 +1,157 @@
+//! Receptances of sweeps compared: forward against backward, and level against level.
+//!
+//! The receptance of one record is estimated line by line with the local polynomial method: over 2R + 1 neighbouring lines
+//! Y = H·F + T with H and T parabolas of the frequency, T what starts and ends of the record leave. It does not depend on the
+//! rate or the direction of the sweep, as the ratio at the instantaneous frequency does: of a linear structure two sweeps give
+//! the same H within noise.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+
+/// Lines on either side.
+const R: i64 = 7;
+/// Complex unknowns of a fit.
+const UNKNOWNS: usize = 6;
+
+/// The spectra of force and motion of one record.
+pub struct Spectra {
+    force: Vec<Complex64>,
+    motion: Vec<Complex64>,
+    /// Hz per line.
+    spacing_hz: f64,
+}
+
+/// How two records compare.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Comparison {
+    /// Mean square of the difference of the two receptances over its variance: about 1 to 3 of a linear structure.
+    pub misfit: f64,
+    /// The largest difference as a share of the largest receptance.
+    pub largest_change: f64,
+    /// True where nothing speaks against one linear structure.
+    pub same: bool,
+}
+
+/// A local estimate.
+struct Local {
+    h: Complex64,
+    /// Variance of one line of the motion.
+    noise: f64,
+    /// Variance of H over that.
+    gain: f64,
+}
+
+/// Above this misfit two records are not those of one linear structure. The misfit of a linear one scatters to about 5: its
+/// variances come from nine degrees of freedom a line and leave the noise of the force out.
+const MISFIT: f64 = 20.0;
+/// And differences below this share of the peak are nothing that a sweep can be relied on for.
+const CHANGE: f64 = 0.005;
+
+impl Spectra {
+    /// The spectra of force (N) and displacement, velocity or acceleration, at `rate_hz`.
+    pub fn new(force: &[f64], motion: &[f64], rate_hz: f64) -> Self {
+        let mut planner = FftPlanner::new();
+        let plan = planner.plan_fft_forward(force.len());
+        let transform = |samples: &[f64]| {
+            let mut line: Vec<Complex64> = samples.iter().map(|x| Complex64::new(*x, 0.0)).collect();
+            plan.process(&mut line);
+            line.truncate(samples.len() / 2);
+            line
+        };
+        Self {
+            force: transform(force),
+            motion: transform(motion),
+            spacing_hz: rate_hz / force.len() as f64,
+        }
+    }
+
+    /// From and to which frequency the force has its power: where it is above a tenth of its largest, smoothed.
+    fn band_hz(&self) -> Option<[f64; 2]> {
+        let width = (2 * R + 1) as usize;
+        let power: Vec<f64> = self
+            .force
+            .chunks(width)
+            .map(|lines| lines.iter().map(Complex64::norm_sqr).sum())
+            .collect();
+        let largest = power.iter().copied().fold(0.0, f64::max);
+        let strong = |power: &f64| *power > 0.1 * largest;
+        let (first, last) = (power.iter().position(strong)?, power.iter().rposition(strong)?);
+        let hertz = |chunk: usize| (chunk * width) as f64 * self.spacing_hz;
+        Some([hertz(first + 1), hertz(last)])
+    }
+
+    fn local(&self, frequency_hz: f64) -> Option<Local> {
+        let center = (frequency_hz / self.spacing_hz).round() as i64;
+        if center <= R || center + R >= self.force.len() as i64 {
+            return None;
+        }
+        let rows = (2 * R + 1) as usize;
+        let lines = |k: i64| (center + k) as usize;
+        let size = (-R..=R)
+            .map(|k| self.force[lines(k)].norm_sqr())
+            .sum::<f64>()
+            .sqrt();
+        if size <= 0.0 {
+            return None;
+        }
+        let matrix = DMatrix::from_fn(rows, UNKNOWNS, |row, column| {
+            let k = row as i64 - R;
+            let power = (k as f64 / R as f64).powi((column % 3) as i32);
+            if column < 3 {
+                self.force[lines(k)] * (power / size)
+            } else {
+                Complex64::new(power, 0.0)
+            }
+        });
+        let right = DVector::from_fn(rows, |row, _| self.motion[lines(row as i64 - R)]);
+        let normal = matrix.adjoint() * &matrix;
+        let inverse = normal.try_inverse()?;
+        let solution = &inverse * matrix.adjoint() * &right;
+        let left = (&right - &matrix * &solution).norm_squared();
+        let off = (frequency_hz / self.spacing_hz - center as f64) / R as f64;
+        Some(Local {
+            h: (solution[0] + solution[1] * off + solution[2] * (off * off)) / size,
+            noise: left / (rows - UNKNOWNS) as f64,
+            gain: inverse[(0, 0)].re / (size * size),
+        })
+    }
+}
+
+/// Compares two records of one force direction and one motion; `None` where their bands do not overlap by ten estimates.
+pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
+    let (of_a, of_b) = (a.band_hz()?, b.band_hz()?);
+    let (low, high) = (of_a[0].max(of_b[0]), of_a[1].min(of_b[1]));
+    let step = (2 * R + 1) as f64 * a.spacing_hz.max(b.spacing_hz);
+    let count = ((high - low) / step).floor();
+    if count.is_nan() || count < 10.0 {
+        return None;
+    }
+    let pairs: Vec<(Local, Local)> = (0..=count as usize)
+        .filter_map(|k| {
+            let frequency = low + step * k as f64;
+            Some((a.local(frequency)?, b.local(frequency)?))
+        })
+        .collect();
+    // The noise of a sensor is the same at all lines; what a nonlinear structure adds near resonance is not noise.
+    let median = |of: &dyn Fn(&(Local, Local)) -> f64| {
+        let mut values: Vec<f64> = pairs.iter().map(of).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    };
+    let noise = [median(&|pair| pair.0.noise), median(&|pair| pair.1.noise)];
+    let (mut sum, mut change, mut largest) = (0.0, 0.0_f64, 0.0_f64);
+    for (a, b) in &pairs {
+        let difference = (a.h - b.h).norm();
+        sum += difference * difference / (noise[0] * a.gain + noise[1] * b.gain).max(f64::MIN_POSITIVE);
+        change = change.max(difference);
+        largest = largest.max(a.h.norm());
+    }
+    let misfit = sum / pairs.len() as f64;
+    let largest_change = change / largest;
+    Some(Comparison {
+        misfit,
+        largest_change,
+        same: misfit < MISFIT || largest_change < CHANGE,
+    })
+}
