@@ -10,9 +10,9 @@ use serde::Serialize;
 use super::forced::ForcedProblem;
 use super::orbit::{Mesh, Orbit, OrbitError, PIECE_ANGLE, Scale, pass};
 use super::variation;
-use crate::stability::collocation;
 use crate::stability::multiplier::{Kind, chatter_hz};
 use crate::stability::period::Period;
+use crate::stability::period_map;
 use crate::stability::{Limit, SpeedLine, Switch};
 
 /// The longest step, as a share of the last depth (or of the size of the orbit there).
@@ -111,7 +111,7 @@ pub(super) fn multiplier_at(
         let sample = follower.up_to(depth_mm * 1e-3)?;
         let depth_m = sample.orbit.depth_m;
         let multiplier =
-            collocation::dominant(&sample.period, depth_m).ok_or(OrbitError::Singular { depth_mm })?;
+            period_map::dominant(&sample.period, depth_m).ok_or(OrbitError::Singular { depth_mm })?;
         let multiplier = Complex64::new(multiplier.re, multiplier.im.abs());
         let linear = &problem.linear;
         Ok(Dominant {
@@ -274,7 +274,7 @@ impl<'a> Follower<'a> {
         let depth_mm = orbit.depth_m * 1e3;
         let singular = OrbitError::Singular { depth_mm };
         let period = variation::about(self.problem, &self.mesh, &orbit).ok_or(singular)?;
-        let all = collocation::multipliers(&period, orbit.depth_m).ok_or(singular)?;
+        let all = period_map::multipliers(&period, orbit.depth_m).ok_or(singular)?;
         let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
         let roots = all
             .into_iter()

@@ -1,6 +1,5 @@
-//! Collocation of the one-period map: all multipliers at one speed and depth at once.
+//! The default method: collocation of the one-period map, limits and exact multipliers from the characteristic matrix.
 
-use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::cells::{Cell, cells_of};
@@ -8,12 +7,12 @@ use super::characteristic::{Characteristic, Crossing, Workspace};
 use super::line::{SpeedLine, line};
 use super::method::Method;
 use super::multiplier::chatter_hz;
-use super::period::{Period, Resolution};
+use super::period::{Period, Resolution, check_length};
+use super::period_map;
 use super::point::{Point, point};
 use super::root::Root;
 use super::spectrum::Spectrum;
 use super::{Problem, StabilityError};
-use crate::eigenvalues::eigenvalues;
 
 /// The default method: collocation of the one-period map, limits from the characteristic matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +35,8 @@ impl Method for Collocation {
     }
 
     fn cells(&self, rpm: f64, depths_mm: &[f64]) -> Result<Vec<Cell>, StabilityError> {
+        let deepest_mm = depths_mm.iter().copied().fold(0.0, f64::max);
+        check_length(&self.problem, rpm, deepest_mm)?;
         cells_of(rpm, depths_mm, |deepest_m| {
             Collocated::new(&self.problem, rpm, deepest_m)
         })
@@ -73,7 +74,7 @@ impl<'a> Collocated<'a> {
 
 impl Spectrum for Collocated<'_> {
     fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
-        multipliers(&self.coarse, depth_m)
+        period_map::multipliers(&self.coarse, depth_m)
     }
 
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64> {
@@ -99,56 +100,4 @@ impl Spectrum for Collocated<'_> {
         let Crossing { multiplier, depth_m } = *crossing;
         chatter_hz(self.problem, self.rpm, &self.period, multiplier, depth_m)
     }
-}
-
-/// The matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at a depth, m.
-///
-/// p are the displacements along the chip normal at the collocation nodes while teeth cut. `None` where a depth is so
-/// large that the collocation equations are singular.
-pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
-    let order = period.order();
-    let history: usize = period.elements.iter().map(|element| element.kernel.nrows()).sum();
-    let size = order + history;
-    let mut map = DMatrix::zeros(size, size);
-    let mut state = DMatrix::zeros(order, size);
-    state.view_mut((0, 0), (order, order)).fill_with_identity();
-    let mut first = order;
-    for element in &period.elements {
-        let ports = element.kernel.nrows();
-        // p − w Q p = E x − w Q p_τ
-        let weighted = &element.kernel * depth_m;
-        let implicit = DMatrix::identity(ports, ports) - &weighted;
-        // Chips of later elements are not in it yet.
-        let known = first + ports;
-        let mut seen = &element.observe * state.columns(0, known);
-        let mut past = seen.columns_mut(first, ports);
-        past -= &weighted;
-        if !implicit.lu().solve_mut(&mut seen) {
-            return None;
-        }
-        map.view_mut((first, 0), (ports, known)).copy_from(&seen);
-        for port in 0..ports {
-            seen[(port, first + port)] -= 1.0;
-        }
-        let mut next = &element.flow * state.columns(0, known);
-        next.gemm(depth_m, &element.drive, &seen, 1.0);
-        state.columns_mut(0, known).copy_from(&next);
-        first = known;
-    }
-    map.rows_mut(0, order).copy_from(&(&period.flight * state));
-    Some(map)
-}
-
-/// All multipliers of the collocated map, largest first; those of the history that have no physical meaning are near
-/// zero.
-pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
-    let map = monodromy(period, depth_m)?;
-    let mut multipliers = eigenvalues(map)?;
-    multipliers.sort_by(|p, q| q.norm_sqr().total_cmp(&p.norm_sqr()).then(q.im.total_cmp(&p.im)));
-    Some(multipliers)
-}
-
-/// The largest multiplier; of a pair the one above the real axis.
-pub(crate) fn dominant(period: &Period, depth_m: f64) -> Option<Complex64> {
-    multipliers(period, depth_m)?.first().copied()
 }

@@ -22,6 +22,9 @@ const LOOK: usize = 10;
 /// Residual ‖M v − μ v‖ with ‖v‖ = 1 below which an eigenvalue is taken: rounding in a map of some hundred steps.
 const RESIDUAL: f64 = 1e-11;
 
+/// The same where Newton goes on from there.
+const ROUGH: f64 = 1e-7;
+
 /// A linear map of ℝⁿ.
 pub(super) trait LinearMap {
     /// n.
@@ -48,7 +51,9 @@ impl Dominant {
         // Beyond half the size the whole matrix is cheaper.
         let most = map.size() / 2;
         if map.size() > WHOLE
-            && let Some(found) = arnoldi(map, least, most)
+            && let Some(found) = arnoldi(map, most, RESIDUAL, &|values| {
+                values.retain(|value| value.norm() > least);
+            })
         {
             return Some(found);
         }
@@ -82,8 +87,25 @@ impl Dominant {
     }
 }
 
-/// Block Arnoldi with full orthogonalization; `None` where the space would have to grow beyond `most`.
-fn arnoldi(map: &impl LinearMap, least: f64, most: usize) -> Option<Dominant> {
+/// The eigenvalues within `share` of the largest, largest first, to a relative residual of about 1e-7: to begin Newton with.
+///
+/// `None` where block Arnoldi does not settle in a space of half the size, or nothing finite comes out.
+pub(super) fn largest(map: &impl LinearMap, share: f64) -> Option<Vec<Complex64>> {
+    let found = arnoldi(map, map.size() / 2, ROUGH, &|values| {
+        let largest = values.first().map_or(0.0, |value| value.norm());
+        values.retain(|value| value.norm() >= share * largest);
+    })?;
+    Some(found.eigenvalues)
+}
+
+/// Block Arnoldi with full orthogonalization until those eigenvalues are settled that `keep` keeps of all of them, largest
+/// first; `None` where the space would have to grow beyond `most`.
+fn arnoldi(
+    map: &impl LinearMap,
+    most: usize,
+    residual: f64,
+    keep: &dyn Fn(&mut Vec<Complex64>),
+) -> Option<Dominant> {
     let size = map.size();
     // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
     let mut basis = DMatrix::zeros(size, most + BLOCK);
@@ -112,8 +134,9 @@ fn arnoldi(map: &impl LinearMap, least: f64, most: usize) -> Option<Dominant> {
         basis.columns_mut(end, next.ncols()).copy_from(&next);
         if next.ncols() == 0 || count % LOOK == 0 {
             let within = projected.view((0, 0), (end, end)).into_owned();
-            let eigenvalues = larger(&within, least)?;
-            if are_settled(&within, &coupling, &eigenvalues) {
+            let mut eigenvalues = larger(&within, 0.0)?;
+            keep(&mut eigenvalues);
+            if are_settled(&within, &coupling, &eigenvalues, residual) {
                 return Some(Dominant {
                     eigenvalues,
                     basis: Some(basis.columns(0, end).into_owned()),
@@ -127,14 +150,19 @@ fn arnoldi(map: &impl LinearMap, least: f64, most: usize) -> Option<Dominant> {
 }
 
 /// True where ‖K y‖ is small for the last part y of every eigenvector: the residual of M at μ.
-fn are_settled(projected: &DMatrix<f64>, coupling: &DMatrix<f64>, eigenvalues: &[Complex64]) -> bool {
+fn are_settled(
+    projected: &DMatrix<f64>,
+    coupling: &DMatrix<f64>,
+    eigenvalues: &[Complex64],
+    residual: f64,
+) -> bool {
     let complex = projected.map(Complex64::from);
     let coupling = coupling.map(Complex64::from);
     let width = coupling.ncols();
     eigenvalues.iter().filter(|value| value.im >= 0.0).all(|&value| {
         eigenvector(&complex, value).is_some_and(|vector| {
             let last = vector.rows(vector.len() - width, width);
-            (&coupling * last).norm() < RESIDUAL * value.norm().max(1.0)
+            (&coupling * last).norm() < residual * value.norm().max(1.0)
         })
     })
 }

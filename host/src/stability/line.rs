@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::characteristic::Crossing;
 use super::collocation::Collocated;
 use super::multiplier::Kind;
+use super::period::check_length;
 use super::point::{check_depth, check_speed};
 use super::root::Root;
 use super::spectrum::Spectrum;
@@ -81,6 +82,7 @@ pub struct SpeedLine {
 /// # Errors
 /// Speed or depth out of range, or a computation that leaves the range of numbers.
 pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+    check_length(problem, rpm, depth_mm)?;
     line_of(rpm, depth_mm, samples, |deepest_m| {
         Collocated::new(problem, rpm, deepest_m)
     })

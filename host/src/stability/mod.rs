@@ -20,6 +20,7 @@ pub(crate) mod multiplier;
 mod one_period;
 mod passages;
 pub(crate) mod period;
+pub(crate) mod period_map;
 mod pitched;
 mod point;
 mod problem;
@@ -56,6 +57,8 @@ mod agreement;
 mod cells_tests;
 #[cfg(test)]
 mod properties;
+#[cfg(test)]
+mod random_tests;
 #[cfg(test)]
 mod sensitivity_tests;
 #[cfg(test)]

@@ -14,11 +14,11 @@
 
 use nalgebra::DMatrix;
 
-use super::Problem;
 use super::element::Step;
 pub(crate) use super::element::{Element, Port};
 use super::exponential::Exponential;
 use super::gauss::Gauss;
+use super::{Problem, StabilityError};
 
 /// How finely a period is cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +52,26 @@ pub(super) const DECAY_MAX: f64 = 5.0;
 
 /// The most nodes of an element.
 const NODES_MAX: u32 = 40;
+
+/// The most elements of the working resolution that a period may have: of five radians each, some thousand vibrations.
+const ELEMENTS_MAX: f64 = 4000.0;
+
+/// Refuses a speed and depth, mm, at which the motion turns too often in a tooth period to be followed.
+///
+/// # Errors
+/// [`StabilityError::BrokeDown`] with the reason. Speeds and depths that are none pass: others refuse them.
+pub(super) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<(), StabilityError> {
+    let rate = Rates::new(problem).at(2e-3 * depth_mm) + problem.fastest_decay();
+    if rate * problem.tooth_period_s(rpm) > ELEMENTS_MAX * Resolution::WORKING.angle {
+        return Err(StabilityError::BrokeDown {
+            rpm,
+            depth_mm,
+            what: "the structure vibrates more often in a tooth period than can be followed; \
+                   a higher speed or a smaller depth is needed",
+        });
+    }
+    Ok(())
+}
 
 /// One tooth period at one speed.
 #[derive(Clone, Debug)]
@@ -92,6 +112,11 @@ impl Period {
             }
         }
         Self { elements, flight }
+    }
+
+    /// Number of ports of all elements.
+    pub(crate) fn ports(&self) -> usize {
+        self.elements.iter().map(|element| element.kernel.nrows()).sum()
     }
 
     /// Number of states.

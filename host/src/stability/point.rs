@@ -4,14 +4,20 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::characteristic::Characteristic;
-use super::collocation;
 use super::multiplier::{Kind, Verdict, chatter_hz};
-use super::period::{Period, Resolution};
+use super::period::{Period, Resolution, check_length};
+use super::period_map;
 use super::{Problem, StabilityError};
 
 /// The least error that is ever stated, relative to max(1, |μ|): what has been checked against independent
 /// computations. Collocation itself settles at 1e-10 and below.
 pub const LEAST_ERROR: f64 = 1e-7;
+
+/// Multipliers within this share of the largest at a coarse resolution may be the largest at a finer one.
+const RIVAL: f64 = 0.9;
+
+/// How many times the depth |w (1 − 1/μ)| may be for Newton: multipliers below about a twentieth are found among all.
+const KAPPA_MAX: f64 = 20.0;
 
 /// What is known of one working point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -46,15 +52,14 @@ fn as_pair<S: serde::Serializer>(value: &Complex64, serializer: S) -> Result<S::
 pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
     check_speed(rpm)?;
     check_depth(depth_mm)?;
+    check_length(problem, rpm, depth_mm)?;
     let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
     let depth_m = depth_mm * 1e-3;
-    // |w (1 − 1/μ)| is about twice the depth for the multipliers that matter, those near the unit circle.
-    let period = Period::new(problem, rpm, 2.0 * depth_m, Resolution::WORKING);
-    let coarse = collocation::dominant(&period, depth_m)
-        .ok_or_else(|| broke_down("the collocation equations have no finite solution"))?;
-    let finer = Period::new(problem, rpm, 2.0 * depth_m, Resolution::FINE);
-    let fine = nearest(&finer, coarse, depth_m)
-        .ok_or_else(|| broke_down("a finer collocation has no multiplier near the one found"))?;
+    let (coarse, fine, period) = coarse_and_fine(problem, rpm, depth_m).ok_or_else(|| {
+        broke_down(
+            "the collocation equations have no finite solution, or none on which two resolutions agree",
+        )
+    })?;
     let multiplier = Complex64::new(fine.re, fine.im.abs());
     let multiplier_abs = multiplier.norm();
     let error = (10.0 * (coarse - fine).norm()).max(LEAST_ERROR * multiplier_abs.max(1.0));
@@ -66,26 +71,49 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, Stabil
         error,
         verdict: Verdict::of(multiplier_abs, error),
         kind: Kind::of(multiplier),
-        chatter_hz: chatter_hz(problem, rpm, &finer, multiplier, depth_m),
+        chatter_hz: chatter_hz(problem, rpm, &period, multiplier, depth_m),
     })
 }
 
-/// The multiplier of a finer collocation that belongs to a coarse one: by Newton, else among all.
-fn nearest(period: &Period, coarse: Complex64, depth_m: f64) -> Option<Complex64> {
-    let characteristic = Characteristic::new(period, 2.0 * depth_m);
-    let reach = 0.05 * coarse.norm();
-    // The radius of the polynomials: small multipliers lie outside, and are found among all instead.
-    let inside = coarse.norm() > 0.5;
-    let newton = if inside {
-        characteristic.multiplier_near(coarse, depth_m, reach, &mut characteristic.workspace())
-    } else {
-        None
-    };
-    newton.or_else(|| {
-        collocation::multipliers(period, depth_m)?
-            .into_iter()
-            .min_by(|p, q| (p - coarse).norm().total_cmp(&(q - coarse).norm()))
-    })
+/// The dominant multiplier at the working and at a finer resolution, and the period at the former.
+fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64) -> Option<(Complex64, Complex64, Period)> {
+    let scan = Period::new(problem, rpm, 2.0 * depth_m, Resolution::SCAN);
+    let rough: Vec<Complex64> = period_map::largest(&scan, depth_m, RIVAL)?
+        .into_iter()
+        .filter(|multiplier| multiplier.im >= 0.0)
+        .collect();
+    // The complex depth w (1 − 1/μ) of the smallest of them; for those near the unit circle it is about twice the depth.
+    let kappa_m = rough
+        .iter()
+        .map(|multiplier| (Complex64::ONE - multiplier.inv()).norm() * depth_m)
+        .fold(2.0 * depth_m, f64::max);
+    let period_at = |resolution| Period::new(problem, rpm, kappa_m.min(KAPPA_MAX * depth_m), resolution);
+    let working = period_at(Resolution::WORKING);
+    let finer = period_at(Resolution::FINE);
+    if kappa_m <= KAPPA_MAX * depth_m
+        && let Some(coarse) = dominant_of(&working, kappa_m, depth_m, &rough)
+        && let Some(fine) = dominant_of(&finer, kappa_m, depth_m, &[coarse])
+    {
+        return Some((coarse, fine, working));
+    }
+    let coarse = *period_map::largest(&working, depth_m, 1.0)?.first()?;
+    let fine = period_map::largest(&finer, depth_m, RIVAL)?
+        .into_iter()
+        .min_by(|p, q| (p - coarse).norm().total_cmp(&(q - coarse).norm()))?;
+    Some((coarse, fine, working))
+}
+
+/// The largest of the multipliers near guesses, by Newton; `None` where one of them leads nowhere.
+fn dominant_of(period: &Period, kappa_m: f64, depth_m: f64, guesses: &[Complex64]) -> Option<Complex64> {
+    let characteristic = Characteristic::new(period, kappa_m);
+    let mut work = characteristic.workspace();
+    let found: Option<Vec<Complex64>> = guesses
+        .iter()
+        .map(|&guess| characteristic.multiplier_near(guess, depth_m, 0.05 * guess.norm(), &mut work))
+        .collect();
+    found?
+        .into_iter()
+        .max_by(|p, q| p.norm_sqr().total_cmp(&q.norm_sqr()))
 }
 
 pub(super) fn check_speed(rpm: f64) -> Result<(), StabilityError> {

@@ -234,7 +234,7 @@ fn the_collocated_map_and_the_characteristic_matrix_have_the_same_multipliers() 
         let period = Period::new(&problem, rpm, 2.0 * depth_m, Resolution::WORKING);
         let characteristic = Characteristic::new(&period, 2.0 * depth_m);
         let mut work = characteristic.workspace();
-        let all = collocation::multipliers(&period, depth_m).unwrap();
+        let all = period_map::multipliers(&period, depth_m).unwrap();
         for multiplier in all.iter().take_while(|multiplier| multiplier.norm() > 0.5) {
             let polished = characteristic
                 .multiplier_near(*multiplier, depth_m, 0.1, &mut work)
@@ -414,7 +414,7 @@ fn the_dominant_multiplier_is_the_growth_rate_of_the_map() {
     let problem = problem("insperger-2dof-ad0.5");
     for (rpm, depth_m) in [(5000.0, 0.5e-3), (7500.0, 2e-3), (12_345.0, 4e-3)] {
         let period = Period::new(&problem, rpm, depth_m, Resolution::WORKING);
-        let map = collocation::monodromy(&period, depth_m).unwrap();
+        let map = period_map::monodromy(&period, depth_m).unwrap();
         let mut vector = DVector::from_fn(map.nrows(), |i, _| 1.0 + (i as f64 * 0.37).sin());
         let mut growth = 0.0;
         const TURNS: i32 = 400;
@@ -424,7 +424,7 @@ fn the_dominant_multiplier_is_the_growth_rate_of_the_map() {
             growth += norm.ln();
             vector /= norm;
         }
-        let dominant = collocation::dominant(&period, depth_m).unwrap().norm();
+        let dominant = period_map::dominant(&period, depth_m).unwrap().norm();
         // The start vector and the turning of a complex pair count for a few units over 400 turns.
         assert!(
             (growth / f64::from(TURNS) - dominant.ln()).abs() < 0.02,
@@ -524,7 +524,7 @@ fn lines_of_random_machines_agree_with_multipliers_at_single_depths() {
         for _ in 0..8 {
             let depth = rng.random_range(0.0..depth_mm);
             let period = Period::new(&problem, rpm, depth * 2e-3, Resolution::WORKING);
-            let dominant = collocation::dominant(&period, depth * 1e-3).unwrap().norm();
+            let dominant = period_map::dominant(&period, depth * 1e-3).unwrap().norm();
             let stable = line
                 .stable_mm
                 .iter()

@@ -1,0 +1,139 @@
+//! The collocated map over one tooth period: many multipliers at one speed and depth at once.
+
+use nalgebra::linalg::LU;
+use nalgebra::{DMatrix, Dyn};
+use num_complex::Complex64;
+
+use super::krylov::{self, LinearMap};
+use super::period::Period;
+use crate::eigenvalues::eigenvalues;
+
+/// Up to this size all eigenvalues of the map are computed from its matrix: it is as fast.
+const WHOLE: usize = 110;
+
+/// The largest map of which all eigenvalues are computed; they cost about 10 n³ operations, some ten seconds.
+const WHOLE_MAX: usize = 1200;
+
+/// The matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at a depth, m.
+///
+/// p are the displacements along the chip normal at the collocation nodes while teeth cut. `None` where a depth is so
+/// large that the collocation equations are singular.
+pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
+    let order = period.order();
+    let size = order + period.ports();
+    let mut map = DMatrix::zeros(size, size);
+    let mut state = DMatrix::zeros(order, size);
+    state.view_mut((0, 0), (order, order)).fill_with_identity();
+    let mut first = order;
+    for element in &period.elements {
+        let ports = element.kernel.nrows();
+        // p − w Q p = E x − w Q p_τ
+        let weighted = &element.kernel * depth_m;
+        let implicit = DMatrix::identity(ports, ports) - &weighted;
+        // Chips of later elements are not in it yet.
+        let known = first + ports;
+        let mut seen = &element.observe * state.columns(0, known);
+        let mut past = seen.columns_mut(first, ports);
+        past -= &weighted;
+        if !implicit.lu().solve_mut(&mut seen) {
+            return None;
+        }
+        map.view_mut((first, 0), (ports, known)).copy_from(&seen);
+        for port in 0..ports {
+            seen[(port, first + port)] -= 1.0;
+        }
+        let mut next = &element.flow * state.columns(0, known);
+        next.gemm(depth_m, &element.drive, &seen, 1.0);
+        state.columns_mut(0, known).copy_from(&next);
+        first = known;
+    }
+    map.rows_mut(0, order).copy_from(&(&period.flight * state));
+    Some(map)
+}
+
+/// All multipliers of the collocated map, largest first; those of the history that have no physical meaning are near
+/// zero.
+pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
+    let map = monodromy(period, depth_m)?;
+    let mut multipliers = eigenvalues(map)?;
+    multipliers.sort_by(|p, q| q.norm_sqr().total_cmp(&p.norm_sqr()).then(q.im.total_cmp(&p.im)));
+    Some(multipliers)
+}
+
+/// The largest multiplier; of a pair the one above the real axis.
+pub(crate) fn dominant(period: &Period, depth_m: f64) -> Option<Complex64> {
+    multipliers(period, depth_m)?.first().copied()
+}
+
+/// The multipliers within `share` of the largest, largest first, to begin Newton with.
+///
+/// Of large maps by block Arnoldi. `None` where nothing finite comes out, or where that does not settle and the map is too
+/// large for all eigenvalues.
+pub(super) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Vec<Complex64>> {
+    let size = period.order() + period.ports();
+    if size > WHOLE
+        && let Some(found) = krylov::largest(&Map::new(period, depth_m)?, share)
+    {
+        return Some(found);
+    }
+    if size > WHOLE_MAX {
+        return None;
+    }
+    let mut all = multipliers(period, depth_m)?;
+    let least = share * all.first()?.norm();
+    all.retain(|multiplier| multiplier.norm() >= least);
+    Some(all)
+}
+
+/// The map (x, p_τ) → (x⁺, p) by what it does, element by element.
+struct Map<'a> {
+    period: &'a Period,
+    depth_m: f64,
+    /// I − w Q of each element.
+    implicit: Vec<LU<f64, Dyn, Dyn>>,
+}
+
+impl<'a> Map<'a> {
+    fn new(period: &'a Period, depth_m: f64) -> Option<Self> {
+        let implicit = period.elements.iter().map(|element| {
+            let ports = element.kernel.nrows();
+            let lu = (DMatrix::identity(ports, ports) - &element.kernel * depth_m).lu();
+            lu.is_invertible().then_some(lu)
+        });
+        Some(Self {
+            implicit: implicit.collect::<Option<_>>()?,
+            period,
+            depth_m,
+        })
+    }
+}
+
+impl LinearMap for Map<'_> {
+    fn size(&self) -> usize {
+        self.period.order() + self.period.ports()
+    }
+
+    fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let order = self.period.order();
+        let mut out = DMatrix::zeros(columns.nrows(), columns.ncols());
+        let mut state = columns.rows(0, order).into_owned();
+        let mut first = order;
+        for (element, implicit) in self.period.elements.iter().zip(&self.implicit) {
+            let ports = element.kernel.nrows();
+            let past = columns.rows(first, ports);
+            let mut seen = &element.observe * &state;
+            seen.gemm(-self.depth_m, &element.kernel, &past, 1.0);
+            if !implicit.solve_mut(&mut seen) {
+                return None;
+            }
+            out.rows_mut(first, ports).copy_from(&seen);
+            seen -= past;
+            let mut next = &element.flow * &state;
+            next.gemm(self.depth_m, &element.drive, &seen, 1.0);
+            state = next;
+            first += ports;
+        }
+        out.rows_mut(0, order).copy_from(&(&self.period.flight * state));
+        out.iter().all(|entry| entry.is_finite()).then_some(out)
+    }
+}
