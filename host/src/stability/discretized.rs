@@ -60,6 +60,22 @@ pub(super) fn with_dominant<D: Discretization, T>(
     answer(&dominant, &map).ok_or_else(broke_down)
 }
 
+#[expect(private_bounds, reason = "sealed: discretizations are those of this module")]
+impl<D: Discretization> Discretized<D> {
+    /// The dominant multiplier of the steps asked for, without an estimate of its error: a seventh of the work of
+    /// [`point()`](Method::point).
+    ///
+    /// # Errors
+    /// As [`Method::point`].
+    pub fn multiplier(&self, rpm: f64, depth_mm: f64) -> Result<Complex64, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        with_dominant(self, rpm, depth_mm, self.steps, |dominant, _| {
+            dominant.eigenvalues.first().copied()
+        })
+    }
+}
+
 impl<D: Discretization> Method for Discretized<D> {
     fn name(&self) -> &'static str {
         self.discretization.name()
