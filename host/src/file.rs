@@ -70,6 +70,14 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
     Ok(())
 }
 
+/// What stands behind the last dot of a file's name, in lower case; empty where there is none.
+pub fn ending(path: &Path) -> String {
+    path.extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase()
+}
+
 /// A new file beside `path`, on the same file system, so that renaming it is atomic.
 fn aside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
@@ -103,6 +111,18 @@ mod tests {
         assert!(matches!(failed, Err(FileError::Write { .. })));
         assert_eq!(read(&path).unwrap(), b"old");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn endings_are_in_lower_case_and_empty_where_there_is_none() {
+        for (name, expected) in [
+            ("a/b.CSV", "csv"),
+            ("a.b/c", ""),
+            ("t.tar.Gz", "gz"),
+            (".svg", ""),
+        ] {
+            assert_eq!(ending(Path::new(name)), expected, "{name}");
+        }
     }
 
     #[test]

@@ -112,11 +112,7 @@ enum Form {
 impl Target {
     fn parse(text: &str) -> Result<Self, String> {
         let path = PathBuf::from(text);
-        let ending = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .to_lowercase();
+        let ending = file::ending(&path);
         let form = match ending.as_str() {
             "csv" => Form::Csv,
             "uff" | "unv" => Form::Uff,

@@ -221,14 +221,11 @@ fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
 }
 
 fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, path: &Path) -> Result<(), Error> {
-    let ending = path
-        .extension()
-        .map(|ending| ending.to_string_lossy().to_lowercase());
-    let text = match ending.as_deref() {
-        Some("json") => serde_json::to_string(chart).map_err(Error::other)?,
-        Some("csv") => as_csv(chart)?,
-        Some("svg") => picture(case, chart, depth_mm)?,
-        Some("html") => as_page(case, chart, depth_mm)?,
+    let text = match file::ending(path).as_str() {
+        "json" => serde_json::to_string(chart).map_err(Error::other)?,
+        "csv" => as_csv(chart)?,
+        "svg" => picture(case, chart, depth_mm)?,
+        "html" => as_page(case, chart, depth_mm)?,
         _ => {
             return Err(Error::input(format!(
                 "{}: the ending says what to write; .svg, .html, .csv or .json is needed",

@@ -46,14 +46,11 @@ fn in_words(chart: &CellChart) -> String {
 }
 
 fn write(case: &Case, chart: &CellChart, path: &Path) -> Result<(), Error> {
-    let ending = path
-        .extension()
-        .map(|ending| ending.to_string_lossy().to_lowercase());
-    let text = match ending.as_deref() {
-        Some("json") => serde_json::to_string(chart).map_err(Error::other)?,
-        Some("csv") => as_csv(chart)?,
-        Some("svg") => picture(case, chart)?,
-        Some("html") => {
+    let text = match file::ending(path).as_str() {
+        "json" => serde_json::to_string(chart).map_err(Error::other)?,
+        "csv" => as_csv(chart)?,
+        "svg" => picture(case, chart)?,
+        "html" => {
             let caption = format!(
                 "Size of the dominant multiplier over one tooth period. {}. Line: where it is 1.",
                 in_words(chart)

@@ -3,7 +3,6 @@
 use super::branch::{Extent, follow_depth, multiplier_at};
 use super::forced::ForcedProblem;
 use super::orbit::OrbitError;
-use crate::stability::multiplier::{Kind, Verdict};
 use crate::stability::{LEAST_ERROR, Method, Point, SpeedLine, StabilityError};
 
 /// Multipliers about the forced orbit at the feed of the case, followed from depth 0.
@@ -16,20 +15,11 @@ impl Method for ForcedProblem {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
         let fail = |cause| broke_down(rpm, depth_mm, cause);
         let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;
-        let multiplier_abs = fine.multiplier.norm();
+        let multiplier = fine.multiplier;
         // The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
         let error =
-            (10.0 * (coarse.multiplier - fine.multiplier).norm()).max(LEAST_ERROR * multiplier_abs.max(1.0));
-        Ok(Point {
-            rpm,
-            depth_mm,
-            multiplier: fine.multiplier,
-            multiplier_abs,
-            error,
-            verdict: Verdict::of(multiplier_abs, error),
-            kind: Kind::of(fine.multiplier),
-            chatter_hz: fine.chatter_hz,
-        })
+            (10.0 * (coarse.multiplier - multiplier).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
+        Ok(Point::new(rpm, depth_mm, multiplier, error, fine.chatter_hz))
     }
 
     /// The branch of orbits is followed with steps of its own; `samples` is not needed.

@@ -54,11 +54,7 @@ impl FrfTable {
     /// value that is no number, or whose frequency does not ascend.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FrfError> {
         let path = path.as_ref();
-        let ending = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .to_lowercase();
+        let ending = crate::file::ending(path);
         match ending.as_str() {
             "uff" | "unv" | "bunv" => super::table_uff::read(path),
             _ => Self::parse(path, &crate::file::read_text(path)?),

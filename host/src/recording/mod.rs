@@ -70,11 +70,7 @@ impl Recording {
     /// Missing or malformed file, unknown or contradicting units, uneven time, no sample rate.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let path = path.as_ref();
-        let ending = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .to_lowercase();
+        let ending = crate::file::ending(path);
         let raw = match ending.as_str() {
             "csv" => csv::read(path)?,
             "wav" => wav::read(path)?,

@@ -6,7 +6,6 @@ use super::StabilityError;
 use super::krylov::Dominant;
 use super::line::{SpeedLine, line_of};
 use super::method::{Method, step_error};
-use super::multiplier::{Kind, Verdict};
 use super::one_period::{MapSpectrum, PeriodMap};
 use super::pitched::Pitched;
 use super::point::{Point, check_depth, check_speed};
@@ -107,19 +106,9 @@ impl<D: Discretization> Method for Discretized<D> {
                 values.min_by(|p, q| distance(p).total_cmp(&distance(q)))
             })
         };
-        let multiplier_abs = multiplier.norm();
         let order = self.discretization.order();
         let error = step_error(multiplier, finer(2)?, finer(4)?, order, ROUNDING);
-        Ok(Point {
-            rpm,
-            depth_mm,
-            multiplier,
-            multiplier_abs,
-            error,
-            verdict: Verdict::of(multiplier_abs, error),
-            kind: Kind::of(multiplier),
-            chatter_hz,
-        })
+        Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
     /// Limits are those of the steps asked for.

@@ -41,6 +41,30 @@ pub struct Point {
     pub chatter_hz: Option<f64>,
 }
 
+impl Point {
+    /// A point from its dominant multiplier, either one of a pair, and the error of it: size, verdict and kind follow.
+    pub(crate) fn new(
+        rpm: f64,
+        depth_mm: f64,
+        multiplier: Complex64,
+        error: f64,
+        chatter_hz: Option<f64>,
+    ) -> Self {
+        let multiplier = Complex64::new(multiplier.re, multiplier.im.abs());
+        let multiplier_abs = multiplier.norm();
+        Self {
+            rpm,
+            depth_mm,
+            multiplier,
+            multiplier_abs,
+            error,
+            verdict: Verdict::of(multiplier_abs, error),
+            kind: Kind::of(multiplier),
+            chatter_hz,
+        }
+    }
+}
+
 fn as_pair<S: serde::Serializer>(value: &Complex64, serializer: S) -> Result<S::Ok, S::Error> {
     [value.re, value.im].serialize(serializer)
 }
@@ -61,18 +85,9 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, Stabil
         )
     })?;
     let multiplier = Complex64::new(fine.re, fine.im.abs());
-    let multiplier_abs = multiplier.norm();
-    let error = (10.0 * (coarse - fine).norm()).max(LEAST_ERROR * multiplier_abs.max(1.0));
-    Ok(Point {
-        rpm,
-        depth_mm,
-        multiplier,
-        multiplier_abs,
-        error,
-        verdict: Verdict::of(multiplier_abs, error),
-        kind: Kind::of(multiplier),
-        chatter_hz: chatter_hz(problem, rpm, &period, multiplier, depth_m),
-    })
+    let error = (10.0 * (coarse - fine).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
+    let chatter_hz = chatter_hz(problem, rpm, &period, multiplier, depth_m);
+    Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
 }
 
 /// The dominant multiplier at the working and at a finer resolution, and the period at the former.

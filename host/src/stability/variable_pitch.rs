@@ -8,7 +8,6 @@ use super::StabilityError;
 use super::krylov::Dominant;
 use super::line::{SpeedLine, line_of};
 use super::method::Method;
-use super::multiplier::{Kind, Verdict};
 use super::one_period::{MapSpectrum, PeriodMap};
 use super::pitched::Pitched;
 use super::point::{LEAST_ERROR, Point, check_depth, check_speed};
@@ -55,19 +54,9 @@ impl Method for RevolutionCollocation {
         let chatter_hz = dominant
             .vector(multiplier)
             .and_then(|vector| fine.chatter_hz(multiplier, &vector));
-        let multiplier_abs = multiplier.norm();
         // The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
-        let error = (10.0 * (coarse - multiplier).norm()).max(LEAST_ERROR * multiplier_abs.max(1.0));
-        Ok(Point {
-            rpm,
-            depth_mm,
-            multiplier,
-            multiplier_abs,
-            error,
-            verdict: Verdict::of(multiplier_abs, error),
-            kind: Kind::of(multiplier),
-            chatter_hz,
-        })
+        let error = (10.0 * (coarse - multiplier).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
+        Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {

@@ -12,6 +12,7 @@ mod drift;
 mod error;
 mod hysteresis;
 mod linear;
+mod local_force;
 mod missing_mode;
 mod mode_coupling;
 mod parameters;

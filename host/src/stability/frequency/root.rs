@@ -7,7 +7,7 @@ use super::averaged::AveragedLoop;
 use super::limits::unstable_roots;
 use super::loci::{steps, trace};
 use super::open_loop::OpenLoop;
-use crate::stability::{Kind, LEAST_ERROR, Point, StabilityError, Verdict};
+use crate::stability::{Kind, LEAST_ERROR, Point, StabilityError};
 
 /// Where the lines are laid along which roots are looked for: real parts as multiples of the slowest decay of a resonance.
 const LINES: [f64; 14] = [
@@ -209,17 +209,7 @@ pub(super) fn point_of(
     kind: Kind,
     chatter_hz: Option<f64>,
 ) -> Point {
-    let multiplier = Complex64::new(multiplier.re, multiplier.im.abs());
-    let multiplier_abs = multiplier.norm();
-    let error = error + LEAST_ERROR * multiplier_abs.max(1.0);
-    Point {
-        rpm,
-        depth_mm,
-        multiplier,
-        multiplier_abs,
-        error,
-        verdict: Verdict::of(multiplier_abs, error),
-        kind,
-        chatter_hz,
-    }
+    let error = error + LEAST_ERROR * multiplier.norm().max(1.0);
+    let point = Point::new(rpm, depth_mm, multiplier, error, chatter_hz);
+    Point { kind, ..point }
 }
