@@ -1,99 +1,31 @@
 //! Block in, report out: the pipeline that all callers use.
 
+mod settings;
+mod state;
+
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::acceleration::{Block, Continuity, SampleClock, SampleClockState, Sensor};
+use crate::acceleration::{Block, Continuity, SampleClock};
 use crate::advice::{self, Advice};
-use crate::decimation::{
-    self, Decimation, FRACTION_BITS, MAX_RATE, MIN_RATE, STRUCTURE_BAND, Sample, TOOL_BAND,
-};
+use crate::decimation::{Decimation, FRACTION_BITS, STRUCTURE_BAND, Sample, TOOL_BAND};
+use crate::detector::Judgement;
 use crate::detector::evidence::Evidence;
 use crate::detector::finding::Finding;
 use crate::detector::growth::{Growth, Look};
-use crate::detector::judge::Detector;
-use crate::detector::tone::{Background, Tone};
-use crate::detector::{Judgement, Verdict};
 use crate::lobes::LobeTable;
 use crate::math;
 use crate::peaks::Rotation;
-use crate::spectrum::{
-    Overlap, PowerSpectrum, STRUCTURE_BINS, STRUCTURE_POINTS, TOOL_BINS, TOOL_POINTS, structure_spectrum,
-    tool_spectrum,
-};
-use crate::synchronous::{Method, Passed, SLOTS, Sampler, SamplerState};
-use crate::tachometer::{Edge, Tachometer, TachometerState, Turns, Wheel};
+use crate::spectrum::{PowerSpectrum, STRUCTURE_POINTS, TOOL_POINTS, structure_spectrum, tool_spectrum};
+use crate::synchronous::{Method, Passed, SLOTS, Sampler};
+use crate::tachometer::{Edge, Tachometer, Turns};
 use crate::units::{Hertz, Nanoseconds, Rpm};
-use crate::working_point::{Limits, Tool, WorkingPoint};
+use crate::working_point::WorkingPoint;
 
-/// What the pipeline must be told before it starts; the host may change it over the link.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// The accelerometer.
-    pub sensor: Sensor,
-    /// The tool.
-    pub tool: Tool,
-    /// The tachometer wheel; `None` where there is no tachometer.
-    pub wheel: Option<Wheel>,
-    /// Spindle speed to assume where there is no tachometer.
-    pub assumed_speed: Option<Rpm>,
-    /// What the spindle can do.
-    pub limits: Option<Limits>,
-}
+pub use settings::{MAX_TEETH, Settings, SettingsError};
+pub use state::State;
 
-/// The most teeth of a tool.
-pub const MAX_TEETH: u8 = 12;
-
-/// What is wrong with [`Settings`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum SettingsError {
-    /// The tool has no teeth, or more than [`MAX_TEETH`].
-    Teeth(u8),
-    /// The wheel has no positions, or less than four teeth beside its gap.
-    Wheel(Wheel),
-    /// The sample rate is not one that the filters are made for.
-    SampleRate(Hertz),
-    /// The value of one count is not a positive number.
-    CountScale(f32),
-    /// The noise of the sensor is not a number of at least 0.
-    Noise(f32),
-    /// The assumed speed is not a positive number.
-    AssumedSpeed(Rpm),
-    /// The slowest speed is not a positive number, or not below the fastest.
-    Limits(Limits),
-}
-
-impl core::fmt::Display for SettingsError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Teeth(n) => write!(f, "a tool with {n} teeth: 1 to {MAX_TEETH} are possible"),
-            Self::Wheel(wheel) => write!(
-                f,
-                "a wheel with {} positions of which {} are missing: at least 1 position, and 4 teeth beside a gap, are needed",
-                wheel.positions, wheel.missing
-            ),
-            Self::SampleRate(rate) => write!(
-                f,
-                "a sample rate of {rate}: {MIN_RATE} to {MAX_RATE} are possible"
-            ),
-            Self::CountScale(scale) => write!(f, "a count of {scale} m/s²: it must be a number above 0"),
-            Self::Noise(noise) => write!(
-                f,
-                "a sensor noise of {noise} m/s² per √Hz: it must be a number of at least 0"
-            ),
-            Self::AssumedSpeed(speed) => {
-                write!(f, "an assumed speed of {speed}: it must be a number above 0")
-            }
-            Self::Limits(limits) => write!(
-                f,
-                "a spindle from {} to {}: the slowest speed must be above 0 and below the fastest",
-                limits.rpm_min, limits.rpm_max
-            ),
-        }
-    }
-}
-
-impl core::error::Error for SettingsError {}
+use state::{Advised, Path, follow_tone};
 
 /// A frequency band of the signal chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -145,221 +77,6 @@ pub struct Monitor {
     sample_clock: SampleClock,
     tachometer: Option<Tachometer>,
     decimation: Decimation,
-}
-
-/// What the pipeline knows from the blocks so far. [`State::new`] knows nothing.
-#[derive(Clone, Debug)]
-pub struct State {
-    sample_clock: SampleClockState,
-    tachometer: TachometerState,
-    /// Times the tachometer had lost its lock when the angles were last taken from it.
-    losses: u32,
-    decimation: decimation::State,
-    structure: Path<STRUCTURE_POINTS, STRUCTURE_BINS>,
-    tool: Path<TOOL_POINTS, TOOL_BINS>,
-    tool_work: [i32; TOOL_POINTS],
-    work: [f32; STRUCTURE_POINTS],
-    /// Part of the samples that were clipped or lost lately.
-    damage: f32,
-    /// Speed read from the spectrum, where there is no tachometer.
-    heard_speed: Option<Hertz>,
-    detector: Detector,
-    advice: Option<Advised>,
-    strobes: Vec<Strobe, MAX_BLOCK_STROBES>,
-}
-
-/// Advice, with what it was given for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Advised {
-    advice: Advice,
-    verdict: Verdict,
-    chatter: Option<Hertz>,
-    speed: Rpm,
-    working_point: Option<WorkingPoint>,
-    /// CRC-32 of the table.
-    table: Option<u32>,
-}
-
-/// One band on its way from samples to findings.
-#[derive(Clone, Debug)]
-struct Path<const POINTS: usize, const BINS: usize> {
-    overlap: Overlap<POINTS>,
-    power: [f32; BINS],
-    /// Width of a bin of the newest spectrum; 0 before the first.
-    bin: Hertz,
-    /// The newest block completed a spectrum.
-    fresh: bool,
-    background: Background<BINS>,
-    tone: Option<Tone>,
-    sampler: SamplerState,
-    growth: Growth,
-    /// The newest block completed a passing.
-    passed: bool,
-    /// Root mean square of the sensor's noise in one channel of a passing, in m/s².
-    floor: f32,
-    /// Samples of the band since the growth was last looked at.
-    since_look: u32,
-}
-
-impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
-    const fn new() -> Self {
-        Self {
-            overlap: Overlap::new(),
-            power: [0.0; BINS],
-            bin: Hertz(0.0),
-            fresh: false,
-            background: Background::new(),
-            tone: None,
-            sampler: SamplerState::new(),
-            growth: Growth::new(1),
-            passed: false,
-            floor: 0.0,
-            since_look: 0,
-        }
-    }
-
-    /// Knows nothing again. What is only read where it was written since stays as it is.
-    fn reset(&mut self) {
-        let Self {
-            overlap,
-            power: _,
-            bin,
-            fresh,
-            background,
-            tone,
-            sampler,
-            growth,
-            passed,
-            floor,
-            since_look,
-        } = self;
-        overlap.reset();
-        *bin = Hertz(0.0);
-        background.reset();
-        *sampler = SamplerState::new();
-        growth.reset();
-        (*fresh, *tone, *passed, *floor, *since_look) = (false, None, false, 0.0, 0);
-    }
-
-    /// Takes a sample towards the next spectrum, one of which is due every `hop` samples.
-    fn take(&mut self, sample: Sample, hop: usize) {
-        self.fresh |= self.overlap.push(sample, hop);
-        self.since_look = self.since_look.saturating_add(1);
-    }
-
-    /// Forgets the signal, but not what is usual.
-    fn interrupt(&mut self) {
-        self.overlap.reset();
-        self.tone = None;
-        self.interrupt_angles();
-    }
-
-    /// Forgets what was sampled at angles.
-    fn interrupt_angles(&mut self) {
-        self.sampler = SamplerState::new();
-        self.growth.reset();
-    }
-
-    fn spectrum(&self) -> Option<PowerSpectrum<'_>> {
-        (self.bin.0 > 0.0).then_some(PowerSpectrum {
-            power: &self.power,
-            bin: self.bin,
-        })
-    }
-}
-
-impl Default for State {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl State {
-    /// Knows nothing.
-    pub const fn new() -> Self {
-        Self {
-            sample_clock: SampleClockState::new(),
-            tachometer: TachometerState::new(),
-            losses: 0,
-            decimation: decimation::State::new(),
-            structure: Path::new(),
-            tool: Path::new(),
-            tool_work: [0; TOOL_POINTS],
-            work: [0.0; STRUCTURE_POINTS],
-            damage: 0.0,
-            heard_speed: None,
-            detector: Detector::new(),
-            advice: None,
-            strobes: Vec::new(),
-        }
-    }
-
-    /// Knows nothing again, as after [`State::new`], in place: a state is too large for the stack of a microcontroller.
-    pub fn reset(&mut self) {
-        let Self {
-            sample_clock,
-            tachometer,
-            losses,
-            decimation,
-            structure,
-            tool,
-            tool_work: _,
-            work: _,
-            damage,
-            heard_speed,
-            detector,
-            advice,
-            strobes,
-        } = self;
-        *sample_clock = SampleClockState::new();
-        *tachometer = TachometerState::new();
-        *decimation = decimation::State::new();
-        structure.reset();
-        tool.reset();
-        *detector = Detector::new();
-        strobes.clear();
-        (*losses, *damage, *heard_speed, *advice) = (0, 0.0, None, None);
-    }
-
-    /// The points of the stroboscopic map that the newest block made, oldest first: of the structure band where it holds tooth
-    /// periods long enough, else of the tool band.
-    pub fn strobes(&self) -> &[Strobe] {
-        &self.strobes
-    }
-
-    /// The newest spectrum of a band, summed over the axes; `None` before the first.
-    pub fn spectrum(&self, band: Band) -> Option<PowerSpectrum<'_>> {
-        match band {
-            Band::Structure => self.structure.spectrum(),
-            Band::Tool => self.tool.spectrum(),
-        }
-    }
-
-    /// True where the newest block completed a spectrum of the band.
-    pub fn has_fresh_spectrum(&self, band: Band) -> bool {
-        match band {
-            Band::Structure => self.structure.fresh,
-            Band::Tool => self.tool.fresh,
-        }
-    }
-
-    /// What the samples at fixed angles of a band say.
-    pub fn finding(&self, band: Band) -> &Finding {
-        match band {
-            Band::Structure => self.structure.growth.finding(),
-            Band::Tool => self.tool.growth.finding(),
-        }
-    }
-
-    /// The sample clock: rate, clips, losses.
-    pub fn sample_clock(&self) -> &SampleClockState {
-        &self.sample_clock
-    }
-
-    /// The tachometer: speed per turn, rejected and missing edges.
-    pub fn tachometer(&self) -> &TachometerState {
-        &self.tachometer
-    }
 }
 
 /// Samples of a band from one spectrum to the next.
@@ -418,7 +135,7 @@ impl Monitor {
     /// # Errors
     /// [`SettingsError`] names the setting that cannot be, with its value.
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
-        check(&settings)?;
+        settings::check(&settings)?;
         let tachometer = match settings.wheel {
             None => None,
             Some(wheel) => Some(Tachometer::new(wheel).ok_or(SettingsError::Wheel(wheel))?),
@@ -785,29 +502,6 @@ const AXES: [usize; 3] = [0, 1, 2];
 const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
 const TOOL_TONES: (Hertz, Hertz) = (Hertz(150.0), TOOL_BAND);
 
-/// Goes on with the tone of a fresh spectrum, and with the background where there is no chatter.
-fn follow_tone<const POINTS: usize, const BINS: usize>(
-    path: &mut Path<POINTS, BINS>,
-    rotation: Option<Rotation>,
-    (from, to): (Hertz, Hertz),
-    chatter: bool,
-    work: &mut [f32],
-) {
-    let spectrum = PowerSpectrum {
-        power: &path.power,
-        bin: path.bin,
-    };
-    let found = if path.background.is_learnt() {
-        path.background.new_tone(&spectrum, rotation, from, to, work)
-    } else {
-        None
-    };
-    path.tone = Tone::follow(path.tone, found, &spectrum);
-    if !chatter {
-        path.background.learn(&path.power);
-    }
-}
-
 /// Adds a point of the stroboscopic map: what was felt at the first slot.
 fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, passed: &Passed) {
     let [x, y, z, ..] = passed.passing;
@@ -818,37 +512,4 @@ fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, passed: &Passe
     };
     // More than the capacity cannot come in one block; if they did, the last would be left out.
     let _ = strobes.push(strobe);
-}
-
-/// Refuses settings that cannot be. Not-a-number fails every comparison, so each test is for what must hold.
-fn check(settings: &Settings) -> Result<(), SettingsError> {
-    let Settings {
-        sensor,
-        tool,
-        assumed_speed,
-        limits,
-        ..
-    } = settings;
-    if !(1..=MAX_TEETH).contains(&tool.teeth) {
-        return Err(SettingsError::Teeth(tool.teeth));
-    }
-    let scale = sensor.meters_per_second2_per_count;
-    if !(scale > 0.0 && scale.is_finite()) {
-        return Err(SettingsError::CountScale(scale));
-    }
-    let noise = sensor.noise_meters_per_second2_per_root_hertz;
-    if !(noise >= 0.0 && noise.is_finite()) {
-        return Err(SettingsError::Noise(noise));
-    }
-    if let Some(speed) = assumed_speed
-        && !(speed.0 > 0.0 && speed.0.is_finite())
-    {
-        return Err(SettingsError::AssumedSpeed(*speed));
-    }
-    if let Some(limits) = limits
-        && !(limits.rpm_min.0 > 0.0 && limits.rpm_min.0 < limits.rpm_max.0 && limits.rpm_max.0.is_finite())
-    {
-        return Err(SettingsError::Limits(*limits));
-    }
-    Ok(())
 }

@@ -9,9 +9,8 @@ use proptest::prelude::*;
 use quietcut_core::checksum::crc32;
 use quietcut_core::lobes::format::{SCHEMA, SCHEMA_PLAIN};
 use quietcut_core::lobes::{
-    Additions, Answer, Content, FEED_DIRECTION_SPAN, InterpolationError, IntervalSlopes, Kind, Layer,
-    LayerMode, Learned, LobeTable, MODES_MAX, NotKnown, Slopes, TableError, corrected_limit, encode_with,
-    encoded_length_with,
+    Additions, Answer, FEED_DIRECTION_SPAN, InterpolationError, IntervalSlopes, Kind, LayerMode, Learned,
+    LobeTable, MODES_MAX, NotKnown, Slopes, TableError, corrected_limit,
 };
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
@@ -19,36 +18,6 @@ use support::{Owned, acetal, interval, table, validity, working_point};
 
 /// Bytes of both schemas as they were written when the schema was made, in hexadecimal.
 const FROZEN: &str = include_str!("lobe_table_schemas.txt");
-
-fn encoded(owned: &Owned, additions: &Additions) -> Result<Vec<u8>, TableError> {
-    let columns: Vec<Vec<&[_]>> = owned
-        .layers
-        .iter()
-        .map(|(_, columns)| columns.iter().map(Vec::as_slice).collect())
-        .collect();
-    let layers: Vec<Layer> = owned
-        .layers
-        .iter()
-        .zip(&columns)
-        .map(|((validity, _), columns)| Layer {
-            validity: *validity,
-            columns,
-        })
-        .collect();
-    let content = Content {
-        name: "kuka-kr90-acetal",
-        teeth: 2,
-        limits: owned.limits,
-        depth_from: Millimeters(owned.depth_from_mm),
-        depth_to: Millimeters(owned.depth_to_mm),
-        speeds: &owned.speeds,
-        layers: &layers,
-    };
-    let mut buffer = vec![0; encoded_length_with(&content, additions) as usize];
-    let length = encode_with(&content, additions, &mut buffer)?.len();
-    assert_eq!(length, buffer.len());
-    Ok(buffer)
-}
 
 const MODES: [LayerMode; 2] = [
     LayerMode {
@@ -103,7 +72,7 @@ fn extended() -> Vec<u8> {
         modes: &[&MODES],
         slopes: &slopes,
     };
-    encoded(&owned, &additions).unwrap()
+    owned.encode_with(&additions).unwrap()
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -130,7 +99,7 @@ fn the_bytes_of_both_schemas_are_frozen() {
 #[test]
 fn a_table_without_additions_is_of_schema_1() {
     let owned = acetal();
-    let plain = encoded(&owned, &Additions::default()).unwrap();
+    let plain = owned.encode_with(&Additions::default()).unwrap();
     assert_eq!(plain, owned.encode().unwrap());
     let table = LobeTable::parse(&plain).unwrap();
     assert_eq!(table.header().unwrap().schema, SCHEMA_PLAIN);
@@ -175,7 +144,7 @@ fn additions_come_back() {
 fn each_addition_that_cannot_be_is_refused_on_both_sides() {
     let owned = acetal();
     let slopes = all_slopes(&owned, 2);
-    let with = |additions: Additions| encoded(&owned, &additions).unwrap_err();
+    let with = |additions: Additions| owned.encode_with(&additions).unwrap_err();
     let none = Additions::default();
     assert_eq!(
         with(Additions {
@@ -299,7 +268,7 @@ proptest! {
         let of_layers = vec![&layer_modes[..modes]; content.layers.len()];
         let directions = vec![Some(Degrees(30.0)); content.layers.len()];
         let additions = Additions { feed_directions: &directions, modes: &of_layers, slopes: &slopes, ..Additions::default() };
-        let mut bytes = encoded(&content, &additions).unwrap();
+        let mut bytes = content.encode_with(&additions).unwrap();
         for (position, byte) in damage {
             let position = position.index(bytes.len());
             bytes[position] = byte;
@@ -400,7 +369,7 @@ fn directed(directions: &[Option<f32>], feeds: &[f32]) -> Vec<u8> {
         feed_directions: &of_layers,
         ..Additions::default()
     };
-    encoded(&owned, &additions).unwrap()
+    owned.encode_with(&additions).unwrap()
 }
 
 fn limit_towards(bytes: &[u8], direction: f32, feed: f32) -> Result<f32, NotKnown> {
@@ -479,7 +448,7 @@ fn two_layers_for_the_same_direction_are_refused() {
             feed_directions: directions,
             ..Additions::default()
         };
-        encoded(&owned, &additions).map(|_| ())
+        owned.encode_with(&additions).map(|_| ())
     };
     assert_eq!(with(&[Some(Degrees(0.0)), Some(Degrees(30.0))]), Ok(()));
     let clash = Err(TableError::Layer { layer: 1 });

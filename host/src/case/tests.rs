@@ -25,6 +25,12 @@ feed_per_tooth_mm = 0.1
 on = true
 "#;
 
+/// The case of that name among those that the project brings.
+pub(crate) fn case(name: &str) -> Case {
+    let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Case::read(path).unwrap()
+}
+
 fn parse(text: &str) -> Result<Case, CaseError> {
     Case::parse(Path::new("machine.toml"), text)
 }

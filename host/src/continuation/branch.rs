@@ -496,7 +496,6 @@ fn union(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::Case;
 
     /// rev/min of a tooth period of τ in the units of chapter 6.
     fn rpm(tau: f64) -> f64 {
@@ -507,12 +506,7 @@ mod tests {
     const W_PER_MM: f64 = 0.033_628;
 
     fn problem(name: &str) -> ForcedProblem {
-        let case = Case::read(format!(
-            "{}/../tests/cases/{name}.toml",
-            env!("CARGO_MANIFEST_DIR")
-        ))
-        .unwrap();
-        ForcedProblem::new(&case).unwrap()
+        ForcedProblem::new(&crate::case::tests::case(name)).unwrap()
     }
 
     fn first_limit_w(problem: &ForcedProblem, tau: f64) -> (f64, Kind) {

@@ -6,14 +6,10 @@ use rayon::prelude::*;
 
 use super::accuracy::farthest;
 use super::*;
+use crate::case::tests::case;
 use crate::case::{Deviation, Parameter};
 use crate::continuation;
 use crate::stability::{CubicTerms, Method, Problem, SpeedLine, line};
-
-fn case(name: &str) -> Case {
-    let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    Case::read(path).unwrap()
-}
 
 fn problem(case: &Case) -> Problem {
     Problem::new(case, CubicTerms::Refuse).unwrap()

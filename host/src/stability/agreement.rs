@@ -6,15 +6,7 @@ use super::discretized::{Discretization, Discretized, with_dominant};
 use super::krylov::Dominant;
 use super::stepped::Stepped;
 use super::*;
-use crate::case::Case;
-
-fn case(name: &str) -> Case {
-    Case::read(format!(
-        "{}/../tests/cases/{name}.toml",
-        env!("CARGO_MANIFEST_DIR")
-    ))
-    .unwrap()
-}
+use crate::case::tests::case;
 
 fn default_point(name: &str, rpm: f64, depth_mm: f64) -> Point {
     let problem = Problem::new(&case(name), CubicTerms::Refuse).unwrap();

@@ -1,13 +1,9 @@
 //! Exact derivatives of limits against finite differences of limits, and against closed forms.
 
 use super::*;
+use crate::case::tests::case;
 use crate::case::{Case, Parameter};
 use crate::structure::Form;
-
-fn case(name: &str) -> Case {
-    let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    Case::read(path).unwrap()
-}
 
 fn problem(case: &Case) -> Problem {
     Problem::new(case, CubicTerms::LeaveOut).unwrap()

@@ -5,14 +5,7 @@ use super::characteristic::Characteristic;
 use super::period::{Period, Resolution};
 use super::*;
 use crate::case::Case;
-
-pub(super) fn case(name: &str) -> Case {
-    Case::read(format!(
-        "{}/../tests/cases/{name}.toml",
-        env!("CARGO_MANIFEST_DIR")
-    ))
-    .unwrap()
-}
+pub(super) use crate::case::tests::case;
 
 pub(super) fn problem(name: &str) -> Problem {
     Problem::new(&case(name), CubicTerms::Refuse).unwrap()

@@ -7,12 +7,8 @@ use rayon::prelude::*;
 
 use super::uncertainty::limit_of;
 use super::*;
+use crate::case::tests::case;
 use crate::case::{Case, Deviation, Parameter};
-
-fn case(name: &str) -> Case {
-    let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-    Case::read(path).unwrap()
-}
 
 /// The acetal robot with modes and force coefficients as well known as a good measurement makes them.
 fn acetal() -> Case {

@@ -221,16 +221,8 @@ fn least_diagonal(symmetric: &DMatrix<f64>, row: usize, strict: bool) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::Case;
+    use crate::case::tests::case;
     use crate::structure::{Form, StructureError};
-
-    fn case(name: &str) -> Case {
-        Case::read(format!(
-            "{}/../tests/cases/{name}.toml",
-            env!("CARGO_MANIFEST_DIR")
-        ))
-        .unwrap()
-    }
 
     #[test]
     fn the_printed_matrices_are_refused_with_the_entries_to_blame() {

@@ -142,16 +142,8 @@ fn from_modes(modes: &[Mode], directions: &[Direction]) -> FirstOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::Case;
+    use crate::case::tests::case;
     use std::f64::consts::TAU;
-
-    fn case(name: &str) -> Case {
-        Case::read(format!(
-            "{}/../tests/cases/{name}.toml",
-            env!("CARGO_MANIFEST_DIR")
-        ))
-        .unwrap()
-    }
 
     #[test]
     fn the_acetal_robot_peaks_at_15_2_micrometers_per_newton() {

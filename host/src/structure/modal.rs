@@ -98,23 +98,17 @@ fn invariant(matrix: &DMatrix<f64>, pole: Complex64, count: usize) -> Option<DMa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::Case;
+    use crate::case::tests::case;
 
     fn first_order(name: &str) -> FirstOrder {
-        let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-        let case = Case::read(path).unwrap();
-        case.structure().unwrap().first_order().unwrap()
+        case(name).structure().unwrap().first_order().unwrap()
     }
 
     #[test]
     fn a_mode_moves_as_its_file_entry_does() {
         use crate::structure::Form;
 
-        let path = format!(
-            "{}/../tests/cases/kuka-kr90-acetal.toml",
-            env!("CARGO_MANIFEST_DIR")
-        );
-        let case = Case::read(path).unwrap();
+        let case = case("kuka-kr90-acetal");
         let structure = case.structure().unwrap();
         let parts = structure.first_order().unwrap().modal_parts();
         assert_eq!(parts.len(), 2);

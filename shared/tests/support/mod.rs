@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use quietcut_core::lobes::{
-    Content, Interval, Kind, Layer, LobeTable, TableError, Validity, encode, encoded_length,
+    Additions, Content, Interval, Kind, Layer, LobeTable, TableError, Validity, encode_with,
+    encoded_length_with,
 };
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::{Limits, WorkingPoint};
@@ -19,6 +20,10 @@ pub(crate) struct Owned {
 
 impl Owned {
     pub(crate) fn encode(&self) -> Result<Vec<u8>, TableError> {
+        self.encode_with(&Additions::default())
+    }
+
+    pub(crate) fn encode_with(&self, additions: &Additions) -> Result<Vec<u8>, TableError> {
         let columns: Vec<Vec<&[Interval]>> = self
             .layers
             .iter()
@@ -42,8 +47,8 @@ impl Owned {
             speeds: &self.speeds,
             layers: &layers,
         };
-        let mut buffer = vec![0; encoded_length(&content) as usize];
-        let written = encode(&content, &mut buffer)?.len();
+        let mut buffer = vec![0; encoded_length_with(&content, additions) as usize];
+        let written = encode_with(&content, additions, &mut buffer)?.len();
         assert_eq!(written, buffer.len());
         Ok(buffer)
     }

@@ -8,14 +8,7 @@ mod sensors;
 
 use super::*;
 use crate::case::Case;
-
-pub(crate) fn case(name: &str) -> Case {
-    Case::read(format!(
-        "{}/../tests/cases/{name}.toml",
-        env!("CARGO_MANIFEST_DIR")
-    ))
-    .unwrap()
-}
+pub(crate) use crate::case::tests::case;
 
 /// The tool of chapter 6 in a slot, 1 mm deep.
 pub(super) fn slot_cutter() -> Cutter {

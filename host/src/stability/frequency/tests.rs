@@ -1,20 +1,12 @@
 use super::averaged::AveragedLoop;
 use super::harmonic::HarmonicLoop;
 use super::*;
-use crate::case::Case;
+use crate::case::tests::case;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::limits::limits;
 use crate::stability::{CubicTerms, Kind, Method, Problem, Switch, line, point};
-
-fn case(name: &str) -> Case {
-    Case::read(format!(
-        "{}/../tests/cases/{name}.toml",
-        env!("CARGO_MANIFEST_DIR")
-    ))
-    .unwrap()
-}
 
 fn problem(name: &str) -> FrequencyProblem {
     FrequencyProblem::new(&case(name), CubicTerms::LeaveOut).unwrap()

@@ -1,0 +1,257 @@
+//! What the pipeline knows from the blocks so far.
+
+use heapless::Vec;
+
+use super::{Band, MAX_BLOCK_STROBES, Strobe};
+use crate::acceleration::SampleClockState;
+use crate::advice::Advice;
+use crate::decimation::{self, Sample};
+use crate::detector::Verdict;
+use crate::detector::finding::Finding;
+use crate::detector::growth::Growth;
+use crate::detector::judge::Detector;
+use crate::detector::tone::{Background, Tone};
+use crate::peaks::Rotation;
+use crate::spectrum::{Overlap, PowerSpectrum, STRUCTURE_BINS, STRUCTURE_POINTS, TOOL_BINS, TOOL_POINTS};
+use crate::synchronous::SamplerState;
+use crate::tachometer::TachometerState;
+use crate::units::{Hertz, Rpm};
+use crate::working_point::WorkingPoint;
+
+/// What the pipeline knows from the blocks so far. [`State::new`] knows nothing.
+#[derive(Clone, Debug)]
+pub struct State {
+    pub(super) sample_clock: SampleClockState,
+    pub(super) tachometer: TachometerState,
+    /// Times the tachometer had lost its lock when the angles were last taken from it.
+    pub(super) losses: u32,
+    pub(super) decimation: decimation::State,
+    pub(super) structure: Path<STRUCTURE_POINTS, STRUCTURE_BINS>,
+    pub(super) tool: Path<TOOL_POINTS, TOOL_BINS>,
+    pub(super) tool_work: [i32; TOOL_POINTS],
+    pub(super) work: [f32; STRUCTURE_POINTS],
+    /// Part of the samples that were clipped or lost lately.
+    pub(super) damage: f32,
+    /// Speed read from the spectrum, where there is no tachometer.
+    pub(super) heard_speed: Option<Hertz>,
+    pub(super) detector: Detector,
+    pub(super) advice: Option<Advised>,
+    pub(super) strobes: Vec<Strobe, MAX_BLOCK_STROBES>,
+}
+
+/// Advice, with what it was given for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Advised {
+    pub(super) advice: Advice,
+    pub(super) verdict: Verdict,
+    pub(super) chatter: Option<Hertz>,
+    pub(super) speed: Rpm,
+    pub(super) working_point: Option<WorkingPoint>,
+    /// CRC-32 of the table.
+    pub(super) table: Option<u32>,
+}
+
+/// One band on its way from samples to findings.
+#[derive(Clone, Debug)]
+pub(super) struct Path<const POINTS: usize, const BINS: usize> {
+    pub(super) overlap: Overlap<POINTS>,
+    pub(super) power: [f32; BINS],
+    /// Width of a bin of the newest spectrum; 0 before the first.
+    pub(super) bin: Hertz,
+    /// The newest block completed a spectrum.
+    pub(super) fresh: bool,
+    pub(super) background: Background<BINS>,
+    pub(super) tone: Option<Tone>,
+    pub(super) sampler: SamplerState,
+    pub(super) growth: Growth,
+    /// The newest block completed a passing.
+    pub(super) passed: bool,
+    /// Root mean square of the sensor's noise in one channel of a passing, in m/s².
+    pub(super) floor: f32,
+    /// Samples of the band since the growth was last looked at.
+    pub(super) since_look: u32,
+}
+
+impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
+    const fn new() -> Self {
+        Self {
+            overlap: Overlap::new(),
+            power: [0.0; BINS],
+            bin: Hertz(0.0),
+            fresh: false,
+            background: Background::new(),
+            tone: None,
+            sampler: SamplerState::new(),
+            growth: Growth::new(1),
+            passed: false,
+            floor: 0.0,
+            since_look: 0,
+        }
+    }
+
+    /// Knows nothing again. What is only read where it was written since stays as it is.
+    fn reset(&mut self) {
+        let Self {
+            overlap,
+            power: _,
+            bin,
+            fresh,
+            background,
+            tone,
+            sampler,
+            growth,
+            passed,
+            floor,
+            since_look,
+        } = self;
+        overlap.reset();
+        *bin = Hertz(0.0);
+        background.reset();
+        *sampler = SamplerState::new();
+        growth.reset();
+        (*fresh, *tone, *passed, *floor, *since_look) = (false, None, false, 0.0, 0);
+    }
+
+    /// Takes a sample towards the next spectrum, one of which is due every `hop` samples.
+    pub(super) fn take(&mut self, sample: Sample, hop: usize) {
+        self.fresh |= self.overlap.push(sample, hop);
+        self.since_look = self.since_look.saturating_add(1);
+    }
+
+    /// Forgets the signal, but not what is usual.
+    pub(super) fn interrupt(&mut self) {
+        self.overlap.reset();
+        self.tone = None;
+        self.interrupt_angles();
+    }
+
+    /// Forgets what was sampled at angles.
+    pub(super) fn interrupt_angles(&mut self) {
+        self.sampler = SamplerState::new();
+        self.growth.reset();
+    }
+
+    pub(super) fn spectrum(&self) -> Option<PowerSpectrum<'_>> {
+        (self.bin.0 > 0.0).then_some(PowerSpectrum {
+            power: &self.power,
+            bin: self.bin,
+        })
+    }
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl State {
+    /// Knows nothing.
+    pub const fn new() -> Self {
+        Self {
+            sample_clock: SampleClockState::new(),
+            tachometer: TachometerState::new(),
+            losses: 0,
+            decimation: decimation::State::new(),
+            structure: Path::new(),
+            tool: Path::new(),
+            tool_work: [0; TOOL_POINTS],
+            work: [0.0; STRUCTURE_POINTS],
+            damage: 0.0,
+            heard_speed: None,
+            detector: Detector::new(),
+            advice: None,
+            strobes: Vec::new(),
+        }
+    }
+
+    /// Knows nothing again, as after [`State::new`], in place: a state is too large for the stack of a microcontroller.
+    pub fn reset(&mut self) {
+        let Self {
+            sample_clock,
+            tachometer,
+            losses,
+            decimation,
+            structure,
+            tool,
+            tool_work: _,
+            work: _,
+            damage,
+            heard_speed,
+            detector,
+            advice,
+            strobes,
+        } = self;
+        *sample_clock = SampleClockState::new();
+        *tachometer = TachometerState::new();
+        *decimation = decimation::State::new();
+        structure.reset();
+        tool.reset();
+        *detector = Detector::new();
+        strobes.clear();
+        (*losses, *damage, *heard_speed, *advice) = (0, 0.0, None, None);
+    }
+
+    /// The points of the stroboscopic map that the newest block made, oldest first: of the structure band where it holds tooth
+    /// periods long enough, else of the tool band.
+    pub fn strobes(&self) -> &[Strobe] {
+        &self.strobes
+    }
+
+    /// The newest spectrum of a band, summed over the axes; `None` before the first.
+    pub fn spectrum(&self, band: Band) -> Option<PowerSpectrum<'_>> {
+        match band {
+            Band::Structure => self.structure.spectrum(),
+            Band::Tool => self.tool.spectrum(),
+        }
+    }
+
+    /// True where the newest block completed a spectrum of the band.
+    pub fn has_fresh_spectrum(&self, band: Band) -> bool {
+        match band {
+            Band::Structure => self.structure.fresh,
+            Band::Tool => self.tool.fresh,
+        }
+    }
+
+    /// What the samples at fixed angles of a band say.
+    pub fn finding(&self, band: Band) -> &Finding {
+        match band {
+            Band::Structure => self.structure.growth.finding(),
+            Band::Tool => self.tool.growth.finding(),
+        }
+    }
+
+    /// The sample clock: rate, clips, losses.
+    pub fn sample_clock(&self) -> &SampleClockState {
+        &self.sample_clock
+    }
+
+    /// The tachometer: speed per turn, rejected and missing edges.
+    pub fn tachometer(&self) -> &TachometerState {
+        &self.tachometer
+    }
+}
+
+/// Goes on with the tone of a fresh spectrum, and with the background where there is no chatter.
+pub(super) fn follow_tone<const POINTS: usize, const BINS: usize>(
+    path: &mut Path<POINTS, BINS>,
+    rotation: Option<Rotation>,
+    (from, to): (Hertz, Hertz),
+    chatter: bool,
+    work: &mut [f32],
+) {
+    let spectrum = PowerSpectrum {
+        power: &path.power,
+        bin: path.bin,
+    };
+    let found = if path.background.is_learnt() {
+        path.background.new_tone(&spectrum, rotation, from, to, work)
+    } else {
+        None
+    };
+    path.tone = Tone::follow(path.tone, found, &spectrum);
+    if !chatter {
+        path.background.learn(&path.power);
+    }
+}
