@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde::Serialize;
 
+use super::channels::Channels;
 use super::{Error, Output, Range, non_negative, positive};
 use crate::case::Case;
 use crate::recording::Quantity;
 use crate::simulate::Effects;
-use crate::simulate::rig::{Noise, Rig, Signal};
+use crate::simulate::rig::{Rig, Signal};
 use crate::structure::{Direction, Structure};
 
 /// The options of a rig.
@@ -53,20 +54,6 @@ pub(super) struct Experiment {
     /// How much less the shaker's force is per velocity, in N s/m: its drop-out at resonance.
     #[arg(long, value_name = "C", default_value_t = 0.0, value_parser = non_negative, allow_negative_numbers = true)]
     drop_ns_per_m: f64,
-    /// What is measured besides the force.
-    #[arg(
-        long,
-        value_name = "WHAT,…",
-        value_delimiter = ',',
-        default_value = "displacement,acceleration"
-    )]
-    measure: Vec<Measured>,
-    /// Noise of every sample of every channel, in percent of the root mean square of the channel.
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = non_negative, allow_negative_numbers = true)]
-    noise_percent: f64,
-    /// Noise of one channel instead, in its SI unit, as in fx=0.02; may be repeated.
-    #[arg(long, value_name = "CHANNEL=VALUE", value_parser = channel_noise)]
-    noise: Vec<(String, f64)>,
 }
 
 /// The rigs.
@@ -84,19 +71,14 @@ pub(super) enum Kind {
     FreeDecay,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Measured {
-    Displacement,
-    Velocity,
-    Acceleration,
-}
-
 /// What a rig shares with a cut.
 pub(super) struct Common<'a> {
     pub(super) seconds: Option<f64>,
     pub(super) sample_rate_hz: Option<f64>,
     pub(super) seed: u64,
     pub(super) out: &'a Path,
+    pub(super) effects: &'a [String],
+    pub(super) channels: &'a Channels,
 }
 
 #[derive(Debug, Serialize)]
@@ -117,7 +99,6 @@ pub(super) fn run(
     case: &Case,
     kind: Kind,
     options: &Experiment,
-    effects: &Effects,
     common: &Common<'_>,
     output: Output,
 ) -> Result<(), Error> {
@@ -125,16 +106,17 @@ pub(super) fn run(
     let input = |error: &dyn std::fmt::Display| Error::input(format!("{}: {error}", case.path.display()));
     let direction = direction(options, structure).map_err(Error::input)?;
     let signal = signal(kind, options, common)?;
+    let effects = Effects::parse_over(
+        common.effects.iter().map(String::as_str),
+        Some(signal.duration_s()),
+    )
+    .map_err(Error::input)?;
     let rig = Rig {
         drop_ns_per_m: options.drop_ns_per_m,
-        measured: options
-            .measure
-            .iter()
-            .map(|measured| measured.quantity())
-            .collect(),
+        measured: common.channels.measured(),
         effects: Effects::of_case(case)
             .map_err(|error| input(&error))?
-            .and(effects),
+            .and(&effects),
         ..Rig::new(
             direction,
             signal,
@@ -144,18 +126,7 @@ pub(super) fn run(
         )
     };
     let (mut recording, statistics) = rig.record(structure, common.out).map_err(|error| input(&error))?;
-    let noise = Noise {
-        relative: 0.01 * options.noise_percent,
-        absolute: options.noise.iter().cloned().collect(),
-    };
-    if let Some(name) = noise
-        .absolute
-        .keys()
-        .find(|name| recording.channel(name).is_none())
-    {
-        return Err(Error::input(recording.lacks(name.clone())));
-    }
-    noise.add(&mut recording, common.seed);
+    common.channels.add_noise(&mut recording, common.seed)?;
     recording.write_csv(common.out)?;
     let largest = recording
         .channels
@@ -183,16 +154,6 @@ pub(super) fn run(
         answer.largest_displacement_mm
     );
     output.answer(&answer, text)
-}
-
-impl Measured {
-    fn quantity(self) -> Quantity {
-        match self {
-            Self::Displacement => Quantity::Displacement,
-            Self::Velocity => Quantity::Velocity,
-            Self::Acceleration => Quantity::Acceleration,
-        }
-    }
 }
 
 fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, String> {
@@ -277,11 +238,4 @@ fn signal(kind: Kind, options: &Experiment, common: &Common<'_>) -> Result<Signa
             seconds: common.seconds.unwrap_or(10.0),
         },
     })
-}
-
-fn channel_noise(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text
-        .split_once('=')
-        .ok_or_else(|| format!("`{text}` is not of the form CHANNEL=VALUE, such as fx=0.02"))?;
-    Ok((name.trim().into(), non_negative(value.trim())?))
 }

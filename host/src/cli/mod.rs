@@ -2,6 +2,7 @@
 //!
 //! Exit status 0: done. 2: bad usage or bad input, with one message. 1: anything else, never a panic.
 
+mod channels;
 pub mod demo;
 mod error;
 mod experiment;

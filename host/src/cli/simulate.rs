@@ -6,10 +6,11 @@ use clap::ValueEnum;
 use quietcut_core::tachometer::Wheel;
 use serde::Serialize;
 
+use super::channels::Channels;
 use super::experiment::{self, Experiment};
 use super::{Error, Output, finite, non_negative, positive};
 use crate::case::Case;
-use crate::recording::Sidecar;
+use crate::recording::{Quantity, Sidecar};
 use crate::simulate::{
     Accelerometer, Effects, Entry, Recorder, SimulateError, Statistics, TachometerModel, VirtualCut,
     VirtualCutError,
@@ -36,6 +37,11 @@ pub struct Args {
     seconds: Option<f64>,
     #[command(flatten)]
     experiment: Experiment,
+    #[command(flatten)]
+    channels: Channels,
+    /// Of a cut, do not record the forces.
+    #[arg(long, conflicts_with = "experiment")]
+    no_force: bool,
     /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated.
     #[arg(long, value_name = "NAME=VALUE")]
     effect: Vec<String>,
@@ -50,7 +56,7 @@ pub struct Args {
     #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
     air_s: Option<f64>,
     /// Record the motion itself, without a sensor's faults.
-    #[arg(long, conflicts_with_all = ["range_g", "noise_ug", "clock_error_percent", "tacho_jitter_us", "seed"])]
+    #[arg(long, conflicts_with_all = ["range_g", "noise_ug", "clock_error_percent", "tacho_jitter_us"])]
     ideal: bool,
     /// Samples per second: nominal, where a sensor samples. Without it 26 667 in a cut, and at a rig enough for the
     /// harmonics of what it excites.
@@ -123,7 +129,6 @@ pub fn run(args: Args) -> Result<(), Error> {
             sidecar.display()
         )));
     }
-    let effects = Effects::parse(args.effect.iter().map(String::as_str)).map_err(Error::input)?;
     if let Some(kind) = args.experiment.experiment {
         if args.rpm.is_some() || args.depth_mm.is_some() {
             return Err(Error::input(
@@ -135,12 +140,15 @@ pub fn run(args: Args) -> Result<(), Error> {
             sample_rate_hz: args.sample_rate_hz,
             seed: args.seed,
             out: &args.out,
+            effects: &args.effect,
+            channels: &args.channels,
         };
-        return experiment::run(&case, kind, &args.experiment, &effects, &common, args.output);
+        return experiment::run(&case, kind, &args.experiment, &common, args.output);
     }
     let tachometer = tachometer(&args)?;
     let sample_rate_hz = args.sample_rate_hz.unwrap_or(SAMPLE_RATE_HZ);
-    let cut = cut(&args, &case, effects)?;
+    let effects = Effects::parse_over(args.effect.iter().map(String::as_str), args.seconds);
+    let cut = cut(&args, &case, effects.map_err(Error::input)?)?;
     let recorder = if args.ideal {
         Recorder::Ideal {
             rate_hz: sample_rate_hz,
@@ -160,7 +168,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let named = |error| named(&args, error);
     let full_cut_s = cut.full_cut_s(&case).map_err(named)?;
     let (
-        recording,
+        mut recording,
         Statistics {
             steps,
             contact_changes,
@@ -169,6 +177,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     ) = cut
         .record(&case, recorder, tachometer, &args.out)
         .map_err(named)?;
+    args.channels.add_noise(&mut recording, args.seed)?;
     recording.write_csv(&args.out)?;
     let displacements = recording
         .channels
@@ -238,6 +247,11 @@ fn cut(args: &Args, case: &Case, effects: Effects) -> Result<VirtualCut, Error> 
         effects,
         entry: Entry::None,
         air_s: args.air_s.unwrap_or((0.05 * seconds).min(0.2)),
+        measured: (!args.no_force)
+            .then_some(Quantity::Force)
+            .into_iter()
+            .chain(args.channels.measured())
+            .collect(),
         ..VirtualCut::new(rpm, depth_mm, seconds)
     };
     let ramp = Entry::Ramp {

@@ -88,8 +88,8 @@ impl<'a> Contact<'a> {
             cutting,
             teeth: Vec::with_capacity(cutter.teeth.len()),
             within: [0.0; 2],
-            same_time_s: SAME_TIME * cutting.spindle.delay_s(0.0, shortest),
-            longest_delay_s: cutting.spindle.delay_s(0.0, longest),
+            same_time_s: SAME_TIME * cutting.spindle.bounds_s(shortest)[0],
+            longest_delay_s: cutting.spindle.bounds_s(longest)[1],
             gain_of_order: if velocity_jumps { 1 } else { 2 },
         };
         for tooth in &cutter.teeth {
@@ -126,25 +126,58 @@ impl<'a> Contact<'a> {
         self.within = [from_s + inset, to_s - inset];
     }
 
-    /// Force on the tool, N, at `t` with the tool displaced by `x`.
+    /// Force on the tool, N, at `t` with the tool displaced by `x`; without that of its velocity.
     pub(super) fn force_n(&self, t: f64, x: [f64; 3]) -> [f64; 3] {
         let cutter = &self.cutting.cutter;
+        let depth_m = self.depth_m(t, x);
         let mut sum = [0.0; 3];
-        let mut depth_m = f64::NAN;
-        for (tooth, state) in cutter.teeth.iter().zip(&self.teeth) {
-            if !(state.in_material && state.at_surface) {
-                continue;
-            }
-            if depth_m.is_nan() {
-                depth_m = cutter.depth_at_m(cutter.depth_m * self.cutting.passage.depth_share(t), x[2]);
-            }
+        for tooth in self.cutting_teeth() {
             let chip = self.chip(tooth, t, x);
-            let force = cutter.force_n(chip.place, chip.thickness_m, depth_m);
+            let force = cutter.force.force_n(chip.place, chip.thickness_m, depth_m);
             for (sum, force) in sum.iter_mut().zip(force) {
                 *sum += force;
             }
         }
-        sum
+        sum.map(|force| force * cutter.force.wear(t))
+    }
+
+    /// The matrix D, N s/m, of the force −D v of process damping at `t` with the tool displaced by `x`; `None` where there
+    /// is none.
+    pub(super) fn damping_ns_per_m(&self, t: f64, x: [f64; 3]) -> Option<[[f64; 3]; 3]> {
+        let cutter = &self.cutting.cutter;
+        cutter.force.process_damping?;
+        let speed_m_per_s = cutter.radius_m? * self.cutting.spindle.speed_at_rad_per_s(t);
+        let depth_m = self.depth_m(t, x);
+        let mut sum = [[0.0; 3]; 3];
+        for tooth in self.cutting_teeth() {
+            let damping = cutter
+                .force
+                .damping_ns_per_m(self.place(tooth, t), depth_m, speed_m_per_s);
+            for (sum, damping) in sum.as_flattened_mut().iter_mut().zip(damping.as_flattened()) {
+                *sum += damping * cutter.force.wear(t);
+            }
+        }
+        Some(sum)
+    }
+
+    /// The teeth that touch material.
+    fn cutting_teeth(&self) -> impl Iterator<Item = &Tooth> {
+        let teeth = self.cutting.cutter.teeth.iter().zip(&self.teeth);
+        teeth
+            .filter(|(_, state)| state.in_material && state.at_surface)
+            .map(|(tooth, _)| tooth)
+    }
+
+    /// Axial depth at `t`, m.
+    fn depth_m(&self, t: f64, x: [f64; 3]) -> f64 {
+        let cutter = &self.cutting.cutter;
+        cutter.depth_at_m(cutter.depth_m * self.cutting.passage.depth_share(t), x[2])
+    }
+
+    /// How far the tool feeds until a tooth passes where the one ahead of it did, m: the feed axis moves steadily, also
+    /// where the spindle does not.
+    fn feed_m(&self, tooth: &Tooth, t: f64) -> f64 {
+        tooth.feed_m * self.cutting.spindle.delay_share(t, tooth.pitch_rad)
     }
 
     fn chip(&self, tooth: &Tooth, t: f64, x: [f64; 3]) -> Chip {
@@ -153,7 +186,7 @@ impl<'a> Contact<'a> {
         let thickness_m = if self.cutting.regeneration == Regeneration::None {
             let ahead = &cutter.teeth[tooth.ahead];
             let at_rest = cutter.reach_m(tooth, place, [0.0; 3]) - cutter.reach_m(ahead, place, [0.0; 3]);
-            at_rest + cutter.recession_m(place, tooth.feed_m)
+            at_rest + cutter.recession_m(place, self.feed_m(tooth, t))
         } else {
             cutter.reach_m(tooth, place, x) - self.in_front_m(tooth, place, t)
         };
@@ -169,13 +202,14 @@ impl<'a> Contact<'a> {
     /// Height of the surface in front of a tooth, receded by the feed since it was left, m.
     fn in_front_m(&self, tooth: &Tooth, place: Immersion, t: f64) -> f64 {
         let cutter = &self.cutting.cutter;
-        let delay_s = self.cutting.spindle.delay_s(t, tooth.pitch_rad);
-        let within = self.within.map(|end| end - delay_s);
+        let spindle = &self.cutting.spindle;
+        let delay_s = spindle.delay_s(t, tooth.pitch_rad);
+        let within = self.within.map(|end| end - spindle.delay_s(end, tooth.pitch_rad));
         let ahead = &cutter.teeth[tooth.ahead];
         let left = self.teeth[tooth.ahead]
             .surface
             .height_m(cutter, ahead, place, t - delay_s, within);
-        left - cutter.recession_m(place, tooth.feed_m)
+        left - cutter.recession_m(place, self.feed_m(tooth, t))
     }
 
     /// The first time after `t` at which a tooth enters or leaves, meets or loses material, or meets a kink.
@@ -313,13 +347,13 @@ impl<'a> Contact<'a> {
     /// Contact of a tooth changes at `t`. `false` where it has changed at this very time before: then neither
     /// contact nor air is a motion that goes on.
     pub(super) fn change(&mut self, index: usize, t: f64) -> bool {
-        let edge = self.cutting.cutter.has_edge_force();
+        let jumps = self.cutting.cutter.force.jumps_at_contact();
         let again = (t - self.teeth[index].changed_s).abs() <= self.same_time_s * 1e-3;
         let state = &mut self.teeth[index];
         state.at_surface = !state.at_surface;
         state.changed_s = t;
         if state.in_material {
-            self.kink_of_force(t, if edge { 0 } else { 1 });
+            self.kink_of_force(t, if jumps { 0 } else { 1 });
         }
         self.kink_behind(index, t, 1);
         !again
@@ -368,7 +402,7 @@ impl<'a> Contact<'a> {
         let when = t + self
             .cutting
             .spindle
-            .delay_s(t, self.cutting.cutter.teeth[behind].pitch_rad);
+            .advance_s(t, self.cutting.cutter.teeth[behind].pitch_rad);
         let kinks = &mut self.teeth[behind].kinks;
         match kinks.back_mut() {
             Some(kink) if (kink.0 - when).abs() <= self.same_time_s => kink.1 = kink.1.min(order),

@@ -1,8 +1,9 @@
-//! The teeth: where they are, how thick a chip they see, how hard it pushes.
+//! The teeth: where they are, and how thick a chip they see.
 
 use std::f64::consts::TAU;
 
 use super::SimulateError;
+use super::force_law::ForceLaw;
 use crate::milling::{Cut, Material, Runout, Tool};
 
 /// The tool in its cut, in SI units and in the machine's axes.
@@ -25,11 +26,11 @@ pub struct Cutter {
     pub radius_m: Option<f64>,
     /// True where the depth of cut follows the axial vibration, b = b₀ − z (thesis eq. 3.5).
     pub axial_depth_modulation: bool,
+    /// How hard a chip pushes.
+    pub force: ForceLaw,
     feed_direction: [f64; 2],
     sin_edge: f64,
     cos_edge: f64,
-    cutting: Coefficients,
-    edge: Coefficients,
 }
 
 /// One tooth.
@@ -49,32 +50,13 @@ pub struct Tooth {
     pub feed_m: f64,
 }
 
-/// Coefficients of the tangential force and, by the edge angle, of what the radial and axial forces add up to in
-/// the plane of the tool (towards the axis) and along it.
-#[derive(Clone, Copy, Debug)]
-struct Coefficients {
-    tangential: f64,
-    inward: f64,
-    axial: f64,
-}
-
-impl Coefficients {
-    fn new(tangential: f64, radial: f64, axial: f64, sin_edge: f64, cos_edge: f64) -> Self {
-        Self {
-            tangential,
-            inward: radial * sin_edge + axial * cos_edge,
-            axial: radial * cos_edge - axial * sin_edge,
-        }
-    }
-}
-
 /// A place on the arc of the cut.
 #[derive(Clone, Copy, Debug)]
 pub struct Immersion {
     /// sin φ: how much of the feed lies along the chip.
     pub sin: f64,
     /// Radially outwards, in the machine's x and y.
-    outward: [f64; 2],
+    pub(super) outward: [f64; 2],
 }
 
 impl Cutter {
@@ -107,20 +89,7 @@ impl Cutter {
             feed_direction: [feed_rad.cos(), feed_rad.sin()],
             sin_edge,
             cos_edge,
-            cutting: Coefficients::new(
-                material.ktc_mpa * 1e6,
-                material.krc_mpa * 1e6,
-                material.kac_mpa * 1e6,
-                sin_edge,
-                cos_edge,
-            ),
-            edge: Coefficients::new(
-                material.kte_n_per_mm * 1e3 / sin_edge,
-                material.kre_n_per_mm * 1e3 / sin_edge,
-                material.kae_n_per_mm * 1e3 / sin_edge,
-                sin_edge,
-                cos_edge,
-            ),
+            force: ForceLaw::new(*material, [sin_edge, cos_edge]),
         };
         if let Some(runout) = tool.runout {
             cutter.set_runout(runout);
@@ -168,17 +137,6 @@ impl Cutter {
         feed_m * at.sin * self.sin_edge
     }
 
-    /// Force of the chip on the tool, N: thesis eqs 3.2 to 3.4, with the chip thickness and depth in m.
-    pub fn force_n(&self, at: Immersion, thickness_m: f64, depth_m: f64) -> [f64; 3] {
-        let of = |cutting: f64, edge: f64| depth_m * (cutting * thickness_m + edge);
-        let tangential = of(self.cutting.tangential, self.edge.tangential);
-        let inward = of(self.cutting.inward, self.edge.inward);
-        let axial = of(self.cutting.axial, self.edge.axial);
-        let [x, y] = at.outward;
-        // The tangential force points against the motion of the tooth, (−cos φ, sin φ) in feed and normal.
-        [-tangential * y - inward * x, tangential * x - inward * y, axial]
-    }
-
     /// The depth of cut at the axial displacement `z_m`, m.
     pub fn depth_at_m(&self, nominal_m: f64, z_m: f64) -> f64 {
         if self.axial_depth_modulation {
@@ -186,16 +144,6 @@ impl Cutter {
         } else {
             nominal_m
         }
-    }
-
-    /// True where a tooth feels a force the moment it touches: then the force jumps at loss of contact.
-    pub fn has_edge_force(&self) -> bool {
-        let Coefficients {
-            tangential,
-            inward,
-            axial,
-        } = self.edge;
-        tangential != 0.0 || inward != 0.0 || axial != 0.0
     }
 }
 

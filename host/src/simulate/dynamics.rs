@@ -169,6 +169,15 @@ impl Dynamics {
         })
     }
 
+    /// C B, (m/s)/N: what the velocity of the tool jumps by with the force on it; zero where it does not.
+    pub fn velocity_per_force(&self) -> [[f64; 3]; 3] {
+        if self.velocity_jumps {
+            self.cb
+        } else {
+            [[0.0; 3]; 3]
+        }
+    }
+
     /// C A B, 1/kg: acceleration of the tool per force on it.
     pub fn acceleration_per_force(&self) -> [[f64; 3]; 3] {
         self.cab

@@ -11,6 +11,7 @@ mod dormand_prince;
 mod dynamics;
 pub mod effect;
 mod error;
+mod force_law;
 mod integrator;
 mod passage;
 mod record;
@@ -28,13 +29,16 @@ pub use cutter::{Cutter, Tooth};
 pub use dynamics::Dynamics;
 pub use effect::{Effect, EffectError, Effects};
 pub use error::SimulateError;
+pub use force_law::{ChipLaw, ForceLaw, ProcessDamping};
 pub use integrator::{Motion, Room, Segment, Statistics};
 pub use passage::Passage;
 pub use record::Recorder;
 pub use sensor::{Accelerometer, Sampler, TachometerModel};
-pub use spindle::Spindle;
+pub use spindle::{Fluctuation, Spindle};
 pub use term::{At, Branch, Term};
 pub use virtual_cut::{Entry, Heard, VirtualCut, VirtualCutError};
+
+use nalgebra::{Matrix3, Vector3};
 
 use contact::Contact;
 use integrator::Integrator;
@@ -158,7 +162,7 @@ impl Model {
         Integrator::new(self, settings, y).run(end_s, observe)
     }
 
-    /// Force on the tool from cut and drive, N; `v` is its velocity without what jumps with the force.
+    /// Force on the tool from cut and drive, N.
     fn force_n(&self, stretch: Stretch<'_>, t: f64, x: [f64; 3], y: &[f64]) -> [f64; 3] {
         let mut force = stretch.contact.map_or([0.0; 3], |contact| contact.force_n(t, x));
         if let Some(drive) = &self.drive {
@@ -176,7 +180,28 @@ impl Model {
                 }
             }
         }
-        force
+        match stretch.contact.and_then(|contact| contact.damping_ns_per_m(t, x)) {
+            Some(damping) => self.damped_n(force, damping, y),
+            None => force,
+        }
+    }
+
+    /// F with F = `force` − D v, v = C A x + C B F: where the velocity feels the force itself, both are solved for.
+    fn damped_n(&self, force: [f64; 3], damping: [[f64; 3]; 3], y: &[f64]) -> [f64; 3] {
+        let v = Vector3::from(
+            self.dynamics
+                .velocity_under(&y[..self.dynamics.order()], [0.0; 3]),
+        );
+        let damping = Matrix3::from_fn(|i, j| damping[i][j]);
+        let jump = self.dynamics.velocity_per_force();
+        let jump = Matrix3::from_fn(|i, j| jump[i][j]);
+        let free = Vector3::from(force) - damping * v;
+        // Damping over a tool without inertia is small beside 1: the matrix is regular.
+        (Matrix3::identity() + damping * jump)
+            .lu()
+            .solve(&free)
+            .unwrap_or(free)
+            .into()
     }
 
     /// ẏ at `t` with the tool at `x`; the force on the tool from cut and drive, N.

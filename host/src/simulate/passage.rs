@@ -141,9 +141,11 @@ impl Passage {
             Self::Feed { start_s, end_s } => {
                 let radius_m = cutter.radius_m.unwrap_or(f64::INFINITY);
                 let speed = feed_speed(cutter, spindle) / radius_m;
-                let sin = |t: f64| (cutter.start_rad + spindle.speed_rad_per_s() * (t - open_s)).sin();
+                let opened_rad = spindle.angle_rad(open_s);
+                let sin = |t: f64| (cutter.start_rad + (spindle.angle_rad(t) - opened_rad)).sin();
                 let window = [open_s, close_s];
-                // sin φ less the place of a face over the radius: concave in t, positive beyond the face.
+                // sin φ less the place of a face over the radius: concave in t (a spindle that fluctuates slowly against a
+                // tooth pass bends it little), positive beyond the face.
                 let behind_front = positive(|t| sin(t) - (1.0 - speed * (t - start_s)), window);
                 let behind_end = positive(|t| sin(t) - (1.0 - speed * (t - end_s)), window);
                 let [before, after] = complement(behind_end, window);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use quietcut_core::tachometer::Wheel;
 
-use super::effect::{EffectError, Effects, Pickup};
+use super::effect::{Effects, Pickup};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{Model, Room, Segment, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
 use crate::case::Case;
@@ -40,8 +40,8 @@ impl Recorder {
 }
 
 impl VirtualCut {
-    /// Cuts, and records forces on the tool, its displacement and acceleration in the directions of the structure, and
-    /// the tachometer; `path` is where the recording will be written.
+    /// Cuts, and records what is [measured](Self::measured) in the directions of the structure, and the tachometer; `path`
+    /// is where the recording will be written.
     ///
     /// Time is the true one: a sensor whose clock is off samples at another rate than it says. Forces and displacements
     /// are those at the instants of the samples.
@@ -56,59 +56,37 @@ impl VirtualCut {
         path: &Path,
     ) -> Result<(Recording, Statistics), VirtualCutError> {
         let model = self.model(case)?;
-        let spindle = Spindle::new(self.spindle_rpm);
+        let spindle = self.spindle(case)?;
         let rate_hz = recorder.rate_hz();
         let samples = (self.seconds * rate_hz).floor() as usize + 1;
-        let mut truth = Truth::new(&model, rate_hz, samples);
-        let mut sampler = match recorder {
-            Recorder::Sensor { accelerometer, .. } => Some(Sampler::new(&model, accelerometer)),
-            Recorder::Ideal { .. } => None,
-        };
-        let tail_s = sampler.as_ref().map_or(1.0 / rate_hz, Sampler::tail_s);
+        let pickups = self.pickups(case)?;
+        let mut truth = Truth::new(&model, rate_hz, samples, pickups.clone());
+        let mut sensors = Sensors::new(&model, recorder, &pickups);
+        let tail_s = sensors.tail_s().max(1.0 / rate_hz);
         let statistics = model.run(self.seconds + tail_s, Settings::default(), |segment| {
             truth.observe(segment);
-            if let Some(sampler) = &mut sampler {
-                sampler.observe(segment);
-            }
+            sensors.observe(segment);
         })?;
-        let (accelerations, seed) = match (recorder, sampler) {
-            (Recorder::Sensor { accelerometer, seed }, Some(sampler)) => {
-                (felt(&sampler, accelerometer, seed), Some(seed))
-            }
-            _ => (truth.accelerations(), None),
+        let seed = match recorder {
+            Recorder::Sensor { seed, .. } => Some(seed),
+            Recorder::Ideal { .. } => None,
         };
-        let directions = &case.structure()?.directions;
-        let effects = Effects::of_case(case)?.and(&self.effects);
-        let mut channels = Vec::new();
-        let series: [(Quantity, &[[f64; 3]]); 3] = [
-            (Quantity::Force, &truth.forces_n),
-            (Quantity::Displacement, &truth.displacements_m),
-            (Quantity::Acceleration, &accelerations),
-        ];
-        for (quantity, values) in series {
-            for direction in [Direction::X, Direction::Y, Direction::Z] {
-                let Some(axis) = direction.axis().filter(|_| directions.contains(&direction)) else {
-                    continue;
-                };
-                let pickup = effects.pickup(Pickup::of_axis(quantity, axis));
-                if pickup.delay_s != 0.0 {
-                    return Err(EffectError::Structure {
-                        name: "sensor-delay",
-                        what: "the channels of a cut cannot be late yet; those of --experiment can".into(),
-                    }
-                    .into());
-                }
-                channels.push(Channel {
-                    name: pickup.name.clone(),
-                    quantity,
-                    samples: values
+        let mut channels: Vec<Channel> = pickups
+            .iter()
+            .zip(truth.channels())
+            .map(|(pickup, truth)| Channel {
+                name: pickup.name.clone(),
+                quantity: pickup.quantity,
+                samples: match sensors.felt(pickup) {
+                    Some(felt) => felt
                         .iter()
                         .take(samples)
                         .map(|value| pickup.read(*value))
                         .collect(),
-                });
-            }
-        }
+                    None => truth,
+                },
+            })
+            .collect();
         channels.push(Channel {
             name: "tacho".into(),
             quantity: Quantity::Level,
@@ -130,6 +108,21 @@ impl VirtualCut {
             sidecar: self.sidecar(case, tachometer.wheel)?,
         };
         Ok((recording, statistics))
+    }
+
+    /// What is measured, by quantity and direction.
+    fn pickups(&self, case: &Case) -> Result<Vec<Pickup>, VirtualCutError> {
+        let directions = &case.structure()?.directions;
+        let effects = Effects::of_case(case)?.and(&self.effects);
+        let mut pickups = Vec::new();
+        for quantity in &self.measured {
+            for direction in [Direction::X, Direction::Y, Direction::Z] {
+                if let Some(axis) = direction.axis().filter(|_| directions.contains(&direction)) {
+                    pickups.push(effects.pickup(Pickup::of_axis(*quantity, axis)));
+                }
+            }
+        }
+        Ok(pickups)
     }
 
     fn sidecar(&self, case: &Case, wheel: Wheel) -> Result<Sidecar, VirtualCutError> {
@@ -203,79 +196,134 @@ impl VirtualCut {
     }
 }
 
-/// What the sensor says, back in m/s².
-fn felt(sampler: &Sampler, accelerometer: Accelerometer, seed: u64) -> Vec<[f64; 3]> {
-    let count = f64::from(accelerometer.sensor().meters_per_second2_per_count);
-    sampler
-        .blocks(seed)
-        .iter()
-        .flat_map(|block| &block.counts)
-        .map(|counts| counts.map(|value| f64::from(value) * count))
-        .collect()
+/// The accelerometers of a recording, one for each delay of its channels.
+struct Sensors {
+    accelerometer: Option<(Accelerometer, u64)>,
+    samplers: Vec<(f64, Sampler)>,
 }
 
-/// The motion itself, at a steady rate.
+impl Sensors {
+    fn new(model: &Model, recorder: Recorder, pickups: &[Pickup]) -> Self {
+        let Recorder::Sensor { accelerometer, seed } = recorder else {
+            return Self {
+                accelerometer: None,
+                samplers: Vec::new(),
+            };
+        };
+        let mut samplers: Vec<(f64, Sampler)> = Vec::new();
+        for pickup in pickups
+            .iter()
+            .filter(|pickup| pickup.quantity == Quantity::Acceleration)
+        {
+            if !samplers.iter().any(|(delay_s, _)| *delay_s == pickup.delay_s) {
+                let sampler = Sampler::new(model, accelerometer).late_by(pickup.delay_s);
+                samplers.push((pickup.delay_s, sampler));
+            }
+        }
+        Self {
+            accelerometer: Some((accelerometer, seed)),
+            samplers,
+        }
+    }
+
+    /// How much longer than the last sample the motion must go on, s.
+    fn tail_s(&self) -> f64 {
+        self.samplers
+            .iter()
+            .map(|(delay_s, sampler)| sampler.tail_s() - delay_s)
+            .fold(0.0, f64::max)
+    }
+
+    fn observe(&mut self, segment: &Segment<'_>) {
+        for (_, sampler) in &mut self.samplers {
+            sampler.observe(segment);
+        }
+    }
+
+    /// What the sensor of a channel says, back in m/s²; `None` where it has none.
+    fn felt(&self, pickup: &Pickup) -> Option<Vec<[f64; 3]>> {
+        let (accelerometer, seed) = self.accelerometer?;
+        let (_, sampler) = self
+            .samplers
+            .iter()
+            .find(|(delay_s, _)| pickup.quantity == Quantity::Acceleration && *delay_s == pickup.delay_s)?;
+        let count = f64::from(accelerometer.sensor().meters_per_second2_per_count);
+        let blocks = sampler.blocks(seed);
+        let counts = blocks.iter().flat_map(|block| &block.counts);
+        Some(
+            counts
+                .map(|counts| counts.map(|value| f64::from(value) * count))
+                .collect(),
+        )
+    }
+}
+
+/// What channels would say without a sensor's faults, each at its own delay, at a steady rate.
+///
+/// Where a structure has no acceleration at an instant it is the mean over one sample.
 struct Truth {
     rate_hz: f64,
     samples: usize,
     room: Room,
-    forces_n: Vec<[f64; 3]>,
-    displacements_m: Vec<[f64; 3]>,
-    accelerations: Vec<[f64; 3]>,
-    /// Where there is no acceleration at an instant: velocities half a sample before each sample.
-    velocities: Option<Vec<[f64; 3]>>,
+    velocity_jumps: bool,
+    /// Samples of each channel; where accelerations are means, its velocities half a sample before.
+    channels: Vec<(Pickup, Vec<f64>)>,
 }
 
 impl Truth {
-    fn new(model: &Model, rate_hz: f64, samples: usize) -> Self {
+    fn new(model: &Model, rate_hz: f64, samples: usize, pickups: Vec<Pickup>) -> Self {
         Self {
             rate_hz,
             samples,
             room: Room::new(model),
-            forces_n: Vec::with_capacity(samples),
-            displacements_m: Vec::with_capacity(samples),
-            accelerations: Vec::with_capacity(samples),
-            velocities: model
-                .dynamics
-                .velocity_jumps()
-                .then(|| Vec::with_capacity(samples + 1)),
+            velocity_jumps: model.dynamics.velocity_jumps(),
+            channels: pickups
+                .into_iter()
+                .map(|pickup| (pickup, Vec::with_capacity(samples + 1)))
+                .collect(),
         }
     }
 
     fn observe(&mut self, segment: &Segment<'_>) {
-        while self.forces_n.len() < self.samples {
-            let t = self.forces_n.len() as f64 / self.rate_hz;
-            if t > segment.to_s() {
-                break;
-            }
-            let motion = segment.motion(t, &mut self.room);
-            self.forces_n.push(motion.force_n);
-            self.displacements_m.push(motion.displacement_m);
-            self.accelerations.extend(motion.acceleration_m_per_s2);
-        }
-        if let Some(velocities) = &mut self.velocities {
-            while velocities.len() <= self.samples {
-                let t = (velocities.len() as f64 - 0.5) / self.rate_hz;
+        for (pickup, values) in &mut self.channels {
+            let mean = self.velocity_jumps && pickup.quantity == Quantity::Acceleration;
+            let (early, count) = if mean {
+                (0.5, self.samples + 1)
+            } else {
+                (0.0, self.samples)
+            };
+            while values.len() < count {
+                let t = (values.len() as f64 - early) / self.rate_hz - pickup.delay_s;
                 if t > segment.to_s() {
                     break;
                 }
-                velocities.push(if t < 0.0 {
-                    [0.0; 3]
-                } else {
-                    segment.motion(t, &mut self.room).velocity_m_per_s
-                });
+                if t < 0.0 {
+                    values.push(0.0);
+                    continue;
+                }
+                let motion = segment.motion(t, &mut self.room);
+                values.push(pickup.read(match pickup.quantity {
+                    Quantity::Force => motion.force_n,
+                    Quantity::Displacement => motion.displacement_m,
+                    Quantity::Acceleration if !mean => motion.acceleration_m_per_s2.unwrap_or([0.0; 3]),
+                    _ => motion.velocity_m_per_s,
+                }));
             }
         }
     }
 
-    fn accelerations(&self) -> Vec<[f64; 3]> {
-        let Some(velocities) = &self.velocities else {
-            return self.accelerations.clone();
-        };
-        velocities
-            .windows(2)
-            .map(|pair| std::array::from_fn(|axis| (pair[1][axis] - pair[0][axis]) * self.rate_hz))
-            .collect()
+    fn channels(self) -> impl Iterator<Item = Vec<f64>> {
+        let (rate_hz, velocity_jumps) = (self.rate_hz, self.velocity_jumps);
+        self.channels.into_iter().map(move |(pickup, values)| {
+            if velocity_jumps && pickup.quantity == Quantity::Acceleration {
+                values
+                    .windows(2)
+                    .map(|pair| (pair[1] - pair[0]) * rate_hz)
+                    .collect()
+            } else {
+                values
+            }
+        })
     }
 }
 
@@ -416,6 +464,44 @@ mod tests {
         let largest = y.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
         // Twice summed, the error of the rectangle rule is of the order of dt times the velocity.
         assert!(worst < 0.05 * largest, "{worst} of {largest}");
+    }
+
+    #[test]
+    fn channels_may_be_late_scaled_and_left_out() {
+        let case = case("kuka-kr90-full-cubic");
+        let recorder = Recorder::Ideal { rate_hz: 5000.0 };
+        let record = |effects: &[&str], measured: &[Quantity]| {
+            let cut = VirtualCut {
+                effects: Effects::parse(effects.iter().copied()).unwrap(),
+                measured: measured.to_vec(),
+                ..cut(900.0, 1.0)
+            };
+            let path = Path::new("cut.csv");
+            cut.record(&case, recorder, TachometerModel::ONE_MARK, path)
+                .unwrap()
+                .0
+        };
+        let plain = record(
+            &[],
+            &[Quantity::Force, Quantity::Displacement, Quantity::Velocity],
+        );
+        let faulty = record(
+            &[
+                "sensor-delay=0.0012",
+                "sensor-delay.channel=x",
+                "sensor-gain=1.2",
+                "sensor-gain.channel=vy",
+            ],
+            &[Quantity::Displacement, Quantity::Velocity],
+        );
+        assert!(faulty.channel("fx").is_none() && plain.channel("fx").is_some());
+        let of = |recording: &Recording, name: &str, k: usize| recording.channel(name).unwrap().samples[k];
+        for k in 6..plain.len() {
+            // Six samples late, to rounding of the time.
+            assert!((of(&faulty, "x", k) - of(&plain, "x", k - 6)).abs() < 1e-15);
+            assert_eq!(of(&faulty, "vy", k), 1.2 * of(&plain, "vy", k));
+            assert_eq!(of(&faulty, "y", k), of(&plain, "y", k));
+        }
     }
 
     #[test]

@@ -83,6 +83,7 @@ impl Accelerometer {
 pub struct Sampler {
     accelerometer: Accelerometer,
     step_s: f64,
+    delay_s: f64,
     filter: [f64; 2 * HALF + 1],
     room: Room,
     /// Velocities taken so far; number k is that at (k − ½) steps.
@@ -98,6 +99,7 @@ impl Sampler {
     pub fn new(model: &Model, accelerometer: Accelerometer) -> Self {
         Self {
             accelerometer,
+            delay_s: 0.0,
             step_s: 1.0 / (accelerometer.rate_hz() * OVERSAMPLING as f64),
             filter: low_pass(),
             room: Room::new(model),
@@ -108,7 +110,13 @@ impl Sampler {
         }
     }
 
-    /// How much longer than the last sample the motion must go on, s.
+    /// The same with samples that are late by so much, s.
+    #[must_use]
+    pub fn late_by(self, delay_s: f64) -> Self {
+        Self { delay_s, ..self }
+    }
+
+    /// How much longer than the last sample the motion must go on, s, but for the delay.
     pub fn tail_s(&self) -> f64 {
         (HALF + 1) as f64 * self.step_s
     }
@@ -116,7 +124,7 @@ impl Sampler {
     /// Takes what `segment` has.
     pub fn observe(&mut self, segment: &Segment<'_>) {
         loop {
-            let t = (self.taken as f64 - 0.5) * self.step_s;
+            let t = (self.taken as f64 - 0.5) * self.step_s - self.delay_s;
             if t > segment.to_s() {
                 return;
             }

@@ -8,6 +8,7 @@ use super::effect::{EffectError, Effects};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{Cutter, Cutting, Model, Passage, Regeneration, Settings, SimulateError, Spindle};
 use crate::case::{Case, CaseError};
+use crate::recording::Quantity;
 
 /// A cut of a case.
 #[derive(Clone, Debug)]
@@ -24,6 +25,8 @@ pub struct VirtualCut {
     pub air_s: f64,
     /// What the case does not have, or has otherwise.
     pub effects: Effects,
+    /// What a recording of it has, besides the tachometer, in every direction of the structure.
+    pub measured: Vec<Quantity>,
 }
 
 /// How the tool comes into the workpiece, and out.
@@ -66,6 +69,16 @@ pub enum VirtualCutError {
         /// Samples per second needed.
         needed_hz: f64,
     },
+    /// Forces that turn around within the time.
+    #[error(
+        "wear of {relative_rate_per_s} per s makes the cutting force negative within {seconds} s: a larger rate or a shorter time is needed"
+    )]
+    WornOut {
+        /// The rate, 1/s.
+        relative_rate_per_s: f64,
+        /// The time, s.
+        seconds: f64,
+    },
     /// The time is over before the cut is whole.
     #[error(
         "{seconds} s are too short: with {air_s} s of air at both ends, way in and way out take {needed_s:.2} s, so give more than that"
@@ -101,6 +114,7 @@ impl VirtualCut {
             entry: Entry::Feed,
             air_s: 0.2,
             effects: Effects::default(),
+            measured: vec![Quantity::Force, Quantity::Displacement, Quantity::Acceleration],
         }
     }
 
@@ -110,14 +124,31 @@ impl VirtualCut {
     /// The case lacks a section or has an extension that cannot be simulated; the time is too short; the tool's
     /// size is needed and not known.
     pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
-        let mut cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3 * self.depth_mm)?;
         let effects = Effects::of_case(case)?.and(&self.effects);
-        for effect in &effects.0 {
-            effect.alter_cutter(&mut cutter)?;
+        let cutter = effects.cutter(Cutter::new(
+            case.tool()?,
+            case.material()?,
+            case.cut()?,
+            1e-3 * self.depth_mm,
+        )?)?;
+        if cutter.force.wear(self.seconds) < 0.0 {
+            return Err(VirtualCutError::WornOut {
+                relative_rate_per_s: cutter.force.wear_per_s,
+                seconds: self.seconds,
+            });
         }
-        let spindle = Spindle::new(self.spindle_rpm);
+        let spindle = effects.spindle(Spindle::new(self.spindle_rpm));
         let passage = self.passage(&cutter, &spindle)?;
         let (dynamics, terms) = effects.dynamics(case.structure()?)?;
+        if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !terms.is_empty() {
+            return Err(EffectError::Cut {
+                name: "process-damping",
+                what: "the modes of this structure add up to no mass, so that its velocity jumps with the force; the \
+                       force of the flank is then not known beside added terms such as drift or cubic stiffness; use \
+                       mass, damping and stiffness matrices",
+            }
+            .into());
+        }
         Ok(Model {
             dynamics,
             cutting: Some(Cutting {
@@ -129,6 +160,15 @@ impl VirtualCut {
             drive: None,
             terms,
         })
+    }
+
+    /// How the spindle turns in this cut of `case`.
+    ///
+    /// # Errors
+    /// The case has an extension that cannot be simulated.
+    pub fn spindle(&self, case: &Case) -> Result<Spindle, VirtualCutError> {
+        let effects = Effects::of_case(case)?.and(&self.effects);
+        Ok(effects.spindle(Spindle::new(self.spindle_rpm)))
     }
 
     /// When the tool is in full cut, from and to in s.
@@ -209,7 +249,7 @@ impl VirtualCut {
         })?;
         Ok(Heard {
             blocks: sampler.blocks(seed),
-            edges: tachometer.edges(&Spindle::new(self.spindle_rpm), self.seconds, seed),
+            edges: tachometer.edges(&self.spindle(case)?, self.seconds, seed),
             statistics,
         })
     }

@@ -30,7 +30,7 @@ pub(super) const KIND: Kind = Kind {
                     key: "time_constant_s beside relative_change",
                 });
             }
-            (None, None) => Law::Rate(parameters.main("relative_rate_per_s")?),
+            (None, None) => Law::Rate(parameters.rate("relative_rate_per_s")?),
         };
         Ok(Arc::new(Drift { law, direction }))
     },

@@ -11,9 +11,6 @@ pub enum EffectError {
     /// A name that is not known.
     #[error("effect `{0}` is not known; there are {list}", list = names())]
     Unknown(String),
-    /// A cause that is known and is not simulated.
-    #[error("effect `{0}` is not simulated yet; there are {list}", list = names())]
-    NotSimulated(String),
     /// A key that the effect does not have.
     #[error("effect `{name}` has no key `{key}`; it has {known}")]
     Key {
@@ -30,6 +27,14 @@ pub enum EffectError {
         /// The effect.
         name: String,
         /// What is needed.
+        key: &'static str,
+    },
+    /// A change over a record whose length is not known.
+    #[error("effect `{name}`: how long the record is, is not known here; give {name}.{key} instead")]
+    NoDuration {
+        /// The effect.
+        name: String,
+        /// The key to give.
         key: &'static str,
     },
     /// A value that cannot be.
@@ -59,6 +64,14 @@ pub enum EffectError {
         name: &'static str,
         /// What is wrong, and what would be right.
         what: String,
+    },
+    /// Something that the cut of the case does not allow.
+    #[error("effect `{name}`: {what}")]
+    Cut {
+        /// The effect.
+        name: &'static str,
+        /// What is wrong, and what would be right.
+        what: &'static str,
     },
     /// Friction that holds a tool without inertia.
     #[error(

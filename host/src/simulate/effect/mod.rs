@@ -9,7 +9,10 @@ mod cross_axis;
 mod cubic_damping;
 mod cubic_stiffness;
 mod drift;
+mod edge_force;
 mod error;
+mod force_coefficients;
+mod force_exponent;
 mod hysteresis;
 mod linear;
 mod local_force;
@@ -17,12 +20,15 @@ mod missing_mode;
 mod mode_coupling;
 mod parameters;
 mod place;
+mod process_damping;
 mod quadratic_stiffness;
 mod runout;
 mod sensor_delay;
 mod sensor_gain;
 mod sensor_offset;
 mod softening_hardening;
+mod speed_fluctuation;
+mod wear;
 
 #[cfg(test)]
 mod tests;
@@ -33,14 +39,14 @@ use std::sync::Arc;
 pub use error::EffectError;
 pub use parameters::{Parameters, Value};
 
-use super::{Cutter, Dynamics, SimulateError, Term};
-use crate::case::{Case, EXTENSION_NAMES};
+use super::{Cutter, Dynamics, SimulateError, Spindle, Term};
+use crate::case::Case;
 use crate::recording::Quantity;
 use crate::structure::Structure;
 
 /// One effect with its parameters. It does what it does by one of these; the others leave things as they are.
 pub trait Effect: Debug + Send + Sync {
-    /// Its name, as in `CAUSES`: one of [`EXTENSION_NAMES`].
+    /// Its name, as in `CAUSES`: one of [`EXTENSION_NAMES`](crate::case::EXTENSION_NAMES).
     fn name(&self) -> &'static str;
 
     /// Changes a parameter of the structure.
@@ -74,6 +80,9 @@ pub trait Effect: Debug + Send + Sync {
     fn alter_cutter(&self, _cutter: &mut Cutter) -> Result<(), SimulateError> {
         Ok(())
     }
+
+    /// Changes how the spindle turns.
+    fn alter_spindle(&self, _spindle: &mut Spindle) {}
 
     /// Changes what a channel reads.
     fn alter_channel(&self, _channel: &mut Pickup) {}
@@ -133,7 +142,7 @@ pub struct Kind {
 }
 
 /// All effects that can be simulated.
-pub const KINDS: [Kind; 19] = [
+pub const KINDS: [Kind; 25] = [
     linear::MASS,
     linear::STIFFNESS,
     linear::DAMPING,
@@ -147,8 +156,14 @@ pub const KINDS: [Kind; 19] = [
     hysteresis::KIND,
     mode_coupling::KIND,
     drift::KIND,
+    force_coefficients::KIND,
+    edge_force::KIND,
+    force_exponent::KIND,
     runout::KIND,
+    process_damping::KIND,
     axial_depth_modulation::KIND,
+    speed_fluctuation::KIND,
+    wear::KIND,
     sensor_gain::KIND,
     sensor_delay::KIND,
     cross_axis::KIND,
@@ -163,8 +178,20 @@ impl Effects {
     /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE`, in any order.
     ///
     /// # Errors
-    /// A text of another form, a name or a key that is not known, a value that cannot be.
+    /// A text of another form, a name or a key that is not known, a value that cannot be; a change over the record, whose
+    /// length is not known: see [`Self::parse_over`].
     pub fn parse<'a>(texts: impl IntoIterator<Item = &'a str>) -> Result<Self, EffectError> {
+        Self::parse_over(texts, None)
+    }
+
+    /// The same for a record of a known length in s: the VALUE of drift and wear is the change over it.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn parse_over<'a>(
+        texts: impl IntoIterator<Item = &'a str>,
+        record_s: Option<f64>,
+    ) -> Result<Self, EffectError> {
         let mut all: Vec<Parameters> = Vec::new();
         for text in texts {
             let (path, value) = text
@@ -175,7 +202,7 @@ impl Effects {
             let parameters = match all.iter().position(|known| known.effect() == name) {
                 Some(index) => &mut all[index],
                 None => {
-                    all.push(Parameters::new(name));
+                    all.push(Parameters::new(name).over(record_s));
                     let last = all.len() - 1;
                     &mut all[last]
                 }
@@ -247,6 +274,25 @@ impl Effects {
         Ok((dynamics, terms))
     }
 
+    /// The tool in its cut as these effects make it.
+    ///
+    /// # Errors
+    /// What the cutter refuses, or what goes with it only on some structures.
+    pub fn cutter(&self, mut cutter: Cutter) -> Result<Cutter, SimulateError> {
+        for effect in &self.0 {
+            effect.alter_cutter(&mut cutter)?;
+        }
+        Ok(cutter)
+    }
+
+    /// The spindle as these effects make it.
+    pub fn spindle(&self, mut spindle: Spindle) -> Spindle {
+        for effect in &self.0 {
+            effect.alter_spindle(&mut spindle);
+        }
+        spindle
+    }
+
     /// The channel as these effects make it.
     pub fn pickup(&self, mut channel: Pickup) -> Pickup {
         for effect in &self.0 {
@@ -257,9 +303,8 @@ impl Effects {
 }
 
 fn kind(name: &str) -> Result<&'static Kind, EffectError> {
-    match KINDS.iter().find(|kind| kind.name == name) {
-        Some(kind) => Ok(kind),
-        None if EXTENSION_NAMES.contains(&name) => Err(EffectError::NotSimulated(name.into())),
-        None => Err(EffectError::Unknown(name.into())),
-    }
+    KINDS
+        .iter()
+        .find(|kind| kind.name == name)
+        .ok_or_else(|| EffectError::Unknown(name.into()))
 }

@@ -60,6 +60,8 @@ pub struct Parameters {
     effect: String,
     /// By key; the quantity that the effect is named for has the key "".
     values: BTreeMap<String, Value>,
+    /// How long the record is, s; `None` where that is not known.
+    record_s: Option<f64>,
 }
 
 impl Parameters {
@@ -67,7 +69,14 @@ impl Parameters {
         Self {
             effect: effect.into(),
             values: BTreeMap::new(),
+            record_s: None,
         }
+    }
+
+    /// The same, for a record that is so long.
+    pub(super) fn over(mut self, record_s: Option<f64>) -> Self {
+        self.record_s = record_s;
+        self
     }
 
     pub(super) fn effect(&self) -> &str {
@@ -110,6 +119,18 @@ impl Parameters {
         match self.finite("")? {
             Some(number) => Ok(number),
             None => self.needed(key),
+        }
+    }
+
+    /// A relative rate per s: by its own key, or from the change over the whole record that the effect is named for.
+    pub(super) fn rate(&mut self, key: &'static str) -> Result<f64, EffectError> {
+        match (self.finite("")?, self.record_s) {
+            (Some(change), Some(record_s)) => Ok(change / record_s),
+            (Some(_), None) => Err(EffectError::NoDuration {
+                name: self.effect.clone(),
+                key,
+            }),
+            (None, _) => self.needed(key),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Effects by name, and each term against the closed form of its motion.
 
 use super::*;
+use crate::case::EXTENSION_NAMES;
 
 #[test]
 fn a_value_and_its_keys_are_one_effect() {
@@ -24,14 +25,14 @@ fn what_cannot_be_is_told_apart() {
         Effects::parse(["runout=1", "runout.teeth=2"]).unwrap_err(),
         EffectError::Key { .. }
     ));
-    assert!(matches!(error("wear=0.1"), EffectError::NotSimulated(_)));
+    // A change over the record needs its length.
+    assert!(matches!(error("wear=0.1"), EffectError::NoDuration { .. }));
+    assert!(Effects::parse_over(["wear=0.1"], Some(4.0)).is_ok());
     assert!(matches!(error("weather=1"), EffectError::Unknown(_)));
-    assert!(error("weather=1").to_string().contains("runout, axial-depth"));
+    assert!(error("weather=1").to_string().contains("runout, process-damping"));
 }
 
 #[test]
-fn every_kind_is_a_name_of_a_case() {
-    for kind in KINDS {
-        assert!(EXTENSION_NAMES.contains(&kind.name), "{}", kind.name);
-    }
+fn the_kinds_are_the_names_of_a_case() {
+    assert_eq!(KINDS.map(|kind| kind.name), EXTENSION_NAMES);
 }

@@ -6,12 +6,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::recording::Recording;
+use crate::recording::{Quantity, Recording};
 
 /// How much noise each sample of each channel gets.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Noise {
-    /// Standard deviation as a share of the channel's root mean square, for channels that are not named.
+    /// Standard deviation as a share of the channel's root mean square, for channels that are not named. The level of a
+    /// tachometer gets none.
     pub relative: f64,
     /// Standard deviation by channel, in the SI unit of the channel.
     pub absolute: BTreeMap<String, f64>,
@@ -22,6 +23,9 @@ impl Noise {
     pub fn add(&self, recording: &mut Recording, seed: u64) {
         for (index, channel) in recording.channels.iter_mut().enumerate() {
             let deviation = self.absolute.get(&channel.name).copied().unwrap_or_else(|| {
+                if channel.quantity == Quantity::Level {
+                    return 0.0;
+                }
                 let sum: f64 = channel.samples.iter().map(|x| x * x).sum();
                 self.relative * (sum / channel.samples.len().max(1) as f64).sqrt()
             });

@@ -55,7 +55,9 @@ fn every_smooth_term_obeys_its_equation() {
             ],
             |x, _, _| -5e12 * x.powi(3) + 4e20 * x.powi(5),
         ),
-        (&["drift=0.02"], |x, _, t| 2.26e6 * 0.02 * t * x),
+        (&["drift.relative_rate_per_s=0.02"], |x, _, t| {
+            2.26e6 * 0.02 * t * x
+        }),
         (&["stiffness=0.1", "damping=-0.5"], |x, v, _| {
             2.26e5 * x - 152.5 * v
         }),
