@@ -6,6 +6,7 @@ mod complex_eigenvalues;
 pub mod continuation;
 pub mod demo;
 pub mod device;
+pub mod diagnose;
 mod eigenvalues;
 pub mod file;
 pub mod frf;

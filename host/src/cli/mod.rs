@@ -4,6 +4,7 @@
 
 mod channels;
 pub mod demo;
+pub mod diagnose;
 mod error;
 mod experiment;
 pub mod frf;
@@ -52,6 +53,7 @@ enum Verb {
     Simulate(Box<simulate::Args>),
     Frf(frf::Args),
     Identify(Box<identify::Args>),
+    Diagnose(diagnose::Args),
     Lobes(lobes::Args),
     Table(table::Args),
     Upload(upload::Args),
@@ -86,6 +88,7 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::Simulate(args) => simulate::run(*args),
         Verb::Frf(args) => frf::run(args),
         Verb::Identify(args) => identify::run(*args),
+        Verb::Diagnose(args) => diagnose::run(args),
         Verb::Lobes(args) => lobes::run(args),
         Verb::Table(args) => table::run(args),
         Verb::Upload(args) => upload::run(args),

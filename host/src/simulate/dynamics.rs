@@ -1,6 +1,6 @@
 //! The structure, ready to be integrated: first-order form and cubic terms.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3xX, MatrixXx3};
 
 use super::dormand_prince::Quartic;
 use crate::structure::{FirstOrder, Form, Matrices, Structure, StructureError};
@@ -112,6 +112,15 @@ impl Dynamics {
         self.sizes.extend([1.0, 1.0]);
         self.order = wider;
         self.note_products();
+    }
+
+    /// The linear part, without cubic terms.
+    pub fn first_order(&self) -> FirstOrder {
+        FirstOrder {
+            a: DMatrix::from_row_slice(self.order, self.order, &self.a),
+            b: MatrixXx3::from_fn(self.order, |state, axis| self.b[state][axis]),
+            c: Matrix3xX::from_fn(self.order, |axis, state| self.c[axis][state]),
+        }
     }
 
     /// Number of states.

@@ -13,19 +13,19 @@ use crate::structure::{Direction, Form, Mode, Structure};
 
 pub(super) const MASS: Kind = Kind {
     name: "mass",
-    keys: "mass_kg and direction",
+    keys: "mass_kg or relative_change, and direction",
     build: |parameters| build(Which::Mass, parameters),
 };
 
 pub(super) const STIFFNESS: Kind = Kind {
     name: "stiffness",
-    keys: "stiffness_n_per_m, frequency_hz (of a single mode) and direction",
+    keys: "stiffness_n_per_m, frequency_hz (of a single mode) or relative_change, and direction",
     build: |parameters| build(Which::Stiffness, parameters),
 };
 
 pub(super) const DAMPING: Kind = Kind {
     name: "damping",
-    keys: "damping_ns_per_m, damping_ratio (of a single mode) and direction",
+    keys: "damping_ns_per_m, damping_ratio (of a single mode) or relative_change, and direction",
     build: |parameters| build(Which::Damping, parameters),
 };
 
@@ -64,8 +64,10 @@ fn build(which: Which, parameters: &mut Parameters) -> Result<Arc<dyn Effect>, E
     } else if let Some(value) = of_mode.map(|key| parameters.positive(key)).transpose()?.flatten() {
         Change::OfMode(value)
     } else {
-        let relative = parameters.number("", |r| r > -1.0, "a relative change above −1")?;
-        Change::Relative(relative.ok_or(EffectError::Missing {
+        let above = "a relative change above −1";
+        let named = parameters.number("relative_change", |r| r > -1.0, above)?;
+        let bare = parameters.number("", |r| r > -1.0, above)?;
+        Change::Relative(named.or(bare).ok_or(EffectError::Missing {
             name: parameters.effect().into(),
             key: entry,
         })?)

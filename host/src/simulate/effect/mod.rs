@@ -217,22 +217,19 @@ impl Effects {
     /// # Errors
     /// An extension that cannot be simulated, or a key or value that it cannot have.
     pub fn of_case(case: &Case) -> Result<Self, EffectError> {
-        let mut all = Vec::new();
-        for (name, table) in &case.extensions {
-            kind(name)?;
-            let mut parameters = Parameters::new(name);
-            // How well a parameter is known changes nothing here.
-            for (key, value) in table.iter().filter(|(key, _)| !key.ends_with("_std")) {
-                let value = Value::of_toml(value).ok_or_else(|| EffectError::Value {
-                    effect: format!("{name}.{key}"),
-                    found: value.to_string(),
-                    needed: "a number, a text or true or false",
-                })?;
-                parameters.put(if key == "on" { "" } else { key }, value);
-            }
-            all.push(parameters);
-        }
-        Self::build(all)
+        case.extensions
+            .iter()
+            .map(|(name, table)| extension(name, table))
+            .collect::<Result<_, _>>()
+            .and_then(Self::build)
+    }
+
+    /// The effect of one table `[extension.NAME]`.
+    ///
+    /// # Errors
+    /// As [`Self::of_case`].
+    pub fn of_extension(name: &str, table: &toml::Table) -> Result<Self, EffectError> {
+        Self::build(vec![extension(name, table)?])
     }
 
     fn build(all: Vec<Parameters>) -> Result<Self, EffectError> {
@@ -300,6 +297,21 @@ impl Effects {
         }
         channel
     }
+}
+
+fn extension(name: &str, table: &toml::Table) -> Result<Parameters, EffectError> {
+    kind(name)?;
+    let mut parameters = Parameters::new(name);
+    // How well a parameter is known changes nothing here.
+    for (key, value) in table.iter().filter(|(key, _)| !key.ends_with("_std")) {
+        let value = Value::of_toml(value).ok_or_else(|| EffectError::Value {
+            effect: format!("{name}.{key}"),
+            found: value.to_string(),
+            needed: "a number, a text or true or false",
+        })?;
+        parameters.put(if key == "on" { "" } else { key }, value);
+    }
+    Ok(parameters)
 }
 
 fn kind(name: &str) -> Result<&'static Kind, EffectError> {

@@ -1,0 +1,198 @@
+//! One more mode in the receptance of a direction: y gets F/(m·(ω_m² − ω² + 2iζω_m ω)), exact where the force is measured.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::{Domain, Scene};
+
+pub(super) struct MissingMode;
+
+/// Damping ratios that are tried first.
+const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
+/// Frequencies that are kept after the first look.
+const KEPT: usize = 4;
+
+impl Cause for MissingMode {
+    fn name(&self) -> &'static str {
+        "missing-mode"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        if !scene.all_in(Domain::Response) || scene.baseline.case.extensions.contains_key(self.name()) {
+            return Vec::new();
+        }
+        scene
+            .driven_axes()
+            .into_iter()
+            .filter(|axis| {
+                scene
+                    .records
+                    .iter()
+                    .any(|record| !record.force_n[*axis].is_empty())
+            })
+            .map(Place::Axis)
+            .collect()
+    }
+
+    /// The few frequencies at which such a mode would look most like the residual, at three dampings each.
+    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
+        let Place::Axis(axis) = place else {
+            return Vec::new();
+        };
+        let [[low, high], _] = self.bounds(scene, place)[..] else {
+            return Vec::new();
+        };
+        let count = 160;
+        let bins = bins(scene, *axis);
+        let likeness: Vec<Vec<(f64, Vec<f64>)>> = DAMPING
+            .par_iter()
+            .map(|damping| {
+                (0..count)
+                    .map(|index| {
+                        let frequency = low * (high / low).powf(f64::from(index) / f64::from(count - 1));
+                        (likeness(&bins, frequency, *damping), vec![frequency, *damping])
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut peaks: Vec<(f64, Vec<f64>)> = Vec::new();
+        for of_damping in likeness {
+            for (index, (value, shape)) in of_damping.iter().enumerate() {
+                let below = |other: Option<&(f64, Vec<f64>)>| other.is_none_or(|other| other.0 <= *value);
+                let before = index.checked_sub(1).and_then(|index| of_damping.get(index));
+                if below(before) && below(of_damping.get(index + 1)) {
+                    peaks.push((*value, shape.clone()));
+                }
+            }
+        }
+        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        peaks.truncate(KEPT);
+        peaks.into_iter().map(|(_, shape)| shape).collect()
+    }
+
+    fn bounds(&self, scene: &Scene<'_>, _: &Place) -> Vec<[f64; 2]> {
+        let rate = scene
+            .records
+            .iter()
+            .map(|record| record.grid.rate_hz())
+            .fold(f64::INFINITY, f64::min);
+        let longest = scene
+            .records
+            .iter()
+            .map(|record| record.grid.count() as f64 / record.grid.rate_hz())
+            .fold(0.0, f64::max);
+        let highest = scene
+            .records
+            .iter()
+            .map(|record| record.highest_hz)
+            .fold(0.0, f64::max);
+        let low = (3.0 / longest).min(0.1 * highest);
+        vec![[low, (2.0 * highest).min(0.45 * rate)], [0.001, 0.5]]
+    }
+
+    fn regressors(
+        &self,
+        _: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let (Place::Axis(axis), [frequency, damping]) = (place, shape) else {
+            return None;
+        };
+        let force = &record.force_n[*axis];
+        let observed = record
+            .channels
+            .iter()
+            .map(|channel| {
+                let weight = channel.pickup.weights[*axis];
+                if force.is_empty() || weight == 0.0 {
+                    return Vec::new();
+                }
+                let mut spectrum = record.grid.spectrum(force);
+                for (bin, value) in spectrum.iter_mut().enumerate() {
+                    let omega = record.grid.omega(bin);
+                    *value *= mode(omega, *frequency, *damping) * record.factor(channel, bin) * weight;
+                }
+                record.grid.samples(&spectrum)
+            })
+            .collect();
+        Some(vec![Regressor::of_channels(observed)])
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        shape: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let per_mass = *coefficients.first()?;
+        (per_mass > 0.0).then(|| {
+            vec![
+                ("frequency_hz", shape[0]),
+                ("damping_ratio", shape[1]),
+                ("modal_mass_kg", 1.0 / per_mass),
+            ]
+        })
+    }
+}
+
+/// 1/(ω_m² − ω² + 2iζω_m ω), the receptance of a mode of mass 1.
+fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
+    let natural = TAU * frequency_hz;
+    Complex64::new(
+        natural * natural - omega * omega,
+        2.0 * damping_ratio * natural * omega,
+    )
+    .inv()
+}
+
+/// One bin of a channel: ω, the force as the channel would read it of a mode with receptance 1, and the residual; both in
+/// units of the noise.
+type Bin = (f64, Complex64, Complex64);
+
+fn bins(scene: &Scene<'_>, axis: usize) -> Vec<Bin> {
+    let mut all = Vec::new();
+    for record in scene
+        .records
+        .iter()
+        .filter(|record| !record.force_n[axis].is_empty())
+    {
+        let force = record.grid.spectrum(&record.force_n[axis]);
+        for channel in record
+            .channels
+            .iter()
+            .filter(|channel| channel.pickup.weights[axis] != 0.0)
+        {
+            let residual = record.grid.spectrum(&channel.residual());
+            for bin in 1..record.grid.bins() {
+                let omega = record.grid.omega(bin);
+                if omega > TAU * record.band_hz {
+                    break;
+                }
+                let read = force[bin] * channel.factor(omega) * channel.pickup.weights[axis];
+                all.push((omega, read / channel.deviation, residual[bin] / channel.deviation));
+            }
+        }
+    }
+    all
+}
+
+/// The share of the residual's power in units of the noise that a mode takes, positive masses only.
+fn likeness(bins: &[Bin], frequency_hz: f64, damping_ratio: f64) -> f64 {
+    let (mut along, mut size) = (0.0, 0.0);
+    for (omega, force, residual) in bins {
+        let column = mode(*omega, frequency_hz, damping_ratio) * force;
+        along += (column.conj() * residual).re;
+        size += column.norm_sqr();
+    }
+    if size > 0.0 && along > 0.0 {
+        along * along / size
+    } else {
+        0.0
+    }
+}

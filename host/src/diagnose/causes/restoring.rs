@@ -1,0 +1,205 @@
+//! Terms of the restoring side: their equations are those of the simulation, taken along the measured motion.
+
+mod backlash;
+mod coulomb_friction;
+mod cubic_damping;
+mod cubic_stiffness;
+mod drift;
+mod hysteresis;
+mod mode_coupling;
+mod quadratic_stiffness;
+mod softening_hardening;
+
+use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::path::restoring_along;
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::{Scene, terms_of};
+use crate::simulate::Effects;
+
+pub(super) fn all() -> Vec<Box<dyn Cause>> {
+    [
+        cubic_stiffness::CAUSE,
+        quadratic_stiffness::CAUSE,
+        cubic_damping::CAUSE,
+        softening_hardening::CAUSE,
+        coulomb_friction::CAUSE,
+        backlash::CAUSE,
+        hysteresis::CAUSE,
+        mode_coupling::QUARTIC,
+        mode_coupling::CUBIC,
+        drift::RATE,
+        drift::SETTLING,
+    ]
+    .into_iter()
+    .map(|cause| Box::new(cause) as Box<dyn Cause>)
+    .collect()
+}
+
+/// A term f_r = Σ coefficient · f(x, v, t; shape).
+struct Restoring {
+    name: &'static str,
+    /// Keys of the coefficients.
+    linear: &'static [&'static str],
+    /// Keys of the shape.
+    shape: &'static [&'static str],
+    /// How many axes it joins.
+    axes: usize,
+    /// A grid of shapes for what moves as it does in the scene.
+    shapes: fn(&Scene<'_>, usize) -> Vec<Vec<f64>>,
+    /// Bounds of the shape.
+    bounds: fn(&Scene<'_>, usize) -> Vec<[f64; 2]>,
+    /// Whether coefficients and shape are physical.
+    physical: fn(coefficients: &[f64]) -> bool,
+}
+
+/// A linear one that may have either sign.
+const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring {
+    Restoring {
+        name,
+        linear,
+        shape: &[],
+        axes: 1,
+        shapes: |_, _| vec![Vec::new()],
+        bounds: |_, _| Vec::new(),
+        physical: |_| true,
+    }
+}
+
+/// The largest displacement along an axis in any record, m.
+fn largest_m(scene: &Scene<'_>, axis: usize) -> f64 {
+    scene
+        .records
+        .iter()
+        .map(|record| record.motion.largest_m(axis))
+        .fold(0.0, f64::max)
+}
+
+/// The smallest RMS displacement along an axis of any record, m.
+fn smallest_m(scene: &Scene<'_>, axis: usize) -> f64 {
+    scene
+        .records
+        .iter()
+        .map(|record| record.motion.size_m(axis))
+        .filter(|size| *size > 0.0)
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The longest record, s.
+fn longest_s(scene: &Scene<'_>) -> f64 {
+    scene
+        .records
+        .iter()
+        .map(|record| record.grid.count() as f64 / record.grid.rate_hz())
+        .fold(0.0, f64::max)
+}
+
+fn first_axis(place: &Place) -> usize {
+    match place {
+        Place::Axis(axis) | Place::Axes(axis, _) => *axis,
+        _ => 0,
+    }
+}
+
+/// `count` values from `first` to `last`, evenly in their logarithm.
+fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
+    (0..count)
+        .map(|index| first * (last / first).powf(index as f64 / (count - 1).max(1) as f64))
+        .collect()
+}
+
+impl Restoring {
+    /// The extension that the baseline has of this name.
+    fn in_baseline<'a>(&self, scene: &'a Scene<'_>) -> Option<&'a toml::Table> {
+        scene.baseline.case.extensions.get(self.name)
+    }
+
+    fn table(&self, place: &Place, shape: &[f64], coefficients: &[f64]) -> toml::Table {
+        let mut table = place.table();
+        for (key, value) in self
+            .linear
+            .iter()
+            .zip(coefficients)
+            .chain(self.shape.iter().zip(shape))
+        {
+            table.insert((*key).into(), (*value).into());
+        }
+        table
+    }
+}
+
+impl Cause for Restoring {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        if self.in_baseline(scene).is_some() {
+            return Vec::new();
+        }
+        let axes = scene.driven_axes();
+        match self.axes {
+            1 => axes.into_iter().map(Place::Axis).collect(),
+            _ => axes
+                .iter()
+                .flat_map(|a| axes.iter().map(move |b| (*a, *b)))
+                .filter(|(a, b)| a != b)
+                // A potential in which both enter alike is one place, not two.
+                .filter(|(a, b)| self.name != "mode-coupling" || self.linear[0] != "kxyy_n_per_m3" || a < b)
+                .map(|(a, b)| Place::Axes(a, b))
+                .collect(),
+        }
+    }
+
+    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
+        (self.shapes)(scene, first_axis(place))
+    }
+
+    fn bounds(&self, scene: &Scene<'_>, place: &Place) -> Vec<[f64; 2]> {
+        (self.bounds)(scene, first_axis(place))
+    }
+
+    fn regressors(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        (0..self.linear.len())
+            .map(|index| {
+                let unit: Vec<f64> = (0..self.linear.len())
+                    .map(|i| f64::from(u8::from(i == index)))
+                    .collect();
+                let effects = Effects::of_extension(self.name, &self.table(place, shape, &unit)).ok()?;
+                let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
+                for term in terms_of(&effects, scene.baseline.structure).ok()? {
+                    for (sum, force) in sum.iter_mut().zip(restoring_along(&*term, &record.motion)) {
+                        if sum.is_empty() {
+                            *sum = force;
+                        } else {
+                            sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+                        }
+                    }
+                }
+                Some(Regressor::of_force(sum))
+            })
+            .collect()
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        shape: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        (self.physical)(coefficients).then(|| {
+            self.linear
+                .iter()
+                .zip(coefficients)
+                .chain(self.shape.iter().zip(shape))
+                .map(|(key, value)| (*key, *value))
+                .collect()
+        })
+    }
+}

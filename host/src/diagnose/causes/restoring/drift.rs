@@ -1,0 +1,18 @@
+//! Stiffness that moves with time: K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))). Seen in long records.
+
+use super::{Restoring, logarithmic, longest_s, plain};
+
+pub(super) const RATE: Restoring = plain("drift", &["relative_rate_per_s"]);
+
+pub(super) const SETTLING: Restoring = Restoring {
+    shape: &["time_constant_s"],
+    shapes: |scene, _| {
+        let length = longest_s(scene);
+        logarithmic(0.05 * length, length, 5)
+            .into_iter()
+            .map(|t| vec![t])
+            .collect()
+    },
+    bounds: |scene, _| vec![[0.01 * longest_s(scene), 2.0 * longest_s(scene)]],
+    ..plain("drift", &["relative_change"])
+};

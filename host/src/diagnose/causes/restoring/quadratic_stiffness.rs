@@ -1,0 +1,5 @@
+//! f_r += k2·x². Seen as a second harmonic and an offset.
+
+use super::{Restoring, plain};
+
+pub(super) const CAUSE: Restoring = plain("quadratic-stiffness", &["k2_n_per_m2"]);

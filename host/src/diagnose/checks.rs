@@ -1,0 +1,159 @@
+//! Records that tell nothing, said plainly with what is needed.
+
+use super::DiagnoseError;
+use super::noise::rms;
+use super::record::Observed;
+use super::scene::{Baseline, Domain};
+use crate::recording::{Kind, Quantity, Recording};
+
+/// Fewest samples.
+const FEWEST: usize = 128;
+/// Periods of the slowest mode that a record must hold.
+const PERIODS: f64 = 3.0;
+/// Share of samples at the very ends of a channel's range, in runs, from which on it is clipped.
+const CLIPPED: f64 = 0.002;
+
+/// In what a recording is compared.
+pub(super) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<Domain, DiagnoseError> {
+    let has = |quantity: Quantity| {
+        recording
+            .channels
+            .iter()
+            .any(|channel| channel.quantity == quantity)
+    };
+    let motion = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
+    let input = recording.sidecar.input.clone().unwrap_or_default();
+    for name in &input {
+        if recording.channel(name).is_none() {
+            return Err(recording
+                .lacks(format!("{name}, which its sidecar names as its input"))
+                .into());
+        }
+    }
+    if !motion.into_iter().any(has) {
+        return Err(recording
+            .lacks("a channel of motion, such as x [m] or ax [m/s^2]")
+            .into());
+    }
+    let driven_by_motion = input
+        .iter()
+        .filter_map(|name| recording.channel(name))
+        .any(|channel| motion.contains(&channel.quantity));
+    let kind = recording.sidecar.kind;
+    if driven_by_motion || (baseline.is_free() && kind != Some(Kind::FreeDecay)) {
+        if !has(Quantity::Force) {
+            return Err(recording
+                .lacks("the force: driven by motion, it is what the case predicts")
+                .into());
+        }
+        return Ok(Domain::Force);
+    }
+    match kind {
+        Some(Kind::Cutting | Kind::Idle) => Err(DiagnoseError::record(
+            &recording.path,
+            "recordings of cuts are not diagnosed yet: shaker, step-sine, sweep, hammer and free-decay are",
+        )),
+        Some(Kind::FreeDecay) => Ok(Domain::Response),
+        _ if has(Quantity::Force) => Ok(Domain::Response),
+        _ => Err(recording
+            .lacks("the force that drove it, such as fx [N] (only kind = \"free-decay\" needs none)")
+            .into()),
+    }
+}
+
+/// Refuses what no fit could use.
+pub(super) fn record(
+    baseline: &Baseline<'_>,
+    recording: &Recording,
+    channels: &[Observed],
+) -> Result<(), DiagnoseError> {
+    let wrong = |what: String| Err(DiagnoseError::record(&recording.path, what));
+    let count = recording.len();
+    let seconds = count as f64 / recording.sample_rate_hz;
+    if channels.is_empty() {
+        let directions: Vec<String> = baseline
+            .structure
+            .directions
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        return wrong(format!(
+            "no channel belongs to a direction of the case ({}): x, vx, ax and the like are needed",
+            directions.join(", ")
+        ));
+    }
+    let needed_s = baseline.lowest_hz().map_or(0.0, |hertz| PERIODS / hertz);
+    if count < FEWEST || seconds < needed_s {
+        return wrong(format!(
+            "too short: {count} samples, {seconds:.3} s; at least {FEWEST} samples and {needed_s:.3} s ({PERIODS} periods of the slowest mode) are needed"
+        ));
+    }
+    for channel in &recording.channels {
+        if let Some(at) = channel.samples.iter().position(|sample| !sample.is_finite()) {
+            return wrong(format!(
+                "{} is no number at {:.6} s; every sample must be one",
+                channel.name,
+                recording.time_s(at)
+            ));
+        }
+        if baseline.pickup(&channel.name).is_some()
+            && let Some(level) = clipped(&channel.samples)
+        {
+            return wrong(format!(
+                "{} is clipped at {level:.6e} {}: the range of the sensor is too small; record again with a larger range or less excitation",
+                channel.name,
+                channel.quantity.unit()
+            ));
+        }
+    }
+    if let Some(still) = channels.iter().find(|channel| rms(&channel.measured) == 0.0) {
+        return wrong(format!(
+            "{} is zero throughout: nothing was measured",
+            still.pickup.name
+        ));
+    }
+    Ok(())
+}
+
+/// The level at which a channel is cut off: flat tops of three and more equal samples at an end of its range.
+fn clipped(samples: &[f64]) -> Option<f64> {
+    let (low, high) = samples
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
+    let range = high - low;
+    if range <= 0.0 {
+        return None;
+    }
+    // A digital channel has few levels; flat tops of a slow signal on coarse levels are no clipping.
+    [high, low].into_iter().find(|end| {
+        let at = |x: &f64| (x - end).abs() <= 1e-9 * range;
+        let (mut flat, mut run, mut runs) = (0, 0, 0);
+        for sample in samples {
+            if at(sample) {
+                run += 1;
+                continue;
+            }
+            if run >= 3 {
+                flat += run;
+                runs += 1;
+            }
+            run = 0;
+        }
+        runs >= 2 && flat as f64 > CLIPPED * samples.len() as f64 && *end != 0.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flat_tops_are_clipping_and_tones_are_not() {
+        let tone: Vec<f64> = (0..5000).map(|n| (0.05 * f64::from(n)).sin()).collect();
+        assert_eq!(clipped(&tone), None);
+        let cut: Vec<f64> = tone.iter().map(|x| x.clamp(-2.0, 0.8)).collect();
+        assert_eq!(clipped(&cut), Some(0.8));
+    }
+}

@@ -1,0 +1,106 @@
+//! Free decays: what a record owes to the state in which it began.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::record::Record;
+use super::scene::{Baseline, derivatives};
+
+/// The decay of each state of the baseline as each channel reads it, and how much of each the record holds.
+#[derive(Clone, Debug, Default)]
+pub struct Decays {
+    /// By channel, by state: samples.
+    columns: Vec<Vec<Vec<f64>>>,
+    /// The state at the start of the record.
+    pub start: Vec<f64>,
+}
+
+impl Decays {
+    pub(super) fn of(baseline: &Baseline<'_>, record: &Record) -> Self {
+        let first_order = &baseline.first_order;
+        let order = first_order.order();
+        let count = record.grid.count();
+        let step = (&first_order.a / record.grid.rate_hz()).exp();
+        let columns = record
+            .channels
+            .iter()
+            .map(|channel| {
+                let mut row = DMatrix::zeros(1, order);
+                for (axis, weight) in channel.pickup.weights.iter().enumerate() {
+                    row += first_order.c.row(axis) * *weight;
+                }
+                for _ in 0..derivatives(channel.pickup.quantity) {
+                    row = &row * &first_order.a;
+                }
+                let mut columns = vec![Vec::with_capacity(count); order];
+                for _ in 0..count {
+                    for (column, value) in columns.iter_mut().zip(row.iter()) {
+                        column.push(*value);
+                    }
+                    row = &row * &step;
+                }
+                columns
+            })
+            .collect();
+        Self {
+            columns,
+            start: vec![0.0; order],
+        }
+    }
+
+    /// Number of states.
+    pub fn count(&self) -> usize {
+        self.start.len()
+    }
+
+    /// The decay of a state in a channel.
+    pub fn column(&self, channel: usize, state: usize) -> &[f64] {
+        &self.columns[channel][state]
+    }
+
+    /// The state that explains most of `residuals`, each channel measured by its `sizes`.
+    pub(super) fn fit(&mut self, residuals: &[Vec<f64>], sizes: &[f64]) {
+        let order = self.start.len();
+        let mut gram = DMatrix::<f64>::zeros(order, order);
+        let mut right = DVector::<f64>::zeros(order);
+        for ((columns, residual), size) in self.columns.iter().zip(residuals).zip(sizes) {
+            let weight = 1.0 / (size * size).max(f64::MIN_POSITIVE);
+            for i in 0..order {
+                right[i] += weight * dot(&columns[i], residual);
+                for j in 0..=i {
+                    gram[(i, j)] += weight * dot(&columns[i], &columns[j]);
+                    gram[(j, i)] = gram[(i, j)];
+                }
+            }
+        }
+        // States that no channel sees have no size: they stay zero.
+        let scale: Vec<f64> = (0..order).map(|i| gram[(i, i)].sqrt()).collect();
+        for i in 0..order {
+            for j in 0..order {
+                let by = scale[i] * scale[j];
+                gram[(i, j)] = if by > 0.0 { gram[(i, j)] / by } else { 0.0 };
+            }
+            gram[(i, i)] += 1e-12;
+            right[i] = if scale[i] > 0.0 { right[i] / scale[i] } else { 0.0 };
+        }
+        let found = gram.cholesky().map(|factor| factor.solve(&right));
+        self.start = (0..order)
+            .map(|i| match &found {
+                Some(found) if scale[i] > 0.0 => found[i] / scale[i],
+                _ => 0.0,
+            })
+            .collect();
+    }
+
+    /// Adds the decay of the record to what a channel reads.
+    pub(super) fn add_to(&self, channel: usize, samples: &mut [f64]) {
+        for (column, start) in self.columns[channel].iter().zip(&self.start) {
+            for (sample, value) in samples.iter_mut().zip(column) {
+                *sample += start * value;
+            }
+        }
+    }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,295 @@
+//! Which causes explain the residual, and which do so equally well.
+
+use rayon::prelude::*;
+
+use super::cause::{Cause, Parameter, Place};
+use super::causes;
+use super::regression::{Fit, Regression, Share};
+use super::scene::Scene;
+
+/// A cause at a place, with the columns of each of its shapes.
+pub struct Candidate {
+    /// Its cause, a place in the library.
+    pub cause: usize,
+    /// Where.
+    pub place: Place,
+    /// Shapes and the columns that they have.
+    pub shapes: Vec<(Vec<f64>, Vec<usize>)>,
+}
+
+/// One candidate with one of its shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Choice {
+    /// The candidate.
+    pub candidate: usize,
+    /// Its shape.
+    pub shape: usize,
+}
+
+/// Causes that act together, fitted.
+#[derive(Clone, Debug)]
+pub struct Explanation {
+    /// What acts.
+    pub choices: Vec<Choice>,
+    /// The fit of all their coefficients, in the order of the choices.
+    pub fit: Fit,
+    /// Parameters that were fitted, those of the shape included.
+    pub freedoms: usize,
+}
+
+/// The library on a scene.
+pub struct Library {
+    /// All causes.
+    pub causes: Vec<Box<dyn Cause>>,
+    /// Where they could act.
+    pub candidates: Vec<Candidate>,
+}
+
+/// How many of the best pairs are tried with a third cause.
+const PAIRS_KEPT: usize = 24;
+
+impl Library {
+    /// All causes on a scene, with their columns added to the regression.
+    pub fn new(scene: &Scene<'_>, regression: &mut Regression) -> Self {
+        let causes = causes::all();
+        let placed: Vec<(usize, Place, Vec<f64>)> = causes
+            .iter()
+            .enumerate()
+            .flat_map(|(index, cause)| {
+                let places = cause.places(scene);
+                places.into_iter().flat_map(move |place| {
+                    let shapes = cause.shapes(scene, &place);
+                    shapes.into_iter().map(move |shape| (index, place.clone(), shape))
+                })
+            })
+            .collect();
+        let computed: Vec<_> = placed
+            .into_par_iter()
+            .filter_map(|(cause, place, shape)| {
+                let columns = columns(scene, &*causes[cause], &place, &shape)?;
+                Some((cause, place, shape, columns))
+            })
+            .collect();
+        let mut library = Self {
+            causes,
+            candidates: Vec::new(),
+        };
+        for (cause, place, shape, columns) in computed {
+            let numbers = columns
+                .iter()
+                .map(|column| regression.add(scene, column))
+                .collect();
+            let known = library
+                .candidates
+                .iter_mut()
+                .find(|candidate| candidate.cause == cause && candidate.place == place);
+            match known {
+                Some(candidate) => candidate.shapes.push((shape, numbers)),
+                None => library.candidates.push(Candidate {
+                    cause,
+                    place,
+                    shapes: vec![(shape, numbers)],
+                }),
+            }
+        }
+        library
+    }
+
+    /// The cause of a candidate.
+    pub fn cause(&self, candidate: usize) -> &dyn Cause {
+        &*self.causes[self.candidates[candidate].cause]
+    }
+
+    /// Every candidate with every shape.
+    fn choices(&self) -> Vec<Choice> {
+        self.candidates
+            .iter()
+            .enumerate()
+            .flat_map(|(candidate, known)| {
+                (0..known.shapes.len()).map(move |shape| Choice { candidate, shape })
+            })
+            .collect()
+    }
+
+    fn columns(&self, choice: Choice) -> &[usize] {
+        &self.candidates[choice.candidate].shapes[choice.shape].1
+    }
+
+    /// The fit of some choices; `None` where they cannot be told from each other, or are not physical.
+    pub fn explain(
+        &self,
+        scene: &Scene<'_>,
+        regression: &Regression,
+        choices: &[Choice],
+    ) -> Option<Explanation> {
+        let columns: Vec<usize> = choices
+            .iter()
+            .flat_map(|choice| self.columns(*choice))
+            .copied()
+            .collect();
+        let fit = regression.fit(&columns)?;
+        let explanation = Explanation {
+            freedoms: choices
+                .iter()
+                .map(|choice| {
+                    let (shape, columns) = &self.candidates[choice.candidate].shapes[choice.shape];
+                    shape.len() + columns.len()
+                })
+                .sum(),
+            choices: choices.to_vec(),
+            fit,
+        };
+        self.parameters(scene, &explanation).map(|_| explanation)
+    }
+
+    /// The parameters of every cause of an explanation.
+    pub fn parameters(&self, scene: &Scene<'_>, explanation: &Explanation) -> Option<Vec<Vec<Parameter>>> {
+        let mut from = 0;
+        explanation
+            .choices
+            .iter()
+            .map(|choice| {
+                let candidate = &self.candidates[choice.candidate];
+                let (shape, columns) = &candidate.shapes[choice.shape];
+                let coefficients = &explanation.fit.coefficients[from..from + columns.len()];
+                from += columns.len();
+                self.causes[candidate.cause].parameters(scene, &candidate.place, shape, coefficients)
+            })
+            .collect()
+    }
+
+    /// The best explanation by each single candidate, best first.
+    pub fn singles(&self, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+        let found = self
+            .choices()
+            .par_iter()
+            .filter_map(|choice| self.explain(scene, regression, &[*choice]))
+            .collect();
+        self.best_of_each(found)
+    }
+
+    /// The best explanation by each pair of candidates, best first.
+    pub fn pairs(&self, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+        let choices = self.choices();
+        let found = choices
+            .par_iter()
+            .enumerate()
+            .flat_map_iter(|(index, first)| {
+                let rest = &choices[index + 1..];
+                rest.iter()
+                    .filter(|second| self.may_act_together(&[*first], **second))
+                    .filter_map(|second| self.explain(scene, regression, &[*first, *second]))
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        self.best_of_each(found)
+    }
+
+    /// The best explanation by each triple that contains one of the best pairs, best first.
+    pub fn triples(
+        &self,
+        scene: &Scene<'_>,
+        regression: &Regression,
+        pairs: &[Explanation],
+    ) -> Vec<Explanation> {
+        let choices = self.choices();
+        let found = pairs
+            .par_iter()
+            .take(PAIRS_KEPT)
+            .flat_map_iter(|pair| {
+                choices
+                    .iter()
+                    .filter(|third| self.may_act_together(&pair.choices, **third))
+                    .filter_map(|third| {
+                        let mut all = pair.choices.clone();
+                        all.push(*third);
+                        all.sort_unstable();
+                        self.explain(scene, regression, &all)
+                    })
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        self.best_of_each(found)
+    }
+
+    /// A case holds one extension of a name: the same cause does not act twice.
+    fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
+        some.iter()
+            .all(|choice| self.cause(choice.candidate).name() != self.cause(other.candidate).name())
+    }
+
+    fn best_of_each(&self, mut found: Vec<Explanation>) -> Vec<Explanation> {
+        found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
+        let mut seen: Vec<Vec<usize>> = Vec::new();
+        found.retain(|explanation| {
+            let who: Vec<usize> = explanation
+                .choices
+                .iter()
+                .map(|choice| choice.candidate)
+                .collect();
+            let new = !seen.contains(&who);
+            if new {
+                seen.push(who);
+            }
+            new
+        });
+        found
+    }
+
+    /// Adds a shape to a candidate; `None` where it has no columns.
+    pub fn add_shape(
+        &mut self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        candidate: usize,
+        shape: Vec<f64>,
+    ) -> Option<Choice> {
+        let known = &self.candidates[candidate];
+        if let Some(index) = known.shapes.iter().position(|(known, _)| *known == shape) {
+            return Some(Choice {
+                candidate,
+                shape: index,
+            });
+        }
+        let columns = columns(scene, &*self.causes[known.cause], &known.place, &shape)?;
+        let numbers = columns
+            .iter()
+            .map(|column| regression.add(scene, column))
+            .collect();
+        let shapes = &mut self.candidates[candidate].shapes;
+        shapes.push((shape, numbers));
+        Some(Choice {
+            candidate,
+            shape: shapes.len() - 1,
+        })
+    }
+}
+
+/// Samples by coefficient, record and channel.
+fn columns(
+    scene: &Scene<'_>,
+    cause: &dyn Cause,
+    place: &Place,
+    shape: &[f64],
+) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
+    let mut by_coefficient: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
+    for record in &scene.records {
+        for (index, regressor) in cause.regressors(scene, record, place, shape)?.iter().enumerate() {
+            if by_coefficient.len() <= index {
+                by_coefficient.push(Vec::new());
+            }
+            by_coefficient[index].push(regressor.columns(record));
+        }
+    }
+    let whole = by_coefficient
+        .iter()
+        .all(|column| column.iter().flatten().flatten().all(|sample| sample.is_finite()));
+    whole.then_some(by_coefficient)
+}
+
+/// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
+pub fn gain(regression: &Regression, explanation: &Explanation, inflation: f64) -> f64 {
+    let count = regression.count(Share::Fitted).max(2) as f64;
+    let taken = (regression.residual(Share::Fitted) - explanation.fit.left) / inflation;
+    taken - explanation.freedoms as f64 * count.ln()
+}

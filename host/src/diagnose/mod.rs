@@ -1,0 +1,56 @@
+//! What the simulation gets wrong, why, and what to add.
+//!
+//! The residual is taken with the *measured* motion: with H the receptance of the case and f_r a term that it lacks,
+//! y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large terms. A cause is then one or few regressors
+//! ([`cause`]), fits of any set of causes are linear least squares ([`regression`]), and what competes is judged by
+//! likelihood, parsimony and records that were held out ([`evidence`]).
+
+pub mod answer;
+pub mod cause;
+mod causes;
+mod checks;
+mod cubic;
+mod decay;
+mod error;
+pub mod evidence;
+mod grid;
+mod judge;
+mod motion;
+pub mod noise;
+mod path;
+mod receptance;
+mod record;
+pub mod regression;
+mod scene;
+mod stiffness;
+
+pub use answer::Diagnosis;
+pub use error::DiagnoseError;
+pub use grid::Grid;
+pub use path::{Motion, restoring_along};
+pub use receptance::Receptance;
+pub use record::{Observed, Record};
+pub use scene::{Baseline, Domain, Scene};
+
+use crate::case::Case;
+use crate::recording::Recording;
+
+/// How to diagnose.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// Seed of whatever is drawn.
+    pub seed: u64,
+}
+
+/// What the case gets wrong about the recordings, and why.
+///
+/// # Errors
+/// The case cannot be simulated, or a recording tells nothing: too short, clipped, without a channel that is needed.
+pub fn diagnose(
+    case: &Case,
+    recordings: &[Recording],
+    options: &Options,
+) -> Result<Diagnosis, DiagnoseError> {
+    let scene = Scene::new(case, recordings)?;
+    Ok(judge::judge(&scene, options))
+}

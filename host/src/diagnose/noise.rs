@@ -1,0 +1,106 @@
+//! How much a sensor's noise is: the floor of what the model leaves.
+//!
+//! Sensor noise is taken to be white over the band of the record. Whatever else is in a residual stands above that floor
+//! somewhere and leaves it bare elsewhere.
+
+use super::grid::Stretch;
+
+/// Bands into which a spectrum is cut.
+const BANDS: usize = 32;
+/// Nothing recorded is trusted beyond this share of its size: 100 dB, the best of sixteen bits and of our numerics.
+const TRUSTED: f64 = 1e-5;
+
+/// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel itself.
+///
+/// The mean of the periodogram in each of 32 bands, the lower quartile of these, and then the mean of all bands that are
+/// within three deviations of it: with nothing but noise, all of them.
+pub fn white_floor(residual: &[f64], size: f64) -> f64 {
+    let least = (TRUSTED * size).max(f64::MIN_POSITIVE);
+    let count = residual.len();
+    if count < 4 * BANDS {
+        return rms(residual).max(least);
+    }
+    let mut means = band_means(residual);
+    means.sort_by(f64::total_cmp);
+    let per_band = (count / (2 * BANDS)) as f64;
+    // Hann's window makes neighbouring bins alike: a third of them count.
+    let spread = 3.0 * (3.0 / per_band).sqrt();
+    let mut level = means[BANDS / 4];
+    for _ in 0..8 {
+        let near: Vec<f64> = means
+            .iter()
+            .copied()
+            .filter(|mean| *mean <= level * (1.0 + spread) && *mean >= level / (1.0 + spread))
+            .collect();
+        if near.is_empty() {
+            break;
+        }
+        let next = near.iter().sum::<f64>() / near.len() as f64;
+        if (next - level).abs() <= 1e-9 * level {
+            break;
+        }
+        level = next;
+    }
+    level.sqrt().max(least)
+}
+
+/// Mean of the periodogram, per real part, in each band: σ² where there is white noise.
+fn band_means(residual: &[f64]) -> Vec<f64> {
+    let count = residual.len();
+    let mean = residual.iter().sum::<f64>() / count as f64;
+    let mut power = 0.0;
+    let windowed: Vec<f64> = residual
+        .iter()
+        .enumerate()
+        .map(|(n, x)| {
+            let hann = (std::f64::consts::PI * (n as f64 + 0.5) / count as f64)
+                .sin()
+                .powi(2);
+            power += hann * hann;
+            hann * (x - mean)
+        })
+        .collect();
+    let mut parts = Vec::with_capacity(count);
+    let bins = count / 2;
+    Stretch::new(count).parts(&windowed, bins, &mut parts);
+    let scale = count as f64 / power;
+    (0..BANDS)
+        .map(|band| {
+            let from = (parts.len() * band / BANDS).max(3);
+            let to = parts.len() * (band + 1) / BANDS;
+            let sum: f64 = parts[from..to].iter().map(|x| x * x).sum();
+            scale * sum / (to - from).max(1) as f64
+        })
+        .collect()
+}
+
+/// Root mean square.
+pub fn rms(samples: &[f64]) -> f64 {
+    (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    #[test]
+    fn the_floor_is_that_of_the_noise_with_and_without_a_signal() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        for loud in [0.0, 50.0] {
+            let signal: Vec<f64> = (0..6000)
+                .map(|n| {
+                    let noise: f64 = StandardNormal.sample(&mut random);
+                    let t = n as f64;
+                    noise + loud * ((0.31 * t).sin() + (0.2 * t + 1e-5 * t * t).sin())
+                })
+                .collect();
+            let floor = white_floor(&signal, rms(&signal));
+            // 6000 samples, most of them beside the tones: 2 % is three deviations.
+            assert!((floor - 1.0).abs() < 0.04, "{loud}: {floor}");
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! One recording beside what the baseline predicts of it.
+
+use std::path::PathBuf;
+
+use nalgebra::Matrix3;
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::DiagnoseError;
+use super::checks;
+use super::decay::Decays;
+use super::grid::Grid;
+use super::motion;
+use super::noise::{rms, white_floor};
+use super::path::{Motion, restoring_along};
+use super::scene::{Baseline, Domain, derivatives};
+use crate::recording::{Kind, Quantity, Recording};
+use crate::simulate::effect::Pickup;
+
+/// A channel that the baseline predicts.
+#[derive(Clone, Debug)]
+pub struct Observed {
+    /// What it reads.
+    pub pickup: Pickup,
+    /// What was measured, SI.
+    pub measured: Vec<f64>,
+    /// What the baseline says, along the measured motion.
+    pub predicted: Vec<f64>,
+    /// Standard deviation of its white noise.
+    pub deviation: f64,
+}
+
+/// One recording with its prediction.
+pub struct Record {
+    /// Its place among the recordings.
+    pub index: usize,
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// What kind of test it is.
+    pub kind: Option<Kind>,
+    /// In what it is compared.
+    pub domain: Domain,
+    /// Channels whose sensors sit somewhere else than at the tool tip.
+    pub elsewhere: Vec<String>,
+    /// Its transforms.
+    pub grid: Grid,
+    /// The channels that are compared.
+    pub channels: Vec<Observed>,
+    /// Forces that drive the structure, N, in the machine's axes; empty where none does.
+    pub force_n: [Vec<f64>; 3],
+    /// The motion as far as it is known: measured where that tells more than the model, else as the model has it.
+    pub motion: Motion,
+    /// Its displacement at the samples of the record, as spectra.
+    pub displacement: [Vec<Complex64>; 3],
+    /// Below this lies all but a two-hundredth of the motion's power, Hz.
+    pub highest_hz: f64,
+    /// Highest frequency at which the record is compared, Hz.
+    pub band_hz: f64,
+    /// H(iω) of the baseline at the bins of the grid, m/N; in the domain of force the dynamic stiffness, N/m.
+    pub transfer: Vec<Matrix3<Complex64>>,
+    /// Free decays of the baseline, as the channels read them.
+    pub decays: Decays,
+}
+
+impl Observed {
+    /// Measured less predicted.
+    pub fn residual(&self) -> Vec<f64> {
+        self.measured
+            .iter()
+            .zip(&self.predicted)
+            .map(|(a, b)| a - b)
+            .collect()
+    }
+
+    /// (iω)^q e^(−iωτ): what becomes of a displacement in this channel, without its weights.
+    pub fn factor(&self, omega: f64) -> Complex64 {
+        Complex64::new(0.0, omega).powi(derivatives(self.pickup.quantity))
+            * Complex64::cis(-omega * self.pickup.delay_s)
+    }
+}
+
+impl Record {
+    /// Prepares one recording.
+    ///
+    /// # Errors
+    /// A record that tells nothing: too short, clipped, without a channel that is needed, of a kind that is not judged.
+    pub fn new(baseline: &Baseline<'_>, index: usize, recording: &Recording) -> Result<Self, DiagnoseError> {
+        let domain = checks::domain(baseline, recording)?;
+        let force_n = forces(baseline, recording);
+        let channels = channels(baseline, recording, domain);
+        checks::record(baseline, recording, &channels)?;
+        let highest_hz = highest_hz(recording);
+        let rate_hz = recording.sample_rate_hz;
+        // Harmonics of terms of the motion up to the eighth stay below half the finer rate.
+        let finer = ((16.0 * highest_hz / rate_hz).ceil() as usize)
+            .clamp(1, 8)
+            .next_power_of_two();
+        let grid = Grid::new(recording.len(), rate_hz, 8.0 * baseline.slowest_decay_s(), finer);
+        let transfer = match domain {
+            Domain::Response => response(baseline, &grid),
+            Domain::Force => dynamic_stiffness(baseline, &grid),
+        };
+        let mut record = Self {
+            index,
+            path: recording.path.clone(),
+            kind: recording.sidecar.kind,
+            domain,
+            elsewhere: elsewhere(recording),
+            grid,
+            channels,
+            force_n,
+            motion: Motion::default(),
+            displacement: std::array::from_fn(|_| Vec::new()),
+            highest_hz,
+            band_hz: (6.0 * highest_hz).min(0.5 * rate_hz),
+            transfer,
+            decays: Decays::default(),
+        };
+        match domain {
+            Domain::Response => record.compare_responses(baseline),
+            Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,
+        }
+        Ok(record)
+    }
+
+    /// True where the motion along `axis` is more than what could be noise.
+    pub fn moves(&self, axis: usize) -> bool {
+        !self.motion.x[axis].is_empty()
+            && (self.channels.iter().any(|channel| {
+                channel.pickup.weights[axis] != 0.0 && rms(&channel.measured) > 3.0 * channel.deviation
+            }) || !self.force_n[axis].is_empty())
+    }
+
+    /// Spectra of forces in the machine's axes to what a channel reads of the response to them.
+    pub fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: &Observed) -> Vec<Complex64> {
+        (0..self.grid.bins())
+            .map(|bin| {
+                let mut sum = Complex64::ZERO;
+                for (axis, force) in force.iter().enumerate() {
+                    if let Some(force) = force {
+                        for (weight, row) in channel.pickup.weights.iter().zip(self.transfer[bin].row_iter())
+                        {
+                            if *weight != 0.0 {
+                                sum += row[axis] * force[bin] * *weight;
+                            }
+                        }
+                    }
+                }
+                sum * self.factor(channel, bin)
+            })
+            .collect()
+    }
+
+    /// [`Observed::factor`] at a bin; zero at the last one where it would not be real.
+    pub fn factor(&self, channel: &Observed, bin: usize) -> Complex64 {
+        if bin + 1 == self.grid.bins() {
+            Complex64::ZERO
+        } else {
+            channel.factor(self.grid.omega(bin))
+        }
+    }
+
+    /// Predicts all channels from the forces and the terms of the baseline along the motion, and learns the motion from
+    /// what is left; terms move the motion, so that it takes a few rounds.
+    fn compare_responses(&mut self, baseline: &Baseline<'_>) {
+        self.decays = Decays::of(baseline, self);
+        let rounds = if baseline.terms.is_empty() { 1 } else { 4 };
+        let outside: [Option<Vec<Complex64>>; 3] = std::array::from_fn(|axis| {
+            (!self.force_n[axis].is_empty()).then(|| self.grid.spectrum(&self.force_n[axis]))
+        });
+        for round in 0..rounds {
+            let mut force = outside.clone();
+            if round > 0 {
+                self.add_terms(baseline, &mut force);
+            }
+            self.predict(&force);
+            motion::learn(self, baseline, &force);
+        }
+        if rounds > 1 {
+            let mut force = outside;
+            self.add_terms(baseline, &mut force);
+            self.predict(&force);
+        }
+    }
+
+    /// −f_r of the baseline's terms along the motion, as forces.
+    fn add_terms(&self, baseline: &Baseline<'_>, force: &mut [Option<Vec<Complex64>>; 3]) {
+        for term in &baseline.terms {
+            let restoring = restoring_along(&**term, &self.motion);
+            for &axis in &baseline.axes {
+                if restoring[axis].iter().all(|force| *force == 0.0) {
+                    continue;
+                }
+                let spectrum = self.grid.spectrum_of_fine(&restoring[axis]);
+                let sum = force[axis].get_or_insert_with(|| vec![Complex64::ZERO; self.grid.bins()]);
+                for (sum, restoring) in sum.iter_mut().zip(&spectrum) {
+                    *sum -= restoring;
+                }
+            }
+        }
+    }
+
+    /// Response to `force` and the free decay that fits best, in every channel; the noise of what is left.
+    fn predict(&mut self, force: &[Option<Vec<Complex64>>; 3]) {
+        let predicted: Vec<Vec<f64>> = self
+            .channels
+            .par_iter()
+            .map(|channel| self.grid.samples(&self.read_response(force, channel)))
+            .collect();
+        for (channel, predicted) in self.channels.iter_mut().zip(predicted) {
+            channel.predicted = predicted;
+        }
+        let residuals: Vec<Vec<f64>> = self.channels.iter().map(Observed::residual).collect();
+        let sizes: Vec<f64> = self
+            .channels
+            .iter()
+            .map(|channel| rms(&channel.measured))
+            .collect();
+        self.decays.fit(&residuals, &sizes);
+        for (index, channel) in self.channels.iter_mut().enumerate() {
+            self.decays.add_to(index, &mut channel.predicted);
+            channel.deviation = white_floor(&channel.residual(), rms(&channel.measured));
+        }
+    }
+}
+
+/// Forces along the axes of the baseline, as they act: a force sensor that the baseline knows to be wrong is corrected.
+fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
+    std::array::from_fn(|axis| {
+        let name = ["fx", "fy", "fz"][axis];
+        let Some(channel) = recording.channel(name).filter(|_| baseline.axes.contains(&axis)) else {
+            return Vec::new();
+        };
+        let weight = baseline.pickup(name).map_or(1.0, |pickup| pickup.weights[axis]);
+        channel.samples.iter().map(|force| force / weight).collect()
+    })
+}
+
+/// Places that mean the tool tip.
+const TOOL_TIP: [&str; 5] = ["tool-tip", "tool tip", "tip", "tcp", "tool"];
+
+fn elsewhere(recording: &Recording) -> Vec<String> {
+    recording
+        .sidecar
+        .channels
+        .iter()
+        .filter(|(_, known)| {
+            known
+                .at
+                .as_deref()
+                .is_some_and(|at| !TOOL_TIP.contains(&at.to_lowercase().as_str()))
+        })
+        .map(|(name, known)| known.name.clone().unwrap_or_else(|| name.clone()))
+        .collect()
+}
+
+fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> Vec<Observed> {
+    recording
+        .channels
+        .iter()
+        .filter_map(|channel| {
+            let pickup = baseline.pickup(&channel.name)?;
+            let axes_known = (0..3).all(|axis| pickup.weights[axis] == 0.0 || baseline.axes.contains(&axis));
+            let is_force = pickup.quantity == Quantity::Force;
+            (axes_known && is_force == (domain == Domain::Force)).then(|| Observed {
+                pickup,
+                measured: channel.samples.clone(),
+                predicted: Vec::new(),
+                deviation: 0.0,
+            })
+        })
+        .collect()
+}
+
+/// The frequency below which all but half a percent of the power of every channel of motion lies, Hz; at least three times
+/// the resolution of the record.
+fn highest_hz(recording: &Recording) -> f64 {
+    let grid = Grid::new(recording.len(), recording.sample_rate_hz, 0.0, 1);
+    let of_motion = recording.channels.iter().filter(|channel| {
+        matches!(
+            channel.quantity,
+            Quantity::Displacement | Quantity::Velocity | Quantity::Acceleration
+        )
+    });
+    let least = 3.0 * recording.sample_rate_hz / recording.len() as f64;
+    of_motion
+        .map(|channel| {
+            let mean = channel.samples.iter().sum::<f64>() / channel.samples.len().max(1) as f64;
+            let centered: Vec<f64> = channel.samples.iter().map(|x| x - mean).collect();
+            let power: Vec<f64> = grid
+                .continued_spectrum(&centered)
+                .iter()
+                .map(|bin| bin.norm_sqr())
+                .collect();
+            let whole: f64 = power.iter().sum();
+            let mut sum = 0.0;
+            let bin = power
+                .iter()
+                .position(|power| {
+                    sum += power;
+                    sum >= 0.995 * whole
+                })
+                .unwrap_or(0);
+            grid.omega(bin) / std::f64::consts::TAU
+        })
+        .fold(least, f64::max)
+}
+
+fn response(baseline: &Baseline<'_>, grid: &Grid) -> Vec<Matrix3<Complex64>> {
+    (0..grid.bins())
+        .into_par_iter()
+        .map(|bin| baseline.receptance.at(grid.omega(bin)))
+        .collect()
+}
+
+/// Z(iω) over the axes of the structure; zero where it is not known.
+fn dynamic_stiffness(baseline: &Baseline<'_>, grid: &Grid) -> Vec<Matrix3<Complex64>> {
+    super::stiffness::table(baseline.structure, &baseline.first_order, &baseline.axes, grid)
+}
