@@ -1,0 +1,184 @@
+//! This test's equations against those of the library's simulation: the names mean the same in both.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use quietcut::case::Case;
+use quietcut::simulate::effect::Effects;
+use quietcut::simulate::rig::{Rig as LibraryRig, Signal};
+use quietcut::simulate::{Entry, Recorder, TachometerModel, VirtualCut};
+use quietcut::structure::Direction;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::cause::{Cause, Kind, PROCESS, STRUCTURAL};
+use super::cut::CutBench;
+use super::judge::Lab;
+use super::machine::Machine;
+use super::rig::Rig;
+use super::sensor::Sensor;
+
+/// `--effect` of a cause.
+fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
+    let name = cause.kind.name();
+    let mut texts: Vec<String> = cause
+        .values(machine, &rig.scale)
+        .iter()
+        .map(|(key, value)| format!("{name}.{key}={value:e}"))
+        .collect();
+    if cause.kind.of_sensor() {
+        texts.push(format!("{name}.channel={}", rig.sensors[cause.sensor].name()));
+        if cause.kind == Kind::CrossAxis {
+            texts.push(format!("{name}.direction=y"));
+        }
+    } else if !matches!(cause.kind, Kind::ModeCoupling | Kind::Drift) {
+        texts.push(format!("{name}.direction={}", ["x", "y", "z"][cause.axis]));
+    }
+    texts
+}
+
+#[test]
+fn every_structural_effect_means_what_it_means_in_the_simulation() {
+    for kind in STRUCTURAL {
+        let mut compared = 0;
+        for seed in 0..12 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let machine = Machine::draw(&mut random, 1 + seed as usize % 2);
+            if !Cause::possible(kind, &machine) {
+                continue;
+            }
+            let sensors: Vec<Sensor> = machine
+                .axes
+                .iter()
+                .flat_map(|&axis| {
+                    [false, true].map(|acceleration| Sensor {
+                        axis,
+                        acceleration,
+                        at_housing: false,
+                    })
+                })
+                .collect();
+            let omega = machine.omega[0];
+            let amplitude_n = 0.1 * machine.stiffness_along(0) * machine.amplitude_m;
+            let band = [0.4 * omega / TAU, 1.6 * omega / TAU];
+            let rig = Rig::sweep(&machine, 0, sensors, amplitude_n, band);
+            let cause = Cause {
+                kind,
+                axis: 0,
+                sensor: seed as usize % 2,
+                shares: kind.draw(&mut random),
+            };
+            let ours = rig.output(&machine, std::slice::from_ref(&cause)).remove(0);
+            let case = Case::parse(Path::new("machine.toml"), &machine.case_text()).unwrap();
+            let seconds = rig.samples as f64 / rig.rate_hz;
+            let signal = Signal::Sweep {
+                first_hz: band[0],
+                last_hz: band[1],
+                amplitude_n,
+                seconds,
+            };
+            let mut library = LibraryRig::new(Direction::X, signal, rig.rate_hz);
+            let texts = texts(&cause, &machine, &rig);
+            library.effects = Effects::parse(texts.iter().map(String::as_str)).unwrap();
+            let (recording, _) = library
+                .record(case.structure().unwrap(), Path::new("record.csv"))
+                .unwrap();
+            for (sensor, ours) in rig.sensors.iter().zip(&ours) {
+                let theirs = &recording.channel(&sensor.name()).unwrap().samples;
+                let size = theirs.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+                // The last sample may be missing by rounding of the duration; a jump of the acceleration may fall to either
+                // side of a sample.
+                let mut apart: Vec<f64> = ours
+                    .iter()
+                    .zip(theirs)
+                    .map(|(a, b)| (a - b).abs() / size)
+                    .collect();
+                apart.sort_by(f64::total_cmp);
+                let most = apart[apart.len() * 99 / 100];
+                // The library allows itself 1e-12 m in every step, some thousand in all.
+                let tolerance = 2e-5 + 1e-9 / machine.amplitude_m;
+                assert!(
+                    most < tolerance,
+                    "{} seed {seed} {}: {most:.1e} {texts:?}",
+                    kind.name(),
+                    sensor.name()
+                );
+            }
+            compared += 1;
+        }
+        assert!(compared >= 3, "{}", kind.name());
+    }
+}
+
+#[test]
+fn a_cut_is_the_cut_of_the_simulation() {
+    for kind in PROCESS {
+        let mut compared = 0;
+        for seed in 0..8 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let bench = CutBench::draw(&mut random, true).starting_at_rest();
+            if bench.places(kind).is_empty() {
+                continue;
+            }
+            let cause = Cause {
+                kind,
+                axis: 0,
+                sensor: 0,
+                shares: kind.draw(&mut random),
+            };
+            let ours = bench.output(std::slice::from_ref(&cause)).remove(0);
+            let case = Case::parse(Path::new("machine.toml"), &bench.case_text()).unwrap();
+            let [spindle_rpm, depth_mm] = bench.working_point();
+            let cut = VirtualCut {
+                entry: Entry::None,
+                air_s: 0.0,
+                effects: process_effects(&cause, &bench),
+                ..VirtualCut::new(spindle_rpm, depth_mm, bench.scale.seconds)
+            };
+            let recorder = Recorder::Ideal {
+                rate_hz: bench.rate_hz,
+            };
+            let (recording, _) = cut
+                .record(&case, recorder, TachometerModel::ONE_MARK, Path::new("cut.csv"))
+                .unwrap();
+            for (name, ours) in bench.channel_names().iter().zip(&ours) {
+                let theirs = &recording.channel(name).unwrap().samples;
+                let size = theirs.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+                // The surface before the first cut is not the same in both: the last third has forgotten it.
+                let late = ours.len() * 2 / 3..theirs.len().min(ours.len());
+                let mut apart: Vec<f64> = ours[late.clone()]
+                    .iter()
+                    .zip(&theirs[late])
+                    .map(|(a, b)| (a - b).abs() / size)
+                    .collect();
+                apart.sort_by(f64::total_cmp);
+                // A sample at the very moment of entry may fall to either side.
+                let most = apart[apart.len() * 98 / 100];
+                assert!(
+                    most < 1e-3,
+                    "{} seed {seed} {name}: {most:.1e} {cause:?}",
+                    kind.name()
+                );
+            }
+            compared += 1;
+        }
+        assert!(compared >= 1, "{}", kind.name());
+    }
+}
+
+/// The effect of a process cause.
+fn process_effects(cause: &Cause, bench: &CutBench) -> Effects {
+    let name = cause.kind.name();
+    if cause.kind == Kind::AxialDepthModulation {
+        return Effects::parse(["axial-depth-modulation=1"]).unwrap();
+    }
+    let mut texts: Vec<String> = cause
+        .values(&bench.machine, &bench.scale)
+        .iter()
+        .map(|(key, value)| format!("{name}.{key}={value:e}"))
+        .collect();
+    if cause.kind == Kind::SpeedFluctuation {
+        texts.push(format!("{name}.phase_deg={:e}", cause.shares[2].to_degrees()));
+    }
+    Effects::parse(texts.iter().map(String::as_str)).unwrap()
+}

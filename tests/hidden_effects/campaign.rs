@@ -1,0 +1,358 @@
+//! Many seeds of a family through the tool, and how often it was right.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::time::Instant;
+
+use rayon::prelude::*;
+use serde_json::Value;
+
+use super::judge::Verdict;
+use super::puzzle::{Family, Puzzle};
+
+/// What the tool said of one puzzle.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Said {
+    outcome: String,
+    /// Causes in their order.
+    causes: Vec<SaidCause>,
+    energy_removed: Option<f64>,
+    seconds: f64,
+}
+
+/// One cause of an answer.
+#[derive(Clone, Debug)]
+struct SaidCause {
+    name: String,
+    confidence: f64,
+    /// Parameters with their 90 % intervals.
+    parameters: Vec<(String, [f64; 2])>,
+}
+
+/// What was found of one seed.
+#[derive(Clone, Debug)]
+pub(crate) struct Finding {
+    seed: u64,
+    hidden: Vec<&'static str>,
+    verdict: Verdict,
+    ratio: f64,
+    redrawn: usize,
+    said: Said,
+    right: bool,
+    /// Of the parameters of causes that were named rightly: how many have their truth in the interval, of how many.
+    covered: [usize; 2],
+    /// The worst: name and key, truth, interval.
+    missed: Vec<String>,
+}
+
+impl Said {
+    /// An answer as `diagnose --json` prints it.
+    pub(crate) fn of(answer: &Value, seconds: f64) -> Self {
+        let causes = answer["causes"].as_array().cloned().unwrap_or_default();
+        Self {
+            outcome: answer["outcome"].as_str().unwrap_or("(none)").into(),
+            causes: causes
+                .iter()
+                .map(|cause| {
+                    let parameters = cause["parameters"].as_object().cloned().unwrap_or_default();
+                    let interval =
+                        |value: &Value| [0, 1].map(|end| value["ci90"][end].as_f64().unwrap_or(f64::NAN));
+                    SaidCause {
+                        name: cause["name"].as_str().unwrap_or_default().to_owned(),
+                        confidence: cause["confidence"].as_f64().unwrap_or(f64::NAN),
+                        parameters: parameters
+                            .iter()
+                            .map(|(key, value)| (key.clone(), interval(value)))
+                            .collect(),
+                    }
+                })
+                .collect(),
+            energy_removed: answer["gain"]["residual_energy_removed"].as_f64(),
+            seconds,
+        }
+    }
+
+    fn names(&self) -> BTreeSet<&str> {
+        self.causes.iter().map(|cause| cause.name.as_str()).collect()
+    }
+
+    /// What stands in the confusion matrix.
+    fn label(&self) -> String {
+        match self.outcome.as_str() {
+            "cause" => self
+                .causes
+                .iter()
+                .map(|cause| cause.name.as_str())
+                .collect::<Vec<_>>()
+                .join("+"),
+            "confounded" => format!("{{{}}}", self.names().into_iter().collect::<Vec<_>>().join(" ")),
+            other => other.into(),
+        }
+    }
+}
+
+impl Finding {
+    /// Asks `tool` and judges what it says.
+    pub(crate) fn of(puzzle: &Puzzle, tool: &(dyn Fn(&Puzzle) -> Value + Sync)) -> Self {
+        let began = Instant::now();
+        let said = Said::of(&tool(puzzle), began.elapsed().as_secs_f64());
+        let hidden: Vec<&'static str> = puzzle.hidden.iter().map(|hidden| hidden.name).collect();
+        let wanted: BTreeSet<&str> = hidden.iter().copied().collect();
+        let right = match (&puzzle.verdict, puzzle.family) {
+            (_, Family::NotInLibrary) => said.outcome == "unexplained",
+            (Verdict::Invisible, _) => said.outcome == "none",
+            (Verdict::Equivalent(set), _) => said.outcome == "confounded" && said.names() == *set,
+            (_, Family::TwoEffects) => said.outcome == "cause" && said.names() == wanted,
+            _ => {
+                said.outcome == "cause"
+                    && said
+                        .causes
+                        .first()
+                        .is_some_and(|cause| wanted.contains(cause.name.as_str()))
+            }
+        };
+        let (mut covered, mut missed) = ([0, 0], Vec::new());
+        if right && puzzle.verdict == Verdict::Separable {
+            for SaidCause { name, parameters, .. } in &said.causes {
+                for hidden in puzzle.hidden.iter().filter(|hidden| hidden.name == name) {
+                    for (key, truth) in &hidden.values {
+                        let Some((_, [low, high])) = parameters.iter().find(|(known, _)| known == key) else {
+                            continue;
+                        };
+                        covered[1] += 1;
+                        if (low..=high).contains(&truth) {
+                            covered[0] += 1;
+                        } else {
+                            missed.push(format!(
+                                "{name}.{key} = {truth:.6e} not in [{low:.6e}, {high:.6e}]"
+                            ));
+                        }
+                    }
+                }
+            }
+        }
+        Self {
+            seed: puzzle.seed,
+            hidden,
+            verdict: puzzle.verdict.clone(),
+            ratio: puzzle.ratio,
+            redrawn: puzzle.redrawn,
+            said,
+            right,
+            covered,
+            missed,
+        }
+    }
+
+    fn hidden_label(&self) -> String {
+        match &self.verdict {
+            _ if self.hidden.is_empty() => "nothing".into(),
+            Verdict::Equivalent(set) => format!(
+                "{} {{{}}}",
+                self.hidden.join("+"),
+                set.iter().copied().collect::<Vec<_>>().join(" ")
+            ),
+            Verdict::Invisible => format!("{} (invisible)", self.hidden.join("+")),
+            _ => self.hidden.join("+"),
+        }
+    }
+
+    fn counts(&self) -> bool {
+        self.verdict != Verdict::Separable || self.ratio > 3.0
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let confidence = self
+            .said
+            .causes
+            .first()
+            .map_or(f64::NAN, |cause| cause.confidence);
+        write!(
+            out,
+            "seed {} {}: hidden {} at {:.2}× noise, said {} ({confidence:.3}, {:.2} s)",
+            self.seed,
+            if self.right { "right" } else { "WRONG" },
+            self.hidden_label(),
+            self.ratio,
+            self.said.label(),
+            self.said.seconds
+        )?;
+        self.missed
+            .iter()
+            .try_for_each(|missed| write!(out, "; {missed}"))
+    }
+}
+
+/// All seeds of a family.
+pub(crate) struct Report {
+    pub(crate) family: Family,
+    pub(crate) findings: Vec<Finding>,
+}
+
+impl Report {
+    /// Runs `seeds` of a family; the same for any number of threads.
+    pub(crate) fn run(
+        family: Family,
+        seeds: std::ops::Range<u64>,
+        tool: &(dyn Fn(&Puzzle) -> Value + Sync),
+    ) -> Self {
+        let of = |seed| {
+            let finding = Finding::of(&Puzzle::draw(family, seed), tool);
+            eprintln!("{} {finding}", family.name());
+            finding
+        };
+        Self {
+            family,
+            findings: seeds.into_par_iter().map(of).collect(),
+        }
+    }
+
+    fn share(&self, of: impl Fn(&Finding) -> Option<bool>) -> Share {
+        let judged: Vec<bool> = self.findings.iter().filter_map(of).collect();
+        Share {
+            good: judged.iter().filter(|good| **good).count(),
+            all: judged.len(),
+        }
+    }
+
+    /// Right among the separable ones whose effect is above three times the noise.
+    pub(crate) fn separable(&self) -> Share {
+        self.share(|f| (f.verdict == Verdict::Separable && f.ratio > 3.0).then_some(f.right))
+    }
+
+    /// The exact set among the equivalent ones.
+    pub(crate) fn equivalent(&self) -> Share {
+        self.share(|f| matches!(f.verdict, Verdict::Equivalent(_)).then_some(f.right))
+    }
+
+    /// `none` where nothing can be seen.
+    pub(crate) fn invisible(&self) -> Share {
+        self.share(|f| (f.verdict == Verdict::Invisible).then_some(f.right))
+    }
+
+    /// Weak but separable effects: right.
+    fn weak(&self) -> Share {
+        self.share(|f| (f.verdict == Verdict::Separable && f.ratio <= 3.0).then_some(f.right))
+    }
+
+    /// Weak but separable effects: right, or said to be nothing.
+    fn weak_not_wrong(&self) -> Share {
+        self.share(|f| {
+            (f.verdict == Verdict::Separable && f.ratio <= 3.0).then_some(f.right || f.said.outcome == "none")
+        })
+    }
+
+    /// Truths in their 90 % intervals.
+    pub(crate) fn covered(&self) -> Share {
+        let sum = |index: usize| self.findings.iter().map(|f| f.covered[index]).sum();
+        Share {
+            good: sum(0),
+            all: sum(1),
+        }
+    }
+
+    /// Right among the answers with a confidence of 0.9 or more.
+    pub(crate) fn confident(&self) -> Share {
+        self.share(|f| {
+            let confidence = f
+                .said
+                .causes
+                .first()
+                .filter(|_| f.said.outcome == "cause")?
+                .confidence;
+            (confidence >= 0.9).then_some(f.right)
+        })
+    }
+
+    /// Held-out residual energy cut by 80 % or more where a cause of more than three times the noise is named.
+    pub(crate) fn energy(&self) -> Share {
+        self.share(|f| {
+            let named =
+                f.said.outcome == "cause" && f.right && f.ratio > 3.0 && f.verdict == Verdict::Separable;
+            named.then(|| f.said.energy_removed.is_some_and(|share| share >= 0.8))
+        })
+    }
+}
+
+/// So many of so many.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Share {
+    pub(crate) good: usize,
+    pub(crate) all: usize,
+}
+
+impl Share {
+    /// Both together.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            good: self.good + other.good,
+            all: self.all + other.all,
+        }
+    }
+
+    /// The share; 1 of none.
+    pub(crate) fn value(self) -> f64 {
+        if self.all == 0 {
+            1.0
+        } else {
+            self.good as f64 / self.all as f64
+        }
+    }
+}
+
+impl fmt::Display for Share {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{:5.1} % of {}", 100.0 * self.value(), self.all)
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "== {}: {} seeds", self.family.name(), self.findings.len())?;
+        let mut matrix: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+        for finding in self.findings.iter().filter(|finding| finding.counts()) {
+            *matrix
+                .entry(finding.hidden_label())
+                .or_default()
+                .entry(finding.said.label())
+                .or_default() += 1;
+        }
+        for (hidden, said) in matrix {
+            let said: Vec<String> = said
+                .iter()
+                .map(|(said, count)| format!("{said} {count}"))
+                .collect();
+            writeln!(out, "  {hidden}: {}", said.join(", "))?;
+        }
+        for finding in self
+            .findings
+            .iter()
+            .filter(|f| (!f.right && f.counts()) || !f.missed.is_empty())
+        {
+            writeln!(out, "  {finding}")?;
+        }
+        for (what, share) in [
+            ("right, separable and above 3× noise", self.separable()),
+            ("exact set, equivalent", self.equivalent()),
+            ("none, nothing to be seen", self.invisible()),
+            ("right, separable and below 3× noise", self.weak()),
+            ("right or none, the same", self.weak_not_wrong()),
+            ("truth in the 90 % interval", self.covered()),
+            ("right of those with confidence ≥ 0.9", self.confident()),
+            ("energy cut by ≥ 80 %", self.energy()),
+        ] {
+            if share.all > 0 {
+                writeln!(out, "  {what}: {share}")?;
+            }
+        }
+        let redrawn: usize = self.findings.iter().map(|finding| finding.redrawn).sum();
+        let longest = self
+            .findings
+            .iter()
+            .map(|finding| finding.said.seconds)
+            .fold(0.0, f64::max);
+        writeln!(out, "  drawn again: {redrawn}; longest diagnosis {longest:.2} s")
+    }
+}

@@ -1,0 +1,479 @@
+//! What can be hidden, by the names of the field, and what it does to a machine and its sensors.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::cut::CutScale;
+use super::law::Law;
+use super::machine::{Machine, between, either};
+use super::motion::System;
+
+/// A kind of effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Kind {
+    Mass,
+    Stiffness,
+    Damping,
+    /// Mass, stiffness and damping by one factor: what a gain looks like.
+    CommonFactor,
+    MissingMode,
+    CubicStiffness,
+    QuadraticStiffness,
+    CubicDamping,
+    SofteningHardening,
+    CoulombFriction,
+    Backlash,
+    Hysteresis,
+    ModeCoupling,
+    Drift,
+    SensorGain,
+    SensorDelay,
+    CrossAxis,
+    SensorOffset,
+    ForceCoefficients,
+    /// All force coefficients, edges included, by one factor: what a gain of all channels looks like.
+    CommonForce,
+    EdgeForce,
+    ForceExponent,
+    Runout,
+    ProcessDamping,
+    AxialDepthModulation,
+    SpeedFluctuation,
+    Wear,
+    // Not in the library.
+    PulsatingStiffness,
+    Stop,
+    Stribeck,
+    Stranger,
+    SensorSaturation,
+    SensorSquare,
+}
+
+/// The effects of the library in structures.
+pub(crate) const STRUCTURAL: [Kind; 17] = [
+    Kind::Mass,
+    Kind::Stiffness,
+    Kind::Damping,
+    Kind::MissingMode,
+    Kind::CubicStiffness,
+    Kind::QuadraticStiffness,
+    Kind::CubicDamping,
+    Kind::SofteningHardening,
+    Kind::CoulombFriction,
+    Kind::Backlash,
+    Kind::Hysteresis,
+    Kind::ModeCoupling,
+    Kind::Drift,
+    Kind::SensorGain,
+    Kind::SensorDelay,
+    Kind::CrossAxis,
+    Kind::SensorOffset,
+];
+
+/// The effects of the library in cuts.
+pub(crate) const PROCESS: [Kind; 8] = [
+    Kind::ForceCoefficients,
+    Kind::EdgeForce,
+    Kind::ForceExponent,
+    Kind::Runout,
+    Kind::ProcessDamping,
+    Kind::AxialDepthModulation,
+    Kind::SpeedFluctuation,
+    Kind::Wear,
+];
+
+/// Effects that no library has.
+pub(crate) const STRANGE: [Kind; 6] = [
+    Kind::PulsatingStiffness,
+    Kind::Stop,
+    Kind::Stribeck,
+    Kind::Stranger,
+    Kind::SensorSaturation,
+    Kind::SensorSquare,
+];
+
+/// One effect of one size.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Cause {
+    pub(crate) kind: Kind,
+    /// Direction: 0, 1, 2.
+    pub(crate) axis: usize,
+    /// The sensor that it is about, by its place in the rig.
+    pub(crate) sensor: usize,
+    /// Parameters, each over its scale: 1 is an effect that is easily seen.
+    pub(crate) shares: Vec<f64>,
+}
+
+/// What sizes are measured by.
+#[derive(Clone, Debug)]
+pub(crate) struct Scale {
+    /// Peak displacement of the test, m.
+    pub(crate) peak_m: f64,
+    /// Length of a record, s.
+    pub(crate) seconds: f64,
+    /// Time between samples, s.
+    pub(crate) sample_s: f64,
+    /// Of cuts: the job.
+    pub(crate) cut: Option<CutScale>,
+}
+
+impl Kind {
+    /// Its name in answers; the names, where it is several.
+    pub(crate) fn names(self) -> &'static [&'static str] {
+        match self {
+            Self::Mass => &["mass"],
+            Self::Stiffness => &["stiffness"],
+            Self::Damping => &["damping"],
+            Self::CommonFactor => &["mass", "stiffness", "damping"],
+            Self::MissingMode => &["missing-mode"],
+            Self::CubicStiffness => &["cubic-stiffness"],
+            Self::QuadraticStiffness => &["quadratic-stiffness"],
+            Self::CubicDamping => &["cubic-damping"],
+            Self::SofteningHardening => &["softening-hardening"],
+            Self::CoulombFriction => &["coulomb-friction"],
+            Self::Backlash => &["backlash"],
+            Self::Hysteresis => &["hysteresis"],
+            Self::ModeCoupling => &["mode-coupling"],
+            Self::Drift => &["drift"],
+            Self::SensorGain => &["sensor-gain"],
+            Self::SensorDelay => &["sensor-delay"],
+            Self::CrossAxis => &["cross-axis"],
+            Self::SensorOffset => &["sensor-offset-from-tool-tip"],
+            Self::ForceCoefficients => &["force-coefficients"],
+            Self::CommonForce => &["force-coefficients", "edge-force"],
+            Self::EdgeForce => &["edge-force"],
+            Self::ForceExponent => &["force-exponent"],
+            Self::Runout => &["runout"],
+            Self::ProcessDamping => &["process-damping"],
+            Self::AxialDepthModulation => &["axial-depth-modulation"],
+            Self::SpeedFluctuation => &["speed-fluctuation"],
+            Self::Wear => &["wear"],
+            Self::PulsatingStiffness => &["(pulsating stiffness)"],
+            Self::Stop => &["(one-sided stop)"],
+            Self::Stribeck => &["(Stribeck friction)"],
+            Self::Stranger => &["(unmeasured periodic force)"],
+            Self::SensorSaturation => &["(saturating sensor)"],
+            Self::SensorSquare => &["(sensor with a square)"],
+        }
+    }
+
+    /// Its name, or the first of its names.
+    pub(crate) fn name(self) -> &'static str {
+        self.names()[0]
+    }
+
+    /// Number of parameters.
+    pub(crate) fn parameters(self) -> usize {
+        match self {
+            Self::MissingMode | Self::SpeedFluctuation => 3,
+            Self::SofteningHardening | Self::Backlash | Self::Hysteresis => 2,
+            Self::ForceCoefficients | Self::EdgeForce | Self::ForceExponent | Self::Runout => 2,
+            _ => 1,
+        }
+    }
+
+    /// True of what sensors do.
+    pub(crate) fn of_sensor(self) -> bool {
+        matches!(
+            self,
+            Self::SensorGain
+                | Self::SensorDelay
+                | Self::CrossAxis
+                | Self::SensorOffset
+                | Self::SensorSaturation
+                | Self::SensorSquare
+        )
+    }
+
+    /// Shares of a hidden effect, drawn.
+    pub(crate) fn draw(self, random: &mut ChaCha8Rng) -> Vec<f64> {
+        let size = between(random, 0.1, 1.5);
+        match self {
+            Self::Mass
+            | Self::Stiffness
+            | Self::Damping
+            | Self::CubicStiffness
+            | Self::QuadraticStiffness => {
+                vec![size * either(random)]
+            }
+            Self::ModeCoupling | Self::Drift | Self::SensorGain | Self::CrossAxis => {
+                vec![size * either(random)]
+            }
+            // Frequency over that of the machine, damping ratio, a mass over that of the machine.
+            Self::MissingMode => {
+                let apart = if random.random::<bool>() {
+                    random.random_range(0.55..0.8)
+                } else {
+                    random.random_range(1.25..1.8)
+                };
+                vec![apart, between(random, 0.01, 0.05), between(random, 4.0, 60.0)]
+            }
+            Self::SofteningHardening => vec![size, random.random_range(0.4..0.7)],
+            Self::Backlash => vec![random.random_range(0.15..0.7), between(random, 0.05, 0.5)],
+            Self::Hysteresis => vec![between(random, 0.03, 0.3), random.random_range(0.1..0.5)],
+            Self::ForceCoefficients | Self::EdgeForce => {
+                vec![size * either(random), between(random, 0.1, 1.5) * either(random)]
+            }
+            Self::ForceExponent => vec![between(random, 0.15, 1.0), random.random_range(0.5..1.5)],
+            Self::Runout => vec![size, random.random_range(0.0..6.0)],
+            Self::AxialDepthModulation => vec![1.0],
+            Self::SpeedFluctuation => vec![
+                size,
+                random.random_range(0.05..0.25),
+                random.random_range(0.0..6.0),
+            ],
+            _ => vec![size],
+        }
+    }
+
+    /// Where a fit of it begins.
+    pub(crate) fn starts(self, random: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+        match self {
+            Self::MissingMode => [0.55, 0.7, 0.9, 1.15, 1.4, 1.7]
+                .map(|f| vec![f, 0.02, 30.0])
+                .to_vec(),
+            Self::SofteningHardening => vec![vec![0.1, 0.5]],
+            Self::Backlash => [0.15, 0.35, 0.6].map(|gap| vec![gap, 0.1]).to_vec(),
+            Self::Hysteresis => [0.1, 0.3].map(|z| vec![0.05, z]).to_vec(),
+            Self::CoulombFriction => vec![vec![0.2]],
+            Self::ForceCoefficients | Self::EdgeForce => vec![vec![0.02, 0.02]],
+            Self::ForceExponent => vec![vec![0.1, 1.0]],
+            Self::Runout => vec![vec![0.1, 1.0], vec![0.1, 4.0]],
+            Self::SpeedFluctuation => vec![vec![0.1, 0.1, 1.0]],
+            Self::AxialDepthModulation => vec![vec![0.5]],
+            _ => vec![vec![0.02 * either(random)]],
+        }
+    }
+}
+
+impl Cause {
+    /// True where a machine and a rig can have it at all.
+    pub(crate) fn possible(kind: Kind, machine: &Machine) -> bool {
+        match kind {
+            Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::CommonFactor | Kind::Drift => !machine.modal,
+            Kind::ModeCoupling | Kind::CrossAxis => machine.axes.len() >= 2,
+            _ => true,
+        }
+    }
+
+    /// The parameters by the keys that answers give them.
+    pub(crate) fn values(&self, machine: &Machine, scale: &Scale) -> Vec<(&'static str, f64)> {
+        if let Some(cut) = &scale.cut
+            && let Some(values) = self.process_values(machine, cut, scale)
+        {
+            return values;
+        }
+        let (a, s) = (self.axis, &self.shares);
+        let entry = |matrix: &nalgebra::DMatrix<f64>, change: f64| matrix[(a, a)] * (1.0 + change);
+        let k = machine.stiffness_along(a);
+        let c = self.damping_along(machine);
+        let (peak, speed) = (scale.peak_m, scale.peak_m * machine.omega[0]);
+        match self.kind {
+            Kind::Mass => vec![("mass_kg", entry(&machine.mass, 0.1 * s[0]))],
+            Kind::Stiffness => vec![("stiffness_n_per_m", entry(&machine.stiffness, 0.1 * s[0]))],
+            Kind::Damping => vec![("damping_ns_per_m", entry(&machine.damping, 0.3 * s[0]))],
+            Kind::CommonFactor => vec![("factor", 1.0 + 0.1 * s[0])],
+            Kind::MissingMode => vec![
+                (
+                    "frequency_hz",
+                    s[0] * self.natural(machine) / std::f64::consts::TAU,
+                ),
+                ("damping_ratio", s[1]),
+                ("modal_mass_kg", s[2] * machine.mass[(0, 0)]),
+            ],
+            Kind::CubicStiffness => vec![("k3_n_per_m3", 0.1 * s[0] * k / peak.powi(2))],
+            Kind::QuadraticStiffness => vec![("k2_n_per_m2", 0.1 * s[0] * k / peak)],
+            Kind::CubicDamping => vec![("c3_ns3_per_m3", 0.5 * s[0] * c / speed.powi(2))],
+            Kind::SofteningHardening => {
+                let k3 = -0.1 * s[0] * k / peak.powi(2);
+                vec![
+                    ("k3_n_per_m3", k3),
+                    ("k5_n_per_m5", -k3 / (2.0 * (s[1] * peak).powi(2))),
+                ]
+            }
+            Kind::CoulombFriction => vec![("fc_n", 0.3 * s[0].abs() * c * speed)],
+            Kind::Backlash => vec![("gap_mm", 2e3 * s[0].abs() * peak), ("stiffness_fraction", s[1])],
+            Kind::Hysteresis => vec![
+                ("hysteretic_stiffness_n_per_m", s[0] * k),
+                ("yield_m", s[1].abs() * peak),
+            ],
+            Kind::ModeCoupling => vec![("kxyy_n_per_m3", 0.3 * s[0] * k / peak.powi(2))],
+            Kind::Drift => vec![("relative_rate_per_s", 0.1 * s[0] / scale.seconds)],
+            Kind::SensorGain => vec![("gain", 1.0 + 0.1 * s[0])],
+            Kind::SensorDelay => vec![("delay_s", 0.5 * s[0] * scale.sample_s)],
+            Kind::CrossAxis => vec![("fraction", 0.1 * s[0])],
+            Kind::SensorOffset => vec![("ratio", 1.0 - 0.1 * s[0])],
+            Kind::PulsatingStiffness => vec![("stiffness", 0.1 * s[0] * k)],
+            Kind::Stop => vec![("stiffness", 0.5 * s[0] * k)],
+            Kind::Stribeck => vec![("kinetic", 0.5 * s[0] * c * speed)],
+            Kind::Stranger => vec![("amplitude", 0.3 * s[0] * c * speed)],
+            Kind::SensorSaturation => vec![("third", 0.1 * s[0])],
+            Kind::SensorSquare => vec![("second", 0.1 * s[0])],
+            _ => Vec::new(),
+        }
+    }
+
+    /// The parameters of what a cut has.
+    fn process_values(
+        &self,
+        machine: &Machine,
+        cut: &CutScale,
+        scale: &Scale,
+    ) -> Option<Vec<(&'static str, f64)>> {
+        let (s, job) = (&self.shares, &cut.job);
+        let [kt, kr, _] = job.cutting_mpa;
+        let edge = kt * job.feed_mm;
+        Some(match self.kind {
+            Kind::ForceCoefficients => vec![
+                ("ktc_mpa", kt * (1.0 + 0.2 * s[0])),
+                ("krc_mpa", kr * (1.0 + 0.2 * s[1])),
+            ],
+            Kind::CommonForce => vec![("factor", 1.0 + 0.1 * s[0])],
+            Kind::EdgeForce => vec![
+                ("kte_n_per_mm", job.edge_n_per_mm[0] + 0.1 * s[0] * edge),
+                ("kre_n_per_mm", job.edge_n_per_mm[1] + 0.1 * s[1] * edge),
+            ],
+            Kind::ForceExponent => vec![
+                ("exponent", 1.0 - 0.4 * s[0]),
+                ("reference_chip_mm", s[1] * job.feed_mm),
+            ],
+            Kind::Runout => vec![
+                ("runout_um", 0.2e3 * s[0] * job.feed_mm),
+                ("angle_deg", s[1].to_degrees()),
+            ],
+            // A damping of half that of the machine, were one tooth always in the cut.
+            Kind::ProcessDamping => {
+                vec![(
+                    "process_damping_n_per_m",
+                    0.5 * s[0] * machine.damping[(0, 0)] * cut.cutting_speed() / (1e-3 * cut.depth_mm),
+                )]
+            }
+            Kind::AxialDepthModulation => vec![("on", s[0])],
+            Kind::SpeedFluctuation => vec![("delta", 0.02 * s[0]), ("frequency_hz", s[1] * cut.rpm / 60.0)],
+            Kind::Wear => vec![("relative_rate_per_s", 0.2 * s[0] / scale.seconds)],
+            _ => return None,
+        })
+    }
+
+    /// Natural frequency along its direction, rad/s.
+    fn natural(&self, machine: &Machine) -> f64 {
+        let i = if machine.modal { 0 } else { self.axis };
+        (machine.stiffness[(i, i)] / machine.mass[(i, i)]).sqrt()
+    }
+
+    fn damping_along(&self, machine: &Machine) -> f64 {
+        let i = if machine.modal { 0 } else { self.axis };
+        machine.damping[(i, i)]
+    }
+
+    /// The machine's own matrices as it changes them.
+    pub(crate) fn change(&self, machine: &mut Machine, scale: &Scale) {
+        let values = self.values(machine, scale);
+        let (a, value) = (self.axis, values[0].1);
+        match self.kind {
+            Kind::Mass => machine.mass[(a, a)] = value,
+            Kind::Stiffness => machine.stiffness[(a, a)] = value,
+            Kind::Damping => machine.damping[(a, a)] = value,
+            Kind::CommonFactor => {
+                machine.mass[(a, a)] *= value;
+                machine.damping[(a, a)] *= value;
+                machine.stiffness[(a, a)] *= value;
+            }
+            Kind::MissingMode => {
+                let (omega, ratio, mass) = (std::f64::consts::TAU * value, values[1].1, values[2].1);
+                let n = machine.mass.nrows();
+                let grown = |matrix: &nalgebra::DMatrix<f64>, corner: f64| {
+                    let mut grown = matrix.clone().resize(n + 1, n + 1, 0.0);
+                    grown[(n, n)] = corner;
+                    grown
+                };
+                machine.mass = grown(&machine.mass, mass);
+                machine.damping = grown(&machine.damping, 2.0 * ratio * omega * mass);
+                machine.stiffness = grown(&machine.stiffness, mass * omega * omega);
+                machine
+                    .tip
+                    .push(std::array::from_fn(|axis| f64::from(u8::from(axis == a))));
+            }
+            _ => {}
+        }
+    }
+
+    /// The law that it adds; sizes are those of the machine that is believed.
+    pub(crate) fn add(&self, machine: &Machine, scale: &Scale, system: &mut System) {
+        let values = self.values(machine, scale);
+        let (axis, value) = (self.axis, values[0].1);
+        let second = values.get(1).map_or(0.0, |value| value.1);
+        let spring = |power, coefficient| Law::Spring {
+            axis,
+            power,
+            coefficient,
+        };
+        let (k, omega) = (machine.stiffness_along(axis), self.natural(machine));
+        match self.kind {
+            Kind::CubicStiffness => system.add(spring(3, value)),
+            Kind::QuadraticStiffness => system.add(spring(2, value)),
+            Kind::SofteningHardening => {
+                system.add(spring(3, value));
+                system.add(spring(5, second));
+            }
+            Kind::CubicDamping => system.add(Law::Damper {
+                axis,
+                power: 3,
+                coefficient: value,
+            }),
+            Kind::CoulombFriction => system.add(Law::Friction {
+                axis,
+                kinetic_n: value,
+                breakaway_n: value,
+                stribeck_m_per_s: 1.0,
+            }),
+            Kind::Stribeck => system.add(Law::Friction {
+                axis,
+                kinetic_n: value,
+                breakaway_n: 2.5 * value,
+                stribeck_m_per_s: 0.2 * omega * scale.peak_m,
+            }),
+            Kind::Backlash => system.add(Law::Gap {
+                axis,
+                half_gap_m: 0.5e-3 * value,
+                stiffness: second * k,
+            }),
+            Kind::Hysteresis => system.add(Law::BoucWen {
+                axis,
+                stiffness: value,
+                yield_m: second,
+                own: 0,
+            }),
+            Kind::ModeCoupling => system.add(Law::Coupling {
+                axes: [0, 1],
+                coefficient: value,
+            }),
+            Kind::Drift => {
+                let stiffness = std::array::from_fn(|i| {
+                    std::array::from_fn(|j| machine.stiffness.get((i, j)).copied().unwrap_or(0.0))
+                });
+                system.add(Law::Drift {
+                    stiffness,
+                    rate_per_s: value,
+                });
+            }
+            Kind::PulsatingStiffness => system.add(Law::Pulsating {
+                axis,
+                stiffness: value,
+                omega: 0.37 * omega,
+            }),
+            Kind::Stop => system.add(Law::Stop {
+                axis,
+                gap_m: 0.3 * scale.peak_m,
+                stiffness: value,
+            }),
+            Kind::Stranger => system.add(Law::Stranger {
+                axis,
+                amplitude_n: value,
+                omega: 0.83 * omega,
+                phase: 1.0,
+            }),
+            _ => {}
+        }
+    }
+}

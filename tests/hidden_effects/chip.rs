@@ -1,0 +1,246 @@
+//! Chips: which teeth cut when, how thick a chip, how hard it pushes.
+
+use std::f64::consts::TAU;
+
+use super::motion::{State, System, interpolated};
+
+/// Tool, material and engagement as they are believed.
+#[derive(Clone, Debug)]
+pub(crate) struct Job {
+    pub(crate) teeth: usize,
+    pub(crate) edge_angle_deg: f64,
+    pub(crate) diameter_mm: f64,
+    /// Tangential, radial, axial: MPa.
+    pub(crate) cutting_mpa: [f64; 3],
+    /// Tangential, radial, axial: N/mm.
+    pub(crate) edge_n_per_mm: [f64; 3],
+    pub(crate) start_deg: f64,
+    pub(crate) exit_deg: f64,
+    pub(crate) feed_mm: f64,
+}
+
+/// One cut.
+#[derive(Clone, Debug)]
+pub(crate) struct Run {
+    pub(crate) rpm: f64,
+    pub(crate) depth_mm: f64,
+    pub(crate) feed_mm: f64,
+    /// Spindle angle at the start of the record, rad.
+    pub(crate) angle: f64,
+}
+
+/// The process as some causes make it.
+pub(crate) struct Process {
+    pub(crate) cutting_pa: [f64; 3],
+    pub(crate) edge_n_per_m: [f64; 3],
+    /// Radius of each tooth beyond the mean, m.
+    pub(crate) radial_m: Vec<f64>,
+    pub(crate) exponent: Option<(f64, f64)>,
+    pub(crate) damping_n_per_m: f64,
+    /// How much of z is taken from the depth.
+    pub(crate) depth_follows: f64,
+    pub(crate) wear_per_s: f64,
+    pub(crate) fluctuation: Option<[f64; 3]>,
+}
+
+/// The chips of one run.
+pub(crate) struct Chips<'a> {
+    pub(crate) job: &'a Job,
+    pub(crate) run: &'a Run,
+    pub(crate) process: Process,
+    pub(crate) before_s: f64,
+    pub(crate) step_s: f64,
+}
+
+impl Chips<'_> {
+    /// Spindle angle; t counts from the start of the cut, the record's time from `before_s` on.
+    pub(crate) fn angle(&self, t: f64) -> f64 {
+        let omega = TAU * self.run.rpm / 60.0;
+        let recorded = t - self.before_s;
+        let swing = self.process.fluctuation.map_or(0.0, |[delta, hz, phase]| {
+            let rate = TAU * hz;
+            delta * omega / rate * (phase.cos() - (rate * recorded + phase).cos())
+        });
+        self.run.angle + omega * recorded + swing
+    }
+
+    /// When the spindle was at an angle near `guess`.
+    fn time_at(&self, angle: f64, guess: f64) -> f64 {
+        let omega = TAU * self.run.rpm / 60.0;
+        let mut t = guess;
+        if self.process.fluctuation.is_some() {
+            // The speed swings by a percent or so: every round gains two digits.
+            for _ in 0..8 {
+                t -= (self.angle(t) - angle) / omega;
+            }
+        }
+        t
+    }
+
+    /// Which teeth are between start and exit, one bit each.
+    pub(crate) fn engaged(&self, t: f64) -> u32 {
+        let [start, exit] = [self.job.start_deg, self.job.exit_deg].map(f64::to_radians);
+        (0..self.job.teeth).fold(0, |bits, tooth| {
+            let phi = self.immersion(t, tooth);
+            if (start..exit).contains(&phi) {
+                bits | 1 << tooth
+            } else {
+                bits
+            }
+        })
+    }
+
+    fn immersion(&self, t: f64, tooth: usize) -> f64 {
+        (self.angle(t) + TAU * tooth as f64 / self.job.teeth as f64).rem_euclid(TAU)
+    }
+
+    /// When teeth enter or leave between two times, in order.
+    pub(crate) fn switches(&self, from: f64, to: f64) -> Vec<f64> {
+        let omega = TAU * self.run.rpm / 60.0;
+        let mut all = Vec::new();
+        for tooth in 0..self.job.teeth {
+            let phi = self.immersion(from, tooth);
+            for edge in [self.job.start_deg, self.job.exit_deg].map(f64::to_radians) {
+                let ahead = (edge - phi).rem_euclid(TAU);
+                let t = self.time_at(self.angle(from) + ahead, from + ahead / omega);
+                if t > from + 1e-9 * self.step_s && t < to - 1e-9 * self.step_s {
+                    all.push(t);
+                }
+            }
+        }
+        all.sort_by(f64::total_cmp);
+        all
+    }
+
+    /// From one time to another between which no tooth enters or leaves: steps end where a tooth loses the surface or finds it.
+    pub(crate) fn advance(
+        &self,
+        system: &System,
+        [mut from, to]: [f64; 2],
+        y: &mut State,
+        past: &[[f64; 3]],
+    ) {
+        let engaged = self.engaged(0.5 * (from + to));
+        let mut cutting = self.cutting(from, system.displacement(y), engaged, past);
+        // A tooth that touches again and again within one step is beyond what can be told apart.
+        for _ in 0..16 {
+            let stepped = |to: f64| {
+                let mut after = *y;
+                let force = |t: f64, x: [f64; 3], v: [f64; 3]| self.force(t, x, v, cutting, past);
+                system.advance(from, to - from, &mut after, &mut [], &force);
+                let then = self.cutting(to, system.displacement(&after), engaged, past);
+                (after, then)
+            };
+            let (after, then) = stepped(to);
+            if then == cutting {
+                *y = after;
+                return;
+            }
+            let (mut inside, mut outside) = (from, to);
+            while outside - inside > 1e-7 * self.step_s {
+                let middle = 0.5 * (inside + outside);
+                if stepped(middle).1 == cutting {
+                    inside = middle
+                } else {
+                    outside = middle
+                }
+            }
+            let (after, then) = stepped(outside);
+            (*y, cutting, from) = (after, then, outside);
+            if to - from < 1e-7 * self.step_s {
+                return;
+            }
+        }
+        let force = |t: f64, x: [f64; 3], v: [f64; 3]| self.force(t, x, v, cutting, past);
+        system.advance(from, to - from, y, &mut [], &force);
+    }
+
+    /// Those of the `engaged` teeth that reach the surface.
+    pub(crate) fn cutting(&self, t: f64, x: [f64; 3], engaged: u32, past: &[[f64; 3]]) -> u32 {
+        let cuts = |tooth: &usize| engaged & 1 << tooth != 0 && self.chip_m(t, x, *tooth, past) > 0.0;
+        (0..self.job.teeth)
+            .filter(cuts)
+            .fold(0, |bits, tooth| bits | 1 << tooth)
+    }
+
+    /// How far a tooth is into what all passes before it left, m.
+    fn chip_m(&self, t: f64, x: [f64; 3], tooth: usize, past: &[[f64; 3]]) -> f64 {
+        let (sin, cos) = self.immersion(t, tooth).sin_cos();
+        let (sin_edge, cos_edge) = self.edge();
+        let period = 60.0 / self.run.rpm / self.job.teeth as f64;
+        let reach = |x: [f64; 3], tooth: usize| {
+            (sin * x[0] + cos * x[1] + self.process.radial_m[tooth]) * sin_edge - cos_edge * x[2]
+        };
+        let mut chip = f64::INFINITY;
+        // With runout the longest tooth may be the only one that cuts: a turn back, and one more pass for the vibration.
+        let passes = if self.process.radial_m.iter().all(|radial| *radial == 0.0) {
+            2
+        } else {
+            self.job.teeth + 1
+        };
+        for pass in 1..=passes {
+            let angle = self.angle(t) - TAU * pass as f64 / self.job.teeth as f64;
+            let then = self.time_at(angle, t - pass as f64 * period);
+            let was = if then <= 0.0 {
+                [0.0; 3]
+            } else {
+                interpolated(past, then / self.step_s)
+            };
+            // The feed axis moves on steadily, however the spindle turns.
+            let fed = 1e-3 * self.run.feed_mm * (t - then) / period;
+            let left = reach(was, (tooth + pass) % self.job.teeth) - fed * sin * sin_edge;
+            chip = chip.min(reach(x, tooth) - left);
+            // What lies before the start is the tool at rest, once.
+            if then <= 0.0 {
+                break;
+            }
+        }
+        chip
+    }
+
+    /// Sine and cosine of the edge angle.
+    fn edge(&self) -> (f64, f64) {
+        if self.job.edge_angle_deg == 90.0 {
+            (1.0, 0.0)
+        } else {
+            self.job.edge_angle_deg.to_radians().sin_cos()
+        }
+    }
+
+    /// Force of the `cutting` teeth on the tool, N, with the displacements `past` on the grid of steps.
+    pub(crate) fn force(
+        &self,
+        t: f64,
+        x: [f64; 3],
+        v: [f64; 3],
+        cutting: u32,
+        past: &[[f64; 3]],
+    ) -> [f64; 3] {
+        let process = &self.process;
+        let (sin_edge, cos_edge) = self.edge();
+        let depth = (1e-3 * self.run.depth_mm - process.depth_follows * x[2]).max(0.0);
+        let worn = 1.0 + process.wear_per_s * (t - self.before_s);
+        let mut sum = [0.0; 3];
+        for tooth in (0..self.job.teeth).filter(|tooth| cutting & 1 << tooth != 0) {
+            let (sin, cos) = self.immersion(t, tooth).sin_cos();
+            let chip = self.chip_m(t, x, tooth, past);
+            // A stage of a step may look a hair beyond the end of the contact.
+            let power = |power: f64, reference: f64| reference * (chip.max(0.0) / reference).powf(power);
+            let chip = process
+                .exponent
+                .map_or(chip, |(exponent, reference)| power(exponent, reference));
+            let along = |index: usize, width: f64| {
+                worn * depth * (process.cutting_pa[index] * chip + process.edge_n_per_m[index] / width)
+            };
+            let (tangential, radial, axial) = (along(0, sin_edge), along(1, sin_edge), along(2, sin_edge));
+            let speed = std::f64::consts::PI * 1e-3 * self.job.diameter_mm * self.run.rpm / 60.0;
+            let opening = (sin * v[0] + cos * v[1]) * sin_edge - cos_edge * v[2];
+            let rubbing = process.damping_n_per_m / speed * depth * opening;
+            let inward = radial * sin_edge + axial * cos_edge + rubbing * sin_edge;
+            sum[0] += -tangential * cos - inward * sin;
+            sum[1] += tangential * sin - inward * cos;
+            sum[2] += radial * cos_edge - axial * sin_edge + rubbing * cos_edge;
+        }
+        sum
+    }
+}

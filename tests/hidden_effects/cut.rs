@@ -1,0 +1,535 @@
+//! Stable cuts with everything that a chip can have: teeth that enter and leave at their angles, the surface that all earlier
+//! passes left, teeth that lose it.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::sync::OnceLock;
+
+use nalgebra::DMatrix;
+use quietcut::recording::{
+    Channel, Kind as RecordKind, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar,
+};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::cause::{Cause, Kind, PROCESS, Scale};
+use super::chip::{Chips, Job, Process, Run};
+use super::judge::Lab;
+use super::machine::{Machine, between};
+use super::motion::{Path, System};
+use super::rig::Output;
+use super::sensor::{Sensor, letter, noisy, read_by};
+
+/// Cuts of a machine, recorded.
+pub(crate) struct CutBench {
+    pub(crate) machine: Machine,
+    pub(crate) job: Job,
+    runs: Vec<Run>,
+    /// Forces first where they are measured, then motion.
+    forces: bool,
+    motion: Vec<Sensor>,
+    pub(crate) rate_hz: f64,
+    samples: usize,
+    /// Samples before the record while the cut settles.
+    before: usize,
+    steps: usize,
+    pub(crate) scale: Scale,
+    /// The motions as they are believed: what sensors do to them needs no other.
+    plain: OnceLock<Vec<Motion>>,
+}
+
+impl CutBench {
+    /// Two or three stable cuts of a machine with two or three directions, at different speeds and feeds.
+    pub(crate) fn draw(random: &mut ChaCha8Rng, forces: bool) -> Self {
+        let directions = if random.random::<f64>() < 0.3 { 3 } else { 2 };
+        let mut machine = Machine::draw(random, directions);
+        // A cut settles within a few turns: soft machines with little damping would need long records.
+        machine.damping *= 3.0;
+        let teeth = random.random_range(2..=4);
+        let ktc = between(random, 70.0, 1500.0);
+        let (start_deg, exit_deg) = [
+            (90.0, 180.0),
+            (0.0, 90.0),
+            (0.0, 180.0),
+            (120.0, 180.0),
+            (0.0, 70.0),
+        ][random.random_range(0..5)];
+        let feed_mm = between(random, 0.05, 0.2);
+        let edges = if random.random::<bool>() {
+            between(random, 0.05, 0.2) * ktc * feed_mm
+        } else {
+            0.0
+        };
+        let job = Job {
+            teeth,
+            edge_angle_deg: if directions == 3 {
+                random.random_range(45.0..75.0)
+            } else {
+                90.0
+            },
+            diameter_mm: between(random, 8.0, 40.0),
+            cutting_mpa: [
+                ktc,
+                ktc * random.random_range(0.15..0.5),
+                if directions == 3 {
+                    ktc * random.random_range(0.05..0.3)
+                } else {
+                    0.0
+                },
+            ],
+            edge_n_per_mm: [edges, 0.7 * edges, 0.0],
+            start_deg,
+            exit_deg,
+            feed_mm,
+        };
+        let tooth_hz = machine.omega[0] / TAU * random.random_range(0.35..1.6);
+        let rpm = 60.0 * tooth_hz / teeth as f64;
+        // Loop gain below one at every frequency: stable whatever the speed.
+        let compliance = machine.axes.iter().fold(0.0_f64, |most, &a| {
+            let (m, c, k) = (
+                machine.mass[(a, a)],
+                machine.damping[(a, a)],
+                machine.stiffness[(a, a)],
+            );
+            most.max(1.0 / (c * (k / m).sqrt()))
+        });
+        let cutting = 1.0 + (exit_deg - start_deg) / 360.0 * teeth as f64;
+        let depth_mm = random.random_range(0.1..0.4) * 1e3 / (2.0 * cutting * ktc * 1e6 * compliance);
+        let count = if random.random::<f64>() < 0.7 { 2 } else { 3 };
+        let runs: Vec<Run> = (0..count)
+            .map(|index| Run {
+                rpm: rpm * [1.0, 1.37, 0.8][index],
+                depth_mm: depth_mm * [1.0, 0.9, 0.6][index],
+                feed_mm: feed_mm * [1.0, 0.6, 1.3][index],
+                angle: random.random_range(0.0..TAU),
+            })
+            .collect();
+        let fastest = runs.iter().fold(0.0_f64, |most, run| most.max(run.rpm)) / 60.0 * teeth as f64;
+        let rate_hz = (48.0 * fastest).max(16.0 * machine.omega[1] / TAU);
+        let steps = (machine.omega[1] / (0.12 * rate_hz)).max(2.0).ceil() as usize;
+        let turns = 24.0;
+        let samples = (turns * 60.0 / rpm * rate_hz) as usize;
+        let slowest = machine.axes.iter().fold(f64::INFINITY, |least, &a| {
+            least.min(0.5 * machine.damping[(a, a)] / machine.mass[(a, a)])
+        });
+        let before = ((8.0 / slowest).min(40.0 * 60.0 / rpm) * rate_hz) as usize;
+        let acceleration = random.random::<f64>() < 0.4;
+        let motion = machine
+            .axes
+            .iter()
+            .map(|&axis| Sensor {
+                axis,
+                acceleration,
+                at_housing: false,
+            })
+            .collect();
+        let scale = Scale {
+            peak_m: 1e-3 * feed_mm,
+            seconds: samples as f64 / rate_hz,
+            sample_s: 1.0 / rate_hz,
+            cut: Some(CutScale {
+                job: job.clone(),
+                depth_mm,
+                rpm,
+            }),
+        };
+        Self {
+            machine,
+            job,
+            runs,
+            forces,
+            motion,
+            rate_hz,
+            samples,
+            before,
+            steps,
+            scale,
+            plain: OnceLock::new(),
+        }
+    }
+
+    /// The same with its first run alone, from the moment the tool, at rest, is put into the full cut.
+    pub(crate) fn starting_at_rest(mut self) -> Self {
+        self.runs.truncate(1);
+        self.runs[0].angle = 0.0;
+        self.before = 0;
+        self
+    }
+
+    /// Speed and depth of the first run.
+    pub(crate) fn working_point(&self) -> [f64; 2] {
+        [self.runs[0].rpm, self.runs[0].depth_mm]
+    }
+
+    /// The names of the channels of an output.
+    pub(crate) fn channel_names(&self) -> Vec<String> {
+        self.sensors().iter().map(|sensor| sensor.name()).collect()
+    }
+
+    /// The case file.
+    pub(crate) fn case_text(&self) -> String {
+        let Job {
+            teeth,
+            edge_angle_deg,
+            diameter_mm,
+            cutting_mpa,
+            edge_n_per_mm,
+            start_deg,
+            exit_deg,
+            feed_mm,
+        } = &self.job;
+        let mut text = self.machine.case_text();
+        writeln!(text, "[tool]\nteeth = {teeth}\nedge_angle_deg = {edge_angle_deg:?}\ndiameter_mm = {diameter_mm:e}\n[material]").unwrap();
+        for (index, letter) in ['t', 'r', 'a'].iter().enumerate() {
+            writeln!(
+                text,
+                "k{letter}c_mpa = {:e}\nk{letter}e_n_per_mm = {:e}",
+                cutting_mpa[index], edge_n_per_mm[index]
+            )
+            .unwrap();
+        }
+        writeln!(
+            text,
+            "[cut]\nstart_deg = {start_deg:?}\nexit_deg = {exit_deg:?}\nfeed_per_tooth_mm = {feed_mm:e}"
+        )
+        .unwrap();
+        text
+    }
+
+    fn process(&self, causes: &[Cause]) -> Process {
+        let mut process = Process {
+            cutting_pa: self.job.cutting_mpa.map(|value| 1e6 * value),
+            edge_n_per_m: self.job.edge_n_per_mm.map(|value| 1e3 * value),
+            radial_m: vec![0.0; self.job.teeth],
+            exponent: None,
+            damping_n_per_m: 0.0,
+            depth_follows: 0.0,
+            wear_per_s: 0.0,
+            fluctuation: None,
+        };
+        for cause in causes {
+            let values: Vec<f64> = cause
+                .values(&self.machine, &self.scale)
+                .iter()
+                .map(|value| value.1)
+                .collect();
+            match cause.kind {
+                Kind::ForceCoefficients => {
+                    (0..values.len()).for_each(|i| process.cutting_pa[i] = 1e6 * values[i])
+                }
+                Kind::EdgeForce => (0..values.len()).for_each(|i| process.edge_n_per_m[i] = 1e3 * values[i]),
+                Kind::CommonForce => {
+                    process.cutting_pa = process.cutting_pa.map(|value| value * values[0]);
+                    process.edge_n_per_m = process.edge_n_per_m.map(|value| value * values[0]);
+                }
+                Kind::ForceExponent => process.exponent = Some((values[0], 1e-3 * values[1])),
+                Kind::Runout => {
+                    for (index, radial) in process.radial_m.iter_mut().enumerate() {
+                        let angle = values[1].to_radians() + TAU * index as f64 / self.job.teeth as f64;
+                        *radial = 1e-6 * values[0] * angle.cos();
+                    }
+                }
+                Kind::ProcessDamping => process.damping_n_per_m = values[0],
+                Kind::AxialDepthModulation => process.depth_follows = values[0],
+                Kind::SpeedFluctuation => process.fluctuation = Some([values[0], values[1], cause.shares[2]]),
+                Kind::Wear => process.wear_per_s = values[0],
+                _ => {}
+            }
+        }
+        process
+    }
+
+    /// Forces and motion of one run at the samples of its record, and the spindle angle.
+    fn motion(&self, run: &Run, causes: &[Cause]) -> Motion {
+        let step_s = 1.0 / (self.rate_hz * self.steps as f64);
+        let mut changed = self.machine.clone();
+        causes
+            .iter()
+            .for_each(|cause| cause.change(&mut changed, &self.scale));
+        let system = System::new(
+            &changed.mass,
+            &changed.damping,
+            &changed.stiffness,
+            &changed.tip,
+            step_s,
+        );
+        let chips = Chips {
+            job: &self.job,
+            run,
+            process: self.process(causes),
+            before_s: self.before as f64 / self.rate_hz,
+            step_s,
+        };
+        let count = (self.before + self.samples) * self.steps;
+        let mut found = Motion::default();
+        let (mut y, mut u) = (system.pulled([0.0; 3]), Vec::with_capacity(count));
+        for k in 0..count {
+            let (t, to) = (k as f64 * step_s, (k + 1) as f64 * step_s);
+            if k >= self.before * self.steps && k.is_multiple_of(self.steps) {
+                let x = system.displacement(&y);
+                let cutting = chips.cutting(t, x, chips.engaged(t + 1e-6 * step_s), &u);
+                let force = |t: f64, x: [f64; 3], v: [f64; 3]| chips.force(t, x, v, cutting, &u);
+                let mut path = Path::default();
+                system.note(t, &y, &[], &force, &mut path);
+                found.force.push(chips.force(t, x, path.v[0], cutting, &u));
+                found.u.push(x);
+                found.a.push(path.a[0]);
+                found.angle.push(chips.angle(t));
+            }
+            u.push(system.displacement(&y));
+            let mut from = t;
+            for switch in chips.switches(t, to).into_iter().chain([to]) {
+                chips.advance(&system, [from, switch], &mut y, &u);
+                from = switch;
+            }
+        }
+        found
+    }
+
+    /// What the sensors say of a motion, and behind them the angle that the tachometer tells.
+    fn sensed(&self, motion: &Motion, causes: &[Cause]) -> Vec<Vec<f64>> {
+        let mut channels: Vec<Vec<f64>> = self
+            .sensors()
+            .iter()
+            .enumerate()
+            .map(|(index, sensed)| match sensed {
+                Sensed::Force(axis) => motion.force.iter().map(|force| force[*axis]).collect(),
+                Sensed::Motion(sensor) => {
+                    let series = if sensor.acceleration { &motion.a } else { &motion.u };
+                    let about = |cause: &&Cause| cause.sensor == index || cause.sensor == EVERY_SENSOR;
+                    let causes: Vec<&Cause> = causes
+                        .iter()
+                        .filter(|cause| cause.kind.of_sensor())
+                        .filter(about)
+                        .collect();
+                    read_by(
+                        &self.machine,
+                        &self.scale,
+                        *sensor,
+                        &causes,
+                        series,
+                        1,
+                        self.samples,
+                    )
+                }
+            })
+            .collect();
+        channels.push(motion.angle.clone());
+        channels
+    }
+
+    /// Everything that is measured of a run: forces if there are any, motion.
+    fn sensors(&self) -> Vec<Sensed> {
+        let forces = self
+            .machine
+            .axes
+            .iter()
+            .filter(|_| self.forces)
+            .map(|&axis| Sensed::Force(axis));
+        forces
+            .chain(self.motion.iter().map(|sensor| Sensed::Motion(*sensor)))
+            .collect()
+    }
+
+    /// Recordings of an output with white noise of `sigma` per sensor.
+    pub(crate) fn recordings(
+        &self,
+        output: &Output,
+        sigma: &[f64],
+        random: &mut ChaCha8Rng,
+        name: &str,
+    ) -> Vec<Recording> {
+        let sensors = self.sensors();
+        self.runs
+            .iter()
+            .zip(output)
+            .enumerate()
+            .map(|(number, (run, sensed))| {
+                let mut channels: Vec<Channel> = sensors
+                    .iter()
+                    .zip(sensed)
+                    .zip(sigma)
+                    .map(|((sensor, samples), sigma)| Channel {
+                        name: sensor.name(),
+                        quantity: sensor.quantity(),
+                        samples: noisy(samples, *sigma, random),
+                    })
+                    .collect();
+                channels.push(Channel {
+                    name: "tacho".into(),
+                    quantity: Quantity::Level,
+                    samples: level(&sensed[sensors.len()]),
+                });
+                let mut sidecar = Sidecar {
+                    kind: Some(RecordKind::Cutting),
+                    cut: Some(RecordedCut {
+                        spindle_rpm: Some(run.rpm),
+                        axial_depth_mm: Some(run.depth_mm),
+                        start_deg: Some(self.job.start_deg),
+                        exit_deg: Some(self.job.exit_deg),
+                        feed_per_tooth_mm: Some(run.feed_mm),
+                        teeth: u32::try_from(self.job.teeth).ok(),
+                    }),
+                    ..Sidecar::default()
+                };
+                let tacho = RecordedChannel {
+                    pulses_per_rev: Some(1),
+                    ..RecordedChannel::default()
+                };
+                sidecar.channels.insert("tacho".into(), tacho);
+                Recording {
+                    path: format!("{name}-{number}.csv").into(),
+                    sample_rate_hz: self.rate_hz,
+                    start_s: 0.0,
+                    channels,
+                    sidecar,
+                }
+            })
+            .collect()
+    }
+
+    /// The jitter with which the spindle angle is known from the tachometer, rad: a fiftieth of a sample.
+    pub(crate) fn angle_sigma(&self) -> f64 {
+        0.02 * TAU * self.runs[0].rpm / 60.0 / self.rate_hz
+    }
+}
+
+/// Sizes that process causes are measured by.
+#[derive(Clone, Debug)]
+pub(crate) struct CutScale {
+    pub(crate) job: Job,
+    pub(crate) depth_mm: f64,
+    pub(crate) rpm: f64,
+}
+
+impl CutScale {
+    /// Cutting speed, m/s.
+    pub(crate) fn cutting_speed(&self) -> f64 {
+        std::f64::consts::PI * 1e-3 * self.job.diameter_mm * self.rpm / 60.0
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sensed {
+    Force(usize),
+    Motion(Sensor),
+}
+
+impl Sensed {
+    fn name(self) -> String {
+        match self {
+            Self::Force(axis) => format!("f{}", letter(axis)),
+            Self::Motion(sensor) => sensor.name(),
+        }
+    }
+
+    fn quantity(self) -> Quantity {
+        match self {
+            Self::Force(_) => Quantity::Force,
+            Self::Motion(sensor) if sensor.acceleration => Quantity::Acceleration,
+            Self::Motion(_) => Quantity::Displacement,
+        }
+    }
+}
+
+#[derive(Default)]
+struct Motion {
+    force: Vec<[f64; 3]>,
+    u: Vec<[f64; 3]>,
+    a: Vec<[f64; 3]>,
+    angle: Vec<f64>,
+}
+
+impl Lab for CutBench {
+    fn output(&self, causes: &[Cause]) -> Output {
+        let moved = |causes: &[Cause]| -> Vec<Motion> {
+            self.runs.iter().map(|run| self.motion(run, causes)).collect()
+        };
+        if causes.iter().all(|cause| cause.kind.of_sensor()) {
+            self.plain
+                .get_or_init(|| moved(&[]))
+                .iter()
+                .map(|motion| self.sensed(motion, causes))
+                .collect()
+        } else {
+            moved(causes)
+                .iter()
+                .map(|motion| self.sensed(motion, causes))
+                .collect()
+        }
+    }
+
+    fn places(&self, kind: Kind) -> Vec<(usize, usize)> {
+        let first = self.sensors().len() - self.motion.len();
+        let last = first + self.motion.len();
+        match kind {
+            Kind::SensorGain => (first..last)
+                .map(|sensor| (self.motion[sensor - first].axis, sensor))
+                .chain([(0, EVERY_SENSOR)])
+                .collect(),
+            Kind::SensorOffset => Vec::new(),
+            kind if kind.of_sensor() => (first..last)
+                .map(|sensor| (self.motion[sensor - first].axis, sensor))
+                .collect(),
+            Kind::AxialDepthModulation if self.machine.axes.len() < 3 => Vec::new(),
+            Kind::Mass | Kind::Stiffness | Kind::Damping => {
+                self.machine.axes.iter().map(|axis| (*axis, 0)).collect()
+            }
+            Kind::CommonFactor => Vec::new(),
+            _ => vec![(0, 0)],
+        }
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        let mut kinds = PROCESS.to_vec();
+        kinds.extend([
+            Kind::SensorGain,
+            Kind::SensorDelay,
+            Kind::CrossAxis,
+            Kind::Mass,
+            Kind::Stiffness,
+            Kind::Damping,
+        ]);
+        kinds
+    }
+
+    fn names(&self, kind: Kind) -> &'static [&'static str] {
+        // Edges that are zero stay so by any factor.
+        let edgeless = kind == Kind::CommonForce && self.job.edge_n_per_mm == [0.0; 3];
+        if edgeless {
+            &kind.names()[..1]
+        } else {
+            kind.names()
+        }
+    }
+
+    fn nuisance(&self, _: &[f64]) -> DMatrix<f64> {
+        DMatrix::zeros(0, 0)
+    }
+}
+
+/// The place of an effect that all channels of motion have.
+pub(crate) const EVERY_SENSOR: usize = usize::MAX;
+
+/// A tachometer of one pulse per turn: it rises, over two samples, where the angle passes a whole turn, and falls half a
+/// turn later.
+fn level(angle: &[f64]) -> Vec<f64> {
+    (0..angle.len())
+        .map(|k| {
+            let per_sample = if k + 1 < angle.len() {
+                angle[k + 1] - angle[k]
+            } else {
+                angle[k] - angle[k - 1]
+            };
+            let turn = angle[k].rem_euclid(TAU);
+            // Samples since the last rise, and since the fall.
+            let since_rise = if turn > 0.75 * TAU { turn - TAU } else { turn } / per_sample;
+            let since_fall = (turn - 0.5 * TAU) / per_sample;
+            (0.5 + 0.5 * since_rise).clamp(0.0, 1.0).min(
+                (0.5 - 0.5 * since_fall)
+                    .clamp(0.0, 1.0)
+                    .max(f64::from(u8::from(turn > 0.75 * TAU))),
+            )
+        })
+        .collect()
+}

@@ -1,0 +1,87 @@
+//! The judge against what is exactly the same, or exactly invisible, by the equations themselves.
+
+use std::collections::BTreeSet;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::cause::{Cause, Kind};
+use super::cut::{CutBench, EVERY_SENSOR};
+use super::judge::{Judge, Lab, Verdict};
+use super::machine::Machine;
+use super::rig::{Bench, Rig, Test};
+
+/// A percent of what each sensor says; the angle of a cut as the tachometer tells it.
+fn percent(lab: &dyn Lab, angle_sigma: Option<f64>) -> Vec<f64> {
+    let plain = lab.output(&[]);
+    let sensors = plain[0].len() - usize::from(angle_sigma.is_some());
+    let of = |sensor: usize| {
+        let values: Vec<f64> = plain.iter().flat_map(|run| run[sensor].iter().copied()).collect();
+        0.01 * (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+    };
+    (0..sensors).map(of).chain(angle_sigma).collect()
+}
+
+fn verdict(lab: &dyn Lab, sigma: &[f64], hidden: &Cause) -> Verdict {
+    Judge::new(lab, sigma).verdict(hidden, &mut ChaCha8Rng::seed_from_u64(1))
+}
+
+fn gain(sensor: usize) -> Cause {
+    Cause {
+        kind: Kind::SensorGain,
+        axis: 0,
+        sensor,
+        shares: vec![0.8],
+    }
+}
+
+/// The first machine of one direction and one sensor, in a test.
+fn single(test: Test) -> Bench {
+    for seed in 0.. {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let machine = Machine::draw(&mut random, 1);
+        let rig = Rig::draw(&mut random, test, &machine);
+        if !machine.modal && rig.sensors.len() == 1 {
+            return Bench { machine, rig };
+        }
+    }
+    unreachable!("half of all machines have one mode and one sensor")
+}
+
+#[test]
+fn a_gain_of_the_only_channel_is_one_factor_of_mass_damping_and_stiffness() {
+    let bench = single(Test::Shaker);
+    let sigma = percent(&bench, None);
+    let expected = BTreeSet::from(["sensor-gain", "mass", "stiffness", "damping"]);
+    assert_eq!(verdict(&bench, &sigma, &gain(0)), Verdict::Equivalent(expected));
+}
+
+#[test]
+fn a_gain_cannot_be_seen_in_the_decay_of_a_linear_machine() {
+    // Its start is not known, so a larger one and a gain are the same.
+    let bench = single(Test::FreeDecay);
+    let sigma = percent(&bench, None);
+    assert_eq!(verdict(&bench, &sigma, &gain(0)), Verdict::Invisible);
+}
+
+#[test]
+fn a_common_gain_of_a_steady_cut_without_force_is_a_factor_of_the_force() {
+    for seed in 0..3 {
+        let bench = CutBench::draw(&mut ChaCha8Rng::seed_from_u64(seed), false);
+        let sigma = percent(&bench, Some(bench.angle_sigma()));
+        let mut expected: BTreeSet<&str> = bench.names(Kind::CommonForce).iter().copied().collect();
+        expected.insert("sensor-gain");
+        assert_eq!(
+            verdict(&bench, &sigma, &gain(EVERY_SENSOR)),
+            Verdict::Equivalent(expected),
+            "seed {seed}"
+        );
+    }
+}
+
+#[test]
+fn measured_force_separates_a_common_gain_from_the_force() {
+    let bench = CutBench::draw(&mut ChaCha8Rng::seed_from_u64(0), true);
+    let sigma = percent(&bench, Some(bench.angle_sigma()));
+    assert_eq!(verdict(&bench, &sigma, &gain(EVERY_SENSOR)), Verdict::Separable);
+}

@@ -1,0 +1,298 @@
+//! Which causes records can tell apart: the distance, in units of the noise, from the hidden truth to the nearest that each
+//! other cause can come to.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{DMatrix, DVector};
+use rand_chacha::ChaCha8Rng;
+
+use super::cause::{Cause, Kind};
+use super::rig::Output;
+
+/// Squared distances (those of a χ²) below which nothing can be told, and above which a good judge tells nearly always:
+/// the difference of twice the log-likelihoods of two explanations d apart is d² ± 2d.
+const SAME: f64 = 2.0;
+const APART: f64 = 60.0;
+
+/// What a judge who knows the truth says of a set of records.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Verdict {
+    /// The hidden cause is like no other.
+    Separable,
+    /// These names and no others explain the records equally well.
+    Equivalent(BTreeSet<&'static str>),
+    /// Nobody can see the effect.
+    Invisible,
+    /// Between: chance decides.
+    Borderline,
+}
+
+/// Where effects can be tried out.
+pub(crate) trait Lab {
+    /// What the sensors say without noise while `causes` act.
+    fn output(&self, causes: &[Cause]) -> Output;
+
+    /// Where a kind can be: direction and sensor.
+    fn places(&self, kind: Kind) -> Vec<(usize, usize)>;
+
+    /// The kinds of the library that can be here.
+    fn kinds(&self) -> Vec<Kind>;
+
+    /// The names that a kind has in answers here.
+    fn names(&self, kind: Kind) -> &'static [&'static str] {
+        kind.names()
+    }
+
+    /// Motions that the records may hold because the state at their start is not known, run by run and sensor by sensor;
+    /// in units of `sigma`, one column each, not yet orthonormal.
+    fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64>;
+}
+
+/// The judge of one set of records.
+pub(crate) struct Judge<'a> {
+    lab: &'a dyn Lab,
+    /// Noise of each sensor.
+    sigma: &'a [f64],
+    /// What the records cannot say of the state at the start: orthonormal columns.
+    nuisance: DMatrix<f64>,
+}
+
+impl<'a> Judge<'a> {
+    /// A judge; `sigma` is the noise of each sensor.
+    pub(crate) fn new(lab: &'a dyn Lab, sigma: &'a [f64]) -> Self {
+        let mut nuisance = lab.nuisance(sigma);
+        if nuisance.ncols() > 0 {
+            for mut column in nuisance.column_iter_mut() {
+                let norm = column.norm();
+                column /= norm;
+            }
+            nuisance = nuisance.qr().q();
+        }
+        Self { lab, sigma, nuisance }
+    }
+
+    /// One column, in units of the noise.
+    fn whitened(&self, output: &Output) -> DVector<f64> {
+        let values = output.iter().flat_map(|run| {
+            run.iter()
+                .zip(self.sigma)
+                .flat_map(|(samples, sigma)| samples.iter().map(move |value| value / sigma))
+        });
+        DVector::from_iterator(output.iter().flatten().map(Vec::len).sum(), values)
+    }
+
+    /// What is seen while `causes` act.
+    pub(crate) fn of(&self, causes: &[Cause]) -> DVector<f64> {
+        self.whitened(&self.lab.output(causes))
+    }
+
+    fn without_nuisance(&self, mut value: DVector<f64>) -> DVector<f64> {
+        if self.nuisance.ncols() == 0 {
+            return value;
+        }
+        let share = self.nuisance.tr_mul(&value);
+        value.gemv(-1.0, &self.nuisance, &share, 1.0);
+        value
+    }
+
+    /// χ² that is left where the best of `wanted`, from these shares on, stands for the `truth`; and that best.
+    pub(crate) fn nearest(&self, truth: &DVector<f64>, wanted: &[Cause]) -> (f64, Vec<Cause>) {
+        let residual = |causes: &[Cause]| self.without_nuisance(truth - self.of(causes));
+        let mut best = wanted.to_vec();
+        let mut left = residual(&best);
+        let mut trust = 1e-3;
+        for round in 0..12 {
+            let before = left.norm_squared();
+            let jacobian = jacobian(&best, &left, &residual);
+            let (normal, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&left));
+            if round == 0
+                && let Some(step) = normal.clone().lu().solve(&gradient)
+            {
+                // To first order most of it is of another shape: this one need not be followed.
+                let least = before - gradient.dot(&step);
+                if least > 0.5 * before && least > 100.0 * APART {
+                    return (least, best);
+                }
+            }
+            let mut accepted = false;
+            for _ in 0..5 {
+                let mut damped = normal.clone();
+                for i in 0..damped.nrows() {
+                    damped[(i, i)] *= 1.0 + trust;
+                }
+                let Some(step) = damped.lu().solve(&gradient) else {
+                    break;
+                };
+                let mut next = best.clone();
+                let shares = next.iter_mut().flat_map(|cause| cause.shares.iter_mut());
+                for (share, step) in shares.zip(step.iter()) {
+                    // A share is about one where the effect is plain: no step goes beyond that.
+                    *share -= step.clamp(-1.0, 1.0);
+                }
+                if next.iter().all(Cause::sensible) {
+                    let after = residual(&next);
+                    if after.norm_squared() < before {
+                        (best, left) = (next, after);
+                        trust *= 0.1;
+                        accepted = true;
+                        break;
+                    }
+                }
+                trust = trust.max(1e-3) * 10.0;
+            }
+            let now = left.norm_squared();
+            // Far away and slow: it will not come near.
+            let hopeless = now > 3.0 * APART && now > 0.9 * before
+                || round > 1 && now > 100.0 * APART && now > 0.5 * before;
+            if !accepted || hopeless || now < 0.1 * SAME || before - now < 0.01 {
+                break;
+            }
+        }
+        (left.norm_squared(), best)
+    }
+
+    /// All places and starts of a kind.
+    pub(crate) fn candidates(&self, kind: Kind, random: &mut ChaCha8Rng) -> Vec<Cause> {
+        let mut all = Vec::new();
+        for (axis, sensor) in self.lab.places(kind) {
+            for shares in kind.starts(random) {
+                all.push(Cause {
+                    kind,
+                    axis,
+                    sensor,
+                    shares,
+                });
+            }
+        }
+        all
+    }
+
+    /// χ² of what is hidden.
+    pub(crate) fn effect(&self, hidden: &[Cause]) -> f64 {
+        self.without_nuisance(self.of(hidden) - self.of(&[]))
+            .norm_squared()
+    }
+
+    /// What is left of the `hidden` once the best single causes and pairs of those have been taken off.
+    pub(crate) fn unexplained(&self, hidden: &[Cause], random: &mut ChaCha8Rng) -> f64 {
+        let truth = self.of(hidden);
+        let mut singles: Vec<(f64, Vec<Cause>)> = Vec::new();
+        for kind in self.lab.kinds() {
+            let fits = self
+                .candidates(kind, random)
+                .into_iter()
+                .map(|start| self.nearest(&truth, &[start]));
+            singles.extend(fits.min_by(|a, b| a.0.total_cmp(&b.0)));
+        }
+        singles.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut least = singles.first().map_or(f64::INFINITY, |single| single.0);
+        let best: Vec<&Cause> = singles.iter().take(4).map(|(_, causes)| &causes[0]).collect();
+        for (i, first) in best.iter().enumerate() {
+            for second in &best[i + 1..] {
+                let pair = [(*first).clone(), (*second).clone()];
+                least = least.min(self.nearest(&truth, &pair).0);
+            }
+        }
+        least
+    }
+
+    /// What can be said of two causes: they are separable where no other cause can take the place of either.
+    pub(crate) fn verdict_of_two(&self, hidden: &[Cause; 2], random: &mut ChaCha8Rng) -> Verdict {
+        let truth = self.of(hidden);
+        for (gone, stays) in [(0, 1), (1, 0)] {
+            let alone = self.nearest(&truth, &hidden[stays..=stays]).0;
+            if alone < APART {
+                return Verdict::Borderline;
+            }
+            for kind in self.lab.kinds() {
+                if kind == hidden[gone].kind
+                    || kind == hidden[stays].kind
+                    || kind.parameters() > hidden[gone].kind.parameters()
+                {
+                    continue;
+                }
+                for candidate in self.candidates(kind, random) {
+                    if self.nearest(&truth, &[candidate, hidden[stays].clone()]).0 < APART {
+                        return Verdict::Borderline;
+                    }
+                }
+            }
+        }
+        Verdict::Separable
+    }
+
+    /// What can be said of one cause by the records, without any belief beforehand.
+    pub(crate) fn verdict(&self, hidden: &Cause, random: &mut ChaCha8Rng) -> Verdict {
+        let effect = self.effect(std::slice::from_ref(hidden));
+        if effect < SAME {
+            return Verdict::Invisible;
+        }
+        if effect < APART {
+            return Verdict::Borderline;
+        }
+        let truth = self.of(std::slice::from_ref(hidden));
+        let mut same: BTreeSet<&'static str> = hidden.kind.names().iter().copied().collect();
+        let mut kinds = self.lab.kinds();
+        if matches!(hidden.kind, Kind::SensorGain | Kind::SensorOffset) {
+            kinds.extend([Kind::CommonFactor, Kind::CommonForce]);
+        }
+        for kind in kinds {
+            if kind.parameters() > hidden.kind.parameters() {
+                continue;
+            }
+            for candidate in self.candidates(kind, random) {
+                if kind == hidden.kind && candidate.axis == hidden.axis && candidate.sensor == hidden.sensor {
+                    continue;
+                }
+                let (left, _) = self.nearest(&truth, &[candidate]);
+                if left < SAME {
+                    same.extend(self.lab.names(kind));
+                } else if left < APART {
+                    return Verdict::Borderline;
+                }
+            }
+        }
+        if same.len() == hidden.kind.names().len() {
+            Verdict::Separable
+        } else {
+            Verdict::Equivalent(same)
+        }
+    }
+}
+
+/// ∂residual/∂shares by differences.
+fn jacobian(
+    at: &[Cause],
+    residual_there: &DVector<f64>,
+    residual: &dyn Fn(&[Cause]) -> DVector<f64>,
+) -> DMatrix<f64> {
+    let columns: usize = at.iter().map(|cause| cause.shares.len()).sum();
+    let mut jacobian = DMatrix::zeros(residual_there.len(), columns);
+    let mut column = 0;
+    for cause in 0..at.len() {
+        for share in 0..at[cause].shares.len() {
+            let mut moved = at.to_vec();
+            let step = 1e-3 * moved[cause].shares[share].abs().max(0.05);
+            moved[cause].shares[share] += step;
+            jacobian.set_column(column, &((residual(&moved) - residual_there) / step));
+            column += 1;
+        }
+    }
+    jacobian
+}
+
+impl Cause {
+    /// False where a fit has left what a machine can have.
+    fn sensible(&self) -> bool {
+        let s = &self.shares;
+        match self.kind {
+            Kind::MissingMode => s[0] > 0.1 && (0.0005..0.3).contains(&s[1]) && s[2] > 0.5,
+            Kind::SofteningHardening => s[0].abs() < 4.0 && s[1] > 0.2,
+            Kind::Backlash => s[0] > 0.0 && s[0] < 2.0 && (0.0..0.95).contains(&s[1]),
+            Kind::Hysteresis => s[1] > 0.01 && s[0].abs() < 0.9,
+            Kind::ForceExponent => (0.0..2.0).contains(&s[0]) && (0.05..20.0).contains(&s[1]),
+            Kind::SpeedFluctuation => s[1] > 0.01 && s[1] < 1.0,
+            _ => s[0].abs() < 4.0,
+        }
+    }
+}

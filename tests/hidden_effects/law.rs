@@ -1,0 +1,156 @@
+//! Laws: what acts on the tool beside the linear structure.
+
+use super::motion::State;
+
+/// What acts on the tool beside the linear structure, as f_r in M q̈ + C q̇ + K q + Bᵀf_r = Bᵀ F.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Law {
+    /// c_n·u^n.
+    Spring {
+        axis: usize,
+        power: i32,
+        coefficient: f64,
+    },
+    /// c_n·v^n.
+    Damper {
+        axis: usize,
+        power: i32,
+        coefficient: f64,
+    },
+    /// kinetic·sign(v)·(1 + (breakaway/kinetic − 1)·e^(−(v/v_s)²)); at rest whatever is within ±breakaway.
+    Friction {
+        axis: usize,
+        kinetic_n: f64,
+        breakaway_n: f64,
+        stribeck_m_per_s: f64,
+    },
+    /// A spring that has no force within ±half_gap: what is missing of its linear force.
+    Gap {
+        axis: usize,
+        half_gap_m: f64,
+        stiffness: f64,
+    },
+    /// Bouc–Wen of exponent 1 with γ = β = ½; z is the own state `own`.
+    BoucWen {
+        axis: usize,
+        stiffness: f64,
+        yield_m: f64,
+        own: usize,
+    },
+    /// Potential ½·k·x²·y².
+    Coupling { axes: [usize; 2], coefficient: f64 },
+    /// K·u·r·t.
+    Drift {
+        stiffness: [[f64; 3]; 3],
+        rate_per_s: f64,
+    },
+    /// k·cos(ωt)·u.
+    Pulsating { axis: usize, stiffness: f64, omega: f64 },
+    /// A stop on one side: k·(u − gap) beyond the gap.
+    Stop { axis: usize, gap_m: f64, stiffness: f64 },
+    /// −F·cos(ωt + φ): a force that nobody measured.
+    Stranger {
+        axis: usize,
+        amplitude_n: f64,
+        omega: f64,
+        phase: f64,
+    },
+}
+
+/// Which smooth piece of a law holds.
+pub(crate) type Branch = i8;
+
+/// Signs of v and z on a branch of Bouc and Wen.
+pub(crate) fn signs(branch: Branch) -> (f64, f64) {
+    (
+        if branch & 1 == 0 { 1.0 } else { -1.0 },
+        if branch & 2 == 0 { 1.0 } else { -1.0 },
+    )
+}
+
+impl Law {
+    /// True of a law that has pieces.
+    pub(crate) fn switches(&self) -> bool {
+        matches!(
+            self,
+            Self::Friction { .. } | Self::Gap { .. } | Self::BoucWen { .. } | Self::Stop { .. }
+        )
+    }
+
+    /// f_r, N.
+    pub(crate) fn restoring(&self, t: f64, u: [f64; 3], v: [f64; 3], y: &State, branch: Branch) -> [f64; 3] {
+        let mut force = [0.0; 3];
+        match *self {
+            Self::Spring {
+                axis,
+                power,
+                coefficient,
+            } => force[axis] = coefficient * u[axis].powi(power),
+            Self::Damper {
+                axis,
+                power,
+                coefficient,
+            } => force[axis] = coefficient * v[axis].powi(power),
+            Self::Friction {
+                axis,
+                kinetic_n,
+                breakaway_n,
+                stribeck_m_per_s,
+            } => {
+                let more = (breakaway_n - kinetic_n) * (-(v[axis] / stribeck_m_per_s).powi(2)).exp();
+                force[axis] = f64::from(branch) * (kinetic_n + more);
+            }
+            Self::Gap {
+                axis,
+                half_gap_m,
+                stiffness,
+            } => {
+                let missing = if branch == 0 {
+                    u[axis]
+                } else {
+                    f64::from(branch) * half_gap_m
+                };
+                force[axis] = -stiffness * missing;
+            }
+            Self::BoucWen {
+                axis, stiffness, own, ..
+            } => force[axis] = stiffness * (y[own] - u[axis]),
+            Self::Coupling {
+                axes: [a, b],
+                coefficient,
+            } => {
+                force[a] = coefficient * u[a] * u[b] * u[b];
+                force[b] = coefficient * u[a] * u[a] * u[b];
+            }
+            Self::Drift {
+                stiffness,
+                rate_per_s,
+            } => {
+                for (force, row) in force.iter_mut().zip(stiffness) {
+                    *force = rate_per_s * t * (row[0] * u[0] + row[1] * u[1] + row[2] * u[2]);
+                }
+            }
+            Self::Pulsating {
+                axis,
+                stiffness,
+                omega,
+            } => force[axis] = stiffness * (omega * t).cos() * u[axis],
+            Self::Stop {
+                axis,
+                gap_m,
+                stiffness,
+            } => {
+                if branch == 1 {
+                    force[axis] = stiffness * (u[axis] - gap_m);
+                }
+            }
+            Self::Stranger {
+                axis,
+                amplitude_n,
+                omega,
+                phase,
+            } => force[axis] = -amplitude_n * (omega * t + phase).cos(),
+        }
+        force
+    }
+}

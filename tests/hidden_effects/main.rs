@@ -1,0 +1,137 @@
+//! Effects hidden in virtual machines, and what can be said of their records.
+//!
+//! Equations, integrators and the judge are this test's own: nothing of the library's simulation or diagnosis is in them, so
+//! that a mistake in the library cannot hide in its own mirror.
+//!
+//! The whole campaign, with so many seeds of each family (200 take long), or of the families that contain a text:
+//!
+//! ```text
+//! QUIETCUT_SEEDS=200 QUIETCUT_FAMILY=shaker cargo test --release -p quietcut-tests --test hidden_effects -- --ignored --nocapture
+//! ```
+
+#![allow(clippy::unwrap_used)]
+
+mod agreement;
+mod campaign;
+mod cause;
+mod chip;
+mod closed_forms;
+mod cut;
+mod equivalences;
+mod judge;
+mod law;
+mod machine;
+mod motion;
+mod puzzle;
+mod rig;
+mod sensor;
+
+use campaign::{Report, Share};
+use puzzle::{Family, Puzzle};
+use quietcut::diagnose::{Options, diagnose};
+use serde_json::Value;
+
+/// What the tool answers; an error is an outcome of its own.
+fn ask(puzzle: &Puzzle) -> Value {
+    match diagnose(&puzzle.case, &puzzle.recordings, &Options { seed: puzzle.seed }) {
+        Ok(diagnosis) => serde_json::to_value(diagnosis).unwrap(),
+        Err(error) => serde_json::json!({ "outcome": format!("error: {error}") }),
+    }
+}
+
+/// One requirement over all families: at least this share, at most that.
+struct Wanted {
+    what: &'static str,
+    share: Share,
+    least: f64,
+    most: f64,
+}
+
+/// The requirements, summed over the families that were run.
+fn requirements(reports: &[Report]) -> Vec<Wanted> {
+    let named = |family: Family| !matches!(family, Family::Nothing | Family::NotInLibrary);
+    let sum = |of: &dyn Fn(&Report) -> Share, which: &dyn Fn(Family) -> bool| {
+        reports
+            .iter()
+            .filter(|report| which(report.family))
+            .map(of)
+            .fold(Share { good: 0, all: 0 }, Share::and)
+    };
+    let any = |_: Family| true;
+    let line = |what, share, least| Wanted {
+        what,
+        share,
+        least,
+        most: 1.0,
+    };
+    vec![
+        line(
+            "right cause first, separable and above 3× noise",
+            sum(&Report::separable, &named),
+            0.95,
+        ),
+        line(
+            "the exact set, equivalent",
+            sum(&Report::equivalent, &named),
+            0.95,
+        ),
+        line(
+            "none, nothing hidden",
+            sum(&Report::invisible, &|family| family == Family::Nothing),
+            0.98,
+        ),
+        line(
+            "unexplained, not in the library",
+            sum(&Report::separable, &|family| family == Family::NotInLibrary),
+            0.9,
+        ),
+        Wanted {
+            what: "truth in the 90 % interval",
+            share: sum(&Report::covered, &any),
+            least: 0.85,
+            most: 0.95,
+        },
+        line(
+            "right of those with confidence ≥ 0.9",
+            sum(&Report::confident, &any),
+            0.9,
+        ),
+        line(
+            "residual energy cut by ≥ 80 % where a cause is named",
+            sum(&Report::energy, &any),
+            0.95,
+        ),
+    ]
+}
+
+#[test]
+#[ignore = "takes long: see the head of the file"]
+fn campaign() {
+    let text = std::env::var("QUIETCUT_FAMILY").unwrap_or_default();
+    let seeds = std::env::var("QUIETCUT_SEEDS").map_or(200, |text| text.parse().unwrap());
+    let first = std::env::var("QUIETCUT_FIRST_SEED").map_or(0, |text| text.parse().unwrap());
+    let families = Family::ALL
+        .into_iter()
+        .filter(|family| family.name().contains(&text));
+    let mut reports = Vec::new();
+    for family in families {
+        let report = Report::run(family, first..first + seeds, &ask);
+        println!("{report}");
+        reports.push(report);
+    }
+    let mut failed = Vec::new();
+    for Wanted {
+        what,
+        share,
+        least,
+        most,
+    } in requirements(&reports)
+    {
+        let holds = share.all == 0 || (least..=most).contains(&share.value());
+        println!("{} {what}: {share}", if holds { "holds:" } else { "FAILS:" });
+        if !holds {
+            failed.push(what);
+        }
+    }
+    assert!(failed.is_empty(), "{failed:?}");
+}

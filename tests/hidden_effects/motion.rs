@@ -1,0 +1,484 @@
+//! Structures with laws of their own, in time: the linear structure by its exponential, what is added by a Runge–Kutta method
+//! of fixed steps (Lawson's), and steps that end where a law switches.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::law::{Branch, Law, signs};
+
+/// Most states that a structure and its laws may have.
+const ROOM: usize = 16;
+
+/// q, q̇ and the own states of the laws.
+pub(crate) type State = [f64; ROOM];
+
+/// A force of time, place and velocity, N along x, y, z.
+pub(crate) type Force<'a> = dyn Fn(f64, [f64; 3], [f64; 3]) -> [f64; 3] + 'a;
+
+/// M q̈ + C q̇ + K q + Bᵀ f_r = Bᵀ F, u = B q.
+#[derive(Clone, Debug)]
+pub(crate) struct System {
+    /// Degrees of freedom.
+    freedoms: usize,
+    inverse_mass: Vec<f64>,
+    damping: Vec<f64>,
+    stiffness: Vec<f64>,
+    /// B, one row of x, y, z per degree of freedom.
+    tip: Vec<[f64; 3]>,
+    /// M⁻¹ Bᵀ.
+    mobility: Vec<[f64; 3]>,
+    laws: Vec<Law>,
+    /// The step whose exponential is known, and e^(A·h/2) by rows.
+    step_s: f64,
+    half: Vec<f64>,
+}
+
+/// The tool on an even grid of times.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Path {
+    pub(crate) u: Vec<[f64; 3]>,
+    pub(crate) v: Vec<[f64; 3]>,
+    pub(crate) a: Vec<[f64; 3]>,
+}
+
+impl System {
+    /// The equations; matrices by rows.
+    pub(crate) fn new(
+        mass: &DMatrix<f64>,
+        damping: &DMatrix<f64>,
+        stiffness: &DMatrix<f64>,
+        tip: &[[f64; 3]],
+        step_s: f64,
+    ) -> Self {
+        let freedoms = mass.nrows();
+        let rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
+        let inverse = mass.clone().try_inverse().unwrap();
+        let mobility = (0..freedoms)
+            .map(|i| std::array::from_fn(|axis| (0..freedoms).map(|j| inverse[(i, j)] * tip[j][axis]).sum()))
+            .collect();
+        Self {
+            freedoms,
+            inverse_mass: rows(&inverse),
+            damping: rows(damping),
+            stiffness: rows(stiffness),
+            tip: tip.to_vec(),
+            mobility,
+            laws: Vec::new(),
+            step_s,
+            half: rows(&(first_order(&inverse, damping, stiffness) * (0.5 * step_s)).exp()),
+        }
+    }
+
+    /// e^(A·h/2)·y of the structure; own states stay.
+    fn half(&self, y: &State) -> State {
+        let n = 2 * self.freedoms;
+        let mut after = *y;
+        for (after, row) in after.iter_mut().zip(self.half.chunks_exact(n)) {
+            *after = row.iter().zip(y).map(|(a, y)| a * y).sum();
+        }
+        after
+    }
+
+    /// Adds a law.
+    pub(crate) fn add(&mut self, law: Law) {
+        let own = self
+            .laws
+            .iter()
+            .filter(|law| matches!(law, Law::BoucWen { .. }))
+            .count();
+        self.laws.push(match law {
+            Law::BoucWen {
+                axis,
+                stiffness,
+                yield_m,
+                ..
+            } => Law::BoucWen {
+                axis,
+                stiffness,
+                yield_m,
+                own: 2 * self.freedoms + own,
+            },
+            other => other,
+        });
+    }
+
+    fn states(&self) -> usize {
+        2 * self.freedoms
+            + self
+                .laws
+                .iter()
+                .filter(|law| matches!(law, Law::BoucWen { .. }))
+                .count()
+    }
+
+    fn of_tip(&self, q: &[f64]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (q, tip) in q.iter().zip(&self.tip) {
+            for axis in 0..3 {
+                sum[axis] += q * tip[axis];
+            }
+        }
+        sum
+    }
+
+    /// Displacement of the tool.
+    pub(crate) fn displacement(&self, y: &State) -> [f64; 3] {
+        self.of_tip(&y[..self.freedoms])
+    }
+
+    /// The state at rest under a static force, the laws left out.
+    pub(crate) fn pulled(&self, force_n: [f64; 3]) -> State {
+        let n = self.freedoms;
+        let stiffness = DMatrix::from_row_slice(n, n, &self.stiffness);
+        let load = DVector::from_fn(n, |i, _| {
+            (0..3).map(|axis| self.tip[i][axis] * force_n[axis]).sum()
+        });
+        let q = stiffness.lu().solve(&load).unwrap();
+        let mut state = [0.0; ROOM];
+        state[..n].copy_from_slice(q.as_slice());
+        state
+    }
+
+    /// ẏ into `rate`, the linear structure's own part left out if not `whole`; what a sticking law holds with, N.
+    fn rate(
+        &self,
+        t: f64,
+        y: &State,
+        branches: &[Branch],
+        force: &Force<'_>,
+        whole: bool,
+        rate: &mut State,
+    ) -> f64 {
+        let n = self.freedoms;
+        let (u, v) = (self.of_tip(&y[..n]), self.of_tip(&y[n..2 * n]));
+        let mut left = force(t, u, v);
+        let mut stuck = None;
+        for (law, &branch) in self.laws.iter().zip(branches) {
+            match law {
+                Law::Friction { axis, .. } if branch == 0 => stuck = Some(*axis),
+                law => {
+                    let restoring = law.restoring(t, u, v, y, branch);
+                    for axis in 0..3 {
+                        left[axis] -= restoring[axis];
+                    }
+                }
+            }
+            if let Law::BoucWen {
+                axis, yield_m, own, ..
+            } = law
+            {
+                // γ = β = ½: ż = v·(1 − |z/z_y|·(sign(v z) + 1)/2).
+                let (of_v, of_z) = signs(branch);
+                let share = if of_v == of_z {
+                    of_z * y[*own] / yield_m
+                } else {
+                    0.0
+                };
+                rate[*own] = v[*axis] * (1.0 - share);
+            }
+        }
+        for i in 0..n {
+            rate[i] = if whole { y[n + i] } else { 0.0 };
+            rate[n + i] = (0..3)
+                .map(|axis| self.mobility[i][axis] * left[axis])
+                .sum::<f64>();
+        }
+        if whole {
+            self.resist(y, rate);
+        }
+        let Some(axis) = stuck else { return 0.0 };
+        let acceleration: f64 = (0..n).map(|i| self.tip[i][axis] * rate[n + i]).sum();
+        let mobility: f64 = (0..n).map(|i| self.tip[i][axis] * self.mobility[i][axis]).sum();
+        let holding = acceleration / mobility;
+        for i in 0..n {
+            rate[n + i] -= self.mobility[i][axis] * holding;
+        }
+        holding
+    }
+
+    /// Takes M⁻¹(C q̇ + K q) from the accelerations.
+    fn resist(&self, y: &State, rate: &mut State) {
+        let n = self.freedoms;
+        for k in 0..n {
+            let own = k * n..(k + 1) * n;
+            let mut resisting = 0.0;
+            for (j, (c, stiffness)) in self.damping[own.clone()]
+                .iter()
+                .zip(&self.stiffness[own])
+                .enumerate()
+            {
+                resisting += c * y[n + j] + stiffness * y[j];
+            }
+            for i in 0..n {
+                rate[n + i] -= self.inverse_mass[i * n + k] * resisting;
+            }
+        }
+    }
+
+    /// One step: Lawson's where its exponential is known and nothing sticks, else the classical one.
+    fn step(&self, t: f64, h: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> State {
+        let sticks = self
+            .laws
+            .iter()
+            .zip(branches)
+            .any(|(law, branch)| matches!(law, Law::Friction { .. }) && *branch == 0);
+        // Times are sums: a whole step is one to rounding.
+        if sticks || (h - self.step_s).abs() > 1e-9 * self.step_s {
+            return self.classical_step(t, h, y, branches, force);
+        }
+        let added = |t: f64, y: &State| {
+            let mut rate = [0.0; ROOM];
+            self.rate(t, y, branches, force, false, &mut rate);
+            rate
+        };
+        let sum = |y: &State, share: f64, rate: &State| -> State {
+            std::array::from_fn(|i| y[i] + share * rate[i])
+        };
+        let k1 = added(t, y);
+        let middle = self.half(y);
+        let k1 = self.half(&k1);
+        let k2 = added(t + 0.5 * h, &sum(&middle, 0.5 * h, &k1));
+        let k3 = added(t + 0.5 * h, &sum(&middle, 0.5 * h, &k2));
+        let end = self.half(&middle);
+        let k4 = added(t + h, &sum(&end, h, &self.half(&k3)));
+        let k1 = self.half(&k1);
+        let k23 = self.half(&std::array::from_fn(|i| k2[i] + k3[i]));
+        std::array::from_fn(|i| end[i] + h / 6.0 * (k1[i] + 2.0 * k23[i] + k4[i]))
+    }
+
+    /// One step of the classical method of fourth order.
+    fn classical_step(&self, t: f64, h: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> State {
+        let states = self.states();
+        let mut k = [[0.0; ROOM]; 4];
+        let mut at = *y;
+        self.rate(t, y, branches, force, true, &mut k[0]);
+        for (stage, share) in [(1, 0.5), (2, 0.5), (3, 1.0)] {
+            for i in 0..states {
+                at[i] = y[i] + share * h * k[stage - 1][i];
+            }
+            let mut rate = [0.0; ROOM];
+            self.rate(t + share * h, &at, branches, force, true, &mut rate);
+            k[stage] = rate;
+        }
+        let mut after = *y;
+        for i in 0..states {
+            after[i] += h / 6.0 * (k[0][i] + 2.0 * k[1][i] + 2.0 * k[2][i] + k[3][i]);
+        }
+        after
+    }
+
+    /// How far each law is from its next switch; the smallest, and which law it is.
+    fn margin(&self, t: f64, y: &State, branches: &[Branch], force: &Force<'_>) -> (f64, usize) {
+        let mut least = (f64::INFINITY, 0);
+        if self.laws.iter().all(|law| !law.switches()) {
+            return least;
+        }
+        let n = self.freedoms;
+        let (u, v) = (self.of_tip(&y[..n]), self.of_tip(&y[n..2 * n]));
+        for (index, (law, &branch)) in self.laws.iter().zip(branches).enumerate() {
+            let margin = match law {
+                Law::Friction { axis, .. } if branch != 0 => f64::from(branch) * v[*axis],
+                Law::Friction { breakaway_n, .. } => {
+                    let mut rate = [0.0; ROOM];
+                    breakaway_n - self.rate(t, y, branches, force, true, &mut rate).abs()
+                }
+                Law::Gap { axis, half_gap_m, .. } if branch == 0 => half_gap_m - u[*axis].abs(),
+                Law::Gap { axis, half_gap_m, .. } => f64::from(branch) * u[*axis] - half_gap_m,
+                Law::BoucWen { axis, own, .. } => {
+                    let (of_v, of_z) = signs(branch);
+                    // Times of either zero are what counts: any unit will do.
+                    (of_v * v[*axis] * self.step_s).min(of_z * y[*own])
+                }
+                Law::Stop { axis, gap_m, .. } => f64::from(2 * branch - 1) * (u[*axis] - gap_m),
+                _ => f64::INFINITY,
+            };
+            if margin < least.0 {
+                least = (margin, index);
+            }
+        }
+        least
+    }
+
+    /// Takes what rounding left of a velocity that is at zero.
+    fn stop(&self, axis: usize, velocity: f64, y: &mut State) {
+        let n = self.freedoms;
+        let mobility: f64 = (0..n).map(|i| self.tip[i][axis] * self.mobility[i][axis]).sum();
+        for i in 0..n {
+            y[n + i] -= self.mobility[i][axis] * velocity / mobility;
+        }
+    }
+
+    /// What follows when law `index` is at its switch; at the start, what holds.
+    fn switch(
+        &self,
+        index: usize,
+        t: f64,
+        y: &mut State,
+        branches: &mut [Branch],
+        force: &Force<'_>,
+        start: bool,
+    ) {
+        let n = self.freedoms;
+        let (u, v) = (self.of_tip(&y[..n]), self.of_tip(&y[n..2 * n]));
+        let sign = |value: f64| if value > 0.0 { 1 } else { -1 };
+        branches[index] = match self.laws[index] {
+            Law::Friction { axis, .. } if start && v[axis] != 0.0 => sign(v[axis]),
+            Law::Friction {
+                axis, breakaway_n, ..
+            } => {
+                // A hair within the limit at the end of sticking, where the switch was found.
+                let sticks = branches[index] == 0 && !start;
+                let limit = if sticks {
+                    breakaway_n * (1.0 - 1e-9)
+                } else {
+                    breakaway_n
+                };
+                self.stop(axis, v[axis], y);
+                branches[index] = 0;
+                let mut rate = [0.0; ROOM];
+                let holding = self.rate(t, y, branches, force, true, &mut rate);
+                if holding.abs() < limit { 0 } else { sign(holding) }
+            }
+            Law::Gap { axis, half_gap_m, .. } if start => {
+                if u[axis].abs() <= half_gap_m {
+                    0
+                } else {
+                    sign(u[axis])
+                }
+            }
+            Law::Gap { axis, .. } if branches[index] == 0 => sign(u[axis]),
+            Law::Gap { .. } => 0,
+            Law::BoucWen { axis, own, .. } => {
+                let [backward, negative] = [v[axis], y[own]].map(|value| Branch::from(value < 0.0));
+                backward + 2 * negative
+            }
+            Law::Stop { axis, gap_m, .. } if start => Branch::from(u[axis] > gap_m),
+            Law::Stop { .. } => 1 - branches[index],
+            _ => 0,
+        };
+    }
+
+    /// The branches at the start.
+    pub(crate) fn branches(&self, t: f64, y: &mut State, force: &Force<'_>) -> Vec<Branch> {
+        let mut branches = vec![0; self.laws.len()];
+        for index in 0..self.laws.len() {
+            self.switch(index, t, y, &mut branches, force, true);
+        }
+        branches
+    }
+
+    /// From `t` to `t + h`, with a step that ends wherever a law switches.
+    pub(crate) fn advance(&self, t: f64, h: f64, y: &mut State, branches: &mut [i8], force: &Force<'_>) {
+        let (mut now, end) = (t, t + h);
+        // A law that switches endlessly within one step would be one that this method cannot follow.
+        for _ in 0..64 {
+            let rest = end - now;
+            let after = self.step(now, rest, y, branches, force);
+            let (margin, _) = self.margin(end, &after, branches, force);
+            if margin >= 0.0 {
+                *y = after;
+                return;
+            }
+            let outside = self.crossing(now, rest, y, branches, force, margin);
+            let mut at = self.step(now, outside * rest, y, branches, force);
+            now += outside * rest;
+            let (_, index) = self.margin(now, &at, branches, force);
+            self.switch(index, now, &mut at, branches, force, false);
+            *y = at;
+            if end - now <= 1e-12 * h {
+                return;
+            }
+        }
+        *y = self.step(now, end - now, y, branches, force);
+    }
+
+    /// The share of a step just after which a law switches, where its end is beyond by `margin`: regula falsi, the side that
+    /// stays is halved (Illinois), and halves where the margin is too crooked for that.
+    fn crossing(
+        &self,
+        t: f64,
+        h: f64,
+        y: &State,
+        branches: &[Branch],
+        force: &Force<'_>,
+        margin: f64,
+    ) -> f64 {
+        let of = |share: f64| {
+            self.margin(
+                t + share * h,
+                &self.step(t, share * h, y, branches, force),
+                branches,
+                force,
+            )
+            .0
+        };
+        let (mut inside, mut outside) = (0.0, 1.0);
+        let (mut low, mut high) = (self.margin(t, y, branches, force).0.max(0.0), margin);
+        for round in 0..60 {
+            if outside - inside < 1e-12 {
+                break;
+            }
+            let falsi = inside + (outside - inside) * low / (low - high);
+            let share = if round % 3 == 2 {
+                0.5 * (inside + outside)
+            } else {
+                falsi.clamp(inside + 1e-13, outside - 1e-13)
+            };
+            let margin = of(share);
+            if margin >= 0.0 {
+                (inside, low) = (share, margin);
+                high *= 0.5;
+            } else {
+                (outside, high) = (share, margin);
+                low *= 0.5;
+            }
+        }
+        outside
+    }
+
+    /// Notes the tool at a point of the grid.
+    pub(crate) fn note(&self, t: f64, y: &State, branches: &[Branch], force: &Force<'_>, path: &mut Path) {
+        let n = self.freedoms;
+        let mut rate = [0.0; ROOM];
+        self.rate(t, y, branches, force, true, &mut rate);
+        path.u.push(self.of_tip(&y[..n]));
+        path.v.push(self.of_tip(&y[n..2 * n]));
+        path.a.push(self.of_tip(&rate[n..2 * n]));
+    }
+}
+
+/// A of ẏ = A y with y = (q, q̇).
+pub(crate) fn first_order(
+    inverse_mass: &DMatrix<f64>,
+    damping: &DMatrix<f64>,
+    stiffness: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let n = inverse_mass.nrows();
+    let mut a = DMatrix::zeros(2 * n, 2 * n);
+    a.view_mut((0, n), (n, n)).fill_with_identity();
+    a.view_mut((n, 0), (n, n)).copy_from(&(-inverse_mass * stiffness));
+    a.view_mut((n, n), (n, n)).copy_from(&(-inverse_mass * damping));
+    a
+}
+
+/// Values on an even grid, between points by the cubic through the four around `place`, which counts points.
+pub(crate) fn interpolated(series: &[[f64; 3]], place: f64) -> [f64; 3] {
+    let nearest = place.round();
+    if (place - nearest).abs() < 1e-6 {
+        return series[nearest as usize];
+    }
+    let first = (place.floor() as usize).saturating_sub(1).min(series.len() - 4);
+    let s = place - first as f64;
+    let weights = [
+        -(s - 1.0) * (s - 2.0) * (s - 3.0) / 6.0,
+        s * (s - 2.0) * (s - 3.0) / 2.0,
+        -s * (s - 1.0) * (s - 3.0) / 2.0,
+        s * (s - 1.0) * (s - 2.0) / 6.0,
+    ];
+    std::array::from_fn(|axis| {
+        weights
+            .iter()
+            .zip(&series[first..])
+            .map(|(w, value)| w * value[axis])
+            .sum()
+    })
+}

@@ -1,0 +1,460 @@
+//! Virtual tests of a machine, and the recordings that their sensors make.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::OnceLock;
+
+use nalgebra::DMatrix;
+use quietcut::recording::{Channel, Kind as RecordKind, Quantity, RecordedChannel, Recording, Sidecar};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::cause::{Cause, Kind, STRUCTURAL, Scale};
+use super::judge::Lab;
+use super::machine::Machine;
+use super::motion::{Path, System, first_order, interpolated};
+use super::sensor::{Sensor, letter, noisy, read_by, sensors};
+
+/// What kind of test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Test {
+    /// A shaker with many tones, or a hammer.
+    Shaker,
+    /// A gliding frequency, or one after the other.
+    Sweep,
+    /// Pulled and let go.
+    FreeDecay,
+}
+
+/// One run of a test.
+#[derive(Clone, Debug)]
+pub(crate) struct Run {
+    /// Force at every half step, N along x, y, z; empty where there is none.
+    force_n: Vec<[f64; 3]>,
+    /// Which directions are driven.
+    driven: Vec<usize>,
+    /// The static force from which the machine is let go, N.
+    pull_n: [f64; 3],
+}
+
+/// A test: its runs and its sensors.
+#[derive(Debug)]
+pub(crate) struct Rig {
+    pub(crate) kind: RecordKind,
+    pub(crate) runs: Vec<Run>,
+    pub(crate) sensors: Vec<Sensor>,
+    pub(crate) rate_hz: f64,
+    /// Samples of a run.
+    pub(crate) samples: usize,
+    /// Steps of the integration per sample.
+    steps: usize,
+    pub(crate) scale: Scale,
+    /// The motions of the machine that is believed: what sensors do to them needs no other.
+    plain: OnceLock<Vec<Path>>,
+}
+
+/// By run and sensor: samples.
+pub(crate) type Output = Vec<Vec<Vec<f64>>>;
+
+impl Rig {
+    /// A test of `machine`, with directions driven apart and together and at two or three levels.
+    pub(crate) fn draw(random: &mut ChaCha8Rng, test: Test, machine: &Machine) -> Self {
+        let highest = machine.omega[1] / TAU;
+        let rate_hz = highest * random.random_range(18.0..26.0);
+        let cycles = random.random_range(60.0..110.0);
+        let samples = (cycles / (machine.omega[0] / TAU) * rate_hz) as usize;
+        let steps = (machine.omega[1] / (0.12 * rate_hz)).ceil() as usize;
+        let mut rig = Self {
+            kind: RecordKind::Shaker,
+            runs: Vec::new(),
+            sensors: sensors(random, machine),
+            rate_hz,
+            samples,
+            steps,
+            scale: Scale {
+                peak_m: 2.0 * machine.amplitude_m,
+                seconds: samples as f64 / rate_hz,
+                sample_s: 1.0 / rate_hz,
+                cut: None,
+            },
+            plain: OnceLock::new(),
+        };
+        let variant = random.random::<f64>();
+        rig.kind = match test {
+            Test::Shaker if variant < 0.25 => RecordKind::Hammer,
+            Test::Shaker => RecordKind::Shaker,
+            Test::Sweep if variant < 0.3 => RecordKind::StepSine,
+            Test::Sweep => RecordKind::Sweep,
+            Test::FreeDecay => RecordKind::FreeDecay,
+        };
+        let levels: &[f64] = if random.random::<bool>() {
+            &[1.0, 0.3]
+        } else {
+            &[0.25, 1.0, 0.6]
+        };
+        let mut shapes: Vec<Vec<usize>> = machine.axes.iter().map(|axis| vec![*axis]).collect();
+        if machine.axes.len() > 1 {
+            shapes.push(machine.axes.clone());
+        }
+        for (index, shape) in shapes.iter().enumerate() {
+            // Several directions: their last shape, all together, at the largest level only.
+            let levels = if index == 0 { levels } else { &levels[..1] };
+            for level in levels {
+                let run = rig.run(random, machine, shape);
+                rig.runs.push(rig.scaled(run, machine, *level));
+            }
+        }
+        rig
+    }
+
+    /// One sweep along `axis` at a given amplitude, N.
+    pub(crate) fn sweep(
+        machine: &Machine,
+        axis: usize,
+        sensors: Vec<Sensor>,
+        amplitude_n: f64,
+        [first_hz, last_hz]: [f64; 2],
+    ) -> Self {
+        let rate_hz = 20.0 * machine.omega[1] / TAU;
+        let (samples, steps) = (2000, 8);
+        let seconds = samples as f64 / rate_hz;
+        let half_s = 0.5 / (rate_hz * steps as f64);
+        let force_n = (0..2 * samples * steps + 8)
+            .map(|k| {
+                let t = k as f64 * half_s;
+                let mut force = [0.0; 3];
+                force[axis] =
+                    amplitude_n * (TAU * (first_hz * t + 0.5 * (last_hz - first_hz) / seconds * t * t)).sin();
+                force
+            })
+            .collect();
+        Self {
+            kind: RecordKind::Sweep,
+            runs: vec![Run {
+                force_n,
+                driven: vec![axis],
+                pull_n: [0.0; 3],
+            }],
+            sensors,
+            rate_hz,
+            samples,
+            steps,
+            scale: Scale {
+                peak_m: 2.0 * machine.amplitude_m,
+                seconds,
+                sample_s: 1.0 / rate_hz,
+                cut: None,
+            },
+            plain: OnceLock::new(),
+        }
+    }
+
+    fn run(&self, random: &mut ChaCha8Rng, machine: &Machine, driven: &[usize]) -> Run {
+        let points = 2 * self.samples * self.steps + 8;
+        let half_s = 0.5 / (self.rate_hz * self.steps as f64);
+        let mut run = Run {
+            force_n: Vec::new(),
+            driven: driven.to_vec(),
+            pull_n: [0.0; 3],
+        };
+        if self.kind == RecordKind::FreeDecay {
+            for &axis in driven {
+                run.pull_n[axis] = 1.0;
+            }
+            return run;
+        }
+        run.force_n = vec![[0.0; 3]; points];
+        for &axis in driven {
+            let signal = self.signal(random, machine);
+            for (k, force) in run.force_n.iter_mut().enumerate() {
+                force[axis] = signal(k as f64 * half_s);
+            }
+        }
+        run
+    }
+
+    /// A force of time of about unit size.
+    fn signal(&self, random: &mut ChaCha8Rng, machine: &Machine) -> Box<dyn Fn(f64) -> f64> {
+        let [low, high] = machine.omega.map(|omega| omega / TAU);
+        let (first, last, seconds) = (0.35 * low, 2.2 * high, self.scale.seconds);
+        match self.kind {
+            RecordKind::Hammer => {
+                let spacing = seconds / 4.0;
+                let pulse = 0.35 / high;
+                let blows: Vec<(f64, f64)> = (0..4)
+                    .map(|i| ((0.03 + f64::from(i)) * spacing, random.random_range(0.7..1.3)))
+                    .collect();
+                Box::new(move |t| {
+                    blows
+                        .iter()
+                        .filter(|(start, _)| (*start..start + pulse).contains(&t))
+                        .map(|(start, peak)| peak * (PI * (t - start) / pulse).sin().powi(2))
+                        .sum()
+                })
+            }
+            RecordKind::Sweep => {
+                let (from, to) = if random.random::<bool>() {
+                    (first, last)
+                } else {
+                    (last, first)
+                };
+                Box::new(move |t| (TAU * (from * t + 0.5 * (to - from) / seconds * t * t)).sin())
+            }
+            RecordKind::StepSine => {
+                let count = 8;
+                let dwell = seconds / f64::from(count);
+                let tones: Vec<f64> = (0..count)
+                    .map(|i| {
+                        0.8 * low * (1.25 * high / (0.8 * low)).powf(f64::from(i) / f64::from(count - 1))
+                    })
+                    .collect();
+                Box::new(move |t| {
+                    let index = (t / dwell) as usize;
+                    let tone = tones[index.min(tones.len() - 1)];
+                    (TAU * tone * (t - index as f64 * dwell)).sin()
+                })
+            }
+            _ => {
+                let tones: Vec<(f64, f64)> = (0..40)
+                    .map(|i| {
+                        let share = (f64::from(i) + random.random::<f64>()) / 40.0;
+                        (first + (last - first) * share, random.random_range(0.0..TAU))
+                    })
+                    .collect();
+                Box::new(move |t| tones.iter().map(|(f, phase)| (TAU * f * t + phase).cos()).sum())
+            }
+        }
+    }
+
+    /// The run with its force such that the believed machine moves by `level` times what is usual.
+    fn scaled(&self, mut run: Run, machine: &Machine, level: f64) -> Run {
+        let path = self.path(&run, &self.system_of(machine, &[]));
+        let mut factor = f64::INFINITY;
+        for &axis in &run.driven {
+            let rms = (path.u.iter().map(|u| u[axis].powi(2)).sum::<f64>() / path.u.len() as f64).sqrt();
+            let peak = path.u.iter().fold(0.0_f64, |a, u| a.max(u[axis].abs()));
+            factor = factor.min(level * machine.amplitude_m / rms.max(0.4 * peak));
+        }
+        for force in &mut run.force_n {
+            *force = force.map(|value| value * factor);
+        }
+        run.pull_n = run.pull_n.map(|value| value * factor);
+        run
+    }
+
+    /// The equations of a machine under `causes`.
+    fn system_of(&self, machine: &Machine, causes: &[Cause]) -> System {
+        let mut changed = machine.clone();
+        for cause in causes {
+            cause.change(&mut changed, &self.scale);
+        }
+        let step_s = 1.0 / (self.rate_hz * self.steps as f64);
+        let mut system = System::new(
+            &changed.mass,
+            &changed.damping,
+            &changed.stiffness,
+            &changed.tip,
+            step_s,
+        );
+        for cause in causes {
+            cause.add(machine, &self.scale, &mut system);
+        }
+        system
+    }
+
+    /// The motion of one run on the grid of the integration.
+    fn path(&self, run: &Run, system: &System) -> Path {
+        let step = 1.0 / (self.rate_hz * self.steps as f64);
+        let half = 0.5 * step;
+        let force = |t: f64, _: [f64; 3], _: [f64; 3]| {
+            if run.force_n.is_empty() {
+                return [0.0; 3];
+            }
+            interpolated(&run.force_n, t / half)
+        };
+        let count = self.samples * self.steps;
+        let mut path = Path {
+            u: Vec::with_capacity(count + 1),
+            v: Vec::new(),
+            a: Vec::with_capacity(count + 1),
+        };
+        let mut y = system.pulled(run.pull_n);
+        let mut branches = system.branches(0.0, &mut y, &force);
+        for k in 0..count {
+            let t = k as f64 * step;
+            system.note(t, &y, &branches, &force, &mut path);
+            system.advance(t, step, &mut y, &mut branches, &force);
+        }
+        path
+    }
+
+    /// What the sensors would say without noise while `causes` act.
+    pub(crate) fn output(&self, machine: &Machine, causes: &[Cause]) -> Output {
+        let moved = |causes: &[Cause]| -> Vec<Path> {
+            let system = self.system_of(machine, causes);
+            self.runs.iter().map(|run| self.path(run, &system)).collect()
+        };
+        let of_paths = |paths: &[Path]| {
+            let of = |path| {
+                (0..self.sensors.len())
+                    .map(|index| self.read(index, machine, causes, path))
+                    .collect()
+            };
+            paths.iter().map(of).collect()
+        };
+        if causes.iter().all(|cause| cause.kind.of_sensor()) {
+            of_paths(self.plain.get_or_init(|| moved(&[])))
+        } else {
+            of_paths(&moved(causes))
+        }
+    }
+
+    /// One sensor's samples.
+    fn read(&self, index: usize, machine: &Machine, causes: &[Cause], path: &Path) -> Vec<f64> {
+        let sensor = self.sensors[index];
+        let series = if sensor.acceleration { &path.a } else { &path.u };
+        let about: Vec<&Cause> = causes
+            .iter()
+            .filter(|cause| cause.kind.of_sensor() && cause.sensor == index)
+            .collect();
+        read_by(
+            machine,
+            &self.scale,
+            sensor,
+            &about,
+            series,
+            self.steps,
+            self.samples,
+        )
+    }
+
+    /// Recordings of an output with white noise of `sigma` per sensor.
+    pub(crate) fn recordings(
+        &self,
+        output: &Output,
+        sigma: &[f64],
+        random: &mut ChaCha8Rng,
+        name: &str,
+    ) -> Vec<Recording> {
+        self.runs
+            .iter()
+            .zip(output)
+            .enumerate()
+            .map(|(number, (run, sensed))| {
+                let mut channels = Vec::new();
+                if self.kind != RecordKind::FreeDecay {
+                    for &axis in &run.driven {
+                        channels.push(Channel {
+                            name: format!("f{}", letter(axis)),
+                            quantity: Quantity::Force,
+                            samples: (0..self.samples)
+                                .map(|k| run.force_n[2 * k * self.steps][axis])
+                                .collect(),
+                        });
+                    }
+                }
+                let mut sidecar = Sidecar {
+                    kind: Some(self.kind),
+                    ..Sidecar::default()
+                };
+                for ((sensor, samples), sigma) in self.sensors.iter().zip(sensed).zip(sigma) {
+                    let name = sensor.name();
+                    if sensor.at_housing {
+                        let at = RecordedChannel {
+                            at: Some("spindle-housing".into()),
+                            ..RecordedChannel::default()
+                        };
+                        sidecar.channels.insert(name.clone(), at);
+                    }
+                    channels.push(Channel {
+                        name,
+                        quantity: if sensor.acceleration {
+                            Quantity::Acceleration
+                        } else {
+                            Quantity::Displacement
+                        },
+                        samples: noisy(samples, *sigma, random),
+                    });
+                }
+                Recording {
+                    path: format!("{name}-{number}.csv").into(),
+                    sample_rate_hz: self.rate_hz,
+                    start_s: 0.0,
+                    channels,
+                    sidecar,
+                }
+            })
+            .collect()
+    }
+}
+
+/// A machine in its rig.
+pub(crate) struct Bench {
+    pub(crate) machine: Machine,
+    pub(crate) rig: Rig,
+}
+
+impl Lab for Bench {
+    fn output(&self, causes: &[Cause]) -> Output {
+        self.rig.output(&self.machine, causes)
+    }
+
+    fn places(&self, kind: Kind) -> Vec<(usize, usize)> {
+        let sensors = &self.rig.sensors;
+        if kind == Kind::CommonForce || !Cause::possible(kind, &self.machine) {
+            Vec::new()
+        } else if kind.of_sensor() {
+            (0..sensors.len())
+                .filter(|sensor| kind != Kind::SensorOffset || sensors[*sensor].at_housing)
+                .map(|sensor| (sensors[sensor].axis, sensor))
+                .collect()
+        } else if matches!(kind, Kind::ModeCoupling | Kind::Drift) {
+            vec![(0, 0)]
+        } else {
+            self.machine.axes.iter().map(|axis| (*axis, 0)).collect()
+        }
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        STRUCTURAL.to_vec()
+    }
+
+    /// The free motions of the believed machine, each run's by itself.
+    fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64> {
+        let Machine {
+            mass,
+            damping,
+            stiffness,
+            tip,
+            ..
+        } = &self.machine;
+        let freedoms = mass.nrows();
+        let inverse = mass.clone().try_inverse().unwrap();
+        let n = 2 * freedoms;
+        let a = first_order(&inverse, damping, stiffness);
+        let one = (&a / self.rig.rate_hz).exp();
+        let (sensors, samples, runs) = (&self.rig.sensors, self.rig.samples, self.rig.runs.len());
+        let length = sensors.len() * samples;
+        let mut columns = DMatrix::zeros(length * runs, n * runs);
+        let mut power = DMatrix::identity(n, n);
+        for k in 0..samples {
+            let rates = &a * &power;
+            for (s, sensor) in sensors.iter().enumerate() {
+                for state in 0..n {
+                    let seen = |i: usize| {
+                        if sensor.acceleration {
+                            rates[(freedoms + i, state)]
+                        } else {
+                            power[(i, state)]
+                        }
+                    };
+                    let value: f64 = (0..freedoms).map(|i| tip[i][sensor.axis] * seen(i)).sum();
+                    for run in 0..runs {
+                        columns[(run * length + s * samples + k, run * n + state)] = value / sigma[s];
+                    }
+                }
+            }
+            power = &one * power;
+        }
+        columns
+    }
+}
