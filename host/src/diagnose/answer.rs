@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::views::View;
+
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -114,4 +116,7 @@ pub struct Diagnosis {
     /// How many of `causes`, from the first, act together in the extended case.
     #[serde(skip)]
     pub acting: usize,
+    /// The residuals, channel by channel.
+    #[serde(skip)]
+    pub views: Vec<View>,
 }

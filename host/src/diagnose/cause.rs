@@ -116,16 +116,13 @@ impl Regressor {
                 .then(|| record.grid.spectrum_of_fine(force))
         });
         for (channel, column) in record.channels.iter().zip(&mut columns) {
-            let added = match record.domain {
+            let added: Vec<f64> = match record.domain {
                 super::Domain::Response => {
-                    let mut response = record.read_response(&spectra, channel);
-                    for bin in &mut response {
-                        *bin = -*bin;
-                    }
-                    record.grid.samples(&response)
+                    let response = record.read_response(&spectra, channel);
+                    response.into_iter().map(|x| -x).collect()
                 }
                 super::Domain::Force => {
-                    let mut sum = vec![Complex64::ZERO; record.grid.bins()];
+                    let mut sum = vec![Complex64::ZERO; record.grid.fine_bins()];
                     for (weight, spectrum) in channel.pickup.weights.iter().zip(&spectra) {
                         if let Some(spectrum) = spectrum {
                             for (sum, bin) in sum.iter_mut().zip(spectrum) {
@@ -133,7 +130,7 @@ impl Regressor {
                             }
                         }
                     }
-                    record.grid.samples(&sum)
+                    record.grid.samples_of_fine(&sum)
                 }
             };
             for (column, added) in column.iter_mut().zip(added) {
@@ -147,6 +144,17 @@ impl Regressor {
 /// A parameter that has been fitted: its key in `parameters` of the answer and in the extension, and its value.
 pub type Parameter = (&'static str, f64);
 
+/// One name of a cause with what belongs to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// The name, as in `[extension.NAME]`.
+    pub name: &'static str,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// The extension that makes it part of a case.
+    pub extension: toml::Table,
+}
+
 /// A physical term that the baseline may lack.
 ///
 /// It is linear in its coefficients once its shape (gap, yield, time constant …) is given:
@@ -154,6 +162,11 @@ pub type Parameter = (&'static str, f64);
 pub trait Cause: Send + Sync {
     /// Its name, as in `[extension.NAME]`.
     fn name(&self) -> &'static str;
+
+    /// All names that it has in an answer: one, unless it is several that act through each other.
+    fn names(&self) -> Vec<&'static str> {
+        vec![self.name()]
+    }
 
     /// Where in this scene it could act and be seen; empty where it cannot.
     fn places(&self, scene: &Scene<'_>) -> Vec<Place>;
@@ -186,6 +199,12 @@ pub trait Cause: Send + Sync {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>>;
 
+    /// The shape at which the regressors would be exact, where the coefficients say so themselves: it is then no freedom of
+    /// the fit but found by going there.
+    fn settled(&self, _shape: &[f64], _coefficients: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
     /// The extension that makes the cause part of a case.
     fn extension(&self, place: &Place, parameters: &[Parameter]) -> toml::Table {
         let mut table = place.table();
@@ -193,6 +212,15 @@ pub trait Cause: Send + Sync {
             table.insert((*key).into(), (*value).into());
         }
         table
+    }
+
+    /// What the answer says, name by name: parameters and extension.
+    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
+        vec![Part {
+            name: self.name(),
+            parameters: parameters.to_vec(),
+            extension: self.extension(place, parameters),
+        }]
     }
 
     /// Parameters that are said beside those of the extension, as the same thing in other words.

@@ -115,6 +115,49 @@ pub(super) fn record(
     Ok(())
 }
 
+/// Factors that a wrong unit brings: the name of what was likely meant.
+const UNITS: [(f64, &str); 5] = [
+    (1e3, "a thousand: mm, kN or g for m, N or kg"),
+    (1e6, "a million: µm for m"),
+    (25.4, "25.4: inches for mm"),
+    (39.37, "39.37: inches for m"),
+    (9.806_65, "9.81: g for m/s²"),
+];
+/// A model may be wrong by this factor before a unit is suspected.
+const WRONG_BY: f64 = 4.0;
+
+/// Refuses a channel whose size cannot be that of the case: a wrong unit.
+///
+/// The factor is that by which the prediction fits best; it counts where the two look alike.
+pub(super) fn unit(path: &std::path::Path, channel: &Observed) -> Result<(), DiagnoseError> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (own, cross) = (
+        dot(&channel.predicted, &channel.predicted),
+        dot(&channel.predicted, &channel.measured),
+    );
+    let whole = dot(&channel.measured, &channel.measured);
+    if own <= 0.0 || whole <= 0.0 {
+        return Ok(());
+    }
+    let factor = cross.abs() / own;
+    let alike = cross * cross / (own * whole);
+    if alike < 0.3 || (1.0 / WRONG_BY..WRONG_BY).contains(&factor) {
+        return Ok(());
+    }
+    let size = factor.max(1.0 / factor);
+    let likely = UNITS
+        .iter()
+        .find(|(unit, _)| (size / unit).ln().abs() < 0.4)
+        .map_or_else(String::new, |(_, meant)| format!(" It is about {meant}."));
+    Err(DiagnoseError::record(
+        path,
+        format!(
+            "{} is {factor:.4e} times what the case predicts, though of the same shape: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{likely}",
+            channel.pickup.name
+        ),
+    ))
+}
+
 /// The level at which a channel is cut off: flat tops of three and more equal samples at an end of its range.
 fn clipped(samples: &[f64]) -> Option<f64> {
     let (low, high) = samples

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::cause::{Cause, Parameter, Place};
 use super::causes;
+use super::record::Record;
 use super::regression::{Fit, Regression, Share};
 use super::scene::Scene;
 
@@ -127,19 +128,71 @@ impl Library {
             .flat_map(|choice| self.columns(*choice))
             .copied()
             .collect();
-        let fit = regression.fit(&columns)?;
+        let fit = regression.fit(Share::Whole, &columns)?;
         let explanation = Explanation {
             freedoms: choices
                 .iter()
                 .map(|choice| {
                     let (shape, columns) = &self.candidates[choice.candidate].shapes[choice.shape];
-                    shape.len() + columns.len()
+                    // What settles by itself is no freedom.
+                    let settles = self
+                        .cause(choice.candidate)
+                        .settled(shape, &vec![1.0; columns.len()])
+                        .is_some();
+                    columns.len() + if settles { 0 } else { shape.len() }
                 })
                 .sum(),
             choices: choices.to_vec(),
             fit,
         };
         self.parameters(scene, &explanation).map(|_| explanation)
+    }
+
+    /// All columns of an explanation, choice after choice.
+    pub fn columns_of(&self, explanation: &Explanation) -> Vec<usize> {
+        explanation
+            .choices
+            .iter()
+            .flat_map(|choice| self.columns(*choice))
+            .copied()
+            .collect()
+    }
+
+    /// The coefficients of one of the choices.
+    pub fn coefficients(&self, explanation: &Explanation, place: usize) -> Vec<f64> {
+        let from: usize = explanation.choices[..place]
+            .iter()
+            .map(|choice| self.columns(*choice).len())
+            .sum();
+        explanation.fit.coefficients[from..from + self.columns(explanation.choices[place]).len()].to_vec()
+    }
+
+    /// What an explanation adds to the residual of each channel of a record.
+    pub fn explained(&self, scene: &Scene<'_>, record: &Record, explanation: &Explanation) -> Vec<Vec<f64>> {
+        let mut sum = vec![vec![0.0; record.grid.count()]; record.channels.len()];
+        for (place, choice) in explanation.choices.iter().enumerate() {
+            let known = &self.candidates[choice.candidate];
+            let cause = self.cause(choice.candidate);
+            let coefficients = self.coefficients(explanation, place);
+            let regressors = cause.regressors(scene, record, &known.place, &known.shapes[choice.shape].0);
+            for (regressor, coefficient) in regressors.iter().flatten().zip(coefficients) {
+                for (sum, column) in sum.iter_mut().zip(regressor.columns(record)) {
+                    sum.iter_mut()
+                        .zip(column)
+                        .for_each(|(sum, value)| *sum += coefficient * value);
+                }
+            }
+        }
+        sum
+    }
+
+    /// What is left of the held-out parts if the coefficients come from the fitted ones alone.
+    pub fn left_held_out(&self, regression: &Regression, explanation: &Explanation) -> f64 {
+        let columns = self.columns_of(explanation);
+        match regression.fit(Share::Fitted, &columns) {
+            Some(fit) => regression.left(Share::HeldOut, &columns, &fit.coefficients),
+            None => regression.residual(Share::HeldOut),
+        }
     }
 
     /// The parameters of every cause of an explanation.
@@ -214,8 +267,13 @@ impl Library {
 
     /// A case holds one extension of a name: the same cause does not act twice.
     fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
-        some.iter()
-            .all(|choice| self.cause(choice.candidate).name() != self.cause(other.candidate).name())
+        let new = self.cause(other.candidate).names();
+        some.iter().all(|choice| {
+            self.cause(choice.candidate)
+                .names()
+                .iter()
+                .all(|name| !new.contains(name))
+        })
     }
 
     fn best_of_each(&self, mut found: Vec<Explanation>) -> Vec<Explanation> {
@@ -234,6 +292,75 @@ impl Library {
             new
         });
         found
+    }
+
+    /// Columns of the change of what a choice with these coefficients adds, per unit of each parameter of its shape.
+    pub fn slopes(
+        &self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        choice: Choice,
+        coefficients: &[f64],
+    ) -> Option<Vec<usize>> {
+        let known = &self.candidates[choice.candidate];
+        let cause = &*self.causes[known.cause];
+        let shape = &known.shapes[choice.shape].0;
+        let bounds = cause.bounds(scene, &known.place);
+        (0..shape.len())
+            .map(|parameter| {
+                let [low, high] = bounds[parameter];
+                let step = 0.01 * if low > 0.0 { shape[parameter] } else { high - low };
+                let at = |value: f64| {
+                    let mut moved = shape.clone();
+                    moved[parameter] = value.clamp(low, high);
+                    let width = moved[parameter];
+                    columns(scene, cause, &known.place, &moved).map(|columns| (columns, width))
+                };
+                let (above, to) = at(shape[parameter] + step)?;
+                let (below, from) = at(shape[parameter] - step)?;
+                let mut slope = above[0].clone();
+                for (record, slope) in slope.iter_mut().enumerate() {
+                    for (channel, slope) in slope.iter_mut().enumerate() {
+                        for (sample, slope) in slope.iter_mut().enumerate() {
+                            *slope = coefficients
+                                .iter()
+                                .enumerate()
+                                .map(|(j, coefficient)| {
+                                    let change =
+                                        above[j][record][channel][sample] - below[j][record][channel][sample];
+                                    coefficient * change / (to - from)
+                                })
+                                .sum();
+                        }
+                    }
+                }
+                Some(regression.add(scene, &slope))
+            })
+            .collect()
+    }
+
+    /// What is left if one factor on mass, stiffness and damping along `axis` stands for everything, and that factor less one.
+    pub fn common_factor(&self, regression: &Regression, axis: usize) -> Option<(f64, f64)> {
+        let columns: Vec<usize> = ["mass", "stiffness", "damping"]
+            .iter()
+            .map(|name| {
+                self.candidates
+                    .iter()
+                    .position(|known| {
+                        self.causes[known.cause].name() == *name && known.place == Place::Axis(axis)
+                    })
+                    .map(|index| self.candidates[index].shapes[0].1[0])
+            })
+            .collect::<Option<_>>()?;
+        let at = |factor: f64| regression.left(Share::Whole, &columns, &vec![factor; columns.len()]);
+        // A parabola in the factor.
+        let (below, middle, above) = (at(-1.0), at(0.0), at(1.0));
+        let curvature = below + above - 2.0 * middle;
+        if curvature <= 0.0 {
+            return None;
+        }
+        let best = 0.5 * (below - above) / curvature;
+        Some((at(best), best))
     }
 
     /// Adds a shape to a candidate; `None` where it has no columns.
@@ -289,7 +416,7 @@ fn columns(
 
 /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
 pub fn gain(regression: &Regression, explanation: &Explanation, inflation: f64) -> f64 {
-    let count = regression.count(Share::Fitted).max(2) as f64;
-    let taken = (regression.residual(Share::Fitted) - explanation.fit.left) / inflation;
+    let count = regression.count(Share::Whole).max(2) as f64;
+    let taken = (regression.residual(Share::Whole) - explanation.fit.left) / inflation;
     taken - explanation.freedoms as f64 * count.ln()
 }

@@ -115,17 +115,28 @@ impl Grid {
         samples
     }
 
-    /// Spectrum, within the band of the record, of a signal given by finer samples that is zero after the record.
+    /// Bins of a spectrum of finer samples; the first of them are those of [`Self::bins`].
+    pub fn fine_bins(&self) -> usize {
+        self.finer * self.length / 2 + 1
+    }
+
+    /// Spectrum of a signal given by finer samples that is zero after the record, scaled as that of its samples.
     pub fn spectrum_of_fine(&self, fine: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.finer * self.length];
         padded[..fine.len()].copy_from_slice(fine);
         let mut bins = transform(&*self.fine_forward, &mut padded);
-        bins.truncate(self.bins());
         let scale = 1.0 / self.finer as f64;
         for bin in &mut bins {
             *bin *= scale;
         }
         bins
+    }
+
+    /// The samples of the record of a spectrum of finer samples: what a sensor without a filter reads, aliases included.
+    pub fn samples_of_fine(&self, spectrum: &[Complex64]) -> Vec<f64> {
+        let mut bins = spectrum.to_vec();
+        let fine = back(&*self.fine_inverse, &mut bins, self.length);
+        fine.into_iter().step_by(self.finer).take(self.count).collect()
     }
 }
 
@@ -222,7 +233,7 @@ mod tests {
         for (n, value) in fine.iter().enumerate() {
             assert!((value - tone(n as f64 / rate / 4.0)).abs() < 1e-6, "{n}");
         }
-        let again = grid.samples(&grid.spectrum_of_fine(&fine));
+        let again = grid.samples_of_fine(&grid.spectrum_of_fine(&fine));
         for (a, b) in again.iter().zip(&samples) {
             assert!((a - b).abs() < 1e-9);
         }

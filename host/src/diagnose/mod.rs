@@ -13,16 +13,25 @@ mod cubic;
 mod decay;
 mod error;
 pub mod evidence;
+mod extension;
 mod grid;
 mod judge;
+mod leftover;
 mod motion;
+mod named;
+mod next_test;
 pub mod noise;
+mod output_error;
 mod path;
 mod receptance;
 mod record;
+mod refine;
 pub mod regression;
 mod scene;
 mod stiffness;
+#[cfg(test)]
+mod tests;
+mod views;
 
 pub use answer::Diagnosis;
 pub use error::DiagnoseError;
@@ -31,6 +40,7 @@ pub use path::{Motion, restoring_along};
 pub use receptance::Receptance;
 pub use record::{Observed, Record};
 pub use scene::{Baseline, Domain, Scene};
+pub use views::View;
 
 use crate::case::Case;
 use crate::recording::Recording;

@@ -58,7 +58,7 @@ pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Optio
         motion.v[axis] = with(grid.fine_samples(&v), &decay[axis][1]);
         motion.rest_m_per_s[axis] = correction.speed_noise + 0.003 * rms(&motion.v[axis]);
         let coarse: Vec<f64> = motion.x[axis].iter().copied().step_by(grid.finer()).collect();
-        displacement[axis] = grid.spectrum(&coarse);
+        displacement[axis] = grid.continued_spectrum(&coarse);
     }
     record.motion = motion;
     record.displacement = displacement;
@@ -109,7 +109,7 @@ fn correction(record: &Record, axis: usize) -> Correction {
     let weights = heard(&power);
     let mut speed_noise = 0.0;
     for bin in 0..bins {
-        if weights[bin] > 0.0 {
+        if weights[bin] > 0.0 && precision[bin] > 0.0 {
             spectrum[bin] *= weights[bin] / precision[bin];
             speed_noise += grid.omega(bin).powi(2) * weights[bin] * weights[bin] / precision[bin];
         } else {
@@ -275,7 +275,7 @@ fn predict_forces(record: &mut Record, baseline: &Baseline<'_>) {
     for term in &baseline.terms {
         let restoring = restoring_along(&**term, &record.motion);
         for (needed, restoring) in needed.iter_mut().zip(&restoring) {
-            let coarse = grid.samples(&grid.spectrum_of_fine(restoring));
+            let coarse = grid.samples_of_fine(&grid.spectrum_of_fine(restoring));
             for (needed, restoring) in needed.iter_mut().zip(coarse) {
                 *needed += restoring;
             }

@@ -53,8 +53,8 @@ impl Motion {
 
 /// f_r of a term along `motion`, N, in the machine's axes.
 ///
-/// Branches follow the motion as they do in a simulation. Own states begin at zero. A term that can hold an axis (dry
-/// friction) is blended between its branches where the speed cannot be told from rest.
+/// Branches follow the motion as they do in a simulation. A term that can hold an axis and has no
+/// state of its own (dry friction) is blended between its branches where the speed cannot be told from rest.
 pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
     let count = motion.len();
     let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; count]);
@@ -63,7 +63,7 @@ pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
             signal[sample] = value;
         }
     };
-    if let Some(axis) = term.holds() {
+    if let Some(axis) = term.holds().filter(|_| term.states() == 0) {
         for sample in 0..count {
             put(
                 sample,
@@ -73,6 +73,7 @@ pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
         return force;
     }
     let mut own = vec![0.0; term.states()];
+    term.begin(&motion.at(0), &mut own);
     let mut branch = None;
     let mut before: Option<At> = None;
     for sample in 0..count {

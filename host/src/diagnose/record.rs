@@ -48,15 +48,19 @@ pub struct Record {
     pub channels: Vec<Observed>,
     /// Forces that drive the structure, N, in the machine's axes; empty where none does.
     pub force_n: [Vec<f64>; 3],
+    /// Floor of each force's spectrum as a deviation of white noise, N: its sensor's noise, and what sampling hides.
+    pub force_deviation_n: [f64; 3],
     /// The motion as far as it is known: measured where that tells more than the model, else as the model has it.
     pub motion: Motion,
-    /// Its displacement at the samples of the record, as spectra.
+    /// Its displacement at the samples of the record as spectra, continued smoothly before and after: what that adds are free
+    /// decays.
     pub displacement: [Vec<Complex64>; 3],
     /// Below this lies all but a two-hundredth of the motion's power, Hz.
     pub highest_hz: f64,
     /// Highest frequency at which the record is compared, Hz.
     pub band_hz: f64,
-    /// H(iω) of the baseline at the bins of the grid, m/N; in the domain of force the dynamic stiffness, N/m.
+    /// H(iω) of the baseline at the bins of the finer samples, m/N; in the domain of force the dynamic stiffness at the bins
+    /// of the samples, N/m.
     pub transfer: Vec<Matrix3<Complex64>>,
     /// Free decays of the baseline, as the channels read them.
     pub decays: Decays,
@@ -91,8 +95,8 @@ impl Record {
         checks::record(baseline, recording, &channels)?;
         let highest_hz = highest_hz(recording);
         let rate_hz = recording.sample_rate_hz;
-        // Harmonics of terms of the motion up to the eighth stay below half the finer rate.
-        let finer = ((16.0 * highest_hz / rate_hz).ceil() as usize)
+        // Harmonics of terms of the motion up to the sixteenth stay below half the finer rate.
+        let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
             .clamp(1, 8)
             .next_power_of_two();
         let grid = Grid::new(recording.len(), rate_hz, 8.0 * baseline.slowest_decay_s(), finer);
@@ -108,6 +112,7 @@ impl Record {
             elsewhere: elsewhere(recording),
             grid,
             channels,
+            force_deviation_n: force_n.each_ref().map(|force| floor_n(force)),
             force_n,
             motion: Motion::default(),
             displacement: std::array::from_fn(|_| Vec::new()),
@@ -117,7 +122,13 @@ impl Record {
             decays: Decays::default(),
         };
         match domain {
-            Domain::Response => record.compare_responses(baseline),
+            Domain::Response => {
+                record.compare_responses(baseline);
+                record
+                    .channels
+                    .iter()
+                    .try_for_each(|channel| checks::unit(&record.path, channel))?;
+            }
             Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,
         }
         Ok(record)
@@ -131,13 +142,15 @@ impl Record {
             }) || !self.force_n[axis].is_empty())
     }
 
-    /// Spectra of forces in the machine's axes to what a channel reads of the response to them.
-    pub fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: &Observed) -> Vec<Complex64> {
-        (0..self.grid.bins())
+    /// Samples that a channel reads of the response to forces in the machine's axes, given as spectra of the samples or of
+    /// finer ones.
+    pub fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: &Observed) -> Vec<f64> {
+        let count = force.iter().flatten().map(Vec::len).max().unwrap_or(0);
+        let spectrum: Vec<Complex64> = (0..count)
             .map(|bin| {
                 let mut sum = Complex64::ZERO;
                 for (axis, force) in force.iter().enumerate() {
-                    if let Some(force) = force {
+                    if let Some(force) = force.as_ref().filter(|force| bin < force.len()) {
                         for (weight, row) in channel.pickup.weights.iter().zip(self.transfer[bin].row_iter())
                         {
                             if *weight != 0.0 {
@@ -148,12 +161,19 @@ impl Record {
                 }
                 sum * self.factor(channel, bin)
             })
-            .collect()
+            .collect();
+        if count == 0 {
+            vec![0.0; self.grid.count()]
+        } else if count > self.grid.bins() {
+            self.grid.samples_of_fine(&spectrum)
+        } else {
+            self.grid.samples(&spectrum)
+        }
     }
 
-    /// [`Observed::factor`] at a bin; zero at the last one where it would not be real.
+    /// [`Observed::factor`] at a bin; zero at the last one of the finer samples, where it would not be real.
     pub fn factor(&self, channel: &Observed, bin: usize) -> Complex64 {
-        if bin + 1 == self.grid.bins() {
+        if bin + 1 == self.grid.fine_bins() {
             Complex64::ZERO
         } else {
             channel.factor(self.grid.omega(bin))
@@ -192,7 +212,8 @@ impl Record {
                     continue;
                 }
                 let spectrum = self.grid.spectrum_of_fine(&restoring[axis]);
-                let sum = force[axis].get_or_insert_with(|| vec![Complex64::ZERO; self.grid.bins()]);
+                let sum = force[axis].get_or_insert_with(Vec::new);
+                sum.resize(self.grid.fine_bins(), Complex64::ZERO);
                 for (sum, restoring) in sum.iter_mut().zip(&spectrum) {
                     *sum -= restoring;
                 }
@@ -205,7 +226,7 @@ impl Record {
         let predicted: Vec<Vec<f64>> = self
             .channels
             .par_iter()
-            .map(|channel| self.grid.samples(&self.read_response(force, channel)))
+            .map(|channel| self.read_response(force, channel))
             .collect();
         for (channel, predicted) in self.channels.iter_mut().zip(predicted) {
             channel.predicted = predicted;
@@ -234,6 +255,18 @@ fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
         let weight = baseline.pickup(name).map_or(1.0, |pickup| pickup.weights[axis]);
         channel.samples.iter().map(|force| force / weight).collect()
     })
+}
+
+/// A force that is white itself has no floor; its noise is taken to be no more than this share of it.
+const MOST_FORCE_NOISE: f64 = 5e-3;
+
+fn floor_n(force_n: &[f64]) -> f64 {
+    let size = rms(force_n);
+    if size > 0.0 {
+        white_floor(force_n, size).min(MOST_FORCE_NOISE * size)
+    } else {
+        0.0
+    }
 }
 
 /// Places that mean the tool tip.
@@ -307,7 +340,7 @@ fn highest_hz(recording: &Recording) -> f64 {
 }
 
 fn response(baseline: &Baseline<'_>, grid: &Grid) -> Vec<Matrix3<Complex64>> {
-    (0..grid.bins())
+    (0..grid.fine_bins())
         .into_par_iter()
         .map(|bin| baseline.receptance.at(grid.omega(bin)))
         .collect()

@@ -19,6 +19,8 @@ struct Part {
     range: std::ops::Range<usize>,
     held_out: bool,
     bins: usize,
+    /// By channel: one over the deviation of each transformed number.
+    weights: Vec<Vec<f64>>,
     /// Orthonormal: what decays and offsets can be.
     nuisance: Vec<Vec<f64>>,
 }
@@ -30,6 +32,8 @@ pub enum Share {
     Fitted,
     /// Those that are held out.
     HeldOut,
+    /// All.
+    Whole,
 }
 
 /// Products of columns.
@@ -50,10 +54,8 @@ pub struct Fit {
     pub coefficients: Vec<f64>,
     /// Their covariance for noise of deviation 1.
     pub covariance: DMatrix<f64>,
-    /// What is left of the fitted parts, in units of the noise.
+    /// What is left, in units of the noise.
     pub left: f64,
-    /// What is left of the held-out parts.
-    pub left_held_out: f64,
 }
 
 /// All columns of a scene.
@@ -63,8 +65,8 @@ pub struct Regression {
     /// By column, by part.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
-    fitted: Products,
-    held_out: Products,
+    /// Fitted, held out, and both.
+    products: [Products; 3],
 }
 
 impl Regression {
@@ -73,6 +75,7 @@ impl Regression {
         let mut parts = split(scene);
         let stretches: Vec<Stretch> = parts.iter().map(|part| Stretch::new(part.range.len())).collect();
         for (part, stretch) in parts.iter_mut().zip(&stretches) {
+            part.weights = weights(&scene.records[part.record], part);
             part.nuisance = nuisance(&scene.records[part.record], part, stretch);
         }
         let residuals: Vec<Vec<f64>> = parts
@@ -90,17 +93,14 @@ impl Regression {
             stretches,
             columns: Vec::new(),
             residuals,
-            fitted: Products::default(),
-            held_out: Products::default(),
+            products: std::array::from_fn(|_| Products::default()),
         };
         for (part, residual) in regression.parts.iter().zip(&regression.residuals) {
-            let products = if part.held_out {
-                &mut regression.held_out
-            } else {
-                &mut regression.fitted
-            };
-            products.residual += dot(residual, residual);
-            products.count += residual.len() - part.nuisance.len();
+            for share in [part.share(), Share::Whole] {
+                let products = &mut regression.products[share as usize];
+                products.residual += dot(residual, residual);
+                products.count += residual.len() - part.nuisance.len();
+            }
         }
         regression
     }
@@ -115,34 +115,32 @@ impl Regression {
             .collect();
         let number = self.columns.len();
         self.columns.push(column);
-        let mut rows = [vec![0.0; number + 1], vec![0.0; number + 1]];
-        let mut right = [0.0; 2];
+        let mut rows: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; number + 1]);
+        let mut right = [0.0; 3];
         for (index, part) in self.parts.iter().enumerate() {
-            let share = usize::from(part.held_out);
             let new = &self.columns[number][index];
-            right[share] += dot(new, &self.residuals[index]);
+            let with_residual = dot(new, &self.residuals[index]);
             let products: Vec<f64> = self
                 .columns
                 .par_iter()
                 .map(|column| dot(&column[index], new))
                 .collect();
-            for (sum, product) in rows[share].iter_mut().zip(products) {
-                *sum += product;
+            for share in [part.share(), Share::Whole] {
+                right[share as usize] += with_residual;
+                for (sum, product) in rows[share as usize].iter_mut().zip(&products) {
+                    *sum += product;
+                }
             }
         }
-        let [fitted, held_out] = rows;
-        self.fitted.gram.push(fitted);
-        self.fitted.with_residual.push(right[0]);
-        self.held_out.gram.push(held_out);
-        self.held_out.with_residual.push(right[1]);
+        for ((products, row), right) in self.products.iter_mut().zip(rows).zip(right) {
+            products.gram.push(row);
+            products.with_residual.push(right);
+        }
         number
     }
 
     fn products(&self, share: Share) -> &Products {
-        match share {
-            Share::Fitted => &self.fitted,
-            Share::HeldOut => &self.held_out,
-        }
+        &self.products[share as usize]
     }
 
     /// Σ residual² in units of the noise.
@@ -155,56 +153,99 @@ impl Regression {
         self.products(share).count
     }
 
+    /// Root mean square of the residual over that of what was measured, on what is held out; channels count alike.
+    pub fn missed(&self, scene: &Scene<'_>) -> f64 {
+        let (mut sum, mut count) = (0.0_f64, 0.0_f64);
+        for part in self.parts.iter().filter(|part| part.held_out) {
+            for channel in &scene.records[part.record].channels {
+                let energy =
+                    |samples: &[f64]| dot(&samples[part.range.clone()], &samples[part.range.clone()]);
+                let whole = dot(&channel.measured, &channel.measured) * part.range.len() as f64
+                    / channel.measured.len() as f64;
+                sum += energy(&channel.residual()) / whole.max(f64::MIN_POSITIVE);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
+    }
+
     /// Number of columns.
     pub fn columns(&self) -> usize {
         self.columns.len()
     }
 
-    /// The fit of some columns; `None` where they are one and the same, or nothing.
-    pub fn fit(&self, columns: &[usize]) -> Option<Fit> {
-        self.solve(columns, 1e-13)
+    /// The fit of some columns to a share; `None` where they are one and the same, or nothing.
+    pub fn fit(&self, share: Share, columns: &[usize]) -> Option<Fit> {
+        self.solve(share, columns, 1e-13)
     }
 
-    /// What is left of the fitted parts if all columns may explain, numerically dependent ones softened.
+    /// Σ column² in units of the noise.
+    pub fn energy(&self, column: usize) -> f64 {
+        self.products(Share::Whole).gram[column][column]
+    }
+
+    /// Coefficients of `columns` that fit the column `target`.
+    pub fn fit_column(&self, share: Share, columns: &[usize], target: usize) -> Option<Vec<f64>> {
+        let products = self.products(share);
+        let right = |column: usize| products.entry(column, target);
+        self.normal(share, columns, 1e-13, right)
+            .map(|(solution, _)| solution)
+    }
+
+    /// What is left if all columns may explain, numerically dependent ones softened.
     pub fn left_by_all(&self) -> f64 {
+        let whole = self.products(Share::Whole);
         let all: Vec<usize> = (0..self.columns.len())
-            .filter(|column| self.fitted.gram[*column][*column] > 0.0)
+            .filter(|column| whole.gram[*column][*column] > 0.0)
             .collect();
-        self.solve(&all, 1e-9)
-            .map_or(self.fitted.residual, |fit| fit.left)
+        self.solve(Share::Whole, &all, 1e-9)
+            .map_or(whole.residual, |fit| fit.left)
     }
 
-    fn solve(&self, columns: &[usize], ridge: f64) -> Option<Fit> {
+    fn solve(&self, share: Share, columns: &[usize], ridge: f64) -> Option<Fit> {
+        let products = self.products(share);
+        let right = |column: usize| products.with_residual[column];
+        let (coefficients, covariance) = self.normal(share, columns, ridge, right)?;
+        Some(Fit {
+            left: self.left(share, columns, &coefficients),
+            coefficients,
+            covariance,
+        })
+    }
+
+    /// Solution and inverse of the normal equations; `None` where columns are one and the same, or nothing.
+    fn normal(
+        &self,
+        share: Share,
+        columns: &[usize],
+        ridge: f64,
+        right: impl Fn(usize) -> f64,
+    ) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let products = self.products(share);
         let size = columns.len();
         let scale: Vec<f64> = columns
             .iter()
-            .map(|column| self.fitted.gram[*column][*column].sqrt())
+            .map(|column| products.gram[*column][*column].sqrt())
             .collect();
         if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
             return None;
         }
         let mut gram = DMatrix::from_fn(size, size, |i, j| {
-            self.fitted.entry(columns[i], columns[j]) / (scale[i] * scale[j])
+            products.entry(columns[i], columns[j]) / (scale[i] * scale[j])
         });
         for i in 0..size {
             gram[(i, i)] += ridge;
         }
-        let right = DVector::from_fn(size, |i, _| self.fitted.with_residual[columns[i]] / scale[i]);
+        let right = DVector::from_fn(size, |i, _| right(columns[i]) / scale[i]);
         let factor = gram.cholesky()?;
         let solution = factor.solve(&right);
-        let coefficients: Vec<f64> = (0..size).map(|i| solution[i] / scale[i]).collect();
         let mut covariance = factor.inverse();
         for i in 0..size {
             for j in 0..size {
                 covariance[(i, j)] /= scale[i] * scale[j];
             }
         }
-        Some(Fit {
-            left: self.left(Share::Fitted, columns, &coefficients),
-            left_held_out: self.left(Share::HeldOut, columns, &coefficients),
-            coefficients,
-            covariance,
-        })
+        Some(((0..size).map(|i| solution[i] / scale[i]).collect(), covariance))
     }
 
     /// What is left of a share with given coefficients.
@@ -219,11 +260,15 @@ impl Regression {
         }
         left.max(0.0)
     }
+}
 
-    /// Root mean square of a column over all parts, in units of the noise.
-    pub fn size(&self, column: usize) -> f64 {
-        let sum = self.fitted.gram[column][column] + self.held_out.gram[column][column];
-        (sum / (self.fitted.count + self.held_out.count).max(1) as f64).sqrt()
+impl Part {
+    fn share(&self) -> Share {
+        if self.held_out {
+            Share::HeldOut
+        } else {
+            Share::Fitted
+        }
     }
 }
 
@@ -233,41 +278,29 @@ impl Products {
     }
 }
 
-/// Whole records where there are three and more: the one of middling motion is held out; else the last third of each.
+/// Each record in four blocks of a third, a sixth, a third and a sixth: the short ones are held out. They hold other times,
+/// and of a sweep other frequencies, than what is fitted.
 fn split(scene: &Scene<'_>) -> Vec<Part> {
-    let records = &scene.records;
-    let held_out = middling(records);
-    records
+    scene
+        .records
         .iter()
         .enumerate()
         .flat_map(|(index, record)| {
             let count = record.grid.count();
-            match held_out {
-                Some(held_out) => vec![(index, 0..count, index == held_out)],
-                None => vec![
-                    (index, 0..2 * count / 3, false),
-                    (index, 2 * count / 3..count, true),
-                ],
-            }
-        })
-        .map(|(record, range, held_out)| Part {
-            record,
-            bins: bins_of(&records[record], range.len()),
-            range,
-            held_out,
-            nuisance: Vec::new(),
+            let edges = [0, count / 3, count / 2, 5 * count / 6, count];
+            (0..4).map(move |block| {
+                let range = edges[block]..edges[block + 1];
+                Part {
+                    record: index,
+                    bins: bins_of(record, range.len()),
+                    range,
+                    held_out: block % 2 == 1,
+                    weights: Vec::new(),
+                    nuisance: Vec::new(),
+                }
+            })
         })
         .collect()
-}
-
-fn middling(records: &[Record]) -> Option<usize> {
-    if records.len() < 3 {
-        return None;
-    }
-    let size = |record: &Record| -> f64 { (0..3).map(|axis| record.motion.size_m(axis).powi(2)).sum() };
-    let mut order: Vec<usize> = (0..records.len()).collect();
-    order.sort_by(|a, b| size(&records[*a]).total_cmp(&size(&records[*b])));
-    Some(order[records.len() / 2])
 }
 
 fn bins_of(record: &Record, length: usize) -> usize {
@@ -289,14 +322,49 @@ fn whiten(record: &Record, part: &Part, stretch: &Stretch, samples: &[Vec<f64>])
 
 fn raw(record: &Record, part: &Part, stretch: &Stretch, samples: &[Vec<f64>]) -> Vec<f64> {
     let mut column = Vec::with_capacity(2 * part.bins * samples.len());
-    for (samples, channel) in samples.iter().zip(&record.channels) {
+    for (samples, weights) in samples.iter().zip(&part.weights) {
         let from = column.len();
         stretch.parts(&samples[part.range.clone()], part.bins, &mut column);
-        for value in &mut column[from..] {
-            *value /= channel.deviation;
+        for (value, weight) in column[from..].iter_mut().zip(weights) {
+            *value *= weight;
         }
     }
+    debug_assert_eq!(samples.len(), record.channels.len());
     column
+}
+
+/// One over the deviation of each transformed number, by channel: of the sensor, and of what the channel reads of the response
+/// to the noise of the force sensors and to what sampling hides of the forces, both taken as the floor of their spectra.
+fn weights(record: &Record, part: &Part) -> Vec<Vec<f64>> {
+    let length = part.range.len();
+    let step = record.grid.omega(1);
+    record
+        .channels
+        .iter()
+        .map(|channel| {
+            (0..part.bins)
+                .flat_map(|bin| {
+                    let omega = std::f64::consts::TAU * record.grid.rate_hz() * bin as f64 / length as f64;
+                    let near = ((omega / step).round() as usize).min(record.transfer.len() - 1);
+                    let mut variance = channel.deviation * channel.deviation;
+                    if record.domain == Domain::Response {
+                        for (from, force_deviation) in record.force_deviation_n.iter().enumerate() {
+                            let response: num_complex::Complex64 = (0..3)
+                                .map(|axis| {
+                                    record.transfer[near][(axis, from)] * channel.pickup.weights[axis]
+                                })
+                                .sum();
+                            variance += (response * channel.factor(omega)).norm_sqr()
+                                * force_deviation
+                                * force_deviation;
+                        }
+                    }
+                    let parts = if bin == 0 || 2 * bin == length { 1 } else { 2 };
+                    std::iter::repeat_n(1.0 / variance.sqrt(), parts)
+                })
+                .collect()
+        })
+        .collect()
 }
 
 /// An orthonormal basis of decays and offsets in a part; where forces are compared there is neither.

@@ -2,6 +2,8 @@
 
 pub mod answer;
 pub mod cell_map;
+pub mod comparison;
+pub mod diagnosis;
 pub mod frf_chart;
 pub mod lobe_chart;
 pub mod marks;

@@ -59,7 +59,7 @@ pub fn time_signal(
 }
 
 /// The least and the greatest value of every stretch, in the order in which they come.
-fn thinned(t_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+pub(super) fn thinned(t_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = t_s.iter().copied().zip(values.iter().copied()).collect();
     let stretch = points.len().div_ceil(STRETCHES).max(1);
     if stretch <= 2 {

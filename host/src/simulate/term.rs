@@ -31,6 +31,9 @@ pub trait Term: Debug + Send + Sync {
         0
     }
 
+    /// Puts its own states to what they are where a motion is found going on; a simulation begins with zeros.
+    fn begin(&self, _at: &At, _own: &mut [f64]) {}
+
     /// f_r, N.
     fn restoring_n(&self, branch: Branch, at: &At, own: &[f64]) -> [f64; 3];
 

@@ -10,7 +10,7 @@ mod mode_coupling;
 mod quadratic_stiffness;
 mod softening_hardening;
 
-use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::cause::{Cause, Parameter, Part, Place, Regressor};
 use crate::diagnose::path::restoring_along;
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::{Scene, terms_of};
@@ -22,7 +22,9 @@ pub(super) fn all() -> Vec<Box<dyn Cause>> {
         quadratic_stiffness::CAUSE,
         cubic_damping::CAUSE,
         softening_hardening::CAUSE,
-        coulomb_friction::CAUSE,
+        coulomb_friction::ALIKE,
+        coulomb_friction::EACH_WAY,
+        coulomb_friction::BEHIND_PLAY,
         backlash::CAUSE,
         hysteresis::CAUSE,
         mode_coupling::QUARTIC,
@@ -48,6 +50,8 @@ struct Restoring {
     shapes: fn(&Scene<'_>, usize) -> Vec<Vec<f64>>,
     /// Bounds of the shape.
     bounds: fn(&Scene<'_>, usize) -> Vec<[f64; 2]>,
+    /// Whether it acts behind a play, which is a backlash.
+    behind_play: bool,
     /// Whether coefficients and shape are physical.
     physical: fn(coefficients: &[f64]) -> bool,
 }
@@ -61,6 +65,7 @@ const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring
         axes: 1,
         shapes: |_, _| vec![Vec::new()],
         bounds: |_, _| Vec::new(),
+        behind_play: false,
         physical: |_| true,
     }
 }
@@ -108,9 +113,11 @@ fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
 }
 
 impl Restoring {
-    /// The extension that the baseline has of this name.
-    fn in_baseline<'a>(&self, scene: &'a Scene<'_>) -> Option<&'a toml::Table> {
-        scene.baseline.case.extensions.get(self.name)
+    /// True where the baseline has an extension of its name: a case holds one.
+    fn in_baseline(&self, scene: &Scene<'_>) -> bool {
+        self.names()
+            .iter()
+            .any(|name| scene.baseline.case.extensions.contains_key(*name))
     }
 
     fn table(&self, place: &Place, shape: &[f64], coefficients: &[f64]) -> toml::Table {
@@ -132,8 +139,38 @@ impl Cause for Restoring {
         self.name
     }
 
+    fn names(&self) -> Vec<&'static str> {
+        if self.behind_play {
+            vec![self.name, "backlash"]
+        } else {
+            vec![self.name]
+        }
+    }
+
+    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
+        let of_play = |(key, _): &&Parameter| *key == "play_mm";
+        let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
+        let mut parts = vec![Part {
+            name: self.name,
+            extension: self.extension(place, &own),
+            parameters: own,
+        }];
+        if let Some((_, play_mm)) = parameters.iter().find(of_play) {
+            let gap = vec![("gap_mm", *play_mm)];
+            let mut extension = toml::Table::new();
+            extension.insert("gap_mm".into(), (*play_mm).into());
+            extension.insert("before".into(), self.name.into());
+            parts.push(Part {
+                name: "backlash",
+                parameters: gap,
+                extension,
+            });
+        }
+        parts
+    }
+
     fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        if self.in_baseline(scene).is_some() {
+        if self.in_baseline(scene) {
             return Vec::new();
         }
         let axes = scene.driven_axes();

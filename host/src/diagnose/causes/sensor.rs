@@ -143,9 +143,7 @@ impl Cause for Delay {
         let [[_, longest]] = self.bounds(scene, place)[..] else {
             return Vec::new();
         };
-        [0.002, 0.1, 0.3, 0.6, 1.0]
-            .map(|share| vec![share * longest])
-            .to_vec()
+        [0.01, 0.3, 1.0].map(|share| vec![share * longest]).to_vec()
     }
 
     fn bounds(&self, scene: &Scene<'_>, _: &Place) -> Vec<[f64; 2]> {
@@ -177,8 +175,14 @@ impl Cause for Delay {
         })
     }
 
-    /// The coefficient scales a curve that is exact at one delay: it must come out as that delay, within the reach of the
-    /// straight line between them.
+    /// The regressor is exact at the delay that it was made for.
+    fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
+        coefficients
+            .first()
+            .filter(|delay| **delay > 0.0)
+            .map(|delay| vec![*delay])
+    }
+
     fn parameters(
         &self,
         _: &Scene<'_>,

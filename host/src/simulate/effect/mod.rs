@@ -232,7 +232,8 @@ impl Effects {
         Self::build(vec![extension(name, table)?])
     }
 
-    fn build(all: Vec<Parameters>) -> Result<Self, EffectError> {
+    fn build(mut all: Vec<Parameters>) -> Result<Self, EffectError> {
+        coulomb_friction::take_play(&mut all)?;
         all.into_iter()
             .map(|mut parameters| {
                 let kind = kind(parameters.effect())?;

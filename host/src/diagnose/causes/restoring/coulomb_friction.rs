@@ -1,8 +1,29 @@
-//! f_r += fc·sign(v), with another force for each way. Seen at low levels: sticking, and damping that falls with amplitude.
+//! f_r += fc·sign(v), alike for both ways or another force for each. Seen at low levels: sticking, and damping that falls with
+//! amplitude.
 
-use super::{Restoring, plain};
+use super::{Restoring, largest_m, plain};
 
-pub(super) const CAUSE: Restoring = Restoring {
+pub(super) const ALIKE: Restoring = Restoring {
+    physical: |fc| fc.iter().all(|fc| *fc > 0.0),
+    ..plain("coulomb-friction", &["fc_n"])
+};
+
+pub(super) const EACH_WAY: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc >= 0.0),
+    ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
+};
+
+/// Friction that takes hold only once a play has been crossed: no force after a reversal, then friction.
+pub(super) const BEHIND_PLAY: Restoring = Restoring {
+    shape: &["play_mm"],
+    shapes: |scene, axis| {
+        let most = 2e3 * largest_m(scene, axis);
+        [0.02, 0.04, 0.08, 0.16, 0.32, 0.5, 0.7]
+            .map(|share| vec![share * most])
+            .to_vec()
+    },
+    bounds: |scene, axis| vec![[largest_m(scene, axis), 1.9e3 * largest_m(scene, axis)]],
+    physical: |fc| fc.iter().all(|fc| *fc >= 0.0) && fc.iter().any(|fc| *fc > 0.0),
+    behind_play: true,
     ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
 };

@@ -13,6 +13,6 @@ pub(super) const SETTLING: Restoring = Restoring {
             .map(|t| vec![t])
             .collect()
     },
-    bounds: |scene, _| vec![[0.01 * longest_s(scene), 2.0 * longest_s(scene)]],
+    bounds: |scene, _| vec![[0.05 * longest_s(scene), 2.0 * longest_s(scene)]],
     ..plain("drift", &["relative_change"])
 };

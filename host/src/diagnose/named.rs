@@ -1,0 +1,237 @@
+//! Causes with their parameters and intervals, as an answer says them.
+
+use nalgebra::DMatrix;
+
+use super::answer::{Figure, NamedCause};
+use super::cause::{Part, Place};
+use super::evidence::{Explanation, Library};
+use super::judge::APART;
+use super::regression::{Regression, Share};
+use super::scene::{Scene, direction_of};
+
+/// A normal deviate is within this many deviations with 90 %.
+const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
+
+/// The causes of an explanation.
+pub(super) fn named(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &mut Regression,
+    explanation: &Explanation,
+    inflation: f64,
+    confidence: f64,
+) -> Vec<NamedCause> {
+    let covariance = covariance(scene, library, regression, explanation);
+    let mut all = Vec::new();
+    for place in 0..explanation.choices.len() {
+        let choice = explanation.choices[place];
+        let candidate = &library.candidates[choice.candidate];
+        let cause = library.cause(choice.candidate);
+        let shape = &candidate.shapes[choice.shape].0;
+        let coefficients = library.coefficients(explanation, place);
+        let parts = |inner: &[f64]| -> Option<Vec<Part>> {
+            let (coefficients, shape) = inner.split_at(coefficients.len());
+            let parameters = cause.parameters(scene, &candidate.place, shape, coefficients)?;
+            let mut parts = cause.parts(&candidate.place, &parameters);
+            parts[0]
+                .parameters
+                .extend(cause.also(scene, &candidate.place, &parameters));
+            Some(parts)
+        };
+        let values = |inner: &[f64]| -> Option<Vec<f64>> {
+            let parts = parts(inner)?;
+            Some(
+                parts
+                    .iter()
+                    .flat_map(|part| part.parameters.iter().map(|(_, value)| *value))
+                    .collect(),
+            )
+        };
+        let inner: Vec<f64> = coefficients.iter().chain(shape).copied().collect();
+        let (Some(parts), Some(center)) = (parts(&inner), values(&inner)) else {
+            continue;
+        };
+        let mut deviations = deviations(&values, &inner, &center, &covariance[place], inflation).into_iter();
+        for part in parts {
+            all.push(NamedCause {
+                parameters: part
+                    .parameters
+                    .iter()
+                    .map(|(key, value)| (*key, figure(*value, deviations.next().unwrap_or(0.0))))
+                    .collect(),
+                ..empty(part.name, &candidate.place, confidence, part.extension)
+            });
+        }
+    }
+    all
+}
+
+/// The extensions of an explanation, name by name.
+pub(super) fn extensions(
+    scene: &Scene<'_>,
+    library: &Library,
+    explanation: &Explanation,
+) -> Option<Vec<(&'static str, toml::Table)>> {
+    let parameters = library.parameters(scene, explanation)?;
+    Some(
+        explanation
+            .choices
+            .iter()
+            .zip(parameters)
+            .flat_map(|(choice, parameters)| {
+                let place = &library.candidates[choice.candidate].place;
+                library.cause(choice.candidate).parts(place, &parameters)
+            })
+            .map(|part| (part.name, part.extension))
+            .collect(),
+    )
+}
+
+/// Mass, stiffness and damping by one factor, where that is the same as the gain that was found.
+pub(super) fn by_common_factor(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &Regression,
+    best: &Explanation,
+    inflation: f64,
+) -> Vec<NamedCause> {
+    let [choice] = best.choices[..] else {
+        return Vec::new();
+    };
+    if !["sensor-gain", "sensor-offset-from-tool-tip"].contains(&library.cause(choice.candidate).name()) {
+        return Vec::new();
+    }
+    for axis in scene.driven_axes() {
+        let Some((left, change)) = library.common_factor(regression, axis) else {
+            continue;
+        };
+        if (left - best.fit.left) / inflation > APART {
+            continue;
+        }
+        // The factor is as sure as the gain.
+        let deviation = best.fit.covariance[(0, 0)].max(0.0).sqrt() * inflation.sqrt();
+        return library
+            .candidates
+            .iter()
+            .filter(|known| known.place == Place::Axis(axis))
+            .filter_map(|known| {
+                let cause = &*library.causes[known.cause];
+                if !["mass", "stiffness", "damping"].contains(&cause.name()) {
+                    return None;
+                }
+                let parameters = cause.parameters(scene, &known.place, &[], &[change])?;
+                let (key, value) = *parameters.first()?;
+                let scale = value / (1.0 + change);
+                let extension = cause.extension(&known.place, &parameters);
+                Some(NamedCause {
+                    parameters: [(key, figure(value, scale * deviation))].into(),
+                    ..empty(cause.name(), &known.place, 0.25, extension)
+                })
+            })
+            .collect();
+    }
+    Vec::new()
+}
+
+fn empty(name: &'static str, place: &Place, confidence: f64, extension: toml::Table) -> NamedCause {
+    NamedCause {
+        name,
+        confidence,
+        direction: place.direction().map(|direction| direction.name()),
+        directions: match place {
+            Place::Axes(a, b) => Some([direction_of(*a).name(), direction_of(*b).name()]),
+            _ => None,
+        },
+        channel: place.channel().map(String::from),
+        parameters: std::collections::BTreeMap::new(),
+        extension,
+    }
+}
+
+fn figure(value: f64, deviation: f64) -> Figure {
+    Figure {
+        value,
+        ci90: [
+            value - NINETY_PERCENT * deviation,
+            value + NINETY_PERCENT * deviation,
+        ],
+    }
+}
+
+/// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1.
+fn covariance(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &mut Regression,
+    explanation: &Explanation,
+) -> Vec<DMatrix<f64>> {
+    let mut columns = library.columns_of(explanation);
+    let mut places: Vec<Vec<usize>> = Vec::new();
+    let mut from = 0;
+    for place in 0..explanation.choices.len() {
+        let coefficients = library.coefficients(explanation, place);
+        places.push((from..from + coefficients.len()).collect());
+        from += coefficients.len();
+    }
+    for (place, rows) in places.iter_mut().enumerate() {
+        let choice = explanation.choices[place];
+        let coefficients = library.coefficients(explanation, place);
+        let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
+        if shape.is_empty()
+            || library
+                .cause(choice.candidate)
+                .settled(shape, &coefficients)
+                .is_some()
+        {
+            continue;
+        }
+        if let Some(slopes) = library.slopes(scene, regression, choice, &coefficients) {
+            rows.extend(columns.len()..columns.len() + slopes.len());
+            columns.extend(slopes);
+        }
+    }
+    let whole = regression
+        .fit(Share::Whole, &columns)
+        .map_or_else(|| explanation.fit.covariance.clone(), |fit| fit.covariance);
+    places
+        .iter()
+        .map(|rows| {
+            DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+                whole.get((rows[i], rows[j])).copied().unwrap_or(0.0)
+            })
+        })
+        .collect()
+}
+
+/// Standard deviations of what `values` says, by differences.
+fn deviations(
+    values: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
+    inner: &[f64],
+    center: &[f64],
+    covariance: &DMatrix<f64>,
+    inflation: f64,
+) -> Vec<f64> {
+    let mut gradient = vec![vec![0.0; inner.len()]; center.len()];
+    for index in 0..inner.len() {
+        let step = 1e-6 * inner[index].abs().max(1e-300);
+        let mut moved = inner.to_vec();
+        moved[index] += step;
+        if let Some(moved) = values(&moved) {
+            for (parameter, value) in moved.iter().enumerate() {
+                gradient[parameter][index] = (value - center[parameter]) / step;
+            }
+        }
+    }
+    gradient
+        .iter()
+        .map(|gradient| {
+            let mut variance = 0.0;
+            for i in 0..covariance.nrows() {
+                for j in 0..covariance.nrows() {
+                    variance += gradient[i] * gradient[j] * covariance[(i, j)];
+                }
+            }
+            (variance.max(0.0) * inflation).sqrt()
+        })
+        .collect()
+}
