@@ -17,7 +17,13 @@ fn folder(name: &str) -> Option<PathBuf> {
     folder
 }
 
-fn recording(name: &str, rate_hz: f64, force: &[f64], displacement: &[f64], input: Option<&str>) -> Recording {
+fn recording(
+    name: &str,
+    rate_hz: f64,
+    force: &[f64],
+    displacement: &[f64],
+    input: Option<&str>,
+) -> Recording {
     let channel = |name: &str, quantity, samples: &[f64]| Channel {
         name: name.into(),
         quantity,
@@ -71,7 +77,10 @@ const SILVERBOX_RATE_HZ: f64 = 610.35;
 fn the_silverbox_has_a_cubic_spring() {
     let Some(folder) = folder("silverbox") else { return };
     let text = std::fs::read_to_string(folder.join("SNLS80mV.csv")).unwrap();
-    let rows = text.lines().skip(1).filter(|line| !line.trim_matches(',').is_empty());
+    let rows = text
+        .lines()
+        .skip(1)
+        .filter(|line| !line.trim_matches(',').is_empty());
     let mut columns = [Vec::new(), Vec::new()];
     for row in rows {
         for (column, field) in columns.iter_mut().zip(row.split(',')) {
@@ -112,9 +121,16 @@ fn the_positioning_stage_has_dry_friction() {
     let believed = case_text(95.109, 203.50, 0.0);
     let found = ask(&believed, std::slice::from_ref(&record));
     assert!(names(&found).contains(&"coulomb-friction"));
-    let friction = found.causes.iter().find(|cause| cause.name == "coulomb-friction").unwrap();
+    let friction = found
+        .causes
+        .iter()
+        .find(|cause| cause.name == "coulomb-friction")
+        .unwrap();
     println!("{friction:?}");
-    let (before, after) = (found.baseline.nrmse_heldout, found.extended.unwrap().nrmse_heldout);
+    let (before, after) = (
+        found.baseline.nrmse_heldout,
+        found.extended.unwrap().nrmse_heldout,
+    );
     println!("force error {:.2} % -> {:.2} %", 100.0 * before, 100.0 * after);
     assert!(after <= 0.041, "{after}");
     not_again(&believed, &found, &[record]);
@@ -122,7 +138,9 @@ fn the_positioning_stage_has_dry_friction() {
 
 #[test]
 fn the_banded_damper_has_friction_behind_a_play() {
-    let Some(folder) = folder("friction_backlash") else { return };
+    let Some(folder) = folder("friction_backlash") else {
+        return;
+    };
     let records: Vec<Recording> = ["0.5Hz25lbtension", "1Hz35lbtension", "1Hz70lbtension"]
         .iter()
         .map(|name| {
@@ -130,7 +148,9 @@ fn the_banded_damper_has_friction_behind_a_play() {
             let json: serde_json::Value = serde_json::from_str(&text).unwrap();
             let rows = json["data"].as_array().unwrap();
             let column = |index: usize, unit: f64| -> Vec<f64> {
-                rows.iter().map(|row| unit * row[index].as_f64().unwrap()).collect()
+                rows.iter()
+                    .map(|row| unit * row[index].as_f64().unwrap())
+                    .collect()
             };
             // Inches and kips.
             let (displacement, force) = (column(1, 0.0254), column(2, 4448.221_6));
@@ -142,8 +162,15 @@ fn the_banded_damper_has_friction_behind_a_play() {
     for record in &records {
         let found = ask(&believed, std::slice::from_ref(record));
         let names = names(&found);
-        assert!(names.contains(&"backlash") && names.contains(&"coulomb-friction"), "{names:?}");
-        let backlash = found.causes.iter().find(|cause| cause.name == "backlash").unwrap();
+        assert!(
+            names.contains(&"backlash") && names.contains(&"coulomb-friction"),
+            "{names:?}"
+        );
+        let backlash = found
+            .causes
+            .iter()
+            .find(|cause| cause.name == "backlash")
+            .unwrap();
         let gap_in = backlash.parameters["gap_mm"].value / 25.4;
         println!("{}: gap {gap_in:.4} in", record.path.display());
         assert!((gap_in / 0.125 - 1.0).abs() < 0.1, "{gap_in}");

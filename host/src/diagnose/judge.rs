@@ -19,7 +19,7 @@ const SAMPLING: f64 = 2e-3;
 /// Share of the residual's energy by which interpolation between samples may mislead the comparison of explanations.
 const NUMERICS: f64 = 1e-4;
 /// What may be left beyond the noise, as a share of the noise: that of the estimate of the noise and of chance.
-const WITHIN_NOISE: f64 = 0.1;
+const WITHIN_NOISE: f64 = 0.15;
 /// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
 /// where the noise is known by its floor, and of forces, where derivatives of the motion bring noise that is not white.
 const LEFT_OF_RESPONSE: f64 = 0.012;

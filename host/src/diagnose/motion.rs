@@ -11,6 +11,8 @@ use crate::recording::{Quantity, Recording};
 
 /// Bins over which power is averaged before it is compared with the noise, to either side.
 const AVERAGED: usize = 4;
+/// Share of the lowest natural frequency from which on velocity and acceleration are integrated.
+const INTEGRATED: f64 = 0.25;
 /// Power over noise below which a bin tells nothing.
 const HEARD: f64 = 3.0;
 
@@ -29,7 +31,7 @@ pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Optio
     let mut displacement: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());
     let decay = fine_decay(record, baseline, rate);
     for &axis in &baseline.axes {
-        let correction = correction(record, axis);
+        let correction = correction(record, axis, baseline.lowest_hz().unwrap_or(0.0));
         let x: Vec<Complex64> = (0..bins)
             .map(|bin| {
                 let model: Complex64 = force
@@ -71,7 +73,7 @@ struct Correction {
 }
 
 /// W·(x_measured − x_model) along an axis.
-fn correction(record: &Record, axis: usize) -> Correction {
+fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
     let grid = &record.grid;
     let bins = grid.bins();
     let of_axis: Vec<(&Observed, Vec<Complex64>)> = record
@@ -84,7 +86,13 @@ fn correction(record: &Record, axis: usize) -> Correction {
     let mut precision = vec![0.0; bins];
     for (channel, residual) in &of_axis {
         let weight = channel.pickup.weights[axis];
-        for bin in 0..bins {
+        // Integrals of what leaks to low frequencies would bury the motion: there the model is the better witness.
+        let lowest = if derivatives(channel.pickup.quantity) > 0 {
+            INTEGRATED * std::f64::consts::TAU * lowest_hz
+        } else {
+            0.0
+        };
+        for bin in (0..bins).filter(|bin| grid.omega(*bin) >= lowest) {
             let factor = channel.factor(grid.omega(bin)) * weight;
             let gain = factor.norm_sqr() / (channel.deviation * channel.deviation);
             if gain > 0.0 {

@@ -23,7 +23,7 @@ pub(super) fn named(
 ) -> Vec<NamedCause> {
     let covariance = covariance(scene, library, regression, explanation);
     let mut all = Vec::new();
-    for place in 0..explanation.choices.len() {
+    for (place, covariance) in covariance.iter().enumerate() {
         let choice = explanation.choices[place];
         let candidate = &library.candidates[choice.candidate];
         let cause = library.cause(choice.candidate);
@@ -51,7 +51,7 @@ pub(super) fn named(
         let (Some(parts), Some(center)) = (parts(&inner), values(&inner)) else {
             continue;
         };
-        let mut deviations = deviations(&values, &inner, &center, &covariance[place], inflation).into_iter();
+        let mut deviations = deviations(&values, &inner, &center, covariance, inflation).into_iter();
         for part in parts {
             all.push(NamedCause {
                 parameters: part

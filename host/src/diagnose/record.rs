@@ -258,7 +258,7 @@ fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
 }
 
 /// A force that is white itself has no floor; its noise is taken to be no more than this share of it.
-const MOST_FORCE_NOISE: f64 = 5e-3;
+const MOST_FORCE_NOISE: f64 = 0.02;
 
 fn floor_n(force_n: &[f64]) -> f64 {
     let size = rms(force_n);

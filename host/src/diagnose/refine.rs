@@ -12,7 +12,7 @@ pub(super) fn refine(
     scene: &Scene<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    found: &mut Vec<Explanation>,
+    found: &mut [Explanation],
 ) {
     let Some(best) = found.first().map(|best| best.fit.left) else {
         return;
@@ -46,7 +46,7 @@ fn one(
     }
     let settles = library
         .cause(choice.candidate)
-        .settled(shape, &vec![1.0; 8])
+        .settled(shape, &[1.0; 8])
         .is_some();
     if settles {
         settle(scene, library, regression, explanation, place)
