@@ -3,8 +3,15 @@
 //! Limits have cusps where lobes cross, and islands come and go: linearization alone is wrong there. So machines are drawn
 //! from the distribution of the parameters and the first limit of each is computed, by the method itself. Exact derivatives
 //! make few draws do: the space of the parameters is turned so that its first axes are those along which the limits move, and
-//! along these the draws are stratified. They also say how deep a line must be searched. Batches are drawn until their
-//! scatter says that the percentiles have settled.
+//! along these the draws are stratified. They also say how deep a line must be searched.
+//!
+//! Where limits jump (machines with and without a flip island at the same speed) derivatives at the nominal machine say little. So
+//! the first batches are a pilot: the mean of the machines whose limit lies below a percentile points, by Stein's lemma, along
+//! the mean gradient of the share of such machines, and later batches are stratified along that.
+//!
+//! Percentiles have confidence intervals by Woodruff's method: the scatter of the share below, from batch to batch, says between
+//! which ranks the percentile lies. That holds where the distribution has a gap, in which no percentile is known well,
+//! and is as wide there as it must be. Batches are drawn until the intervals are narrow.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -20,11 +27,17 @@ use crate::case::Case;
 /// Machines in a batch: a power of 2.
 const BATCH: u32 = 64;
 
-/// Batches that are drawn at least, so that their scatter can be told, and at most: 2 048 machines.
-const BATCHES: std::ops::RangeInclusive<u32> = 4..=32;
+/// Batches that are drawn at least, so that their scatter can be told, and at most: 8 192 machines.
+const BATCHES: std::ops::RangeInclusive<u32> = 4..=128;
 
-/// Standard error of every percentile, relative to it, with which no further batch is drawn.
-const SETTLED: f64 = 3e-3;
+/// Batches of the pilot.
+const PILOT: u32 = 4;
+
+/// Half the width of the interval of every percentile, relative to it, with which no further batch is drawn.
+const SETTLED: f64 = 7e-3;
+
+/// Two-sided quantile of the standard normal distribution for 90 % confidence.
+const CONFIDENCE_90: f64 = 1.644_853_626_951_473;
 
 /// The shares of machines whose limits are told.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
@@ -55,13 +68,27 @@ pub struct Percentiles {
     pub high: Option<f64>,
 }
 
+/// For each of the [`Percentiles`] the depths, mm, between which it lies with 90 % confidence; `None` beyond the last depth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PercentileIntervals {
+    /// Of the 5 % limit.
+    #[serde(rename = "5")]
+    pub low: [Option<f64>; 2],
+    /// Of the median.
+    #[serde(rename = "50")]
+    pub median: [Option<f64>; 2],
+    /// Of the 95 % limit.
+    #[serde(rename = "95")]
+    pub high: [Option<f64>; 2],
+}
+
 /// What is known of the limit at one speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitSpread {
     /// Of the first limit.
     pub limit_percentiles_mm: Percentiles,
-    /// The largest standard error of the percentiles, mm, from the scatter of the batches.
-    pub limit_percentiles_error_mm: f64,
+    /// Between which depths each percentile lies with 90 % confidence, mm.
+    pub limit_percentiles_ci90_mm: PercentileIntervals,
     /// How many machines were drawn.
     pub machines: usize,
     /// Share of machines that are stable at each depth asked for; empty where none was.
@@ -141,20 +168,22 @@ impl<'a> Uncertainty<'a> {
             BATCHES_OF_CELLS
         };
         let batches = self.batches(nominal, depth_mm, !cells_mm.is_empty(), least, &SHARES)?;
-        let all = Sorted::new(batches.iter().flatten().flatten());
-        let lines: Vec<&SpeedLine> = batches.iter().flatten().flatten().collect();
+        let lines: Vec<&SpeedLine> = batches.lines().collect();
         let stable = |cell_mm: &f64| {
             let is_stable = |line: &&&SpeedLine| is_stable(line, *cell_mm);
             lines.iter().filter(is_stable).count() as f64 / lines.len() as f64
         };
-        let [low, median, high] = SHARES.map(|share| all.quantile(share));
+        let limits = batches.limits();
+        let [low, median, high] = SHARES.map(|share| limits.all.quantile(share));
+        let [low_ci, median_ci, high_ci] = SHARES.map(|share| limits.interval(share));
         Ok(LimitSpread {
             limit_percentiles_mm: Percentiles { low, median, high },
-            limit_percentiles_error_mm: SHARES
-                .into_iter()
-                .map(|share| error(&batches, share))
-                .fold(0.0, f64::max),
-            machines: batches.iter().map(Vec::len).sum(),
+            limit_percentiles_ci90_mm: PercentileIntervals {
+                low: low_ci,
+                median: median_ci,
+                high: high_ci,
+            },
+            machines: batches.0.iter().map(Vec::len).sum(),
             stable_share: cells_mm.iter().map(stable).collect(),
         })
     }
@@ -171,7 +200,7 @@ impl<'a> Uncertainty<'a> {
         share: f64,
     ) -> Result<Option<f64>, StabilityError> {
         let batches = self.batches(nominal, depth_mm, false, *BATCHES.start(), &[share])?;
-        Ok(Sorted::new(batches.iter().flatten().flatten()).quantile(share))
+        Ok(batches.limits().all.quantile(share))
     }
 
     /// Lines of batches of machines, at least `least`, until the percentiles of these shares have settled.
@@ -182,39 +211,42 @@ impl<'a> Uncertainty<'a> {
         whole: bool,
         least: u32,
         shares: &[f64],
-    ) -> Result<Vec<Vec<Option<SpeedLine>>>, StabilityError> {
+    ) -> Result<Batches, StabilityError> {
         let planes = self.planes(nominal);
         let gradients: Vec<DVector<f64>> = planes.iter().map(|plane| plane.gradient.clone()).collect();
-        let basis = Basis::new(self.variables.len(), &gradients);
-        let mut batches: Vec<Vec<Option<SpeedLine>>> = Vec::new();
+        let mut basis = Basis::new(self.variables.len(), &gradients);
+        let mut batches = Batches(Vec::new());
         for batch in 0..*BATCHES.end() {
             // The speed takes part in the stream: neighbouring speeds draw other machines.
             let stream = nominal.rpm.to_bits().rotate_left(8) ^ u64::from(batch);
             let machines = basis.points(BATCH, self.seed, stream, batch);
-            let lines: Vec<Result<Option<SpeedLine>, StabilityError>> = machines
-                .par_iter()
-                .map(|machine| self.line(machine, nominal.rpm, depth_mm, &planes, whole))
+            let lines: Vec<Result<Drawn, StabilityError>> = machines
+                .into_par_iter()
+                .map(|machine| {
+                    let line = self.line(&machine, nominal.rpm, depth_mm, &planes, whole)?;
+                    Ok(Drawn { machine, line })
+                })
                 .collect();
-            batches.push(lines.into_iter().collect::<Result<_, _>>()?);
+            batches.0.push(lines.into_iter().collect::<Result<_, _>>()?);
             if batch + 1 >= least {
                 self.check_possible(&batches)?;
-                let all = Sorted::new(batches.iter().flatten().flatten());
-                let is_settled = |share: &f64| {
-                    let value = all.quantile(*share).unwrap_or(depth_mm);
-                    error(&batches, *share) <= SETTLED * value
-                };
-                if shares.iter().all(is_settled) {
+                let limits = batches.limits();
+                if shares.iter().all(|share| limits.is_settled(*share, depth_mm)) {
                     break;
                 }
+            }
+            if batch + 1 == PILOT {
+                let mut leading = batches.directions(shares, depth_mm);
+                leading.extend_from_slice(&gradients);
+                basis = Basis::new(self.variables.len(), &leading);
             }
         }
         Ok(batches)
     }
 
-    fn check_possible(&self, batches: &[Vec<Option<SpeedLine>>]) -> Result<(), StabilityError> {
-        let drawn = batches.iter().map(Vec::len).sum::<usize>();
-        let possible = batches.iter().flatten().flatten().count();
-        let impossible = 1.0 - possible as f64 / drawn as f64;
+    fn check_possible(&self, batches: &Batches) -> Result<(), StabilityError> {
+        let drawn = batches.0.iter().map(Vec::len).sum::<usize>();
+        let impossible = 1.0 - batches.lines().count() as f64 / drawn as f64;
         if impossible > IMPOSSIBLE_MAX {
             return Err(StabilityError::Deviations {
                 path: self.case.path.clone(),
@@ -278,19 +310,104 @@ impl<'a> Uncertainty<'a> {
     }
 }
 
-/// The standard error of a percentile, mm, from the scatter of the batches; 0 where it lies beyond the last depth.
-fn error(batches: &[Vec<Option<SpeedLine>>], share: f64) -> f64 {
-    let all = Sorted::new(batches.iter().flatten().flatten()).quantile(share);
-    let each: Option<Vec<f64>> = batches
-        .iter()
-        .map(|batch| Sorted::new(batch.iter().flatten()).quantile(share))
-        .collect();
-    match (all, each) {
-        (None, _) => 0.0,
-        (Some(_), Some(values)) => standard_error(&values),
-        // Some batches see no limit where others do: not settled.
-        (Some(value), None) => value,
+/// A machine, by its standard normal variables, and its line; `None` where there is no such machine.
+struct Drawn {
+    machine: DVector<f64>,
+    line: Option<SpeedLine>,
+}
+
+/// Batches of machines, each evenly spread.
+struct Batches(Vec<Vec<Drawn>>);
+
+impl Batches {
+    fn lines(&self) -> impl Iterator<Item = &SpeedLine> {
+        self.0.iter().flatten().filter_map(|drawn| drawn.line.as_ref())
     }
+
+    fn limits(&self) -> Limits {
+        let of_batch = |batch: &Vec<Drawn>| Sorted::new(batch.iter().filter_map(|drawn| drawn.line.as_ref()));
+        Limits {
+            all: Sorted::new(self.lines()),
+            by_batch: self.0.iter().map(of_batch).collect(),
+        }
+    }
+
+    /// The directions along which the share of limits below each percentile changes, those of percentiles that are known worst
+    /// first.
+    fn directions(&self, shares: &[f64], depth_mm: f64) -> Vec<DVector<f64>> {
+        let limits = self.limits();
+        let mut shares = shares.to_vec();
+        let width = |share: &f64| limits.relative_width(*share, depth_mm);
+        shares.sort_by(|a, b| width(b).total_cmp(&width(a)));
+        let toward = |share: f64| {
+            let percentile_mm = limits.all.quantile(share).unwrap_or(f64::INFINITY);
+            let below = self.0.iter().flatten().filter(|drawn| {
+                let limit = drawn
+                    .line
+                    .as_ref()
+                    .map(|line| limit_of(line).unwrap_or(f64::INFINITY));
+                limit.is_some_and(|limit_mm| limit_mm < percentile_mm)
+            });
+            let size = self
+                .0
+                .iter()
+                .flatten()
+                .next()
+                .map_or(0, |drawn| drawn.machine.len());
+            below.fold(DVector::zeros(size), |sum, drawn| sum + &drawn.machine)
+        };
+        shares.into_iter().map(toward).collect()
+    }
+}
+
+/// First limits of all machines and of every batch.
+struct Limits {
+    all: Sorted,
+    by_batch: Vec<Sorted>,
+}
+
+impl Limits {
+    /// The depths, mm, between which the percentile lies with 90 % confidence (Woodruff 1952); `None` beyond the last depth.
+    fn interval(&self, share: f64) -> [Option<f64>; 2] {
+        let all = &self.all.0;
+        let least = 1.0 / all.len().max(1) as f64;
+        let percentile_mm = self.all.quantile(share).unwrap_or(f64::INFINITY);
+        let below: Vec<f64> = self
+            .by_batch
+            .iter()
+            .map(|batch| batch.share_below(percentile_mm))
+            .collect();
+        // A machine is the finest that shares can tell.
+        let reach = (student_90(below.len()) * standard_error(&below)).max(least);
+        [share - reach, share + reach].map(|share| self.all.quantile(share.clamp(0.0, 1.0)))
+    }
+
+    /// Half the width of the interval relative to the percentile; what lies beyond the last depth counts as there.
+    fn relative_width(&self, share: f64, depth_mm: f64) -> f64 {
+        let [low, high] = self.interval(share).map(|end| end.unwrap_or(depth_mm));
+        let percentile_mm = self.all.quantile(share).unwrap_or(depth_mm);
+        if high > low {
+            0.5 * (high - low) / percentile_mm
+        } else {
+            0.0
+        }
+    }
+
+    fn is_settled(&self, share: f64, depth_mm: f64) -> bool {
+        self.relative_width(share, depth_mm) <= SETTLED
+    }
+}
+
+/// Two-sided quantile of Student's distribution for 90 % confidence with `count` − 1 degrees of freedom, to 2 % from 4 values
+/// on (Abramowitz & Stegun 26.7.5).
+fn student_90(count: usize) -> f64 {
+    let freedom = count.saturating_sub(1).max(1) as f64;
+    let z = CONFIDENCE_90;
+    let (first, second) = (
+        (z.powi(2) + 1.0) / 4.0,
+        (5.0 * z.powi(4) + 16.0 * z.powi(2) + 3.0) / 96.0,
+    );
+    z * (1.0 + first / freedom + second / freedom.powi(2))
 }
 
 /// The first depth that is not surely stable: where stability is lost, or where a second stable orbit begins.
@@ -328,6 +445,13 @@ impl Sorted {
         Self(limits)
     }
 
+    /// The share of all that lies below a depth; a half of what lies at it.
+    fn share_below(&self, depth_mm: f64) -> f64 {
+        let below = self.0.partition_point(|limit| *limit < depth_mm);
+        let up_to = self.0.partition_point(|limit| *limit <= depth_mm);
+        0.5 * (below + up_to) as f64 / self.0.len().max(1) as f64
+    }
+
     /// The value below which a share of all lies, between the neighbours at (i + 1/2)/n (Hazen); `None` where it is infinite.
     fn quantile(&self, share: f64) -> Option<f64> {
         let position = (share * self.0.len() as f64 - 0.5).max(0.0);
@@ -348,4 +472,62 @@ fn standard_error(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / count;
     let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
     (square / (count * (count - 1.0).max(1.0))).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    /// Nine of ten in [1, 2], the others in [4, 5]: a gap in which no percentile is known.
+    fn limit_mm(share: f64) -> f64 {
+        if share < 0.9 {
+            1.0 + share / 0.9
+        } else {
+            4.0 + (share - 0.9) / 0.1
+        }
+    }
+
+    #[test]
+    fn nine_of_ten_intervals_hold_the_percentile_also_beside_a_gap() {
+        let seed = 20_261_121;
+        println!("seed {seed}");
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        for batches in [4, 16, 64] {
+            for share in [0.05, 0.5, 0.89, 0.91, 0.95] {
+                let repeats = 400;
+                let mut held = 0;
+                for _ in 0..repeats {
+                    let by_batch: Vec<Sorted> = (0..batches)
+                        .map(|_| {
+                            let mut limits: Vec<f64> =
+                                (0..BATCH).map(|_| limit_mm(rng.random::<f64>())).collect();
+                            limits.sort_by(f64::total_cmp);
+                            Sorted(limits)
+                        })
+                        .collect();
+                    let mut all: Vec<f64> = by_batch.iter().flat_map(|batch| batch.0.clone()).collect();
+                    all.sort_by(f64::total_cmp);
+                    let limits = Limits {
+                        all: Sorted(all),
+                        by_batch,
+                    };
+                    let [low, high] = limits.interval(share).map(Option::unwrap);
+                    held += i32::from(low <= limit_mm(share) && limit_mm(share) <= high);
+                }
+                let coverage = f64::from(held) / f64::from(repeats);
+                // 400 repeats tell 90 % to 1.5 %; few batches know their own scatter badly, few machines are coarse steps.
+                assert!(coverage > 0.84, "{batches} batches, {share}: {coverage}");
+            }
+        }
+    }
+
+    #[test]
+    fn students_quantiles_are_those_of_the_tables() {
+        // Abramowitz & Stegun, table 26.10.
+        for (count, expected) in [(4, 2.353), (6, 2.015), (11, 1.812), (31, 1.697), (121, 1.658)] {
+            assert!((student_90(count) - expected).abs() < 0.02 * expected, "{count}");
+        }
+    }
 }

@@ -62,66 +62,81 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[((share * sorted.len() as f64) as usize).min(sorted.len() - 1)]
 }
 
+/// Between which depths a percentile of independent draws lies: from the ranks np ± z √(np(1 − p)).
+fn interval_of(sorted: &[f64], share: f64, z: f64) -> [f64; 2] {
+    let reach = z * (share * (1.0 - share) / sorted.len() as f64).sqrt();
+    [share - reach, share + reach].map(|share| quantile(sorted, share))
+}
+
 /// Compares at one speed; the seed of the Monte Carlo differs from that of the draws.
-fn compare(case: &Case, rpm: f64, depth_mm: f64) {
+fn compare(case: &Case, rpm: f64, depth_mm: f64, count: u64) {
     let uncertainty = Uncertainty::new(case, &maker, 7).unwrap();
     let line = nominal(case, rpm, depth_mm);
     let began = std::time::Instant::now();
     let spread = uncertainty.spread(&line, depth_mm, &[]).unwrap();
     let ours = began.elapsed();
     let seed = 20_261_121;
-    let limits = monte_carlo(case, rpm, depth_mm, 2000, seed);
+    let limits = monte_carlo(case, rpm, depth_mm, count, seed);
     let theirs = began.elapsed() - ours;
-    let percentiles = spread.limit_percentiles_mm;
     println!(
-        "{}, {rpm} rev/min: nominal {:.4}, {percentiles:.4?} ± {:.4} from {} machines; Monte Carlo with seed {seed}: \
-         {:.4} {:.4} {:.4}; {:.2} s and {:.2} s",
+        "{}, {rpm} rev/min: nominal {:.4} mm; {} machines in {:.1} s, Monte Carlo of {count} with seed {seed} in {:.1} s",
         case.name,
         limit_of(&line).unwrap_or(f64::INFINITY),
-        spread.limit_percentiles_error_mm,
         spread.machines,
-        quantile(&limits, 0.05),
-        quantile(&limits, 0.5),
-        quantile(&limits, 0.95),
         ours.as_secs_f64(),
         theirs.as_secs_f64(),
     );
-    for (share, found) in [
-        (0.05, percentiles.low),
-        (0.5, percentiles.median),
-        (0.95, percentiles.high),
+    let (percentiles, intervals) = (spread.limit_percentiles_mm, spread.limit_percentiles_ci90_mm);
+    for (share, found, interval) in [
+        (0.05, percentiles.low, intervals.low),
+        (0.5, percentiles.median, intervals.median),
+        (0.95, percentiles.high, intervals.high),
     ] {
         let found = found.unwrap_or(f64::INFINITY);
-        // Where few machines have limits near a percentile the Monte Carlo does not know it to 2 % itself: then its own
-        // interval of 95 % confidence, from the ranks np ± 1.96 √(np(1 − p)), is what can be met.
-        let reach = 1.96 * (share * (1.0 - share) / limits.len() as f64).sqrt();
-        let [low, high] = [share - reach, share + reach].map(|share| quantile(&limits, share));
+        let [from, to] = interval.map(|end| end.unwrap_or(f64::INFINITY));
         let expected = quantile(&limits, share);
+        let [low, high] = interval_of(&limits, share, 1.96);
+        let difference = found / expected - 1.0;
+        println!(
+            "  {:>2.0} %: {found:.4} mm, {from:.4} to {to:.4}; Monte Carlo {expected:.4}, {low:.4} to {high:.4}; {:+.2} %",
+            100.0 * share,
+            100.0 * difference,
+        );
+        // Where few machines have limits near a percentile the Monte Carlo does not know it to 2 % itself: then its own
+        // interval of 95 % is what can be met.
         assert!(
-            found == expected
-                || (found - expected).abs() < 0.02 * expected
-                || (low <= found && found <= high),
+            found == expected || difference.abs() < 0.02 || (low <= found && found <= high),
             "{rpm} rev/min, {share}: {found} mm, Monte Carlo {expected}, {low} to {high}"
+        );
+        assert!(
+            from <= found && found <= to,
+            "{rpm} rev/min, {share}: {interval:?}"
+        );
+        // The stated interval reaches into that of the Monte Carlo; of 99.9 %, since there are dozens of comparisons.
+        let [low, high] = interval_of(&limits, share, 3.29);
+        assert!(
+            from <= high && low <= to,
+            "{rpm} rev/min, {share}: {interval:?} and {low} to {high}"
         );
     }
 }
 
 #[test]
-fn percentiles_at_the_notch_and_at_a_cusp_are_those_of_2000_machines() {
-    for rpm in [1045.0, 1480.0] {
-        compare(&acetal(), rpm, 8.0);
-    }
+fn percentiles_at_a_cusp_are_those_of_2000_machines() {
+    compare(&acetal(), 1480.0, 8.0, 2000);
 }
 
-/// The whole comparison, about a minute: `cargo test --release -p quietcut --lib percentiles_over -- --ignored --nocapture`
+/// The whole comparison: `cargo test --release -p quietcut --lib percentiles_over -- --ignored --nocapture`
 #[test]
-#[ignore = "a minute of Monte Carlo; see the comment above for the command"]
+#[ignore = "a minute or two of Monte Carlo; see the comment above for the command"]
 fn percentiles_over_lobes_cusps_notch_and_islands_are_those_of_2000_machines() {
     for rpm in [
         650.0, 715.0, 812.0, 900.0, 1000.0, 1036.0, 1045.0, 1060.0, 1078.0, 1100.0, 1200.0, 1480.0, 2000.0,
     ] {
-        compare(&acetal(), rpm, 8.0);
+        compare(&acetal(), rpm, 8.0, 2000);
     }
+    // Beside the gap between the flip notch and the Hopf limits 2 000 machines know the 95 % limit to 20 %.
+    compare(&acetal(), 1045.0, 8.0, 40_000);
 }
 
 #[test]
@@ -155,7 +170,8 @@ fn the_force_coefficient_alone_gives_the_distribution_of_its_inverse() {
         );
     }
     // Batches lie between one another: their scatter is more than the error of all of them.
-    assert!(spread.limit_percentiles_error_mm < 5e-3 * limit_mm);
+    let [from, to] = spread.limit_percentiles_ci90_mm.median.map(Option::unwrap);
+    assert!(from < limit_mm && limit_mm < to && to - from < 0.014 * limit_mm);
     let [shallow, at, deep] = spread.stable_share[..] else {
         panic!("three cells")
     };
