@@ -30,6 +30,9 @@ pub struct Args {
     /// The largest axial depth in mm. Default: four times the lowest limit.
     #[arg(long, value_name = "MM", value_parser = super::positive, allow_negative_numbers = true, requires = "cases")]
     depth_mm: Option<f64>,
+    /// Speeds to begin with; more are added where limits bend. Default: 121.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2000), requires = "cases")]
+    speeds: Option<u16>,
     /// Feeds per tooth in mm, one layer each and more between them where limits bend, where limits depend on the feed; separated by
     /// commas.
     #[arg(long, value_name = "MM", value_parser = super::positive, value_delimiter = ',', requires = "cases")]
@@ -137,6 +140,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             .map(|rpm| (rpm.first().min(rpm.last()), rpm.first().max(rpm.last()))),
         depth_mm: args.depth_mm,
         feeds_per_tooth_mm: args.feed,
+        speeds: args.speeds.map(usize::from),
         feed_directions_deg: args.feed_direction_deg,
         derivatives: args.derivatives,
         percentile: args.percentile,
@@ -267,7 +271,7 @@ fn as_text(path: &Path, shown: &Shown) -> String {
     if let Some(error) = &shown.interpolation_error {
         let _ = write!(
             text,
-            ", good to {:.4} mm or {:.2} % of the speed between the entries",
+            ", stable depths right to {:.4} mm between the entries, too cautious over at most {:.2} % of the speed",
             error.depth_mm,
             100.0 * error.speed
         );

@@ -62,7 +62,42 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
         }
         from_mm = stable_to;
     }
-    // A column holds so many: the narrowest stable gap is given up, which is on the safe side.
+    limited(entries)
+}
+
+/// The entries with all depths of others: what overlaps keeps its kind.
+pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
+    let mut all = entries.to_vec();
+    for other in others {
+        let mut from_mm = other.from_mm;
+        let behind = entries.iter().filter(|own| own.to_mm > other.from_mm);
+        for own in behind.take_while(|own| own.from_mm < other.to_mm) {
+            all.extend(other.part(from_mm, own.from_mm));
+            from_mm = own.to_mm;
+        }
+        all.extend(other.part(from_mm, other.to_mm));
+    }
+    all.sort_by(|a, b| a.from_mm.total_cmp(&b.from_mm));
+    limited(all)
+}
+
+impl Entry {
+    /// The part of it between two depths; `None` where there is none.
+    fn part(&self, from_mm: f64, to_mm: f64) -> Option<Self> {
+        (from_mm < to_mm).then_some(Self {
+            interval: Interval {
+                from: Millimeters(from_mm as f32),
+                to: Millimeters(to_mm as f32),
+                ..self.interval
+            },
+            from_mm,
+            to_mm,
+        })
+    }
+}
+
+/// No more entries than a column holds: the narrowest stable gaps are given up, which is on the safe side.
+fn limited(mut entries: Vec<Entry>) -> Vec<Entry> {
     while entries.len() > MAX_INTERVALS {
         let gap = |i: usize| entries[i + 1].from_mm - entries[i].to_mm;
         let narrowest = (0..entries.len() - 1)

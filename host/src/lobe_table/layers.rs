@@ -10,7 +10,8 @@ use super::{BuildError, TableRequest};
 use crate::case::Case;
 use crate::continuation::ForcedProblem;
 use crate::stability::{
-    Collocation, CubicTerms, Limit, Method, Problem, SpeedLine, StabilityError, Uncertainty, chart,
+    Collocation, CubicTerms, Limit, Method, Pitched, Problem, RevolutionCollocation, SpeedLine,
+    StabilityError, Uncertainty, chart,
 };
 
 /// Feed per tooth, mm, up to which a layer holds whose limits do not depend on the feed.
@@ -28,7 +29,7 @@ const SEED: u64 = 1;
 /// What a layer is computed from.
 pub(super) struct Family {
     pub(super) method: Box<dyn Method>,
-    /// The linear problem: the method's own where the structure is linear.
+    /// The linear problem, with the mean pitch: the method's own where the structure is linear and the teeth stand evenly.
     pub(super) linear: Problem,
     pub(super) validity: Validity,
     /// The feed direction, degrees, where the table states it.
@@ -52,7 +53,8 @@ impl Family {
                 what: "--percentile needs deviations, keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa",
             });
         }
-        let linear = Problem::new(&case, CubicTerms::LeaveOut)?;
+        let pitched = Pitched::new(&case, CubicTerms::LeaveOut)?;
+        let linear = pitched.with_mean_pitch().clone();
         Ok(Self {
             method: method(&case)?,
             validity: Validity {
@@ -73,6 +75,38 @@ impl Family {
     /// The case file.
     pub(super) fn path(&self) -> &Path {
         &self.case.path
+    }
+
+    fn feed_mm(&self) -> f64 {
+        self.case.cut.map_or(0.0, |cut| cut.feed_per_tooth_mm)
+    }
+
+    /// The same case at another feed and direction.
+    fn at(&self, feed_mm: f64, direction_deg: Option<f64>) -> Result<Self, BuildError> {
+        Self::new(
+            at(&self.case, feed_mm, direction_deg),
+            self.percentile,
+            direction_deg,
+        )
+    }
+
+    fn is_of_cut(&self, other: &Self) -> bool {
+        let (a, b) = (self.validity, other.validity);
+        (a.posture, a.start, a.exit) == (b.posture, b.start, b.exit)
+    }
+
+    /// By how much, mm, its feed is larger, all else the same; `None` where it is not.
+    fn feeds_beyond(&self, other: &Self) -> Option<f64> {
+        let more_mm = self.feed_mm() - other.feed_mm();
+        let is_same = self.is_of_cut(other) && self.direction_deg == other.direction_deg;
+        (is_same && depends_on_feed(&self.case) && more_mm > 0.0).then_some(more_mm)
+    }
+
+    /// By how much, degrees, its direction lies further, all else the same; `None` where that is too far for lookups.
+    fn turned_from(&self, other: &Self) -> Option<f64> {
+        let turn = (self.direction_deg? - other.direction_deg?).rem_euclid(360.0);
+        let is_same = self.is_of_cut(other) && self.feed_mm() == other.feed_mm();
+        (is_same && turn > 0.0 && turn <= f64::from(FEED_DIRECTION_SPAN.0)).then_some(turn)
     }
 
     /// The lines at these speeds; where a percentile was asked for, what it leaves of them.
@@ -129,6 +163,10 @@ fn up_to(line: SpeedLine, limit_mm: Option<f64>, depth_mm: f64) -> SpeedLine {
 fn method(case: &Case) -> Result<Box<dyn Method>, StabilityError> {
     Ok(if is_nonlinear(case) {
         Box::new(ForcedProblem::new(case)?)
+    } else if has_variable_pitch(case) {
+        Box::new(RevolutionCollocation {
+            pitched: Pitched::new(case, CubicTerms::Refuse)?,
+        })
     } else {
         Box::new(Collocation {
             problem: Problem::new(case, CubicTerms::Refuse)?,
@@ -142,8 +180,57 @@ fn is_nonlinear(case: &Case) -> bool {
         .is_some_and(crate::structure::Structure::is_nonlinear)
 }
 
+fn has_variable_pitch(case: &Case) -> bool {
+    case.tool
+        .as_ref()
+        .is_some_and(crate::milling::Tool::has_variable_pitch)
+}
+
 fn depends_on_feed(case: &Case) -> bool {
     case.axial_depth_modulation() || is_nonlinear(case)
+}
+
+/// A place where a table is checked: a layer, or half way between two that lookups interpolate between.
+pub(super) struct Span {
+    pub(super) family: Family,
+    /// Index of the layer, or of both.
+    pub(super) layers: Vec<usize>,
+}
+
+/// All layers, and the middles of all pairs of neighbours in feed or in feed direction.
+pub(super) fn spans(families: &[Family]) -> Result<Vec<Span>, BuildError> {
+    let mut spans = Vec::new();
+    for (index, family) in families.iter().enumerate() {
+        spans.push(Span {
+            family: family.at(family.feed_mm(), family.direction_deg)?,
+            layers: vec![index],
+        });
+        if let Some(next) = nearest(families, index, |other| other.feeds_beyond(family)) {
+            let feed_mm = 0.5 * (family.feed_mm() + families[next].feed_mm());
+            spans.push(Span {
+                family: family.at(feed_mm, family.direction_deg)?,
+                layers: vec![index, next],
+            });
+        }
+        if let Some(next) = nearest(families, index, |other| other.turned_from(family)) {
+            let turn = families[next].turned_from(family).unwrap_or(0.0);
+            let degrees = family.direction_deg.map(|degrees| degrees + 0.5 * turn);
+            spans.push(Span {
+                family: family.at(family.feed_mm(), degrees)?,
+                layers: vec![index, next],
+            });
+        }
+    }
+    Ok(spans)
+}
+
+/// The family with the least distance from one, where it has any.
+fn nearest(families: &[Family], index: usize, distance: impl Fn(&Family) -> Option<f64>) -> Option<usize> {
+    let others = families.iter().enumerate().filter(|(other, _)| *other != index);
+    others
+        .filter_map(|(other, family)| Some((other, distance(family)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(other, _)| other)
 }
 
 /// What layers a case is divided into.
@@ -217,10 +304,11 @@ pub(super) fn families(cases: &[Case], request: &TableRequest) -> Result<Vec<Fam
                 expected,
             });
         }
-        if request.derivatives && (is_nonlinear(case) || request.percentile.is_some()) {
+        let is_followed = !is_nonlinear(case) && !has_variable_pitch(case) && request.percentile.is_none();
+        if request.derivatives && !is_followed {
             return Err(BuildError::NotPossible {
                 path: case.path.clone(),
-                what: "--derivatives are those of the limits of a linear structure: without cubic terms, without --percentile",
+                what: "--derivatives are those of the limits of a linear structure: without cubic terms, with equal pitch, without --percentile",
             });
         }
     }
@@ -233,17 +321,15 @@ fn divisions(cases: &[Case], request: &TableRequest) -> Result<Vec<Division>, Bu
 }
 
 /// The layers with more feeds and directions between those asked for, until first limits half way differ from the mean of
-/// both sides by less than `tolerance_mm` at the probe speeds, or there are as many as there should be; and by how much,
-/// mm, they differ at most in the end.
+/// both sides by less than `tolerance_mm` at the probe speeds, or there are as many as there should be.
 pub(super) fn refined(
     cases: &[Case],
     request: &TableRequest,
     probes_rpm: &[f64],
     depth_mm: f64,
     tolerance_mm: f64,
-) -> Result<(Vec<Family>, f64), BuildError> {
+) -> Result<Vec<Family>, BuildError> {
     let mut divisions = divisions(cases, request)?;
-    let mut between_mm = 0.0_f64;
     for (case, division) in cases.iter().zip(&mut divisions) {
         let limits = |feed_mm: f64, direction_deg: Option<f64>| -> Result<Vec<f64>, BuildError> {
             let family = Family::new(at(case, feed_mm, direction_deg), None, direction_deg)?;
@@ -257,10 +343,7 @@ pub(super) fn refined(
             most: LAYERS_MAX / division.directions_deg.len().max(1),
             widest: f64::INFINITY,
         };
-        let (feeds_mm, error_mm) =
-            axis.filled(&division.feeds_mm, |feed_mm| limits(feed_mm, direction_deg))?;
-        between_mm = between_mm.max(error_mm);
-        division.feeds_mm = feeds_mm;
+        division.feeds_mm = axis.filled(&division.feeds_mm, |feed_mm| limits(feed_mm, direction_deg))?;
         let stated: Vec<f64> = division.directions_deg.iter().copied().flatten().collect();
         if stated.len() > 1 {
             let axis = Axis {
@@ -269,12 +352,11 @@ pub(super) fn refined(
                 widest: f64::from(FEED_DIRECTION_SPAN.0),
             };
             let feed_mm = division.feeds_mm[0];
-            let (directions, error_mm) = axis.filled(&stated, |degrees| limits(feed_mm, Some(degrees)))?;
-            between_mm = between_mm.max(error_mm);
+            let directions = axis.filled(&stated, |degrees| limits(feed_mm, Some(degrees)))?;
             division.directions_deg = directions.into_iter().map(Some).collect();
         }
     }
-    Ok((divided(cases, &divisions, request)?, between_mm))
+    divided(cases, &divisions, request)
 }
 
 /// How an axis of layers is filled.
@@ -286,17 +368,15 @@ struct Axis {
 }
 
 impl Axis {
-    /// Values between the given ones, ascending, and the largest difference, half way in the gaps that are left, between what
-    /// `limits` says and the mean of both sides.
+    /// The given values, ascending, and more between them, until what `limits` says half way is near the mean of both sides.
     fn filled(
         &self,
         values: &[f64],
         limits: impl Fn(f64) -> Result<Vec<f64>, BuildError>,
-    ) -> Result<(Vec<f64>, f64), BuildError> {
-        let mut error = 0.0_f64;
+    ) -> Result<Vec<f64>, BuildError> {
         let mut filled: Vec<(f64, Vec<f64>)> = Vec::new();
         if let [lone] = values {
-            return Ok((vec![*lone], 0.0));
+            return Ok(vec![*lone]);
         }
         for &value in values {
             filled.push((value, limits(value)?));
@@ -314,10 +394,9 @@ impl Axis {
             if is_wide || (miss > self.tolerance && filled.len() < self.most) {
                 filled.insert(index + 1, (middle, there));
             } else {
-                error = error.max(miss);
                 index += 1;
             }
         }
-        Ok((filled.into_iter().map(|(value, _)| value).collect(), error))
+        Ok(filled.into_iter().map(|(value, _)| value).collect())
     }
 }

@@ -15,6 +15,7 @@ use quietcut_core::working_point::Limits;
 
 use crate::case::Case;
 use crate::stability::{Refinement, StabilityError};
+use accuracy::Checks;
 use derivatives::Derivatives;
 use entries::Entry;
 use layers::Family;
@@ -43,6 +44,8 @@ pub struct TableRequest {
     /// Feed directions, degrees from the machine's x towards its y, one layer each, and more between them where limits bend;
     /// none: that of each case, which the table then does not state.
     pub feed_directions_deg: Vec<f64>,
+    /// Speeds before refinement, at least 2; default 121.
+    pub speeds: Option<usize>,
     /// True for the derivatives of every entry beside the entries.
     pub derivatives: bool,
     /// The first limit of all but this share of the machines that the deviations describe, in percent, instead of the
@@ -87,9 +90,10 @@ pub enum BuildError {
 /// The bytes of a lobe table, header and CRC included: one layer per case, feed and feed direction.
 ///
 /// Speeds are refined until every limit differs from the straight line between its neighbours by less than 0.3 % of
-/// the largest depth, or the table is as long as it should be; feeds and directions likewise. Then every gap of the speeds is
-/// checked against the method itself at one more speed, and the table states how far its answers may be off. Depths with two stable
-/// orbits, which only cubic terms make, count as unstable.
+/// the largest depth, or the table is as long as it should be; feeds and directions likewise. Then every gap between speeds is
+/// checked against the method itself at one more speed, in every layer and half way between layers. Where the table is too deep there,
+/// on flanks too steep for its speeds, the entries around are made as shallow as the gap: see [`InterpolationError`] for what it
+/// states. Depths with two stable orbits, which only cubic terms make, count as unstable.
 ///
 /// # Errors
 /// No case, cases of different tools, two layers for the same cut, or a case whose stability cannot be computed.
@@ -102,7 +106,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
         None => grid::default_depth(&asked, from_rpm, to_rpm)?,
     };
     let probes = grid::spaced(from_rpm, to_rpm, layers::PROBES);
-    let (families, between_mm) = layers::refined(cases, request, &probes, depth_mm, TOLERANCE * depth_mm)?;
+    let families = layers::refined(cases, request, &probes, depth_mm, TOLERANCE * depth_mm)?;
     let modes = if request.derivatives {
         derivatives::mode_count(&families)?
     } else {
@@ -115,7 +119,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
         least_step: 2e-4,
         most_speeds: (BYTES / bytes_of_speed).max(SPEEDS),
     };
-    let coarse = grid::spaced(from_rpm, to_rpm, SPEEDS);
+    let coarse = grid::spaced(from_rpm, to_rpm, request.speeds.unwrap_or(SPEEDS).max(2));
     let speeds = grid::speeds_of_all(&families, &coarse, depth_mm, refinement)?;
     let mut lines = Vec::with_capacity(families.len());
     for family in &families {
@@ -129,7 +133,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
     } else {
         Vec::new()
     };
-    let entries: Vec<Vec<Vec<Entry>>> = lines
+    let mut entries: Vec<Vec<Vec<Entry>>> = lines
         .iter()
         .map(|lines| {
             lines
@@ -138,20 +142,34 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
                 .collect()
         })
         .collect();
-    let table = Table {
-        first,
-        families: &families,
-        speeds: &speeds,
-        entries: &entries,
-        derivatives: &derivatives,
-        depth_mm,
+    let bytes = |entries: &[Vec<Vec<Entry>>], error: Option<InterpolationError>| {
+        let table = Table {
+            first,
+            families: &families,
+            speeds: &speeds,
+            entries,
+            derivatives: &derivatives,
+            depth_mm,
+        };
+        table.bytes(error)
     };
-    let plain = table.bytes(None)?;
+    let tolerance_mm = TOLERANCE * depth_mm;
+    let spans = layers::spans(&families)?;
+    let checks = Checks::new(&spans, &speeds, depth_mm)?;
+    let plain = bytes(&entries, None)?;
     let plain = LobeTable::parse(&plain).map_err(BuildError::Format)?;
-    let mut error =
-        accuracy::interpolation_error(&plain, &families, &speeds, depth_mm, TOLERANCE * depth_mm)?;
-    error.depth = Millimeters(error.depth.0.max(between_mm as f32));
-    table.bytes(Some(error))
+    checks.guard(&plain, &mut entries, tolerance_mm);
+    let guarded = bytes(&entries, None)?;
+    let guarded = LobeTable::parse(&guarded).map_err(BuildError::Format)?;
+    bytes(&entries, Some(checks.stated(&guarded, tolerance_mm)))
+}
+
+/// The table for cuts with a feed direction, where that is known.
+fn towards<'a>(table: &LobeTable<'a>, direction_deg: Option<f64>) -> LobeTable<'a> {
+    match direction_deg {
+        Some(degrees) => table.towards(Degrees(degrees as f32)),
+        None => *table,
+    }
 }
 
 /// All that is written.

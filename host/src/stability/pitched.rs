@@ -28,6 +28,11 @@ impl Pitched {
         Ok(Self { problem, pitch_rad })
     }
 
+    /// The problem with unequal pitches replaced by their mean: its structure, process and number of teeth are those of this one.
+    pub fn with_mean_pitch(&self) -> &Problem {
+        &self.problem
+    }
+
     /// True where teeth stand at unequal angles: there are then several delays.
     pub fn has_variable_pitch(&self) -> bool {
         self.pitch_rad.is_some()

@@ -21,13 +21,15 @@ const MODE_LENGTH: usize = 8;
 
 /// How far what the table says between its entries may be from what the method says there.
 ///
-/// A verdict may differ only at points from which a limit of the method lies within `depth` in depth, or within the share
-/// `speed` of the speed at the same depth.
+/// On the unsafe side `depth` bounds it alone: a depth that the table calls stable is stable for the method, or lies within `depth`
+/// of one that is. On the safe side, what a layer calls unstable may be stable within `depth` of a limit of the method, or within
+/// the share `speed` of the speed of one at the same depth: on steep flanks, and where islands begin and kinds change, entries are
+/// not interpolated but what is unstable in either holds. Between layers that may give up more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InterpolationError {
     /// In depth.
     pub depth: Millimeters,
-    /// In speed, relative to it: where islands begin and kinds change, entries cannot be interpolated.
+    /// In speed, relative to it, on the safe side.
     pub speed: f32,
 }
 
@@ -203,7 +205,7 @@ pub(super) fn check_flags(flags: u16, is_extended: bool) -> Result<(), TableErro
 
 /// Checks all that schema 2 adds: every number finite, errors and modes in their range.
 pub(super) fn check_additions(table: &LobeTable<'_>) -> Result<(), TableError> {
-    let LobeTable { bytes, shape } = table;
+    let LobeTable { bytes, shape, .. } = table;
     for layer in 0..shape.layers {
         shape.feed_direction(bytes, layer)?;
         for mode in 0..shape.modes {
