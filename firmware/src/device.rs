@@ -27,7 +27,7 @@ use quietcut_core::protocol::{
     Info, Refusal, Reply, Reports, Request, Response, Sequence, Status, Subscription, VERSION,
 };
 use quietcut_core::tachometer::Edge;
-use quietcut_core::units::Nanoseconds;
+use quietcut_core::units::{Degrees, Nanoseconds};
 use quietcut_core::working_point::WorkingPoint;
 
 use crate::link::{Line, Link};
@@ -57,6 +57,7 @@ pub struct Device<'a, M, C> {
     monitor: Monitor,
     state: &'a mut State,
     working_point: Option<WorkingPoint>,
+    feed_direction: Option<Degrees>,
     link: Link,
     session: Session,
     outbox: Outbox,
@@ -106,6 +107,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
             monitor: Monitor::new(settings)?,
             state,
             working_point: None,
+            feed_direction: None,
             link: Link::new(),
             session: Session::default(),
             outbox: Outbox::default(),
@@ -229,7 +231,10 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
 
     fn step(&mut self, block: &Block, edges: &[Edge]) {
         self.outbox.make_way();
-        let table = self.storage.table();
+        let table = self.storage.table().map(|table| match self.feed_direction {
+            Some(direction) => table.towards(direction),
+            None => table,
+        });
         let report = self.monitor.step(
             self.state,
             block,
@@ -304,6 +309,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
                 self.restart();
             }
             Request::SetWorkingPoint(point) => self.working_point = checked(point)?,
+            Request::SetFeedDirection(direction) => self.feed_direction = checked_direction(direction)?,
+            Request::FeedDirection => return Ok(Reply::FeedDirection(self.feed_direction)),
             Request::Subscribe(subscription) => {
                 self.subscription = subscription;
                 self.told = None;
@@ -388,5 +395,14 @@ fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal>
         Ok(point)
     } else {
         Err(Refusal::WorkingPoint(cut))
+    }
+}
+
+/// Refuses a feed direction that is no angle.
+fn checked_direction(direction: Option<Degrees>) -> Result<Option<Degrees>, Refusal> {
+    match direction {
+        // Written so that NaN is refused too.
+        Some(direction) if !(-360.0..=360.0).contains(&direction.0) => Err(Refusal::FeedDirection(direction)),
+        _ => Ok(direction),
     }
 }

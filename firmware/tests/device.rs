@@ -287,6 +287,17 @@ fn settings_and_working_point() {
     assert_eq!(bench.status().working_point, Some(POINT));
     assert_eq!(bench.ask(Request::SetWorkingPoint(None)), Reply::Done);
     assert_eq!(bench.status().working_point, None);
+
+    let direction = Some(Degrees(-30.0));
+    assert_eq!(bench.ask(Request::FeedDirection), Reply::FeedDirection(None));
+    assert_eq!(bench.ask(Request::SetFeedDirection(direction)), Reply::Done);
+    for wrong in [f32::INFINITY, 361.0] {
+        let reply = bench.ask(Request::SetFeedDirection(Some(Degrees(wrong))));
+        assert_eq!(reply, Reply::Refused(Refusal::FeedDirection(Degrees(wrong))));
+    }
+    assert_eq!(bench.ask(Request::FeedDirection), Reply::FeedDirection(direction));
+    assert_eq!(bench.ask(Request::SetFeedDirection(None)), Reply::Done);
+    assert_eq!(bench.ask(Request::FeedDirection), Reply::FeedDirection(None));
 }
 
 #[test]

@@ -75,6 +75,8 @@ pub const FEED_DIRECTION_SPAN: Degrees = Degrees(45.0);
 pub const FEED_DIRECTION_TOLERANCE: Degrees = Degrees(0.5);
 
 /// What a depth interval is, if it is not stable.
+///
+/// Multipliers are those over a tooth period; of a tool with teeth at unequal pitch over a revolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Kind {
@@ -132,6 +134,8 @@ impl Validity {
 pub struct LobeTable<'a> {
     bytes: &'a [u8],
     shape: Shape,
+    /// Where the feed goes, if that is known.
+    feed_direction: Option<Degrees>,
 }
 
 impl<'a> LobeTable<'a> {
@@ -142,7 +146,11 @@ impl<'a> LobeTable<'a> {
         let header = Header::read(bytes)?;
         header.check(bytes)?;
         let shape = Shape::read(bytes)?;
-        let table = Self { bytes, shape };
+        let table = Self {
+            bytes,
+            shape,
+            feed_direction: None,
+        };
         table.check_entries()?;
         Ok(table)
     }
@@ -160,6 +168,7 @@ impl<'a> LobeTable<'a> {
         Ok(Self {
             bytes,
             shape: Shape::read(bytes)?,
+            feed_direction: None,
         })
     }
 
@@ -248,16 +257,20 @@ impl<'a> LobeTable<'a> {
 
     /// The columns of one cut; its axial depth is not used.
     pub fn cut(&self, working_point: &WorkingPoint) -> Result<CutLobes<'a>, NotKnown> {
-        CutLobes::new(*self, working_point, None)
+        CutLobes::new(*self, working_point)
     }
 
-    /// The columns of one cut whose feed has a known direction, from the machine's x towards its y.
-    pub fn cut_towards(
-        &self,
-        working_point: &WorkingPoint,
-        feed_direction: Degrees,
-    ) -> Result<CutLobes<'a>, NotKnown> {
-        CutLobes::new(*self, working_point, Some(feed_direction))
+    /// The same table for cuts whose feed has this direction, from the machine's x towards its y.
+    pub fn towards(self, feed_direction: Degrees) -> Self {
+        Self {
+            feed_direction: Some(feed_direction),
+            ..self
+        }
+    }
+
+    /// The feed direction that cuts are asked for with, as [`towards`](Self::towards) has told it.
+    pub fn asked_direction(&self) -> Option<Degrees> {
+        self.feed_direction
     }
 
     /// The column at any speed and working point; its axial depth is not used.

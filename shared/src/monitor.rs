@@ -467,6 +467,7 @@ impl Monitor {
         working_point: Option<&WorkingPoint>,
     ) -> Option<Advice> {
         let table_crc = table.and_then(|table| Some(table.header().ok()?.crc));
+        let feed_direction = table.and_then(LobeTable::asked_direction);
         let moved = |a: f32, b: f32, step: f32| (a - b).abs() > step * b.abs();
         let same = state.advice.as_ref().filter(|advised| {
             let chatter = match (advised.chatter, judgement.chatter) {
@@ -478,6 +479,7 @@ impl Monitor {
                 && !moved(advised.speed.0, speed.0, ADVICE_SPEED_STEP)
                 && advised.working_point.as_ref() == working_point
                 && advised.table == table_crc
+                && advised.feed_direction == feed_direction
         });
         if let Some(advised) = same {
             return Some(advised.advice);
@@ -491,6 +493,7 @@ impl Monitor {
             speed,
             working_point: working_point.copied(),
             table: table_crc,
+            feed_direction,
         });
         Some(advice)
     }

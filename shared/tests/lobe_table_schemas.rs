@@ -278,7 +278,7 @@ proptest! {
             for (index, layer) in table.layers().enumerate().take(8) {
                 let at = working_point(&layer, 1.0);
                 let _ = table.lookup(Rpm(rpm), &at);
-                let _ = table.cut_towards(&at, Degrees(direction)).and_then(|cut| cut.column(Rpm(rpm)));
+                let _ = table.towards(Degrees(direction)).column(Rpm(rpm), &at);
                 let _ = table.corrected_entry(index, 0, &learned);
                 let _ = table.modes(index).count();
             }
@@ -378,7 +378,7 @@ fn limit_towards(bytes: &[u8], direction: f32, feed: f32) -> Result<f32, NotKnow
         ..working_point(&validity(0.15), 1.0)
     };
     let table = LobeTable::parse(bytes).unwrap();
-    let column = table.cut_towards(&at, Degrees(direction))?.column(Rpm(900.0))?;
+    let column = table.towards(Degrees(direction)).column(Rpm(900.0), &at)?;
     Ok(column.first_limit().unwrap().from.0)
 }
 
@@ -432,7 +432,7 @@ fn a_direction_that_was_not_told_is_the_only_one_or_not_known() {
     ));
     assert!(matches!(
         ask(&directed(&[Some(30.0), Some(60.0)], &[0.0])),
-        Answer::NotKnown(NotKnown::FeedDirection { .. })
+        Answer::NotKnown(NotKnown::FeedDirectionNotTold)
     ));
     // A layer for any direction answers for all of them.
     let any = directed(&[None], &[0.0]);

@@ -180,6 +180,8 @@ fn requests() -> Vec<Request> {
         Request::Feed(Feed::new(&block(), edges(8))),
         Request::FeedEdges(edges(32)),
         Request::Reset,
+        Request::SetFeedDirection(Some(Degrees(-30.5))),
+        Request::FeedDirection,
     ]
 }
 
@@ -228,6 +230,7 @@ fn refusals() -> Vec<Refusal> {
         },
         Refusal::Flash,
         Refusal::TooManyEdges { limit: 128 },
+        Refusal::FeedDirection(Degrees(400.0)),
     ]
 }
 
@@ -238,6 +241,7 @@ fn replies() -> Vec<Reply> {
         Reply::Status(status()),
         Reply::Settings(SETTINGS),
         Reply::Upload(UPLOAD),
+        Reply::FeedDirection(Some(Degrees(-30.5))),
     ];
     replies.extend(refusals().into_iter().map(Reply::Refused));
     replies
@@ -291,6 +295,8 @@ fn request_name(request: &Request) -> String {
         Request::Feed(_) => "feed",
         Request::FeedEdges(_) => "feed-edges",
         Request::Reset => "reset",
+        Request::SetFeedDirection(_) => "set-feed-direction",
+        Request::FeedDirection => "feed-direction",
     }
     .into()
 }
@@ -303,6 +309,7 @@ fn response_name(response: &Response) -> String {
             Reply::Status(_) => "reply-status".into(),
             Reply::Settings(_) => "reply-settings".into(),
             Reply::Upload(_) => "reply-upload".into(),
+            Reply::FeedDirection(_) => "reply-feed-direction".into(),
             Reply::Refused(refusal) => format!("refused-{}", refusal_name(refusal)),
         },
         Response::FrameRefused(error) => format!("frame-{}", frame_error_name(error)),
@@ -324,6 +331,7 @@ fn refusal_name(refusal: &Refusal) -> &'static str {
         Refusal::Incomplete { .. } => "incomplete",
         Refusal::Flash => "flash",
         Refusal::TooManyEdges { .. } => "too-many-edges",
+        Refusal::FeedDirection(_) => "feed-direction",
     }
 }
 
@@ -535,8 +543,8 @@ fn each_damage_has_its_own_error() {
         FrameError::Version { ours: 1, theirs: 2 }
     );
     assert_eq!(
-        error(&forged(&raw(&[15]))),
-        FrameError::UnknownMessage { variant: 15 }
+        error(&forged(&raw(&[17]))),
+        FrameError::UnknownMessage { variant: 17 }
     );
     assert_eq!(
         error(&forged(&raw(&[0xFF]))),

@@ -6,7 +6,7 @@ use quietcut_core::monitor::Settings;
 use quietcut_core::protocol::{Info, Status};
 use serde::Serialize;
 
-use super::port::{PortArgs, SlotAnswer, TableAnswer, WorkingPointAnswer};
+use super::port::{PortArgs, SlotAnswer, TableAnswer, WorkingPointAnswer, direction_in_words};
 use super::{Error, Output};
 use crate::report::answer::number;
 
@@ -33,6 +33,7 @@ struct Answer {
     slots: Vec<SlotAnswer>,
     table: Option<TableAnswer>,
     working_point: Option<WorkingPointAnswer>,
+    feed_direction_deg: Option<f64>,
     uptime_s: f64,
     blocks: u32,
     clipped: u32,
@@ -46,7 +47,12 @@ struct Answer {
 pub fn run(args: Args) -> Result<(), Error> {
     let (mut client, info) = args.port.connect()?;
     let (settings, status) = (client.settings()?, client.status()?);
-    let answer = Answer::new(args.port.name(), &info, &settings, &status);
+    // Last, since older firmware does not know of directions.
+    let direction = client.feed_direction()?;
+    let answer = Answer {
+        feed_direction_deg: direction.map(|direction| number(direction.0)),
+        ..Answer::new(args.port.name(), &info, &settings, &status)
+    };
     args.output.answer(&answer, answer.text())
 }
 
@@ -64,6 +70,7 @@ impl Answer {
             slots: info.slots.iter().map(SlotAnswer::new).collect(),
             table: info.table.as_ref().map(TableAnswer::new),
             working_point: status.working_point.as_ref().map(WorkingPointAnswer::new),
+            feed_direction_deg: None,
             uptime_s: status.uptime.0 as f64 / 1e9,
             blocks: status.blocks,
             clipped: status.clipped,
@@ -101,6 +108,7 @@ impl Answer {
             line(&format!("slot {}", index + 1), slot.to_string());
         }
         line("working point", working_point);
+        line("feed direction", direction_in_words(self.feed_direction_deg));
         line("tool", format!("{} teeth", self.teeth));
         line("sensor", format!("{} samples/s", self.sample_rate_hz));
         line("tachometer", wheel);

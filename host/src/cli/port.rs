@@ -166,6 +166,14 @@ impl std::fmt::Display for SlotAnswer {
     }
 }
 
+/// A feed direction, degrees, as text.
+pub fn direction_in_words(direction_deg: Option<f64>) -> String {
+    match direction_deg {
+        Some(degrees) => format!("{degrees}°"),
+        None => "not told: that of the table is assumed, where it has only one".into(),
+    }
+}
+
 /// A working point, as JSON and as text.
 #[derive(Debug, Serialize)]
 pub struct WorkingPointAnswer {

@@ -7,8 +7,9 @@ use std::time::Duration;
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::monitor::{Monitor, State};
 use quietcut_core::protocol::{Reports, Subscription};
+use quietcut_core::units::Degrees;
 
-use super::{Error, Output, count, positive};
+use super::{Error, Output, angle, count, positive};
 use crate::device::{self, Client, Event};
 use crate::recording::{Recording, RecordingError, Sensed, Speed};
 use crate::report::answer::VerdictLog;
@@ -35,8 +36,17 @@ pub struct Args {
     /// Number of teeth where the recording does not say.
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     teeth: Option<NonZeroU8>,
+    /// Feed direction in degrees from the machine's x towards its y, for tables with layers for several.
+    #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
+    feed_direction_deg: Option<f64>,
     #[command(flatten)]
     output: Output,
+}
+
+impl Args {
+    fn feed_direction(&self) -> Option<Degrees> {
+        self.feed_direction_deg.map(|degrees| Degrees(degrees as f32))
+    }
 }
 
 /// Runs the verb.
@@ -69,6 +79,10 @@ fn here(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog
         (Some(bytes), Some(path)) => Some(parse(path, bytes)?),
         _ => None,
     };
+    let table = table.map(|table| match args.feed_direction() {
+        Some(direction) => table.towards(direction),
+        None => table,
+    });
     let mut state = State::default();
     let mut log = VerdictLog::default();
     for (block, edges) in sensed.steps() {
@@ -93,11 +107,17 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
         client.upload(&parse(path, bytes)?, |_, _| {})?;
     }
     let (settings, status) = (client.settings()?, client.status()?);
+    let direction = args
+        .feed_direction_deg
+        .is_some()
+        .then(|| client.feed_direction())
+        .transpose()?;
     let heard = hear(args, &mut client, sensed);
     // Also where something went wrong on the way; that is told then.
     let left = client
         .subscribe(Subscription::default())
         .and_then(|()| client.set_working_point(status.working_point))
+        .and_then(|()| direction.map_or(Ok(()), |told| client.set_feed_direction(told)))
         .and_then(|()| client.set_settings(settings))
         .and_then(|()| client.reset());
     let log = heard?;
@@ -109,6 +129,9 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
 fn hear(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<VerdictLog, Error> {
     client.set_settings(sensed.settings)?;
     client.set_working_point(sensed.working_point)?;
+    if let Some(direction) = args.feed_direction() {
+        client.set_feed_direction(Some(direction))?;
+    }
     client.subscribe(Subscription {
         reports: Reports::All,
         ..Subscription::default()

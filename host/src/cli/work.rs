@@ -4,8 +4,9 @@ use quietcut_core::units::{Degrees, Millimeters};
 use quietcut_core::working_point::WorkingPoint;
 use serde::Serialize;
 
-use super::port::{PortArgs, WorkingPointAnswer};
+use super::port::{PortArgs, WorkingPointAnswer, direction_in_words};
 use super::{Error, Output, angle, positive};
+use crate::report::answer::number;
 
 /// Tells the device its working point; without it, advice says what it assumes.
 #[derive(Debug, clap::Args)]
@@ -25,6 +26,9 @@ pub struct Args {
     /// Feed per tooth in mm.
     #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
     feed: f64,
+    /// Feed direction in degrees from the machine's x towards its y, for tables with layers for several.
+    #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
+    feed_direction_deg: Option<f64>,
     /// Posture of the robot: an index that means the same on host and device.
     #[arg(long, value_name = "N", default_value_t = 0)]
     posture: u8,
@@ -36,6 +40,8 @@ pub struct Args {
 struct Answer<'a> {
     port: &'a str,
     working_point: WorkingPointAnswer,
+    /// `null` where it was not told.
+    feed_direction_deg: Option<f64>,
 }
 
 /// Runs the verb.
@@ -63,10 +69,21 @@ pub fn run(args: Args) -> Result<(), Error> {
             args.port.name()
         ))
     })?;
+    // Last, since older firmware does not know of directions; what was told before is not left behind.
+    let direction = args.feed_direction_deg.map(|degrees| Degrees(degrees as f32));
+    if direction.is_some() || client.feed_direction()?.is_some() {
+        client.set_feed_direction(direction)?;
+    }
     let answer = Answer {
         port: args.port.name(),
         working_point: WorkingPointAnswer::new(&told),
+        feed_direction_deg: client.feed_direction()?.map(|direction| number(direction.0)),
     };
-    let text = format!("{}: {}", answer.port, answer.working_point);
+    let text = format!(
+        "{}: {}, feed direction {}",
+        answer.port,
+        answer.working_point,
+        direction_in_words(answer.feed_direction_deg)
+    );
     args.output.answer(&answer, text)
 }

@@ -9,6 +9,7 @@ use quietcut_core::protocol::{
     Decoder, FrameError, Info, MAX_FRAME, Reply, Request, Response, Sequence, SpectrumChunk, Status,
     StrobeChunk, Subscription, VERSION, encode,
 };
+use quietcut_core::units::Degrees;
 use quietcut_core::working_point::WorkingPoint;
 
 use super::DeviceError;
@@ -129,6 +130,26 @@ impl Client {
     /// Tells the working point, or that it is not known.
     pub fn set_working_point(&mut self, point: Option<WorkingPoint>) -> Result<(), DeviceError> {
         self.tell(&Request::SetWorkingPoint(point), "working point")
+    }
+
+    /// The feed direction, as told.
+    ///
+    /// A device with older firmware does not know the question; it was told none. It must be the last that is asked of such a device.
+    pub fn feed_direction(&mut self) -> Result<Option<Degrees>, DeviceError> {
+        match self.exchange(&Request::FeedDirection, "feed direction", REPLY) {
+            Ok(Reply::FeedDirection(direction)) => Ok(direction),
+            Ok(other) => Err(self.unexpected("feed direction", &other)),
+            Err(DeviceError::Frames {
+                error: FrameError::UnknownMessage { .. },
+                ..
+            }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Tells the feed direction, or that it is not known.
+    pub fn set_feed_direction(&mut self, direction: Option<Degrees>) -> Result<(), DeviceError> {
+        self.tell(&Request::SetFeedDirection(direction), "feed direction")
     }
 
     /// Says what the device shall send by itself.
@@ -321,6 +342,7 @@ impl Client {
             Reply::Status(_) => "status",
             Reply::Settings(_) => "settings",
             Reply::Upload(_) => "upload",
+            Reply::FeedDirection(_) => "feed direction",
         };
         DeviceError::Unexpected {
             port: self.port.name().into(),

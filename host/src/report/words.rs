@@ -217,6 +217,11 @@ pub fn not_known(why: &NotKnown) -> String {
         NotKnown::FeedDirection { .. } => {
             "it depends on the direction of the feed, and has no layers around that of the cut".into()
         }
+        NotKnown::FeedDirectionNotTold => {
+            "it depends on the direction of the feed, which was not told (tell it with `quietcut work`, \
+             --feed-direction-deg)"
+                .into()
+        }
     }
 }
 

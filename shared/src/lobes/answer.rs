@@ -61,9 +61,11 @@ pub enum NotKnown {
     Damaged,
     /// The table has layers for several feed directions, and none is near enough to the one asked for.
     FeedDirection {
-        /// The direction asked for; not a number where none was told.
+        /// The direction asked for.
         asked: Degrees,
     },
+    /// The table has layers for several feed directions, and that of the cut was not told.
+    FeedDirectionNotTold,
 }
 
 /// What the table says of a point.

@@ -14,7 +14,7 @@ pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
             .enumerate()
             .map(|(layer, validity)| (validity, table.feed_direction(layer))),
     )?;
-    let LobeTable { bytes, shape } = table;
+    let LobeTable { bytes, shape, .. } = table;
     let mut expected = 0;
     for layer in 0..shape.layers {
         for speed in 0..shape.speeds {
@@ -32,7 +32,7 @@ pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
 
 /// Checks a column whose intervals must begin at index `expected`; the index behind them.
 fn check_column(
-    LobeTable { bytes, shape }: &LobeTable<'_>,
+    LobeTable { bytes, shape, .. }: &LobeTable<'_>,
     layer: usize,
     speed: usize,
     expected: usize,

@@ -30,12 +30,8 @@ pub struct CutLobes<'a> {
 }
 
 impl<'a> CutLobes<'a> {
-    pub(super) fn new(
-        table: LobeTable<'a>,
-        working_point: &WorkingPoint,
-        feed_direction: Option<Degrees>,
-    ) -> Result<Self, NotKnown> {
-        let (near, far, weight) = bracket(&table, working_point, feed_direction)?;
+    pub(super) fn new(table: LobeTable<'a>, working_point: &WorkingPoint) -> Result<Self, NotKnown> {
+        let (near, far, weight) = bracket(&table, working_point)?;
         Ok(Self {
             table,
             near,
@@ -76,7 +72,7 @@ impl<'a> CutLobes<'a> {
         layer: usize,
         speed_index: usize,
     ) -> Option<impl Iterator<Item = Option<Interval>> + use<'a>> {
-        let LobeTable { bytes, shape } = self.table;
+        let LobeTable { bytes, shape, .. } = self.table;
         shape
             .column(bytes, layer, speed_index)
             .filter(|column| column.len() <= FEW)
@@ -121,31 +117,27 @@ impl<'a> CutLobes<'a> {
 }
 
 /// The two layers around the working point in feed or in feed direction, and the weight of the second.
-fn bracket(
-    table: &LobeTable<'_>,
-    working_point: &WorkingPoint,
-    feed_direction: Option<Degrees>,
-) -> Result<(usize, usize, f32), NotKnown> {
+// Here and below one copy each: flash is scarcer than the time of a call.
+#[inline(never)]
+fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize, usize, f32), NotKnown> {
     // Most tables know of no directions: they are not asked for them at every lookup.
     if !table.shape.is_extended {
-        return bracket_feed(table, working_point, |_| true);
+        return bracket_feed(table, working_point, &|_| true);
     }
     let mut directions = family(table, working_point).filter_map(|layer| table.feed_direction(layer));
     let Some(first) = directions.next() else {
-        return bracket_feed(table, working_point, |_| true);
+        return bracket_feed(table, working_point, &|_| true);
     };
-    let Some(asked) = feed_direction else {
+    let Some(asked) = table.asked_direction() else {
         if directions.any(|other| other != first) {
-            return Err(NotKnown::FeedDirection {
-                asked: Degrees(f32::NAN),
-            });
+            return Err(NotKnown::FeedDirectionNotTold);
         }
-        return bracket_feed(table, working_point, |_| true);
+        return bracket_feed(table, working_point, &|_| true);
     };
     let unknown = NotKnown::FeedDirection { asked };
     let (below, above) = neighbours(table, working_point, asked).ok_or(unknown)?;
     let at = |direction: Degrees| {
-        bracket_feed(table, working_point, |layer| {
+        bracket_feed(table, working_point, &|layer| {
             table.feed_direction(layer).is_none_or(|other| other == direction)
         })
     };
@@ -180,6 +172,7 @@ fn family<'t>(table: &'t LobeTable<'_>, working_point: &'t WorkingPoint) -> impl
 
 /// The directions of layers next to one on both sides, if they are near enough; a layer for any direction counts as
 /// being there itself.
+#[inline(never)]
 fn neighbours(
     table: &LobeTable<'_>,
     working_point: &WorkingPoint,
@@ -203,6 +196,7 @@ fn neighbours(
 }
 
 /// The angle from one direction to another, anticlockwise, from 0 to below 360; NaN where one is no angle.
+#[inline(never)]
 fn turn(from: Degrees, to: Degrees) -> f32 {
     let mut turn = to.0 - from.0;
     if !(-1.0e6..=1.0e6).contains(&turn) {
@@ -219,10 +213,11 @@ fn turn(from: Degrees, to: Degrees) -> f32 {
 
 /// The two layers whose feeds are around that of the working point, and the weight of the second; the same
 /// layer twice where one holds for it.
+#[inline(never)]
 fn bracket_feed(
     table: &LobeTable<'_>,
     working_point: &WorkingPoint,
-    belongs: impl Fn(usize) -> bool,
+    belongs: &dyn Fn(usize) -> bool,
 ) -> Result<(usize, usize, f32), NotKnown> {
     let feed_mm = working_point.feed_per_tooth.0;
     let mut posture_known = false;

@@ -15,7 +15,7 @@ use crate::peaks::Rotation;
 use crate::spectrum::{Overlap, PowerSpectrum, STRUCTURE_BINS, STRUCTURE_POINTS, TOOL_BINS, TOOL_POINTS};
 use crate::synchronous::SamplerState;
 use crate::tachometer::TachometerState;
-use crate::units::{Hertz, Rpm};
+use crate::units::{Degrees, Hertz, Rpm};
 use crate::working_point::WorkingPoint;
 
 /// What the pipeline knows from the blocks so far. [`State::new`] knows nothing.
@@ -49,6 +49,8 @@ pub(super) struct Advised {
     pub(super) working_point: Option<WorkingPoint>,
     /// CRC-32 of the table.
     pub(super) table: Option<u32>,
+    /// The feed direction that the table was asked with.
+    pub(super) feed_direction: Option<Degrees>,
 }
 
 /// One band on its way from samples to findings.

@@ -9,7 +9,7 @@ use crate::lobes::format::NAME_CAPACITY;
 use crate::lobes::{Header, LobeTable, TableError};
 use crate::monitor::{Band, Report, Settings, SettingsError, Strobe};
 use crate::tachometer::Edge;
-use crate::units::{Hertz, Millimeters, Nanoseconds, Rpm};
+use crate::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
 use crate::working_point::{Limits, WorkingPoint};
 
 /// The most bytes of a table in one [`Request::UploadChunk`].
@@ -69,10 +69,14 @@ pub enum Request {
     FeedEdges(Vec<Edge, MAX_EDGES>),
     /// Forgets what the pipeline has learned and takes blocks from the sensor again.
     Reset,
+    /// Tells the feed direction, from the machine's x towards its y, or that it is not known: for tables with layers for some.
+    SetFeedDirection(Option<Degrees>),
+    /// Asks for the feed direction, as told. Reply: [`Reply::FeedDirection`].
+    FeedDirection,
 }
 
 impl Message for Request {
-    const VARIANTS: u8 = 15;
+    const VARIANTS: u8 = 17;
 }
 
 /// What the device sends.
@@ -116,6 +120,8 @@ pub enum Reply {
     Settings(Settings),
     /// How far the upload is.
     Upload(Upload),
+    /// The feed direction, as told.
+    FeedDirection(Option<Degrees>),
 }
 
 /// Why a request is not done.
@@ -161,6 +167,8 @@ pub enum Refusal {
         /// The most it can hold.
         limit: u16,
     },
+    /// The feed direction is no angle from −360 to 360 degrees.
+    FeedDirection(Degrees),
 }
 
 impl core::fmt::Display for Refusal {
@@ -198,6 +206,12 @@ impl core::fmt::Display for Refusal {
             Self::Flash => f.write_str("the flash memory of the device does not keep what is written to it"),
             Self::TooManyEdges { limit } => {
                 write!(f, "more than {limit} tachometer edges for one block of samples")
+            }
+            Self::FeedDirection(direction) => {
+                write!(
+                    f,
+                    "a feed towards {direction}: an angle from -360 to 360 degrees is needed"
+                )
             }
         }
     }
