@@ -203,11 +203,13 @@ fn limits_as_text(chart: &Chart) -> String {
             stable.join(", ")
         );
         if let Some(spread) = &line.spread {
-            let [low, median, high] = percentiles(spread, "beyond");
-            let _ = write!(
-                text,
-                "; limit of 5, 50, 95 % of the machines: {low}, {median}, {high}"
-            );
+            let intervals = spread.limit_percentiles_ci90_mm;
+            let intervals = [intervals.low, intervals.median, intervals.high];
+            text.push_str("; limit of 5, 50, 95 % of the machines:");
+            for (percentile, interval) in percentiles(spread, "beyond").into_iter().zip(intervals) {
+                let [from, to] = interval.map(|end| depth_or(end, "beyond"));
+                let _ = write!(text, " {percentile} ({from}–{to})");
+            }
         }
     }
     text
@@ -216,8 +218,11 @@ fn limits_as_text(chart: &Chart) -> String {
 /// The percentiles as text, mm; `beyond` for what lies beyond the last depth.
 fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
     let percentiles = spread.limit_percentiles_mm;
-    [percentiles.low, percentiles.median, percentiles.high]
-        .map(|depth_mm| depth_mm.map_or_else(|| beyond.into(), |depth_mm| format!("{depth_mm:.4}")))
+    [percentiles.low, percentiles.median, percentiles.high].map(|depth_mm| depth_or(depth_mm, beyond))
+}
+
+fn depth_or(depth_mm: Option<f64>, beyond: &str) -> String {
+    depth_mm.map_or_else(|| beyond.into(), |depth_mm| format!("{depth_mm:.4}"))
 }
 
 fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, path: &Path) -> Result<(), Error> {
