@@ -69,8 +69,8 @@ fn a_virtual_cut_that_cannot_be_is_refused_and_leaves_no_file() {
     let with = |more: &[&str]| cut(&[&long[..], more].concat());
     cut(&["--depth-mm", "-1", "--seconds", "3"]).refused(&["--depth-mm", "-1", "greater than 0"]);
     cut(&["--depth-mm", "1", "--seconds", "1", "--entry", "feed"]).refused(&["--seconds 1", "too short"]);
-    with(&["--effect", "weather=1"]).refused(&["weather", "runout, axial-depth-modulation"]);
-    with(&["--effect", "wear=0.1"]).refused(&["wear", "not simulated yet"]);
+    with(&["--effect", "weather=1"]).refused(&["weather", "runout, process-damping"]);
+    with(&["--effect", "wear=-2"]).refused(&["wear", "negative within 3 s"]);
     with(&["--effect", "runout=much"]).refused(&["runout", "much", "number"]);
     with(&["--clock-error-percent", "4"]).refused(&["--clock-error-percent", "4", "−3 to 3"]);
     with(&["--tacho-positions", "60", "--tacho-missing", "60"])
