@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use super::judge::Verdict;
-use super::puzzle::{Family, Puzzle};
+use super::puzzle::{Family, Hidden, Puzzle};
 
 /// What the tool said of one puzzle.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +25,8 @@ pub(crate) struct Said {
 struct SaidCause {
     name: String,
     confidence: f64,
+    /// Its direction and its channel, where it says one.
+    places: Vec<String>,
     /// Parameters with their 90 % intervals.
     parameters: Vec<(String, [f64; 2])>,
 }
@@ -60,6 +62,10 @@ impl Said {
                     SaidCause {
                         name: cause["name"].as_str().unwrap_or_default().to_owned(),
                         confidence: cause["confidence"].as_f64().unwrap_or(f64::NAN),
+                        places: ["direction", "channel"]
+                            .iter()
+                            .filter_map(|key| Some(cause[key].as_str()?.to_owned()))
+                            .collect(),
                         parameters: parameters
                             .iter()
                             .map(|(key, value)| (key.clone(), interval(value)))
@@ -91,6 +97,16 @@ impl Said {
     }
 }
 
+impl SaidCause {
+    /// True where it is one of the hidden causes, and where it says its direction or channel, at the right one.
+    fn is_any_of(&self, hidden: &[Hidden]) -> bool {
+        hidden.iter().any(|hidden| {
+            let placed = hidden.place.as_ref().filter(|_| !self.places.is_empty());
+            hidden.name == self.name && placed.is_none_or(|place| self.places.contains(place))
+        })
+    }
+}
+
 impl Finding {
     /// Asks `tool` and judges what it says.
     pub(crate) fn of(puzzle: &Puzzle, tool: &(dyn Fn(&Puzzle) -> Value + Sync)) -> Self {
@@ -102,13 +118,13 @@ impl Finding {
             (_, Family::NotInLibrary) => said.outcome == "unexplained",
             (Verdict::Invisible, _) => said.outcome == "none",
             (Verdict::Equivalent(set), _) => said.outcome == "confounded" && said.names() == *set,
-            (_, Family::TwoEffects) => said.outcome == "cause" && said.names() == wanted,
+            (_, Family::TwoEffects) => {
+                let both = said.causes.iter().all(|cause| cause.is_any_of(&puzzle.hidden));
+                said.outcome == "cause" && both && said.names() == wanted
+            }
             _ => {
-                said.outcome == "cause"
-                    && said
-                        .causes
-                        .first()
-                        .is_some_and(|cause| wanted.contains(cause.name.as_str()))
+                let first = said.causes.first();
+                said.outcome == "cause" && first.is_some_and(|cause| cause.is_any_of(&puzzle.hidden))
             }
         };
         let (mut covered, mut missed) = ([0, 0], Vec::new());

@@ -3,10 +3,10 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::cut::CutScale;
 use super::law::Law;
 use super::machine::{Machine, between, either};
 use super::motion::System;
+use super::process::CutScale;
 
 /// A kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -185,6 +185,15 @@ impl Kind {
         )
     }
 
+    /// True of what acts along one direction.
+    pub(crate) fn has_direction(self) -> bool {
+        let of_all = matches!(
+            self,
+            Self::ModeCoupling | Self::Drift | Self::CommonFactor | Self::CommonForce
+        );
+        !of_all && !self.of_sensor() && !PROCESS.contains(&self)
+    }
+
     /// Shares of a hidden effect, drawn.
     pub(crate) fn draw(self, random: &mut ChaCha8Rng) -> Vec<f64> {
         let size = between(random, 0.1, 1.5);
@@ -311,48 +320,6 @@ impl Cause {
             Kind::SensorSquare => vec![("second", 0.1 * s[0])],
             _ => Vec::new(),
         }
-    }
-
-    /// The parameters of what a cut has.
-    fn process_values(
-        &self,
-        machine: &Machine,
-        cut: &CutScale,
-        scale: &Scale,
-    ) -> Option<Vec<(&'static str, f64)>> {
-        let (s, job) = (&self.shares, &cut.job);
-        let [kt, kr, _] = job.cutting_mpa;
-        let edge = kt * job.feed_mm;
-        Some(match self.kind {
-            Kind::ForceCoefficients => vec![
-                ("ktc_mpa", kt * (1.0 + 0.2 * s[0])),
-                ("krc_mpa", kr * (1.0 + 0.2 * s[1])),
-            ],
-            Kind::CommonForce => vec![("factor", 1.0 + 0.1 * s[0])],
-            Kind::EdgeForce => vec![
-                ("kte_n_per_mm", job.edge_n_per_mm[0] + 0.1 * s[0] * edge),
-                ("kre_n_per_mm", job.edge_n_per_mm[1] + 0.1 * s[1] * edge),
-            ],
-            Kind::ForceExponent => vec![
-                ("exponent", 1.0 - 0.4 * s[0]),
-                ("reference_chip_mm", s[1] * job.feed_mm),
-            ],
-            Kind::Runout => vec![
-                ("runout_um", 0.2e3 * s[0] * job.feed_mm),
-                ("angle_deg", s[1].to_degrees()),
-            ],
-            // A damping of half that of the machine, were one tooth always in the cut.
-            Kind::ProcessDamping => {
-                vec![(
-                    "process_damping_n_per_m",
-                    0.5 * s[0] * machine.damping[(0, 0)] * cut.cutting_speed() / (1e-3 * cut.depth_mm),
-                )]
-            }
-            Kind::AxialDepthModulation => vec![("on", s[0])],
-            Kind::SpeedFluctuation => vec![("delta", 0.02 * s[0]), ("frequency_hz", s[1] * cut.rpm / 60.0)],
-            Kind::Wear => vec![("relative_rate_per_s", 0.2 * s[0] / scale.seconds)],
-            _ => return None,
-        })
     }
 
     /// Natural frequency along its direction, rad/s.

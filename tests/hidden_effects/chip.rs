@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::motion::{State, System, interpolated};
+use super::process::Process;
 
 /// Tool, material and engagement as they are believed.
 #[derive(Clone, Debug)]
@@ -27,20 +28,6 @@ pub(crate) struct Run {
     pub(crate) feed_mm: f64,
     /// Spindle angle at the start of the record, rad.
     pub(crate) angle: f64,
-}
-
-/// The process as some causes make it.
-pub(crate) struct Process {
-    pub(crate) cutting_pa: [f64; 3],
-    pub(crate) edge_n_per_m: [f64; 3],
-    /// Radius of each tooth beyond the mean, m.
-    pub(crate) radial_m: Vec<f64>,
-    pub(crate) exponent: Option<(f64, f64)>,
-    pub(crate) damping_n_per_m: f64,
-    /// How much of z is taken from the depth.
-    pub(crate) depth_follows: f64,
-    pub(crate) wear_per_s: f64,
-    pub(crate) fluctuation: Option<[f64; 3]>,
 }
 
 /// The chips of one run.

@@ -13,10 +13,11 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind, PROCESS, Scale};
-use super::chip::{Chips, Job, Process, Run};
+use super::chip::{Chips, Job, Run};
 use super::judge::Lab;
 use super::machine::{Machine, between};
 use super::motion::{Path, System};
+use super::process::{CutScale, Process};
 use super::rig::Output;
 use super::sensor::{Sensor, letter, noisy, read_by};
 
@@ -196,49 +197,6 @@ impl CutBench {
         text
     }
 
-    fn process(&self, causes: &[Cause]) -> Process {
-        let mut process = Process {
-            cutting_pa: self.job.cutting_mpa.map(|value| 1e6 * value),
-            edge_n_per_m: self.job.edge_n_per_mm.map(|value| 1e3 * value),
-            radial_m: vec![0.0; self.job.teeth],
-            exponent: None,
-            damping_n_per_m: 0.0,
-            depth_follows: 0.0,
-            wear_per_s: 0.0,
-            fluctuation: None,
-        };
-        for cause in causes {
-            let values: Vec<f64> = cause
-                .values(&self.machine, &self.scale)
-                .iter()
-                .map(|value| value.1)
-                .collect();
-            match cause.kind {
-                Kind::ForceCoefficients => {
-                    (0..values.len()).for_each(|i| process.cutting_pa[i] = 1e6 * values[i])
-                }
-                Kind::EdgeForce => (0..values.len()).for_each(|i| process.edge_n_per_m[i] = 1e3 * values[i]),
-                Kind::CommonForce => {
-                    process.cutting_pa = process.cutting_pa.map(|value| value * values[0]);
-                    process.edge_n_per_m = process.edge_n_per_m.map(|value| value * values[0]);
-                }
-                Kind::ForceExponent => process.exponent = Some((values[0], 1e-3 * values[1])),
-                Kind::Runout => {
-                    for (index, radial) in process.radial_m.iter_mut().enumerate() {
-                        let angle = values[1].to_radians() + TAU * index as f64 / self.job.teeth as f64;
-                        *radial = 1e-6 * values[0] * angle.cos();
-                    }
-                }
-                Kind::ProcessDamping => process.damping_n_per_m = values[0],
-                Kind::AxialDepthModulation => process.depth_follows = values[0],
-                Kind::SpeedFluctuation => process.fluctuation = Some([values[0], values[1], cause.shares[2]]),
-                Kind::Wear => process.wear_per_s = values[0],
-                _ => {}
-            }
-        }
-        process
-    }
-
     /// Forces and motion of one run at the samples of its record, and the spindle angle.
     fn motion(&self, run: &Run, causes: &[Cause]) -> Motion {
         let step_s = 1.0 / (self.rate_hz * self.steps as f64);
@@ -256,7 +214,7 @@ impl CutBench {
         let chips = Chips {
             job: &self.job,
             run,
-            process: self.process(causes),
+            process: Process::under(causes, &self.job, &self.machine, &self.scale),
             before_s: self.before as f64 / self.rate_hz,
             step_s,
         };
@@ -391,21 +349,6 @@ impl CutBench {
     /// The jitter with which the spindle angle is known from the tachometer, rad: a fiftieth of a sample.
     pub(crate) fn angle_sigma(&self) -> f64 {
         0.02 * TAU * self.runs[0].rpm / 60.0 / self.rate_hz
-    }
-}
-
-/// Sizes that process causes are measured by.
-#[derive(Clone, Debug)]
-pub(crate) struct CutScale {
-    pub(crate) job: Job,
-    pub(crate) depth_mm: f64,
-    pub(crate) rpm: f64,
-}
-
-impl CutScale {
-    /// Cutting speed, m/s.
-    pub(crate) fn cutting_speed(&self) -> f64 {
-        std::f64::consts::PI * 1e-3 * self.job.diameter_mm * self.rpm / 60.0
     }
 }
 

@@ -11,6 +11,7 @@ use super::cut::CutBench;
 use super::judge::{Judge, Lab, Verdict};
 use super::machine::{Machine, between};
 use super::rig::{Bench as RigBench, Output, Rig, Test};
+use super::sensor::letter;
 
 /// The families of the campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +58,8 @@ impl Family {
 pub(crate) struct Hidden {
     pub(crate) name: &'static str,
     pub(crate) values: Vec<(&'static str, f64)>,
+    /// Its direction or channel, where it has one.
+    pub(crate) place: Option<String>,
 }
 
 /// One seed of a family.
@@ -139,9 +142,10 @@ impl Puzzle {
         let ratio = largest_ratio(&output, &lab.output(&[]), &sigma);
         let name = format!("{}-{seed}", family.name());
         let (machine, scale) = bench.machine();
-        let values = |cause: &Cause| Hidden {
+        let describe = |cause: &Cause| Hidden {
             name: cause.kind.name(),
             values: cause.values(machine, scale),
+            place: bench.place(cause),
         };
         Some(Self {
             family,
@@ -151,7 +155,7 @@ impl Puzzle {
                 Bench::Rig(bench) => bench.rig.recordings(&output, &sigma, random, &name),
                 Bench::Cut(bench) => bench.recordings(&output, &sigma, random, &name),
             },
-            hidden: hidden.iter().map(values).collect(),
+            hidden: hidden.iter().map(describe).collect(),
             ratio,
             verdict,
             redrawn: 0,
@@ -177,6 +181,17 @@ impl Bench {
         match self {
             Self::Rig(bench) => (&bench.machine, &bench.rig.scale),
             Self::Cut(bench) => (&bench.machine, &bench.scale),
+        }
+    }
+
+    /// The direction or the channel of a cause, as answers call it.
+    fn place(&self, cause: &Cause) -> Option<String> {
+        if !cause.kind.of_sensor() {
+            return cause.kind.has_direction().then(|| letter(cause.axis).to_string());
+        }
+        match self {
+            Self::Rig(bench) => Some(bench.rig.sensors[cause.sensor].name()),
+            Self::Cut(bench) => bench.channel_names().get(cause.sensor).cloned(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Virtual tests of a machine, and the recordings that their sensors make.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
@@ -13,6 +13,7 @@ use super::judge::Lab;
 use super::machine::Machine;
 use super::motion::{Path, System, first_order, interpolated};
 use super::sensor::{Sensor, letter, noisy, read_by, sensors};
+use super::signal::signal;
 
 /// What kind of test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,65 +165,12 @@ impl Rig {
         }
         run.force_n = vec![[0.0; 3]; points];
         for &axis in driven {
-            let signal = self.signal(random, machine);
+            let signal = signal(self.kind, self.scale.seconds, random, machine);
             for (k, force) in run.force_n.iter_mut().enumerate() {
                 force[axis] = signal(k as f64 * half_s);
             }
         }
         run
-    }
-
-    /// A force of time of about unit size.
-    fn signal(&self, random: &mut ChaCha8Rng, machine: &Machine) -> Box<dyn Fn(f64) -> f64> {
-        let [low, high] = machine.omega.map(|omega| omega / TAU);
-        let (first, last, seconds) = (0.35 * low, 2.2 * high, self.scale.seconds);
-        match self.kind {
-            RecordKind::Hammer => {
-                let spacing = seconds / 4.0;
-                let pulse = 0.35 / high;
-                let blows: Vec<(f64, f64)> = (0..4)
-                    .map(|i| ((0.03 + f64::from(i)) * spacing, random.random_range(0.7..1.3)))
-                    .collect();
-                Box::new(move |t| {
-                    blows
-                        .iter()
-                        .filter(|(start, _)| (*start..start + pulse).contains(&t))
-                        .map(|(start, peak)| peak * (PI * (t - start) / pulse).sin().powi(2))
-                        .sum()
-                })
-            }
-            RecordKind::Sweep => {
-                let (from, to) = if random.random::<bool>() {
-                    (first, last)
-                } else {
-                    (last, first)
-                };
-                Box::new(move |t| (TAU * (from * t + 0.5 * (to - from) / seconds * t * t)).sin())
-            }
-            RecordKind::StepSine => {
-                let count = 8;
-                let dwell = seconds / f64::from(count);
-                let tones: Vec<f64> = (0..count)
-                    .map(|i| {
-                        0.8 * low * (1.25 * high / (0.8 * low)).powf(f64::from(i) / f64::from(count - 1))
-                    })
-                    .collect();
-                Box::new(move |t| {
-                    let index = (t / dwell) as usize;
-                    let tone = tones[index.min(tones.len() - 1)];
-                    (TAU * tone * (t - index as f64 * dwell)).sin()
-                })
-            }
-            _ => {
-                let tones: Vec<(f64, f64)> = (0..40)
-                    .map(|i| {
-                        let share = (f64::from(i) + random.random::<f64>()) / 40.0;
-                        (first + (last - first) * share, random.random_range(0.0..TAU))
-                    })
-                    .collect();
-                Box::new(move |t| tones.iter().map(|(f, phase)| (TAU * f * t + phase).cos()).sum())
-            }
-        }
     }
 
     /// The run with its force such that the believed machine moves by `level` times what is usual.

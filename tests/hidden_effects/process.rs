@@ -1,0 +1,122 @@
+//! The cutting process, and what causes make of it.
+
+use std::f64::consts::TAU;
+
+use super::cause::{Cause, Kind, Scale};
+use super::chip::Job;
+use super::machine::Machine;
+
+/// The process as some causes make it.
+pub(crate) struct Process {
+    pub(crate) cutting_pa: [f64; 3],
+    pub(crate) edge_n_per_m: [f64; 3],
+    /// Radius of each tooth beyond the mean, m.
+    pub(crate) radial_m: Vec<f64>,
+    pub(crate) exponent: Option<(f64, f64)>,
+    pub(crate) damping_n_per_m: f64,
+    /// How much of z is taken from the depth.
+    pub(crate) depth_follows: f64,
+    pub(crate) wear_per_s: f64,
+    pub(crate) fluctuation: Option<[f64; 3]>,
+}
+
+impl Process {
+    /// The process of a job under `causes`.
+    pub(crate) fn under(causes: &[Cause], job: &Job, machine: &Machine, scale: &Scale) -> Self {
+        let mut process = Self {
+            cutting_pa: job.cutting_mpa.map(|value| 1e6 * value),
+            edge_n_per_m: job.edge_n_per_mm.map(|value| 1e3 * value),
+            radial_m: vec![0.0; job.teeth],
+            exponent: None,
+            damping_n_per_m: 0.0,
+            depth_follows: 0.0,
+            wear_per_s: 0.0,
+            fluctuation: None,
+        };
+        for cause in causes {
+            let values: Vec<f64> = cause.values(machine, scale).iter().map(|value| value.1).collect();
+            match cause.kind {
+                Kind::ForceCoefficients => {
+                    (0..values.len()).for_each(|i| process.cutting_pa[i] = 1e6 * values[i])
+                }
+                Kind::EdgeForce => (0..values.len()).for_each(|i| process.edge_n_per_m[i] = 1e3 * values[i]),
+                Kind::CommonForce => {
+                    process.cutting_pa = process.cutting_pa.map(|value| value * values[0]);
+                    process.edge_n_per_m = process.edge_n_per_m.map(|value| value * values[0]);
+                }
+                Kind::ForceExponent => process.exponent = Some((values[0], 1e-3 * values[1])),
+                Kind::Runout => {
+                    for (index, radial) in process.radial_m.iter_mut().enumerate() {
+                        let angle = values[1].to_radians() + TAU * index as f64 / job.teeth as f64;
+                        *radial = 1e-6 * values[0] * angle.cos();
+                    }
+                }
+                Kind::ProcessDamping => process.damping_n_per_m = values[0],
+                Kind::AxialDepthModulation => process.depth_follows = values[0],
+                Kind::SpeedFluctuation => process.fluctuation = Some([values[0], values[1], cause.shares[2]]),
+                Kind::Wear => process.wear_per_s = values[0],
+                _ => {}
+            }
+        }
+        process
+    }
+}
+
+/// Sizes that process causes are measured by.
+#[derive(Clone, Debug)]
+pub(crate) struct CutScale {
+    pub(crate) job: Job,
+    pub(crate) depth_mm: f64,
+    pub(crate) rpm: f64,
+}
+
+impl CutScale {
+    /// Cutting speed, m/s.
+    pub(crate) fn cutting_speed(&self) -> f64 {
+        std::f64::consts::PI * 1e-3 * self.job.diameter_mm * self.rpm / 60.0
+    }
+}
+
+impl Cause {
+    /// The parameters of what a cut has.
+    pub(crate) fn process_values(
+        &self,
+        machine: &Machine,
+        cut: &CutScale,
+        scale: &Scale,
+    ) -> Option<Vec<(&'static str, f64)>> {
+        let (s, job) = (&self.shares, &cut.job);
+        let [kt, kr, _] = job.cutting_mpa;
+        let edge = kt * job.feed_mm;
+        Some(match self.kind {
+            Kind::ForceCoefficients => vec![
+                ("ktc_mpa", kt * (1.0 + 0.2 * s[0])),
+                ("krc_mpa", kr * (1.0 + 0.2 * s[1])),
+            ],
+            Kind::CommonForce => vec![("factor", 1.0 + 0.1 * s[0])],
+            Kind::EdgeForce => vec![
+                ("kte_n_per_mm", job.edge_n_per_mm[0] + 0.1 * s[0] * edge),
+                ("kre_n_per_mm", job.edge_n_per_mm[1] + 0.1 * s[1] * edge),
+            ],
+            Kind::ForceExponent => vec![
+                ("exponent", 1.0 - 0.4 * s[0]),
+                ("reference_chip_mm", s[1] * job.feed_mm),
+            ],
+            Kind::Runout => vec![
+                ("runout_um", 0.2e3 * s[0] * job.feed_mm),
+                ("angle_deg", s[1].to_degrees()),
+            ],
+            // A damping of half that of the machine, were one tooth always in the cut.
+            Kind::ProcessDamping => {
+                vec![(
+                    "process_damping_n_per_m",
+                    0.5 * s[0] * machine.damping[(0, 0)] * cut.cutting_speed() / (1e-3 * cut.depth_mm),
+                )]
+            }
+            Kind::AxialDepthModulation => vec![("on", s[0])],
+            Kind::SpeedFluctuation => vec![("delta", 0.02 * s[0]), ("frequency_hz", s[1] * cut.rpm / 60.0)],
+            Kind::Wear => vec![("relative_rate_per_s", 0.2 * s[0] / scale.seconds)],
+            _ => return None,
+        })
+    }
+}

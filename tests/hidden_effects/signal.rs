@@ -1,0 +1,69 @@
+//! What shakers and hammers ask for.
+
+use std::f64::consts::{PI, TAU};
+
+use quietcut::recording::Kind as RecordKind;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::machine::Machine;
+
+/// A force of time, of about unit size, for a test of `kind` that lasts so long.
+pub(crate) fn signal(
+    kind: RecordKind,
+    seconds: f64,
+    random: &mut ChaCha8Rng,
+    machine: &Machine,
+) -> Box<dyn Fn(f64) -> f64> {
+    let [low, high] = machine.omega.map(|omega| omega / TAU);
+    let (first, last) = (0.35 * low, 2.2 * high);
+    match kind {
+        RecordKind::Hammer => {
+            let spacing = seconds / 4.0;
+            // Smooth, so that it is known between its samples, of which it has twenty or more.
+            let pulse = 1.2 / high;
+            let blows: Vec<(f64, f64)> = (0..4)
+                .map(|i| ((0.03 + f64::from(i)) * spacing, random.random_range(0.7..1.3)))
+                .collect();
+            Box::new(move |t| {
+                blows
+                    .iter()
+                    .filter(|(start, _)| (*start..start + pulse).contains(&t))
+                    .map(|(start, peak)| peak * (PI * (t - start) / pulse).sin().powi(4))
+                    .sum()
+            })
+        }
+        RecordKind::Sweep => {
+            let (from, to) = if random.random::<bool>() {
+                (first, last)
+            } else {
+                (last, first)
+            };
+            Box::new(move |t| (TAU * (from * t + 0.5 * (to - from) / seconds * t * t)).sin())
+        }
+        RecordKind::StepSine => {
+            let count = 8;
+            let dwell = seconds / f64::from(count);
+            let tones: Vec<f64> = (0..count)
+                .map(|i| 0.8 * low * (1.25 * high / (0.8 * low)).powf(f64::from(i) / f64::from(count - 1)))
+                .collect();
+            // The phase goes on from tone to tone, as that of a generator does.
+            let turns_before = |index: usize| tones[..index].iter().sum::<f64>() * dwell;
+            let steps: Vec<(f64, f64)> = (0..count as usize).map(|i| (tones[i], turns_before(i))).collect();
+            Box::new(move |t| {
+                let index = ((t / dwell) as usize).min(steps.len() - 1);
+                let (tone, turns) = steps[index];
+                (TAU * (turns + tone * (t - index as f64 * dwell))).sin()
+            })
+        }
+        _ => {
+            let tones: Vec<(f64, f64)> = (0..40)
+                .map(|i| {
+                    let share = (f64::from(i) + random.random::<f64>()) / 40.0;
+                    (first + (last - first) * share, random.random_range(0.0..TAU))
+                })
+                .collect();
+            Box::new(move |t| tones.iter().map(|(f, phase)| (TAU * f * t + phase).cos()).sum())
+        }
+    }
+}
