@@ -167,7 +167,7 @@ fn teeth(recording: &Recording, speed: Speed) -> Result<u8, RecordingError> {
     }
 }
 
-fn wheel(recording: &Recording) -> Option<Wheel> {
+pub(super) fn wheel(recording: &Recording) -> Option<Wheel> {
     recording.channel("tacho")?;
     let said = recording
         .sidecar
@@ -229,7 +229,8 @@ fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
         .collect()
 }
 
-fn edges(recording: &Recording) -> Vec<Edge> {
+/// The rising edges of the tachometer, in order; none where there is no such channel.
+pub(super) fn edges(recording: &Recording) -> Vec<Edge> {
     let Some(tacho) = recording.channel("tacho") else {
         return Vec::new();
     };

@@ -8,6 +8,7 @@ mod csv;
 mod error;
 mod mat;
 mod sidecar;
+mod spindle_angle;
 pub(crate) mod uff;
 mod unit;
 mod wav;
@@ -16,7 +17,8 @@ use std::path::{Path, PathBuf};
 
 pub use blocks::{Sensed, Speed};
 pub use error::RecordingError;
-pub use sidecar::{Kind, RecordedChannel, RecordedCut, Sidecar};
+pub use sidecar::{Kind, RecordedChannel, RecordedCut, RecordedPosture, Sidecar};
+pub use spindle_angle::SpindleAngle;
 pub use uff::UffForm;
 pub use unit::{Quantity, Sensitivity, Unit, UnknownUnit};
 

@@ -43,9 +43,20 @@ pub struct Sidecar {
     /// The cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cut: Option<RecordedCut>,
+    /// Where the robot stood.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub posture: Option<RecordedPosture>,
     /// The channels by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub channels: BTreeMap<String, RecordedChannel>,
+}
+
+/// The posture at which it was recorded.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordedPosture {
+    /// Joint angles from the base on, degrees.
+    pub joints_deg: Vec<f64>,
 }
 
 /// The cut that was recorded, as far as it is known.
@@ -158,6 +169,10 @@ impl Sidecar {
             && !(0.0 <= start && start < exit && exit <= 360.0)
         {
             return Err(wrong("cut.exit_deg", exit, "an angle above start_deg, up to 360"));
+        }
+        let angles = self.posture.iter().flat_map(|posture| &posture.joints_deg);
+        if let Some(angle) = angles.into_iter().find(|angle| !angle.is_finite()) {
+            return Err(wrong("posture.joints_deg", *angle, "a finite angle"));
         }
         for (name, channel) in &self.channels {
             let positions = channel.pulses_per_rev.unwrap_or(1);

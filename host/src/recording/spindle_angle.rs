@@ -1,0 +1,183 @@
+//! The angle of the spindle at every sample, from the tachometer.
+
+use std::f64::consts::TAU;
+
+use quietcut_core::tachometer::Wheel;
+
+use super::{Recording, RecordingError, blocks};
+
+/// The angle of the spindle, rad, between the first edge of the tachometer and the last.
+///
+/// It is 0 at immersion angle 0 of tooth 1, grows by 2π per turn, and runs straight from edge to edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpindleAngle {
+    /// The first sample that has an angle.
+    pub first: usize,
+    /// The angle of that sample and of all that follow.
+    pub rad: Vec<f64>,
+}
+
+impl SpindleAngle {
+    /// From the channel `tacho` of a recording; `teeth` stand evenly on the tool.
+    ///
+    /// # Errors
+    /// No tachometer, fewer than two edges, edges that do not fit the wheel of the sidecar, or a wheel without a gap of which
+    /// not every edge finds a tooth at immersion angle 0.
+    pub fn new(recording: &Recording, teeth: u32) -> Result<Self, RecordingError> {
+        let Some(wheel) = blocks::wheel(recording) else {
+            return Err(recording.lacks("tacho channel, which says where the teeth are"));
+        };
+        let content = |what: String| RecordingError::Content {
+            path: recording.path.clone(),
+            what,
+        };
+        let edges_s: Vec<f64> = blocks::edges(recording)
+            .iter()
+            .map(|edge| edge.time.0 as f64 * 1e-9)
+            .collect();
+        if edges_s.len() < 2 {
+            return Err(content(format!(
+                "tacho has {} rising edges; at least two are needed",
+                edges_s.len()
+            )));
+        }
+        if wheel.missing == 0 && !teeth.is_multiple_of(u32::from(wheel.positions)) {
+            return Err(content(format!(
+                "a tachometer with {} pulses per turn and no gap does not say where {teeth} teeth are; one pulse per turn, a wheel with a gap (missing), or one pulse per tooth is needed",
+                wheel.positions
+            )));
+        }
+        let edges_rad = angles(&edges_s, wheel).map_err(content)?;
+        let rate_hz = recording.sample_rate_hz;
+        let first = (edges_s[0] * rate_hz).ceil() as usize;
+        let mut edge = 0;
+        let rad = (first..recording.len())
+            .map_while(|sample| {
+                let t = sample as f64 / rate_hz;
+                while edge + 2 < edges_s.len() && edges_s[edge + 1] <= t {
+                    edge += 1;
+                }
+                let share = (t - edges_s[edge]) / (edges_s[edge + 1] - edges_s[edge]);
+                (share <= 1.0).then(|| edges_rad[edge] + share * (edges_rad[edge + 1] - edges_rad[edge]))
+            })
+            .collect();
+        Ok(Self { first, rad })
+    }
+}
+
+/// The angle of every edge, rad.
+fn angles(edges_s: &[f64], wheel: Wheel) -> Result<Vec<f64>, String> {
+    let positions = f64::from(wheel.positions);
+    if wheel.missing == 0 {
+        return Ok((0..edges_s.len())
+            .map(|edge| TAU * edge as f64 / positions)
+            .collect());
+    }
+    let missing = f64::from(wheel.missing);
+    let intervals: Vec<f64> = edges_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    // The speed changes little from one edge to the next: an interval is a gap where a neighbour is shorter by half the gap.
+    let is_gap = |interval: usize| {
+        let neighbours = [
+            interval.checked_sub(1),
+            Some(interval + 1).filter(|&next| next < intervals.len()),
+        ];
+        let shortest = neighbours
+            .into_iter()
+            .flatten()
+            .map(|neighbour| intervals[neighbour])
+            .fold(f64::INFINITY, f64::min);
+        intervals[interval] > (1.0 + 0.5 * missing) * shortest
+    };
+    // With one edge per turn every interval is a gap and none is longer than its neighbours.
+    let lone = wheel.positions - wheel.missing == 1;
+    let gaps: Vec<usize> = (0..intervals.len())
+        .filter(|&interval| lone || is_gap(interval))
+        .collect();
+    let Some(&first) = gaps.first() else {
+        return Err(format!(
+            "tacho has no gap, but missing = {} of {} positions are said to be; does the sidecar belong to this wheel?",
+            wheel.missing, wheel.positions
+        ));
+    };
+    let expected = usize::from(wheel.positions - wheel.missing);
+    if let Some(pair) = gaps.windows(2).find(|pair| pair[1] - pair[0] != expected) {
+        return Err(format!(
+            "tacho has {} edges in the turn that begins at {:.4} s; {expected} are expected of a wheel with {} positions of which {} are missing",
+            pair[1] - pair[0],
+            edges_s[pair[0] + 1],
+            wheel.positions,
+            wheel.missing
+        ));
+    }
+    // The edge after the first gap stands at 0; the ones before it at negative angles.
+    let mut position = -(first as f64 + 1.0 + missing);
+    let mut angles = vec![TAU * position / positions];
+    for interval in 0..intervals.len() {
+        let is_gap = gaps.binary_search(&interval).is_ok();
+        position += if is_gap { 1.0 + missing } else { 1.0 };
+        angles.push(TAU * position / positions);
+    }
+    Ok(angles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Channel, Quantity, RecordedChannel, Sidecar};
+    use super::*;
+
+    /// A level of a spindle at 7 turns per second, sampled at 10 kHz, whose first edge of position 0 comes at 0.05 s.
+    fn recording(positions: u16, missing: u16) -> Recording {
+        let there = positions - missing;
+        let level = |sample: usize| {
+            let turns = 7.0 * (sample as f64 * 1e-4 - 0.05) + 10.0;
+            let place = turns.fract() * f64::from(positions);
+            f64::from(u8::from(place.fract() < 0.5 && (place as u16) < there))
+        };
+        let mut sidecar = Sidecar::default();
+        let channel = RecordedChannel {
+            pulses_per_rev: Some(positions),
+            missing: Some(missing),
+            ..RecordedChannel::default()
+        };
+        sidecar.channels.insert("tacho".into(), channel);
+        Recording {
+            path: "cut.csv".into(),
+            sample_rate_hz: 1e4,
+            start_s: 0.0,
+            channels: vec![Channel {
+                name: "tacho".into(),
+                quantity: Quantity::Level,
+                samples: (0..20_000).map(level).collect(),
+            }],
+            sidecar,
+        }
+    }
+
+    #[test]
+    fn the_angle_is_that_of_the_spindle_for_every_wheel() {
+        for (positions, missing) in [(1, 0), (4, 3), (12, 2), (36, 1)] {
+            let recording = recording(positions, missing);
+            let angle = SpindleAngle::new(&recording, 3).unwrap();
+            assert!(angle.rad.len() > 17_000, "{positions} {missing}");
+            for (index, rad) in angle.rad.iter().enumerate() {
+                let turns = 7.0 * ((index + angle.first) as f64 * 1e-4 - 0.05);
+                let off = (rad / TAU - turns + 0.5).rem_euclid(1.0) - 0.5;
+                // An edge is known to a sample: 7e-4 of a turn.
+                assert!(off.abs() < 1e-3, "{positions} {missing} {index}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn wheels_that_do_not_say_where_the_teeth_are_are_refused() {
+        let error = SpindleAngle::new(&recording(4, 0), 3).unwrap_err().to_string();
+        assert!(error.contains("4 pulses per turn and no gap"), "{error}");
+        assert!(SpindleAngle::new(&recording(3, 0), 3).is_ok());
+        let mut other = recording(12, 2);
+        if let Some(tacho) = other.sidecar.channels.get_mut("tacho") {
+            tacho.pulses_per_rev = Some(14);
+        }
+        let error = SpindleAngle::new(&other, 3).unwrap_err().to_string();
+        assert!(error.contains("12 are expected"), "{error}");
+    }
+}
