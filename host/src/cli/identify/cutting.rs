@@ -1,0 +1,147 @@
+//! `--method force-coefficients`: what cutting tests say of material and tool.
+
+use std::collections::BTreeMap;
+
+use super::answer::{Answer, Cutting, Figure};
+use super::{Args, Error};
+use crate::identify::case_file::{self, Estimate};
+use crate::identify::cutting_test::{CuttingTest, Setup};
+use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
+use crate::recording::Recording;
+
+pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    let full_cut_s = match args.cut_s[..] {
+        [] => None,
+        [from, to] if from < to => Some([from, to]),
+        _ => {
+            return Err(Error::input(
+                "--cut-s: two times are needed, the earlier first, as in 0.5,3",
+            ));
+        }
+    };
+    if args.edge_angle_deg > 90.0 {
+        return Err(Error::input(format!(
+            "--edge-angle-deg {}: an angle above 0 and up to 90 is needed",
+            args.edge_angle_deg
+        )));
+    }
+    let setup = Setup {
+        edge_angle_deg: args.edge_angle_deg,
+        feed_direction_deg: args.feed_direction_deg,
+        full_cut_s,
+    };
+    let tests = recordings
+        .iter()
+        .map(|recording| CuttingTest::new(recording, setup))
+        .collect::<Result<Vec<_>, _>>()?;
+    let fit = fit(&tests).map_err(|error| Error::input(error.to_string()))?;
+    let estimates: Vec<Estimate> = KEYS
+        .into_iter()
+        .zip(fit.coefficients)
+        .filter_map(|(key, value)| {
+            value.map(|value| Estimate {
+                key,
+                directions: Vec::new(),
+                value: value.value,
+                deviation: value.deviation,
+            })
+        })
+        .collect();
+    let teeth = tests.first().map_or(1, |test| test.teeth);
+    let name = args
+        .out
+        .as_deref()
+        .and_then(std::path::Path::file_stem)
+        .unwrap_or_default()
+        .to_string_lossy();
+    let table = case_file::cutting(&name, &estimates, teeth, args.edge_angle_deg, runout(&fit));
+    let table = match (table, &args.out) {
+        (Ok(table), _) => Some(table),
+        (Err(_), None) => None,
+        (Err(error), Some(path)) => {
+            return Err(Error::input(format!(
+                "--out {}: {error}: fz was not measured",
+                path.display()
+            )));
+        }
+    };
+    Ok(Answer {
+        fit_error: Some(fit.relative_error),
+        warnings: warnings(&fit, &tests),
+        said: said(&fit),
+        cutting: Some(Cutting {
+            averaged: fit.averaged.map(figures),
+            runout_um: fit
+                .runout_m
+                .iter()
+                .map(|value| Figure::new(1e6 * value.value, 1e6 * value.deviation))
+                .collect(),
+            revolutions: fit.revolutions,
+            feeds: fit.feeds,
+        }),
+        table,
+        ..Answer::of("force-coefficients", Vec::new(), estimates)
+    })
+}
+
+fn figures(values: [Option<Value>; 6]) -> BTreeMap<&'static str, Figure> {
+    KEYS.into_iter()
+        .zip(values)
+        .filter_map(|(key, value)| Some((key, Figure::new(value?.value, value?.deviation))))
+        .collect()
+}
+
+fn warnings(fit: &Fit, tests: &[CuttingTest]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if fit.feeds < 2 {
+        warnings.push(
+            "all tests have one feed: edge and cutting forces are told apart by the chip thickness along the arc alone, and mean forces cannot tell them apart at all; tests at two or more feeds are needed for that"
+                .into(),
+        );
+    }
+    if tests.iter().any(|test| test.displacement.is_none()) {
+        warnings.push(
+            "not every recording has the displacement of the tool: there chips are those of feed and runout alone"
+                .into(),
+        );
+    }
+    let apart = fit.apart();
+    if !apart.is_empty() {
+        warnings.push(format!(
+            "mean forces give other values of {} than the fit over the arc, by more than both intervals: the phase of the tachometer, the immersion, or a motion that was not measured is to blame",
+            apart.join(", ")
+        ));
+    }
+    warnings
+}
+
+fn said(fit: &Fit) -> Vec<String> {
+    let mut said = vec![format!("{} revolutions at {} feeds", fit.revolutions, fit.feeds)];
+    if let Some(averaged) = fit.averaged {
+        said.extend(figures(averaged).into_iter().map(|(key, figure)| {
+            let [low, high] = figure.ci90;
+            format!(
+                "by mean forces {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
+                figure.value
+            )
+        }));
+    }
+    if fit.runout_m.len() > 1 {
+        let teeth: Vec<String> = fit
+            .runout_m
+            .iter()
+            .map(|value| {
+                let figure = Figure::new(1e6 * value.value, 1e6 * value.deviation);
+                format!(
+                    "{:.2} ({:.2} to {:.2})",
+                    figure.value, figure.ci90[0], figure.ci90[1]
+                )
+            })
+            .collect();
+        said.push(format!(
+            "teeth stand out by {} um, 90 % intervals",
+            teeth.join(", ")
+        ));
+    }
+    said
+}

@@ -1,0 +1,113 @@
+//! The chips of a recorded cut: who cut how thick a chip where, by the surface that all passes before have left.
+
+use nalgebra::Vector3;
+
+use super::cutting_test::CuttingTest;
+
+/// A tooth in its chip at the instant of a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chip {
+    /// Immersion angle, rad.
+    pub phi: f64,
+    /// Chip thickness, m, positive.
+    pub thickness_m: f64,
+    /// The tooth, from 0.
+    pub tooth: usize,
+    /// The tooth that left the surface which it cuts.
+    pub ahead: usize,
+}
+
+/// A point of the surface, as far along the chip thickness as a tooth without runout would stand that has the feed of
+/// this pass.
+#[derive(Clone, Copy)]
+struct Point {
+    phi: f64,
+    reach_m: f64,
+    owner: usize,
+}
+
+/// For every sample the chips that are cut, those of `runout_m` for how far each tooth stands out.
+///
+/// On pass k tooth (−k mod N) runs over the arc; the edge stands at p(φ) = (sin φ, cos φ, 0)·u sin γ − z cos γ + r sin γ (eq. 3.1)
+/// before the feed, the surface S_k = max(p_k, S_(k−1) − f sin φ sin γ), and the chip is p_k − S_(k−1) + f sin φ sin γ where that
+/// is positive.
+pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
+    let mut chips = vec![Vec::new(); test.angle.len()];
+    let (Some(&first), Some(&last)) = (test.angle.first(), test.angle.last()) else {
+        return chips;
+    };
+    let pitch = test.pitch();
+    let passes = ((first - test.exit) / pitch).floor() as i64..=((last - test.start) / pitch).ceil() as i64;
+    let (sin_edge, cos_edge) = test.edge_angle.sin_cos();
+    let mut surface: Vec<Point> = Vec::new();
+    for pass in passes {
+        let turned = pass as f64 * pitch;
+        let tooth = (-pass).rem_euclid(test.teeth as i64) as usize;
+        let samples = test.sample_at(test.start + turned)..test.sample_at(test.exit + turned);
+        let mut place = 0;
+        let mut left = Vec::with_capacity(samples.len());
+        for sample in samples {
+            let phi = test.angle[sample] - turned;
+            let (sin, cos) = phi.sin_cos();
+            let u = test.displacement.as_ref().map_or(Vector3::zeros(), |u| u[sample]);
+            let own = (sin * u.x + cos * u.y) * sin_edge - u.z * cos_edge;
+            let recession = test.feed_per_tooth_m * sin * sin_edge;
+            // Where nothing is known of the pass before, it was one without vibration.
+            let before = at(&surface, phi, &mut place).unwrap_or(Point {
+                phi,
+                reach_m: 0.0,
+                owner: (tooth + 1) % test.teeth,
+            });
+            let thickness_m =
+                own - before.reach_m + (runout_m[tooth] - runout_m[before.owner]) * sin_edge + recession;
+            if thickness_m > 0.0 {
+                chips[sample].push(Chip {
+                    phi,
+                    thickness_m,
+                    tooth,
+                    ahead: before.owner,
+                });
+                left.push(Point {
+                    phi,
+                    reach_m: own,
+                    owner: tooth,
+                });
+            } else {
+                left.push(Point {
+                    phi,
+                    reach_m: before.reach_m - recession,
+                    owner: before.owner,
+                });
+            }
+        }
+        surface = left;
+    }
+    chips
+}
+
+/// The surface at an angle, by the cubic through four neighbours that one tooth has left, else along a straight line;
+/// `place` moves on with the angle.
+fn at(surface: &[Point], phi: f64, place: &mut usize) -> Option<Point> {
+    while *place + 1 < surface.len() && surface[*place + 1].phi <= phi {
+        *place += 1;
+    }
+    let left = *surface.get(*place)?;
+    let around = |before: usize, after: usize| {
+        let points = surface.get(place.checked_sub(before)?..=*place + after)?;
+        let is_one = points.iter().all(|point| point.owner == left.owner);
+        (is_one && phi > left.phi).then(|| interpolated(points, phi))
+    };
+    let reach_m = around(1, 2).or_else(|| around(0, 1)).unwrap_or(left.reach_m);
+    Some(Point { reach_m, ..left })
+}
+
+/// The polynomial through all points (Lagrange).
+fn interpolated(points: &[Point], phi: f64) -> f64 {
+    let weight = |i: usize| -> f64 {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        others
+            .map(|(_, other)| (phi - other.phi) / (points[i].phi - other.phi))
+            .product()
+    };
+    (0..points.len()).map(|i| weight(i) * points[i].reach_m).sum()
+}
