@@ -1,6 +1,7 @@
 //! From the shape of a case file to a case: every value is judged here.
 
 mod job;
+mod joints;
 mod structure;
 mod tool;
 
@@ -19,9 +20,12 @@ pub(super) fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
         text,
         deviations: Vec::new(),
     };
+    let posture = file
+        .posture
+        .map_or(Ok(Posture::default()), |posture| check.posture(posture))?;
     let structure = file
         .structure
-        .map(|structure| check.structure(structure))
+        .map(|structure| check.structure(structure, &posture.joints_deg))
         .transpose()?;
     let tool = file.tool.map(|tool| check.tool(&tool)).transpose()?;
     let material = file
@@ -30,9 +34,6 @@ pub(super) fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
         .transpose()?;
     let cut = file.cut.map(|cut| check.cut(&cut)).transpose()?;
     let limits = file.limits.map(|limits| check.limits(&limits)).transpose()?;
-    let posture = file
-        .posture
-        .map_or(Ok(Posture::default()), |posture| check.posture(posture))?;
     let extensions = check.extensions(file.extension)?;
     let name = file.name.unwrap_or_else(|| {
         path.file_stem()

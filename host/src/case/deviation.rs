@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::Case;
-use crate::structure::{Form, Matrices, Mode};
+use crate::structure::{Form, Joint, Matrices, Mode};
 
 /// The standard deviation of one parameter, in the unit of that parameter: a key `…_std` of the case.
 ///
@@ -37,6 +37,12 @@ pub enum Parameter {
     Left(usize, usize, bool),
     /// Real (false) or imaginary (true) part of an entry of a right shape: mode, entry, part.
     Right(usize, usize, bool),
+    /// Stiffness of a joint.
+    JointStiffness(usize),
+    /// Damping of a joint.
+    JointDamping(usize),
+    /// Mass of the link behind a joint.
+    LinkMass(usize),
     /// Edge angle of the tool.
     EdgeAngle,
     /// Offset of the runout.
@@ -86,7 +92,8 @@ impl Parameter {
                 *value = value.clamp(0.0, 180.0);
                 case.cut.is_some_and(|cut| cut.start_deg < cut.exit_deg)
             }
-            Self::Frequency(_) | Self::Ktc => *value > 0.0,
+            Self::Frequency(_) | Self::Ktc | Self::JointStiffness(_) | Self::LinkMass(_) => *value > 0.0,
+            Self::JointDamping(_) => *value >= 0.0,
             Self::DampingRatio(_) => (0.0..1.0).contains(value),
             Self::EdgeAngle => *value > 0.0 && *value <= 90.0,
             Self::FeedPerTooth | Self::RunoutOffset => *value >= 0.0,
@@ -102,15 +109,21 @@ impl Parameter {
             | Self::CubicDamping(..)
             | Self::CubicStiffness(..) => match &mut case.structure.as_mut()?.form {
                 Form::Matrices(matrices) => self.of_matrices(matrices),
-                Form::Modes(_) => None,
+                Form::Modes(_) | Form::Joints(_) => None,
             },
             Self::Frequency(mode)
             | Self::DampingRatio(mode)
             | Self::Left(mode, ..)
             | Self::Right(mode, ..) => match &mut case.structure.as_mut()?.form {
                 Form::Modes(modes) => self.of_mode(modes.get_mut(mode)?),
-                Form::Matrices(_) => None,
+                Form::Matrices(_) | Form::Joints(_) => None,
             },
+            Self::JointStiffness(joint) | Self::JointDamping(joint) | Self::LinkMass(joint) => {
+                match &mut case.structure.as_mut()?.form {
+                    Form::Joints(robot) => self.of_joint(robot.joints.get_mut(joint)?),
+                    Form::Matrices(_) | Form::Modes(_) => None,
+                }
+            }
             Self::EdgeAngle => Some(&mut case.tool.as_mut()?.edge_angle_deg),
             Self::RunoutOffset => Some(&mut case.tool.as_mut()?.runout.as_mut()?.offset_um),
             Self::RunoutAngle => Some(&mut case.tool.as_mut()?.runout.as_mut()?.angle_deg),
@@ -134,6 +147,15 @@ impl Parameter {
             Self::Stiffness(i, j) => matrices.stiffness.get_mut((i, j)),
             Self::CubicDamping(i, j) => matrices.cubic_damping.as_mut()?.get_mut((i, j)),
             Self::CubicStiffness(i, j) => matrices.cubic_stiffness.as_mut()?.get_mut((i, j)),
+            _ => None,
+        }
+    }
+
+    fn of_joint(self, joint: &mut Joint) -> Option<&mut f64> {
+        match self {
+            Self::JointStiffness(_) => Some(&mut joint.stiffness_nm_per_rad),
+            Self::JointDamping(_) => Some(&mut joint.damping_nms_per_rad),
+            Self::LinkMass(_) => Some(&mut joint.mass_kg),
             _ => None,
         }
     }

@@ -41,6 +41,26 @@ pub(super) struct StructureFile {
     pub(super) cubic_stiffness: Option<Rows>,
     pub(super) cubic_stiffness_std: Option<Rows>,
     pub(super) mode: Option<Vec<Spanned<ModeFile>>>,
+    pub(super) tool_m: Option<Spanned<[f64; 3]>>,
+    pub(super) joint: Option<Vec<Spanned<JointFile>>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct JointFile {
+    pub(super) axis: Spanned<[f64; 3]>,
+    pub(super) point_m: Spanned<[f64; 3]>,
+    pub(super) stiffness_nm_per_rad: Number,
+    pub(super) stiffness_nm_per_rad_std: Option<Number>,
+    pub(super) damping_nms_per_rad: Number,
+    pub(super) damping_nms_per_rad_std: Option<Number>,
+    pub(super) cubic_stiffness_nm_per_rad3: Option<Number>,
+    pub(super) cubic_damping_nms3_per_rad3: Option<Number>,
+    pub(super) rotor_kg_m2: Option<Number>,
+    pub(super) mass_kg: Number,
+    pub(super) mass_kg_std: Option<Number>,
+    pub(super) center_m: Spanned<[f64; 3]>,
+    pub(super) inertia_kg_m2: Spanned<Vec<f64>>,
 }
 
 #[derive(Deserialize)]

@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::case::Case;
 use crate::stability::{CubicTerms, Problem, StabilityError};
-use crate::structure::Form;
 
 /// ẋ = A x + B F(t, x) − N(x), u = C x: eqs 6.1 and 3.6 in first-order form.
 ///
@@ -36,8 +35,8 @@ impl ForcedProblem {
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         let linear = Problem::new(case, CubicTerms::LeaveOut)?;
         let structure = case.structure()?;
-        let cubic = match &structure.form {
-            Form::Matrices(matrices) if structure.is_nonlinear() => {
+        let cubic = match structure.equation() {
+            Some(matrices) if structure.is_nonlinear() => {
                 let size = matrices.mass.nrows();
                 // q̇ = s·(lower half): the scale of the first-order form stands in its own upper right corner.
                 let scale = linear.structure.a[(0, size)];

@@ -51,15 +51,15 @@ impl Dynamics {
         // The modes of real matrices cancel but for rounding and for the digits that a file gives them; less than a
         // millionth of what does not cancel is below any sensor.
         let velocity_jumps = jump.amax() > 1e-6 * c.amax() * b.amax() * order as f64;
-        let cubic = match &structure.form {
-            Form::Matrices(matrices) if structure.is_nonlinear() => Some(cubic(matrices, &a)?),
+        let cubic = match structure.equation() {
+            Some(matrices) if structure.is_nonlinear() => Some(cubic(&matrices, &a)?),
             _ => None,
         };
-        // States of modes move the tool by up to |C| each; states of matrices are displacements already.
+        // States of modes and joints move the tool by up to |C| each; states of matrices are displacements already.
         let size = |state: usize| {
             let moved = c.column(state).amax();
             match &structure.form {
-                Form::Modes(_) if moved > 0.0 => 1.0 / moved,
+                Form::Modes(_) | Form::Joints(_) if moved > 0.0 => 1.0 / moved,
                 _ => 1.0,
             }
         };

@@ -137,6 +137,7 @@ impl VirtualCut {
                 feed_per_tooth_mm: Some(cut.feed_per_tooth_mm),
                 teeth: u32::try_from(case.tool()?.teeth).ok(),
             }),
+            posture: case.posture.recorded(),
             ..Sidecar::default()
         };
         sidecar.channels.insert(

@@ -151,7 +151,7 @@ fn parameters(case: &Case) -> Vec<(Parameter, f64)> {
                 all.extend([Parameter::Right(mode, 1, true), Parameter::Right(mode, 0, false)]);
             }
         }
-        Form::Matrices(_) => {
+        Form::Matrices(_) | Form::Joints(_) => {
             all.extend([
                 Parameter::Mass(0, 0),
                 Parameter::Damping(0, 0),

@@ -79,12 +79,24 @@ impl Structure {
         match &self.form {
             Form::Matrices(matrices) => from_matrices(matrices, &self.directions),
             Form::Modes(modes) => Ok(from_modes(modes, &self.directions)),
+            Form::Joints(robot) => from_second_order(&robot.matrices(), &robot.jacobian()),
         }
     }
 }
 
 fn from_matrices(matrices: &Matrices, directions: &[Direction]) -> Result<FirstOrder, StructureError> {
-    let size = directions.len();
+    let mut seen = Matrix3xX::zeros(directions.len());
+    for (index, direction) in directions.iter().enumerate() {
+        if let Some(axis) = direction.axis() {
+            seen[(axis, index)] = 1.0;
+        }
+    }
+    from_second_order(matrices, &seen)
+}
+
+/// M q̈ + C q̇ + K q = Jᵀ F, u = J q.
+fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<FirstOrder, StructureError> {
+    let size = jacobian.ncols();
     let inverse_mass = matrices
         .mass
         .clone()
@@ -105,14 +117,10 @@ fn from_matrices(matrices: &Matrices, directions: &[Direction]) -> Result<FirstO
         .copy_from(&(stiffness * (-1.0 / scale)));
     a.view_mut((size, size), (size, size)).copy_from(&(-damping));
     let mut b = MatrixXx3::zeros(2 * size);
+    b.rows_mut(size, size)
+        .copy_from(&(&inverse_mass * jacobian.transpose() * (1.0 / scale)));
     let mut c = Matrix3xX::zeros(2 * size);
-    for (index, direction) in directions.iter().enumerate() {
-        if let Some(axis) = direction.axis() {
-            b.view_mut((size, axis), (size, 1))
-                .copy_from(&(inverse_mass.column(index) * (1.0 / scale)));
-            c[(axis, index)] = 1.0;
-        }
-    }
+    c.columns_mut(0, size).copy_from(jacobian);
     Ok(FirstOrder { a, b, c })
 }
 

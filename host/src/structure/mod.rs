@@ -4,14 +4,20 @@ mod definiteness;
 mod direction;
 mod error;
 mod first_order;
+mod joints;
 mod matrices;
 mod modal;
 mod modes;
+
+use std::borrow::Cow;
 
 pub use definiteness::{Indefinite, Remedy};
 pub use direction::{Direction, feed_axes};
 pub use error::StructureError;
 pub use first_order::FirstOrder;
+#[cfg(test)]
+pub(crate) use joints::tests;
+pub use joints::{Joint, Robot};
 pub use matrices::Matrices;
 pub use modal::ModalPart;
 pub use modes::Mode;
@@ -26,13 +32,15 @@ pub struct Structure {
     pub form: Form,
 }
 
-/// The two ways to say how a structure moves.
+/// The ways to say how a structure moves.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
     /// Mass, damping and stiffness.
     Matrices(Matrices),
     /// Complex modes with left and right shapes.
     Modes(Vec<Mode>),
+    /// Compliant joints at a posture; the directions are x, y and z of the base.
+    Joints(Box<Robot>),
 }
 
 impl Structure {
@@ -43,7 +51,8 @@ impl Structure {
     pub fn check(&self) -> Result<(), StructureError> {
         let found = match &self.form {
             Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
-            Form::Modes(_) => Vec::new(),
+            // A passive robot is definite: its joints have positive mass and stiffness.
+            Form::Modes(_) | Form::Joints(_) => Vec::new(),
         };
         if found.is_empty() {
             Ok(())
@@ -52,14 +61,26 @@ impl Structure {
         }
     }
 
+    /// The equation of motion in coordinates of its own, displacements or joint angles; `None` for modes, which have none.
+    pub fn equation(&self) -> Option<Cow<'_, Matrices>> {
+        match &self.form {
+            Form::Matrices(matrices) => Some(Cow::Borrowed(matrices)),
+            Form::Modes(_) => None,
+            Form::Joints(robot) => Some(Cow::Owned(robot.matrices())),
+        }
+    }
+
     /// True where the case has cubic terms that are not all zero.
     pub fn is_nonlinear(&self) -> bool {
-        let Form::Matrices(matrices) = &self.form else {
-            return false;
-        };
-        [&matrices.cubic_damping, &matrices.cubic_stiffness]
-            .into_iter()
-            .flatten()
-            .any(|cubic| cubic.iter().any(|&entry| entry != 0.0))
+        match &self.form {
+            Form::Matrices(matrices) => [&matrices.cubic_damping, &matrices.cubic_stiffness]
+                .into_iter()
+                .flatten()
+                .any(|cubic| cubic.iter().any(|&entry| entry != 0.0)),
+            Form::Modes(_) => false,
+            Form::Joints(robot) => robot.joints.iter().any(|joint| {
+                joint.cubic_stiffness_nm_per_rad3 != 0.0 || joint.cubic_damping_nms3_per_rad3 != 0.0
+            }),
+        }
     }
 }

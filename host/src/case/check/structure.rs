@@ -10,18 +10,24 @@ use crate::case::{CaseError, Parameter};
 use crate::structure::{Direction, Form, Matrices, Mode, Structure};
 
 impl Check<'_> {
-    pub(super) fn structure(&mut self, file: Spanned<StructureFile>) -> Result<Structure, CaseError> {
+    pub(super) fn structure(
+        &mut self,
+        file: Spanned<StructureFile>,
+        joints_deg: &[f64],
+    ) -> Result<Structure, CaseError> {
         let directions = self.directions(&file.get_ref().directions)?;
+        self.no_joints_but_with_their_kind(&file)?;
         let form = match file.get_ref().kind.get_ref().as_str() {
             "matrices" => Form::Matrices(self.matrices(&file, directions.len())?),
             "modes" => Form::Modes(self.modes(&file, directions.len())?),
+            "joints" => Form::Joints(Box::new(self.robot(&file, &directions, joints_deg)?)),
             other => {
                 let kind = &file.get_ref().kind;
                 return Err(self.wrong(
                     kind,
                     "structure.kind",
                     format!("\"{other}\""),
-                    "\"matrices\" or \"modes\"",
+                    "\"matrices\", \"modes\" or \"joints\"",
                 ));
             }
         };
@@ -161,6 +167,24 @@ impl Check<'_> {
 
     fn modes(&mut self, file: &Spanned<StructureFile>, size: usize) -> Result<Vec<Mode>, CaseError> {
         let table = file.get_ref();
+        self.no_matrices(table, "[[structure.mode]] tables only (kind = \"modes\")")?;
+        match &table.mode {
+            Some(modes) if !modes.is_empty() => modes
+                .iter()
+                .enumerate()
+                .map(|(index, mode)| self.mode(mode.get_ref(), index, size))
+                .collect(),
+            _ => Err(self.wrong(
+                file,
+                "structure.mode",
+                "nothing",
+                "at least one [[structure.mode]]",
+            )),
+        }
+    }
+
+    /// Refuses matrices beside another kind of structure.
+    pub(super) fn no_matrices(&self, table: &StructureFile, expected: &str) -> Result<(), CaseError> {
         let strangers = [
             ("mass", &table.mass),
             ("mass_std", &table.mass_std),
@@ -175,23 +199,10 @@ impl Check<'_> {
         ];
         for (key, rows) in strangers {
             if let Some(rows) = rows {
-                let expected = "[[structure.mode]] tables only (kind = \"modes\")";
                 return Err(self.wrong(rows, &format!("structure.{key}"), "a matrix", expected));
             }
         }
-        match &table.mode {
-            Some(modes) if !modes.is_empty() => modes
-                .iter()
-                .enumerate()
-                .map(|(index, mode)| self.mode(mode.get_ref(), index, size))
-                .collect(),
-            _ => Err(self.wrong(
-                file,
-                "structure.mode",
-                "nothing",
-                "at least one [[structure.mode]]",
-            )),
-        }
+        Ok(())
     }
 
     fn mode(&mut self, file: &ModeFile, index: usize, size: usize) -> Result<Mode, CaseError> {

@@ -186,6 +186,12 @@ impl Effect for Linear {
                 self.of_matrix(matrix, &structure.directions)
             }
             Form::Modes(modes) => self.of_modes(modes),
+            Form::Joints(_) => Err(EffectError::Structure {
+                name: self.name(),
+                what:
+                    "the structure is given by joints: change their stiffness, damping or masses in the case"
+                        .into(),
+            }),
         }
     }
 }

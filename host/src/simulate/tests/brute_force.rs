@@ -63,6 +63,7 @@ impl Equations {
                     .map(|direction| direction.axis())
                     .collect(),
             },
+            Form::Joints(_) => unreachable!("no case of these tests has joints"),
             Form::Modes(modes) => Self::Modes(
                 modes
                     .iter()
