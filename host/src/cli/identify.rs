@@ -2,14 +2,17 @@
 
 mod answer;
 mod checks;
+mod cutting;
+mod joints;
 mod methods;
 mod records;
+mod without_force;
 
 use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::{Error, Output, non_negative, positive};
+use super::{Error, Output, finite, non_negative, positive};
 use crate::identify::law::Extra;
 use crate::recording::Recording;
 use answer::Answer;
@@ -17,10 +20,11 @@ use answer::Answer;
 /// A model of the structure from recordings: parameters with 90 % intervals, and what does not fit.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity"
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2,60 --out robot.toml"
 )]
 pub struct Args {
-    /// The recordings.
+    /// The recordings; for inverse-stability a table of cuts, rpm,depth_mm,chatter_hz,verdict with verdict stable, chatter, hopf
+    /// or period-doubling, and chatter_hz empty where nothing was heard.
     #[arg(value_name = "REC", required = true)]
     recordings: Vec<PathBuf>,
     /// How.
@@ -57,7 +61,8 @@ pub struct Args {
     /// The mass, where restoring-force is to take it as known: needed where no force acts.
     #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     mass_kg: Option<f64>,
-    /// The band of restoring-force in Hz, from and to; without it where the motion stands out of its noise.
+    /// The band in Hz, from and to: of restoring-force, without it where the motion stands out of its noise; of joints; and of
+    /// output-only, which needs it.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, value_parser = non_negative)]
     band_hz: Vec<f64>,
     /// Width of the slices of restoring-force, as a share of the largest velocity or displacement.
@@ -66,6 +71,31 @@ pub struct Args {
     /// Degree in the force of the maps of ncma: 1 has the form of eqs 4.8 and 4.9, 2 holds a cubic mode.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=2))]
     degree: u8,
+    /// For joints: a case of the robot, with its geometry and the inertia of its links; its stiffness and damping are a guess.
+    /// For inverse-stability: a case with tool, material and cut, and a first guess of the structure.
+    #[arg(long, value_name = "CASE.toml")]
+    start: Option<PathBuf>,
+    /// For joints: the mass of the last link, tool and payload, is not known either.
+    #[arg(long)]
+    payload: bool,
+    /// For inverse-stability: standard deviation of depths, in percent.
+    #[arg(long, value_name = "P", default_value_t = 2.0, value_parser = positive, allow_negative_numbers = true)]
+    depth_error_percent: f64,
+    /// For inverse-stability: standard deviation of chatter frequencies, in percent.
+    #[arg(long, value_name = "P", default_value_t = 0.3, value_parser = positive, allow_negative_numbers = true)]
+    chatter_error_percent: f64,
+    /// Seed of inverse-stability, which draws structures; the same seed gives the same answer.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Edge angle of the tool in degrees, for force-coefficients; 90 is a square end mill.
+    #[arg(long, value_name = "D", default_value_t = 90.0, value_parser = positive, allow_negative_numbers = true)]
+    edge_angle_deg: f64,
+    /// Angle from x to the feed in degrees, for force-coefficients.
+    #[arg(long, value_name = "D", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
+    feed_direction_deg: f64,
+    /// From when to when the tool is in full cut, in s, for force-coefficients; without it where the force says so.
+    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, value_parser = finite)]
+    cut_s: Vec<f64>,
     #[command(flatten)]
     output: Output,
 }
@@ -83,6 +113,14 @@ enum Method {
     Ncma,
     /// Whether the structure is linear, and if not of what kind it is.
     Linearity,
+    /// Stiffness and damping of a robot's joints, from blows or a shaker at several postures.
+    Joints,
+    /// Natural frequencies and damping ratios from motion alone: idle running, or whatever shakes the machine.
+    OutputOnly,
+    /// Natural frequencies, damping ratios and stiffnesses from a table of cuts that chattered or not.
+    InverseStability,
+    /// Cutting and edge coefficients, and runout, from cuts with measured forces.
+    ForceCoefficients,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -100,17 +138,24 @@ enum SurfaceTerm {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let recordings = args
-        .recordings
-        .iter()
-        .map(Recording::read)
-        .collect::<Result<Vec<_>, _>>()?;
+    let recordings = match args.method {
+        Method::InverseStability => Vec::new(),
+        _ => args
+            .recordings
+            .iter()
+            .map(Recording::read)
+            .collect::<Result<Vec<_>, _>>()?,
+    };
     let mut answer = match args.method {
         Method::HarmonicBalance => methods::harmonic_balance(&args, &recordings)?,
         Method::Hfrf => methods::hfrf(&args, &recordings)?,
         Method::RestoringForce => records::restoring_force(&args, &recordings)?,
         Method::Ncma => methods::ncma(&args, &recordings)?,
         Method::Linearity => checks::linearity(&args, &recordings)?,
+        Method::OutputOnly => without_force::output_only(&args, &recordings)?,
+        Method::InverseStability => without_force::inverse_stability(&args)?,
+        Method::Joints => joints::joints(&args, &recordings)?,
+        Method::ForceCoefficients => cutting::force_coefficients(&args, &recordings)?,
     };
     if let Some(path) = &args.out {
         let text = answer.case(path)?;
@@ -129,7 +174,7 @@ fn text(answer: &Answer) -> String {
         for (key, figure) in &model.parameters {
             let [low, high] = figure.ci90;
             lines.push(format!(
-                "{} {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
+                "{}{key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
                 model.place(),
                 figure.value
             ));

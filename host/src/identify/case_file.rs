@@ -1,9 +1,10 @@
 //! What was identified, as the text of a case file.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use toml::{Table, Value};
 
-use crate::structure::Direction;
+use crate::milling::Runout;
+use crate::structure::{Direction, Joint, Robot};
 
 /// One identified parameter with its interval.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +30,99 @@ pub enum CaseFileError {
         "[extension.{0}] is needed in two directions; a case holds one: identify the directions one by one"
     )]
     Twice(&'static str),
+}
+
+/// A case of a robot at its posture; `deviations` are those of stiffness, damping and mass of each joint, where they are known.
+pub fn robot(name: &str, robot: &Robot, deviations: &[[Option<f64>; 3]]) -> Table {
+    let place = |place: &Vector3<f64>| numbers(place.iter().copied());
+    let joint = |(joint, deviations): (&Joint, &[Option<f64>; 3])| {
+        let mut table = Table::new();
+        let i = &joint.inertia_kg_m2;
+        table.insert("axis".into(), place(&joint.axis));
+        table.insert("point_m".into(), place(&joint.point_m));
+        table.insert("center_m".into(), place(&joint.center_m));
+        table.insert(
+            "inertia_kg_m2".into(),
+            numbers([i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]].into_iter()),
+        );
+        for (key, value) in [
+            ("rotor_kg_m2", joint.rotor_kg_m2),
+            ("cubic_stiffness_nm_per_rad3", joint.cubic_stiffness_nm_per_rad3),
+            ("cubic_damping_nms3_per_rad3", joint.cubic_damping_nms3_per_rad3),
+        ] {
+            table.insert(key.into(), value.into());
+        }
+        for ((key, value), deviation) in [
+            ("stiffness_nm_per_rad", joint.stiffness_nm_per_rad),
+            ("damping_nms_per_rad", joint.damping_nms_per_rad),
+            ("mass_kg", joint.mass_kg),
+        ]
+        .into_iter()
+        .zip(deviations)
+        {
+            table.insert(key.into(), value.into());
+            if let Some(deviation) = deviation {
+                table.insert(format!("{key}_std"), (*deviation).into());
+            }
+        }
+        Value::Table(table)
+    };
+    let mut structure = Table::new();
+    structure.insert("kind".into(), "joints".into());
+    structure.insert(
+        "directions".into(),
+        Value::Array(["x", "y", "z"].map(Value::from).into()),
+    );
+    structure.insert("tool_m".into(), place(&robot.tool_m));
+    let joints = robot.joints.iter().zip(deviations).map(joint).collect();
+    structure.insert("joint".into(), Value::Array(joints));
+    let mut posture = Table::new();
+    let angles = robot.angles_rad.iter().map(|angle| angle.to_degrees());
+    posture.insert("joints_deg".into(), numbers(angles));
+    let mut case = Table::new();
+    case.insert("name".into(), name.into());
+    case.insert("structure".into(), Value::Table(structure));
+    case.insert("posture".into(), Value::Table(posture));
+    case
+}
+
+fn numbers(values: impl Iterator<Item = f64>) -> Value {
+    Value::Array(values.map(Value::Float).collect())
+}
+
+/// A case that says what is cut by what: force coefficients, teeth, and the runout where it was told.
+///
+/// # Errors
+/// A cutting coefficient is missing.
+pub fn cutting(
+    name: &str,
+    material: &[Estimate],
+    teeth: usize,
+    edge_angle_deg: f64,
+    runout: Option<Runout>,
+) -> Result<Table, CaseFileError> {
+    let mut table = Table::new();
+    for key in ["ktc_mpa", "krc_mpa", "kac_mpa"] {
+        if !material.iter().any(|estimate| estimate.key == key) {
+            return Err(CaseFileError::Missing(key));
+        }
+    }
+    for estimate in material {
+        table.insert(estimate.key.into(), estimate.value.into());
+        table.insert(format!("{}_std", estimate.key), estimate.deviation.into());
+    }
+    let mut tool = Table::new();
+    tool.insert("teeth".into(), Value::Integer(teeth as i64));
+    tool.insert("edge_angle_deg".into(), edge_angle_deg.into());
+    if let Some(runout) = runout {
+        tool.insert("runout_um".into(), runout.offset_um.into());
+        tool.insert("runout_angle_deg".into(), runout.angle_deg.into());
+    }
+    let mut case = Table::new();
+    case.insert("name".into(), name.into());
+    case.insert("tool".into(), Value::Table(tool));
+    case.insert("material".into(), Value::Table(table));
+    Ok(case)
 }
 
 /// The extension that holds a key.
@@ -157,6 +251,25 @@ mod tests {
     use crate::case::Case;
     use crate::simulate::Effects;
     use crate::structure::Form;
+
+    #[test]
+    fn a_robot_that_is_written_is_read_again() {
+        let mut before = crate::structure::tests::robot();
+        before.joints[2].cubic_stiffness_nm_per_rad3 = -1e12;
+        let deviations = [[Some(1.0), Some(2.0), None]; 6];
+        let text = toml::to_string(&robot("found", &before, &deviations)).unwrap();
+        let case = Case::parse(std::path::Path::new("found.toml"), &text).unwrap();
+        let Form::Joints(after) = &case.structure.as_ref().unwrap().form else {
+            panic!("joints")
+        };
+        assert_eq!(after.joints, before.joints);
+        assert_eq!(after.tool_m, before.tool_m);
+        assert_eq!(case.deviations.len(), 12);
+        // Degrees are rounded once.
+        for (a, b) in after.angles_rad.iter().zip(&before.angles_rad) {
+            assert!((a - b).abs() < 1e-14);
+        }
+    }
 
     #[test]
     fn what_is_written_is_read_again() {

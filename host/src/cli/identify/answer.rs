@@ -36,9 +36,18 @@ pub(super) struct Answer {
     pub(super) maps: Option<Maps>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) slices: Option<Slices>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) cutting: Option<Cutting>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) modes: Option<Vec<OfMode>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) joints: Option<Vec<OfJoint>>,
     pub(super) warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) case: Option<PathBuf>,
+    /// A case that is no equation of motion.
+    #[serde(skip)]
+    pub(super) table: Option<toml::Table>,
     /// What becomes a case.
     #[serde(skip)]
     pub(super) estimates: Vec<Estimate>,
@@ -114,6 +123,36 @@ pub(super) struct Coefficients {
     pub(super) receptance_m_per_n: [f64; 2],
 }
 
+/// A mode that was found without a measured force.
+#[derive(Debug, Serialize)]
+pub(super) struct OfMode {
+    pub(super) frequency_hz: Figure,
+    pub(super) damping_ratio: Figure,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) stiffness_n_per_m: Option<Figure>,
+    /// Quantities that the data leave as good as open.
+    pub(super) cannot_tell: Vec<&'static str>,
+}
+
+/// What was identified of a joint and its link.
+#[derive(Debug, Serialize)]
+pub(super) struct OfJoint {
+    /// From 1, from the base on.
+    pub(super) joint: usize,
+    pub(super) parameters: BTreeMap<&'static str, Figure>,
+}
+
+/// What cutting tests say besides the force coefficients.
+#[derive(Debug, Serialize)]
+pub(super) struct Cutting {
+    /// Force coefficients by mean forces over the feed; `null` where all feeds are the same.
+    pub(super) averaged: Option<BTreeMap<&'static str, Figure>>,
+    /// How far each tooth stands out from the mean of all.
+    pub(super) runout_um: Vec<Figure>,
+    pub(super) revolutions: usize,
+    pub(super) feeds: usize,
+}
+
 /// What the slices of the restoring-force surface give.
 #[derive(Debug, Serialize)]
 pub(super) struct Slices {
@@ -149,10 +188,11 @@ impl Coefficients {
 }
 
 impl Model {
+    /// What the line of a parameter begins with.
     pub(super) fn place(&self) -> String {
         match (&self.direction, &self.directions) {
-            (Some(direction), _) => (*direction).into(),
-            (None, Some(pair)) => pair.join("-"),
+            (Some(direction), _) => format!("{direction} "),
+            (None, Some(pair)) => format!("{} ", pair.join("-")),
             (None, None) => String::new(),
         }
     }
@@ -169,6 +209,7 @@ impl Answer {
                 .map(|direction| direction.name())
                 .collect();
             let (direction, pair) = match names[..] {
+                [] => (None, None),
                 [one] => (Some(one), None),
                 _ => (None, Some(names)),
             };
@@ -198,6 +239,10 @@ impl Answer {
 
     /// The case file of the model.
     pub(super) fn case(&self, path: &Path) -> Result<String, Error> {
+        if let Some(table) = &self.table {
+            // A table of numbers and words is always TOML.
+            return Ok(toml::to_string(table).unwrap_or_default());
+        }
         if self.estimates.is_empty() {
             return Err(Error::input(format!(
                 "--out {}: --method {} gives no equation of motion that a case could hold",

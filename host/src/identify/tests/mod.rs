@@ -1,6 +1,10 @@
 //! Identification of what a virtual rig has measured, and of records that others measured.
 
+mod ambient;
 mod coupling;
+mod cutting;
+mod inverse_stability;
+mod joints;
 mod linearity;
 mod measured;
 mod steady;

@@ -1,0 +1,163 @@
+//! `--method output-only` and `--method inverse-stability`: modes where no force was measured.
+
+use super::answer::{Answer, Figure, OfMode};
+use super::{Args, Error};
+use crate::case::Case;
+use crate::identify::ambient::Ambient;
+use crate::identify::inverse_stability::{Before, Errors, InverseMode, Spread, modes};
+use crate::identify::{observed_cut, subspace};
+use crate::recording::{Kind, Recording};
+use crate::stability::{CubicTerms, Problem};
+
+/// Modes of a record of motion alone.
+pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+    let [recording] = recordings else {
+        return Err(Error::input(format!(
+            "{} recordings: output-only takes one; give the longest",
+            recordings.len()
+        )));
+    };
+    let band_hz = match args.band_hz[..] {
+        [low, high] if 0.0 < low && low < high && high < 0.5 * recording.sample_rate_hz => [low, high],
+        _ => {
+            return Err(Error::input(format!(
+                "--band-hz: two frequencies below half the sample rate of {} Hz are needed, the lower first, as in 5,60",
+                recording.sample_rate_hz
+            )));
+        }
+    };
+    let Some(ambient) = Ambient::new(recording, band_hz[1]) else {
+        return Err(Error::input(
+            recording.lacks("acceleration, velocity or displacement"),
+        ));
+    };
+    let found = subspace::modes(&ambient, band_hz)
+        .map_err(|error| Error::input(format!("{}: {error}", recording.path.display())))?;
+    let mut warnings = Vec::new();
+    if recording.sidecar.kind == Some(Kind::Cutting) {
+        warnings.push(
+            "it was recorded in a cut: these are modes of the structure together with the cut, whose chip adds stiffness and damping"
+                .into(),
+        );
+    }
+    for mode in &found.modes {
+        let Some(turn_hz) = ambient.turn_hz else { continue };
+        let harmonic = (mode.frequency_hz / turn_hz).round() * turn_hz;
+        if (harmonic - mode.frequency_hz).abs() < mode.damping_ratio * mode.frequency_hz {
+            warnings.push(format!(
+                "the mode of {:.3} Hz lies within its own width of the harmonic of the spindle at {harmonic:.3} Hz, which was taken out; another speed would tell more",
+                mode.frequency_hz
+            ));
+        }
+    }
+    let of_modes = found.modes.iter().map(|mode| OfMode {
+        frequency_hz: Figure::new(mode.frequency_hz, mode.frequency_deviation_hz),
+        damping_ratio: Figure::new(mode.damping_ratio, mode.damping_deviation),
+        stiffness_n_per_m: None,
+        cannot_tell: if mode.is_vague() {
+            vec!["damping_ratio"]
+        } else {
+            Vec::new()
+        },
+    });
+    let of_modes: Vec<OfMode> = of_modes.collect();
+    let mut lines = vec![format!(
+        "{} of {}, {:.1} s in {} blocks, {} states",
+        ambient.names.join(", "),
+        recording.path.display(),
+        ambient.seconds(),
+        found.blocks,
+        found.order
+    )];
+    lines.extend(said(&of_modes));
+    Ok(Answer {
+        modes: Some(of_modes),
+        warnings,
+        said: lines,
+        ..Answer::of("output-only", Vec::new(), Vec::new())
+    })
+}
+
+/// Modes from cuts that chattered and cuts that did not.
+pub(super) fn inverse_stability(args: &Args) -> Result<Answer, Error> {
+    let [path] = &args.recordings[..] else {
+        return Err(Error::input(format!(
+            "{} files: --method inverse-stability takes one table of cuts",
+            args.recordings.len()
+        )));
+    };
+    let cuts = observed_cut::read(path).map_err(|error| Error::input(error.to_string()))?;
+    let Some(start) = &args.start else {
+        return Err(Error::input(
+            "--method inverse-stability needs --start CASE.toml: tool, material and cut, and a first guess of the structure",
+        ));
+    };
+    let problem = Problem::new(&Case::read(start)?, CubicTerms::Refuse)?;
+    let errors = Errors {
+        depth: 0.01 * args.depth_error_percent,
+        frequency: 0.01 * args.chatter_error_percent,
+    };
+    let before = Before::default();
+    let found = modes(&problem, &cuts, errors, before, args.seed)
+        .map_err(|error| Error::input(format!("{}: {error}", path.display())))?;
+    let of_modes: Vec<OfMode> = found.iter().map(of_mode).collect();
+    let mut lines = vec![format!(
+        "{} cuts; thought possible before: frequencies within a factor {}, damping ratios and stiffnesses within {} of the first guess",
+        cuts.len(),
+        before.frequency,
+        before.damping
+    )];
+    lines.extend(said(&of_modes));
+    Ok(Answer {
+        modes: Some(of_modes),
+        said: lines,
+        ..Answer::of("inverse-stability", Vec::new(), Vec::new())
+    })
+}
+
+fn of_mode(mode: &InverseMode) -> OfMode {
+    let figure = |spread: &Spread| Figure {
+        value: spread.value,
+        ci90: spread.ci90,
+    };
+    let vague = [
+        ("frequency_hz", mode.frequency_hz),
+        ("damping_ratio", mode.damping_ratio),
+        ("stiffness_n_per_m", mode.stiffness_n_per_m),
+    ];
+    OfMode {
+        frequency_hz: figure(&mode.frequency_hz),
+        damping_ratio: figure(&mode.damping_ratio),
+        stiffness_n_per_m: Some(figure(&mode.stiffness_n_per_m)),
+        cannot_tell: vague
+            .into_iter()
+            .filter(|(_, spread)| spread.is_vague())
+            .map(|(key, _)| key)
+            .collect(),
+    }
+}
+
+fn said(modes: &[OfMode]) -> Vec<String> {
+    let line = |index: usize, key: &str, figure: &Figure, vague: bool| {
+        let [low, high] = figure.ci90;
+        format!(
+            "mode {} {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}{}",
+            index + 1,
+            figure.value,
+            if vague { ": the data cannot tell" } else { "" }
+        )
+    };
+    let mut lines = Vec::new();
+    for (index, mode) in modes.iter().enumerate() {
+        let figures = [
+            ("frequency_hz", Some(&mode.frequency_hz)),
+            ("damping_ratio", Some(&mode.damping_ratio)),
+            ("stiffness_n_per_m", mode.stiffness_n_per_m.as_ref()),
+        ];
+        for (key, figure) in figures {
+            let Some(figure) = figure else { continue };
+            lines.push(line(index, key, figure, mode.cannot_tell.contains(&key)));
+        }
+    }
+    lines
+}

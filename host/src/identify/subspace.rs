@@ -1,0 +1,252 @@
+//! Modes from motion alone: stochastic subspace identification by covariances, with intervals.
+//!
+//! Of a structure that white noise drives the covariances R_k = E[y(t + k) y(t)ᵀ] = C A^(k−1) G are those of a free decay. Their
+//! block Hankel matrix is O·Γ; its left singular vectors are O in some basis, and A follows from its shift (Peeters and De
+//! Roeck 1999). White noise of sensors is in R₀ alone, which is not used. The covariance of the result is that of the record's
+//! blocks: each block moves the Hankel matrix, and along that move the poles are differentiated (Döhler and Mevel 2013 do the
+//! same by perturbation theory). Modes get no mass this way: force was not measured.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Cholesky, DMatrix};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::ambient::Ambient;
+use super::steady_fit::NINETY_PERCENT;
+use super::student::ninety_percent;
+
+/// A mode with deviations: 1.645 of them are half the 90 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AmbientMode {
+    /// Natural frequency |λ|/2π, Hz.
+    pub frequency_hz: f64,
+    /// Its deviation, Hz.
+    pub frequency_deviation_hz: f64,
+    /// Damping ratio −Re λ/|λ|.
+    pub damping_ratio: f64,
+    /// Its deviation.
+    pub damping_deviation: f64,
+}
+
+/// What a record says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AmbientModes {
+    /// The modes within the band by rising frequency, that stay where they are when the order grows.
+    pub modes: Vec<AmbientMode>,
+    /// Number of states that stand out of the scatter of the blocks.
+    pub order: usize,
+    /// Blocks that the record was cut into.
+    pub blocks: usize,
+}
+
+/// Why nothing can be said.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum AmbientError {
+    /// Too short.
+    #[error(
+        "{seconds:.1} s are too short to tell modes from {low_hz} Hz on, and how well: {needed_s:.1} s are needed at least"
+    )]
+    TooShort {
+        /// Length, s.
+        seconds: f64,
+        /// Lowest frequency, Hz.
+        low_hz: f64,
+        /// Needed, s.
+        needed_s: f64,
+    },
+    /// Nothing but noise.
+    #[error(
+        "nothing between {0} and {1} Hz stands out of the noise: the data cannot tell; record longer, or shake it more"
+    )]
+    Nothing(f64, f64),
+}
+
+/// Fewest and most blocks of a record.
+const BLOCKS: [usize; 2] = [12, 40];
+
+/// A block is so many times as long as the longest lag: then what hangs over from one to the next does not count.
+const BLOCK_LENGTH: usize = 6;
+
+/// Periods of the lowest frequency that the lags span.
+const PERIODS: f64 = 1.5;
+
+/// Step along the move of a block: small beside the scatter of the mean, large beside rounding.
+const STEP: f64 = 1e-3;
+
+/// A mode stays where it is when it moves by less than this share, or this many deviations, as the order grows.
+const STAYS: (f64, f64) = (0.01, 3.0);
+
+/// The largest damping ratio of a mode: what decays faster is the shape of the noise.
+const LARGEST_DAMPING: f64 = 0.3;
+
+/// The modes of a record in a band, Hz.
+///
+/// # Errors
+/// The record is too short, or nothing stands out.
+pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientModes, AmbientError> {
+    let rows = ((PERIODS * ambient.rate_hz / low_hz).ceil() as usize).clamp(6, 60);
+    let samples = ambient.channels.first().map_or(0, Vec::len);
+    let block = BLOCK_LENGTH * 2 * rows;
+    let blocks = (samples.saturating_sub(2 * rows) / block).min(BLOCKS[1]);
+    if blocks < BLOCKS[0] {
+        return Err(AmbientError::TooShort {
+            seconds: ambient.seconds(),
+            low_hz,
+            needed_s: (BLOCKS[0] * block + 2 * rows) as f64 / ambient.rate_hz,
+        });
+    }
+    let length = (samples - 2 * rows) / blocks;
+    let of_blocks: Vec<DMatrix<f64>> = (0..blocks)
+        .into_par_iter()
+        .map(|block| hankel(&ambient.channels, block * length..(block + 1) * length, rows))
+        .collect();
+    let size = of_blocks[0].shape();
+    let mean = of_blocks
+        .iter()
+        .fold(DMatrix::zeros(size.0, size.1), |sum, part| sum + part)
+        / blocks as f64;
+    let record = Record {
+        channels: ambient.channels.len(),
+        rate_hz: ambient.rate_hz,
+        band_hz: [low_hz, high_hz],
+        mean,
+        of_blocks,
+    };
+    let order = record.order();
+    if order == 0 {
+        return Err(AmbientError::Nothing(low_hz, high_hz));
+    }
+    let found = record.modes(order);
+    let larger = record.poles(&record.mean, order + 4).unwrap_or_default();
+    let modes: Vec<AmbientMode> = found
+        .into_iter()
+        .filter(|mode| {
+            larger.iter().any(|pole| {
+                let moved = (pole.norm() / TAU - mode.frequency_hz).abs();
+                moved < STAYS.0 * mode.frequency_hz || moved < STAYS.1 * mode.frequency_deviation_hz
+            })
+        })
+        .collect();
+    if modes.is_empty() {
+        return Err(AmbientError::Nothing(low_hz, high_hz));
+    }
+    Ok(AmbientModes { modes, order, blocks })
+}
+
+impl AmbientMode {
+    /// True where the 90 % interval of the damping ratio is wider than the ratio itself: the data cannot tell it.
+    pub fn is_vague(&self) -> bool {
+        2.0 * NINETY_PERCENT * self.damping_deviation > self.damping_ratio
+    }
+}
+
+struct Record {
+    channels: usize,
+    rate_hz: f64,
+    band_hz: [f64; 2],
+    mean: DMatrix<f64>,
+    of_blocks: Vec<DMatrix<f64>>,
+}
+
+/// The block Hankel matrix of R_1 to R_(2i−1) over a range of t, i block rows and columns.
+fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> DMatrix<f64> {
+    let count = channels.len();
+    let covariance = |lag: usize, i: usize, j: usize| -> f64 {
+        let (later, now) = (
+            &channels[i][range.start + lag..range.end + lag],
+            &channels[j][range.clone()],
+        );
+        later.iter().zip(now).map(|(a, b)| a * b).sum::<f64>() / range.len() as f64
+    };
+    let lags: Vec<DMatrix<f64>> = (1..2 * rows)
+        .map(|lag| DMatrix::from_fn(count, count, |i, j| covariance(lag, i, j)))
+        .collect();
+    DMatrix::from_fn(rows * count, rows * count, |i, j| {
+        lags[i / count + j / count][(i % count, j % count)]
+    })
+}
+
+impl Record {
+    /// How many singular values stand out of the scatter: even, since modes come in pairs.
+    fn order(&self) -> usize {
+        let values = self.mean.singular_values();
+        // The mean of two halves that alternate, one taken from the other: noise of the size of that of the mean.
+        let count = self.of_blocks.len() as f64;
+        let mut noise = DMatrix::zeros(self.mean.nrows(), self.mean.ncols());
+        for (index, block) in self.of_blocks.iter().enumerate() {
+            noise += (block - &self.mean) * (if index % 2 == 0 { 1.0 } else { -1.0 } / count);
+        }
+        let level = noise.singular_values().max();
+        let above = values.iter().filter(|value| **value > level).count();
+        // With as many states as rows there is no shift.
+        (above.div_ceil(2) * 2).min(self.mean.nrows() - self.channels - 4) & !1
+    }
+
+    /// Poles of a Hankel matrix above the real axis, rad/s; `None` where there is no such model.
+    fn poles(&self, hankel: &DMatrix<f64>, order: usize) -> Option<Vec<Complex64>> {
+        let mut svd = hankel.clone().svd(true, false);
+        svd.sort_by_singular_values();
+        let u = svd.u?;
+        if order > u.ncols() {
+            return None;
+        }
+        let rows = u.nrows() - self.channels;
+        let (up, down) = (
+            u.view((0, 0), (rows, order)),
+            u.view((self.channels, 0), (rows, order)),
+        );
+        let flow = Cholesky::new(up.tr_mul(&up))?.solve(&up.tr_mul(&down));
+        let poles = flow.complex_eigenvalues();
+        Some(
+            poles
+                .iter()
+                .filter(|pole| pole.im > 0.0)
+                .map(|pole| pole.ln() * self.rate_hz)
+                .collect(),
+        )
+    }
+
+    /// Modes within the band, with deviations by the moves of the blocks.
+    fn modes(&self, order: usize) -> Vec<AmbientMode> {
+        let [low_hz, high_hz] = self.band_hz;
+        let is_mode = |pole: &Complex64| {
+            let (hz, damping) = (pole.norm() / TAU, -pole.re / pole.norm());
+            (low_hz..=high_hz).contains(&hz) && damping > 0.0 && damping < LARGEST_DAMPING
+        };
+        let mut poles: Vec<Complex64> = self.poles(&self.mean, order).unwrap_or_default();
+        poles.retain(is_mode);
+        poles.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+        let moved: Vec<Vec<Complex64>> = self
+            .of_blocks
+            .par_iter()
+            .map(|block| {
+                let there = &self.mean + (block - &self.mean) * STEP;
+                self.poles(&there, order).unwrap_or_default()
+            })
+            .collect();
+        let count = self.of_blocks.len() as f64;
+        let few = ninety_percent(self.of_blocks.len() - 1) / NINETY_PERCENT;
+        poles
+            .iter()
+            .map(|pole| {
+                let (mut frequency, mut damping) = (0.0, 0.0);
+                for poles in &moved {
+                    let nearest = poles
+                        .iter()
+                        .min_by(|a, b| (*a - pole).norm().total_cmp(&(*b - pole).norm()))
+                        .unwrap_or(pole);
+                    frequency += ((nearest.norm() - pole.norm()) / TAU / STEP).powi(2);
+                    damping += ((pole.re / pole.norm() - nearest.re / nearest.norm()) / STEP).powi(2);
+                }
+                let deviation = |sum: f64| few * (sum / (count * (count - 1.0))).sqrt();
+                AmbientMode {
+                    frequency_hz: pole.norm() / TAU,
+                    frequency_deviation_hz: deviation(frequency),
+                    damping_ratio: -pole.re / pole.norm(),
+                    damping_deviation: deviation(damping),
+                }
+            })
+            .collect()
+    }
+}
