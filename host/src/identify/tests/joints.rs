@@ -12,11 +12,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use crate::case::Case;
+use crate::case::tests::case;
 use crate::frf::{MeasurementSettings, measure};
 use crate::identify::joints::{JointFit, PostureFrf, fit};
 use crate::identify::steady_fit::NINETY_PERCENT;
 use crate::recording::{Quantity, Recording};
 use crate::simulate::rig::{Noise, Rig, Signal};
+use crate::stability::{CubicTerms, Problem, line};
 use crate::structure::{Direction, Form, Matrices, Robot, Structure, tests::robot};
 
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
@@ -207,5 +210,22 @@ fn joint_angles_and_the_directions_of_the_tool_are_one_robot() {
             // Rounding times the condition of J, M and K.
             assert!((a - b).norm() < 1e-8 * a.norm(), "{f}");
         }
+    }
+}
+
+#[test]
+fn limits_of_a_robot_are_those_of_its_tool_space_matrices() {
+    let robot_case = case("six-joint-robot");
+    let mut other = robot_case.clone();
+    other.structure = Some(tool_space(&robot()));
+    let limit = |case: &Case, rpm: f64| {
+        let problem = Problem::new(case, CubicTerms::Refuse).unwrap();
+        line(&problem, rpm, 60.0, 60).unwrap().first_limit.unwrap()
+    };
+    for rpm in [600.0, 1000.0] {
+        let (a, b) = (limit(&robot_case, rpm), limit(&other, rpm));
+        // Rounding times the condition of J, M and K, and of the limit.
+        assert!((a.depth_mm / b.depth_mm - 1.0).abs() < 1e-6, "{a:?} {b:?}");
+        assert_eq!(a.kind, b.kind);
     }
 }

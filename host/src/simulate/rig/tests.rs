@@ -322,3 +322,43 @@ fn noise_repeats_by_seed_and_has_its_size() {
     assert!((deviation("y") / (0.01 * rms) - 1.0).abs() < 0.02);
     assert!((deviation("fy") / 0.5 - 1.0).abs() < 0.02);
 }
+
+#[test]
+fn a_joint_with_cubic_terms_is_the_spring_that_it_makes_at_the_tool() {
+    use crate::case::Case;
+
+    let (arm_m, inertia, c, k, k3, c3) = (2.0, 800.0, 1500.0, 4e6, -1e11, 3e4);
+    let robot = format!(
+        "[structure]\nkind = \"joints\"\ndirections = [\"x\", \"y\", \"z\"]\ntool_m = [{arm_m:?}, 0.0, 0.0]\n\
+         [[structure.joint]]\naxis = [0.0, 0.0, 2.0]\npoint_m = [0.0, 0.0, 1.0]\nstiffness_nm_per_rad = {k:e}\n\
+         damping_nms_per_rad = {c:e}\ncubic_stiffness_nm_per_rad3 = {k3:e}\ncubic_damping_nms3_per_rad3 = {c3:e}\n\
+         mass_kg = 150.0\ncenter_m = [2.0, 0.0, 0.0]\ninertia_kg_m2 = [1.0, 1.0, 200.0]\n[posture]\njoints_deg = [0.0]\n"
+    );
+    // Displacement is the angle times the arm, force the moment over it.
+    let (square, fourth) = (arm_m * arm_m, arm_m.powi(4));
+    let spring = format!(
+        "[structure]\nkind = \"matrices\"\ndirections = [\"y\"]\nmass = [[{:e}]]\ndamping = [[{:e}]]\n\
+         stiffness = [[{:e}]]\ncubic_stiffness = [[{:e}]]\ncubic_damping = [[{:e}]]\n",
+        inertia / square,
+        c / square,
+        k / square,
+        k3 / fourth,
+        c3 / fourth
+    );
+    let pulled = |text: &str| {
+        let case = Case::parse(std::path::Path::new("arm.toml"), text).unwrap();
+        let signal = Signal::tones(&[11.0], [5.0, 60.0], 6.0, 1);
+        let rig = Rig::new(Direction::Y, signal, 256.0);
+        let path = std::path::Path::new("arm.csv");
+        let (recording, _) = rig.record(case.structure().unwrap(), path).unwrap();
+        recording.channel("y").unwrap().samples.clone()
+    };
+    let (a, b) = (pulled(&robot), pulled(&spring));
+    let largest = b.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    // Cubic forces are a few percent of the linear ones here, and both integrations are good to about 1e-7.
+    let cubic = k3 / fourth * largest.powi(2) / (k / square);
+    assert!(cubic.abs() > 0.01, "{cubic}");
+    for (a, b) in a.iter().zip(&b) {
+        assert!((a - b).abs() < 1e-5 * largest, "{a} {b}");
+    }
+}
