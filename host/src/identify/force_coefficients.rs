@@ -2,8 +2,8 @@
 //!
 //! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ} over the teeth that
 //! cut (eqs 3.2 to 3.4), with the chip thickness h of [`chips`], and the runout of each tooth in it: least squares over all
-//! samples, each channel weighed with what it leaves. Beside it the classical way: forces averaged over a revolution, on
-//! which runout and a stable vibration act in second order only, over the feed (Altintas). Intervals come from the scatter between
+//! samples, each channel weighed with what it leaves. Beside it the classical way: forces averaged over a revolution, over
+//! the feed (Altintas): runout and a stable vibration do not act on them as long as every tooth stays in its chip. Intervals come from the scatter between
 //! revolutions.
 
 use std::collections::BTreeSet;
@@ -508,7 +508,7 @@ impl Fitter<'_> {
 
 impl Fit {
     /// The coefficients whose values by mean forces and over the arc differ by more than the sum of both half intervals and a
-    /// twentieth: runout and vibration together leave a mean of second order.
+    /// twentieth.
     pub fn apart(&self) -> Vec<&'static str> {
         let averaged = self.averaged.unwrap_or_default();
         let differs = |&(index, _): &(usize, &'static str)| {

@@ -108,7 +108,7 @@ fn warnings(fit: &Fit, tests: &[CuttingTest]) -> Vec<String> {
     let apart = fit.apart();
     if !apart.is_empty() {
         warnings.push(format!(
-            "mean forces give other values of {} than the fit over the arc, by more than both intervals: the phase of the tachometer, the immersion, or a motion that was not measured is to blame",
+            "mean forces give other values of {} than the fit over the arc, by more than both intervals: teeth that lose their chip to runout where it is thin, the phase of the tachometer, the immersion, or a motion that was not measured",
             apart.join(", ")
         ));
     }

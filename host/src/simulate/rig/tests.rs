@@ -327,7 +327,7 @@ fn noise_repeats_by_seed_and_has_its_size() {
 fn a_joint_with_cubic_terms_is_the_spring_that_it_makes_at_the_tool() {
     use crate::case::Case;
 
-    let (arm_m, inertia, c, k, k3, c3) = (2.0, 800.0, 1500.0, 4e6, -1e11, 3e4);
+    let (arm_m, inertia, c, k, k3, c3) = (2.0_f64, 800.0, 1500.0, 4e6, -1e11, 3e4);
     let robot = format!(
         "[structure]\nkind = \"joints\"\ndirections = [\"x\", \"y\", \"z\"]\ntool_m = [{arm_m:?}, 0.0, 0.0]\n\
          [[structure.joint]]\naxis = [0.0, 0.0, 2.0]\npoint_m = [0.0, 0.0, 1.0]\nstiffness_nm_per_rad = {k:e}\n\
