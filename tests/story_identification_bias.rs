@@ -52,7 +52,7 @@ fn law() -> Law {
 fn matrices(case: &Case) -> &Matrices {
     match &case.structure().expect("a structure").form {
         Form::Matrices(matrices) => matrices,
-        Form::Modes(_) => panic!("{}: matrices are needed", case.name),
+        Form::Modes(_) | Form::Joints(_) => panic!("{}: matrices are needed", case.name),
     }
 }
 
