@@ -79,7 +79,7 @@ type Grid = Vec<((f64, f64), f64)>;
 fn reference(method: &dyn Method, setting: &Setting) -> Grid {
     let mut grid = Grid::new();
     for rpm in setting.speeds_rpm(5) {
-        for depth_mm in spaced(0.1 * setting.depth_mm, setting.depth_mm, 5) {
+        for depth_mm in setting.depths_mm(5) {
             let point = method.point(rpm, depth_mm).expect("a point of the chart");
             assert!(point.error < 0.01 * ACCURACY * point.multiplier_abs.max(1.0));
             grid.push(((rpm, depth_mm), point.multiplier_abs));

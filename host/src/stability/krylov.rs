@@ -25,6 +25,10 @@ const RESIDUAL: f64 = 1e-11;
 /// The same where Newton goes on from there.
 const ROUGH: f64 = 1e-7;
 
+/// What is left of a vector that depends on others, relative to it: rounding of a map of some hundred steps, and far below
+/// any residual.
+const DEPENDENT: f64 = 1e-14;
+
 /// A linear map of ℝⁿ.
 pub(super) trait LinearMap {
     /// n.
@@ -110,7 +114,9 @@ fn arnoldi(
     // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
     let mut basis = DMatrix::zeros(size, most + BLOCK);
     let mut projected = DMatrix::zeros(most + BLOCK, most);
-    let (first, _) = orthonormal(start(size));
+    let first = start(size);
+    let scale = first.norm();
+    let (first, _) = orthonormal(first, scale);
     basis.columns_mut(0, first.ncols()).copy_from(&first);
     let (mut done, mut width) = (0, first.ncols());
     for count in 1.. {
@@ -118,6 +124,7 @@ fn arnoldi(
             return None;
         }
         let mut image = map.apply(&basis.columns(done, width).into_owned())?;
+        let scale = image.norm();
         let known = basis.columns(0, done + width);
         // Twice is enough: what the first pass leaves in the space is rounding of the image.
         for _ in 0..2 {
@@ -126,7 +133,7 @@ fn arnoldi(
             let mut sum = projected.view_mut((0, done), (done + width, width));
             sum += part;
         }
-        let (next, coupling) = orthonormal(image);
+        let (next, coupling) = orthonormal(image, scale);
         let end = done + width;
         projected
             .view_mut((end, done), (next.ncols(), width))
@@ -142,6 +149,9 @@ fn arnoldi(
                     basis: Some(basis.columns(0, end).into_owned()),
                     projected: within,
                 });
+            }
+            if next.ncols() == 0 {
+                return None;
             }
         }
         (done, width) = (end, next.ncols());
@@ -182,12 +192,12 @@ fn start(size: usize) -> DMatrix<f64> {
     DMatrix::from_fn(size, BLOCK, |i, j| ((i + 1) as f64 * irrational[j]).fract() - 0.5)
 }
 
-/// Q and R of a block, Q without columns that depend on those before.
-fn orthonormal(block: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+/// Q and R of a block, Q without columns that depend on those before; `scale` is the norm of what the block was made from:
+/// what is below its rounding is zero.
+fn orthonormal(block: DMatrix<f64>, scale: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let columns = block.ncols();
     let mut kept: Vec<DVector<f64>> = Vec::with_capacity(columns);
     let mut factor = DMatrix::zeros(columns, columns);
-    let scale = block.norm();
     for j in 0..columns {
         let mut column = block.column(j).into_owned();
         for _ in 0..2 {
@@ -198,8 +208,7 @@ fn orthonormal(block: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
             }
         }
         let norm = column.norm();
-        // What is left of a dependent column is rounding.
-        if norm > 1e-14 * scale && norm > 0.0 {
+        if norm > DEPENDENT * scale {
             factor[(kept.len(), j)] = norm;
             kept.push(column / norm);
         }
@@ -266,6 +275,63 @@ mod tests {
                 let miss = map.0.map(Complex64::from) * &vector - &vector * *value;
                 assert!(miss.norm() < 1e-9 && (vector.norm() - 1.0).abs() < 1e-12);
             }
+        }
+    }
+    /// A map of rank 4, as that of a structure in free flight, that counts how many vectors it is applied to.
+    struct Thin {
+        within: DMatrix<f64>,
+        directions: DMatrix<f64>,
+        applied: std::cell::Cell<usize>,
+    }
+
+    impl LinearMap for Thin {
+        fn size(&self) -> usize {
+            self.directions.nrows()
+        }
+
+        fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+            self.applied.set(self.applied.get() + columns.ncols());
+            Some(&self.directions * (&self.within * self.directions.tr_mul(columns)))
+        }
+    }
+
+    #[test]
+    fn the_space_of_a_map_of_low_rank_closes_early() {
+        let size = 1000;
+        let (directions, _) = orthonormal(
+            DMatrix::from_fn(size, 4, |i, j| ((i + 1) as f64 * (j as f64 + 2.3).sqrt()).sin()),
+            size as f64,
+        );
+        // A double pair: two equal modes.
+        let (re, im) = (0.6, -0.3);
+        let within = DMatrix::from_row_slice(
+            4,
+            4,
+            &[
+                re, im, 0.0, 0.0, -im, re, 0.0, 0.0, 0.0, 0.0, re, im, 0.0, 0.0, -im, re,
+            ],
+        );
+        let map = Thin {
+            within,
+            directions,
+            applied: std::cell::Cell::new(0),
+        };
+        let found = Dominant::of(&map, 0.3).unwrap();
+        // The first block, and what its images need to fill four dimensions.
+        assert!(map.applied.get() <= 3 * BLOCK, "{}", map.applied.get());
+        assert_eq!(found.eigenvalues.len(), 4);
+        for value in &found.eigenvalues {
+            let error = (value - Complex64::new(re, im.abs().copysign(value.im))).norm();
+            assert!(error < 1e-12, "{found:?}");
+            let vector = found.vector(*value).unwrap();
+            let miss = map.apply(&DMatrix::from_columns(&[
+                vector.map(|v| v.re),
+                vector.map(|v| v.im),
+            ]));
+            let miss = miss.unwrap();
+            let complex =
+                miss.column(0).map(Complex64::from) + miss.column(1).map(|v| Complex64::new(0.0, v));
+            assert!((complex - vector * *value).norm() < 1e-9);
         }
     }
 }
