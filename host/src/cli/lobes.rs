@@ -252,8 +252,9 @@ fn picture(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
 fn as_page(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
     let svg = picture(case, chart, depth_mm)?;
     let caption = format!(
-        "Stable depths over spindle speed, by {}. Lines: where stability is first lost. A grey band, where there is one: \
-         the first limits of 5 to 95 % of the machines that the deviations of the case describe, with their median.",
+        "Stable depths over spindle speed, by {}. Lines: where stability is first lost. Grey areas, where there are any: \
+         undecided, within the error of the method. A grey band with lines, where there is one: the first limits of 5 to \
+         95 % of the machines that the deviations of the case describe, with their median.",
         chart.label
     );
     let body = maud::html! {
@@ -262,7 +263,7 @@ fn as_page(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
         h2 { "Limits" }
         table {
             tr {
-                th { "rev/min" } th { "first limit [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
+                th { "rev/min" } th { "first limit [mm]" } th { "error [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
                 @if chart.speeds.iter().any(|line| line.spread.is_some()) {
                     th { "limit of 5 % [mm]" } th { "of 50 %" } th { "of 95 % of the machines" }
                 }
@@ -284,10 +285,11 @@ fn row(line: &SpeedLine) -> maud::Markup {
             td { (format!("{:.1}", line.rpm)) }
             @if let Some(limit) = line.first_limit {
                 td { (format!("{:.4}", limit.depth_mm)) }
+                td { @if let Some(error_mm) = limit.error_mm { (format!("{error_mm:.0e}")) } }
                 td { (limit.kind.name()) }
                 td { @if let Some(hz) = limit.chatter_hz { (format!("{hz:.2}")) } }
             } @else {
-                td { "none" } td {} td {}
+                td { "none" } td {} td {} td {}
             }
             td { (stable.join(", ")) }
             @if let Some(spread) = &line.spread {
@@ -307,6 +309,9 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
         "gain",
         "chatter [Hz]",
         "first",
+        "error [mm]",
+        "undecided_from [mm]",
+        "undecided_to [mm]",
     ];
     if chart.speeds.iter().any(|line| line.spread.is_some()) {
         header.extend(["limit_5 [mm]", "limit_50 [mm]", "limit_95 [mm]"]);
@@ -321,7 +326,7 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
             .collect();
         let spread = spread.iter().map(String::as_str);
         if line.switches.is_empty() {
-            let row = [rpm.as_str(), "", "", "", "", ""];
+            let row = [rpm.as_str(), "", "", "", "", "", "", "", ""];
             writer
                 .write_record(row.into_iter().chain(spread.clone()))
                 .map_err(Error::other)?;
@@ -330,13 +335,22 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
             let first = line
                 .first_limit
                 .is_some_and(|limit| limit.depth_mm == switch.depth_mm);
+            // An interval that stands around an end of what is stable.
+            let undecided = line
+                .undecided_mm
+                .iter()
+                .find(|[from, to]| (*from..=*to).contains(&switch.depth_mm));
+            let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
             let row = [
                 rpm.as_str(),
                 &switch.depth_mm.to_string(),
                 switch.kind.name(),
                 &switch.gain.to_string(),
-                &switch.chatter_hz.map_or_else(String::new, |hz| hz.to_string()),
+                &number(switch.chatter_hz),
                 &first.to_string(),
+                &number(switch.error_mm),
+                &number(undecided.map(|interval| interval[0])),
+                &number(undecided.map(|interval| interval[1])),
             ];
             writer
                 .write_record(row.into_iter().chain(spread.clone()))

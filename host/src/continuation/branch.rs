@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::forced::ForcedProblem;
 use super::orbit::{Mesh, Orbit, OrbitError, PIECE_ANGLE, Scale, pass};
 use super::variation;
+use crate::stability::line::union;
 use crate::stability::multiplier::{Kind, chatter_hz};
 use crate::stability::period::Period;
 use crate::stability::period_map;
@@ -455,6 +456,7 @@ impl Branch {
             .iter()
             .map(|event| Switch {
                 depth_mm: event.depth_mm,
+                error_mm: None,
                 kind: event.kind,
                 gain: event.gain,
                 chatter_hz: event.chatter_hz,
@@ -464,33 +466,17 @@ impl Branch {
         let first_limit = switches
             .iter()
             .find(|switch| starts_stable && !switch.gain)
-            .map(|switch| Limit {
-                depth_mm: switch.depth_mm,
-                kind: switch.kind,
-                chatter_hz: switch.chatter_hz,
-            });
+            .map(Limit::from);
         SpeedLine {
             rpm: self.rpm,
             stable_mm: union(self.stable_mm()),
+            undecided_mm: Vec::new(),
             bistable_mm: self.bistable_mm(),
             first_limit,
             switches,
             spread: None,
         }
     }
-}
-
-/// Overlapping intervals joined.
-fn union(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let mut joined: Vec<[f64; 2]> = Vec::with_capacity(intervals.len());
-    for interval in intervals {
-        match joined.last_mut() {
-            Some(last) if interval[0] <= last[1] => last[1] = last[1].max(interval[1]),
-            _ => joined.push(interval),
-        }
-    }
-    joined
 }
 
 #[cfg(test)]

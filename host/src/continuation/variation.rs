@@ -117,5 +117,6 @@ fn element(
         flow,
         drive,
         ports,
+        axial: None,
     })
 }

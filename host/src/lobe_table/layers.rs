@@ -135,6 +135,7 @@ fn up_to(line: SpeedLine, limit_mm: Option<f64>, depth_mm: f64) -> SpeedLine {
     let limit = limit_mm.and_then(|depth_mm| {
         Some(Limit {
             depth_mm,
+            error_mm: None,
             ..line.first_limit?
         })
     });
@@ -145,10 +146,12 @@ fn up_to(line: SpeedLine, limit_mm: Option<f64>, depth_mm: f64) -> SpeedLine {
         } else {
             Vec::new()
         },
+        undecided_mm: Vec::new(),
         bistable_mm: Vec::new(),
         switches: limit
             .map(|limit| crate::stability::Switch {
                 depth_mm: limit.depth_mm,
+                error_mm: limit.error_mm,
                 kind: limit.kind,
                 gain: false,
                 chatter_hz: limit.chatter_hz,

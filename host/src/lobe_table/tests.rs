@@ -564,6 +564,7 @@ fn two_stable_orbits_are_not_surely_stable() {
     let line = SpeedLine {
         rpm: 500.0,
         stable_mm: vec![[0.0, 4.0]],
+        undecided_mm: Vec::new(),
         bistable_mm: vec![[2.0, 3.0]],
         first_limit: None,
         switches: Vec::new(),

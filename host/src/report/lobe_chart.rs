@@ -81,7 +81,7 @@ impl From<&SpeedLine> for Column {
         Self {
             rpm: line.rpm,
             stable_mm: line.stable_mm.iter().map(|&[from, to]| (from, to)).collect(),
-            undecided_mm: Vec::new(),
+            undecided_mm: line.undecided_mm.iter().map(|&[from, to]| (from, to)).collect(),
             first_limit: line.first_limit.map(|limit| FirstLimit {
                 depth_mm: limit.depth_mm,
                 kind: limit.kind,
@@ -133,8 +133,7 @@ pub fn lobe_chart(
         )])?;
         let stable = areas(columns, |column| &column.stable_mm);
         chart.draw_series(stable.into_iter().map(|area| Polygon::new(area, STABLE)))?;
-        let undecided = areas(columns, |column| &column.undecided_mm);
-        chart.draw_series(undecided.into_iter().map(|area| Polygon::new(area, UNDECIDED)))?;
+        draw_undecided(&mut chart, columns, depth_max_mm)?;
         draw_percentiles(&mut chart, columns, depth_max_mm)?;
         for kind in [LimitKind::Hopf, LimitKind::Flip, LimitKind::Fold] {
             draw_limits(&mut chart, columns, depth_max_mm, kind)?;
@@ -149,6 +148,25 @@ pub fn lobe_chart(
             .draw()?;
         Ok(())
     })
+}
+
+/// Where the error leaves the side open, if that is anywhere wide enough to be seen.
+fn draw_undecided(
+    chart: &mut Axes<'_, '_>,
+    columns: &[Column],
+    depth_max_mm: f64,
+) -> Result<(), PictureError> {
+    let pixel_mm = depth_max_mm / f64::from(SIZE.1);
+    let intervals = columns.iter().flat_map(|column| &column.undecided_mm);
+    if intervals.clone().all(|(from, to)| to - from < pixel_mm) {
+        return Ok(());
+    }
+    let areas = areas(columns, |column| &column.undecided_mm);
+    chart
+        .draw_series(areas.into_iter().map(|area| Polygon::new(area, UNDECIDED)))?
+        .label("undecided: within the error")
+        .legend(|(x, y)| Rectangle::new([(x, y - 4), (x + 18, y + 4)], UNDECIDED.filled()));
+    Ok(())
 }
 
 /// The band from the 5 to the 95 % limit, and the median in it.

@@ -167,3 +167,65 @@ fn limits_windows_kinds_and_chatter_are_those_of_the_default() {
         }
     }
 }
+
+#[test]
+fn chatter_is_named_after_the_largest_harmonic_by_every_method() {
+    // The fourth pair to leave the circle: its motion has many harmonics, and is drowned by another that grows a million times
+    // faster within a period.
+    let name = "insperger-2dof-ad1";
+    let default = Collocation {
+        problem: Problem::new(&case(name), CubicTerms::Refuse).unwrap(),
+    };
+    let receptances = MultiFrequency {
+        problem: FrequencyProblem::new(&case(name), CubicTerms::Refuse).unwrap(),
+        harmonics: None,
+    };
+    let chatter_hz = |method: &dyn Method| {
+        let switches = method.line(5000.0, 6.0, 40).unwrap().switches;
+        assert_eq!(switches.len(), 4);
+        switches[3].chatter_hz.unwrap()
+    };
+    let (by_default, by_receptances) = (chatter_hz(&default), chatter_hz(&receptances));
+    assert!((by_default - 1391.286).abs() < 1e-3, "{by_default}");
+    assert!(
+        (by_default - by_receptances).abs() < 1e-6,
+        "{by_default} {by_receptances}"
+    );
+    // The limits of these steps are 2e-3 off.
+    let by_steps = chatter_hz(&sdm(name, SdmOrder::First, 300));
+    assert!(
+        (by_steps / by_default - 1.0).abs() < 2e-3,
+        "{by_steps} {by_default}"
+    );
+}
+
+#[test]
+fn without_depth_the_frequency_is_that_of_a_mode() {
+    for (name, rpm) in [
+        ("kuka-kr90-acetal", 600.0),
+        ("kuka-kr90-acetal", 1200.0),
+        ("insperger-2dof-ad0.05", 5000.0),
+    ] {
+        let point = default_point(name, rpm, 0.0);
+        let problem = Problem::new(&case(name), CubicTerms::Refuse).unwrap();
+        let period_s = problem.tooth_period_s(rpm);
+        let slowest = problem
+            .structure
+            .poles()
+            .into_iter()
+            .max_by(|p, q| p.re.total_cmp(&q.re))
+            .unwrap();
+        let mode_hz = slowest.im.abs() / std::f64::consts::TAU;
+        assert!((point.multiplier_abs - (slowest.re * period_s).exp()).abs() < point.error);
+        let found = point.chatter_hz.unwrap();
+        assert!(
+            (found / mode_hz - 1.0).abs() < 1e-9,
+            "{name} {rpm}: {found} {mode_hz}"
+        );
+        let by_steps = sdm(name, SdmOrder::First, 100).point(rpm, 0.0).unwrap();
+        assert!(
+            (by_steps.chatter_hz.unwrap() / mode_hz - 1.0).abs() < 1e-6,
+            "{by_steps:?} {mode_hz}"
+        );
+    }
+}

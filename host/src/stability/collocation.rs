@@ -9,10 +9,16 @@ use super::method::Method;
 use super::multiplier::chatter_hz;
 use super::period::{Period, Resolution, check_length};
 use super::period_map;
-use super::point::{Point, point};
+use super::point::{LEAST_ERROR, Point, point};
 use super::root::Root;
 use super::spectrum::Spectrum;
 use super::{Problem, StabilityError};
+
+/// Multipliers below this size are not needed to follow others along the depth.
+const FOLLOWED: f64 = 0.25;
+
+/// The same as a share of the largest, where all are small.
+const SHARE: f64 = 0.3;
 
 /// The default method: collocation of the one-period map, limits from the characteristic matrix.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,12 +53,15 @@ impl Method for Collocation {
 pub(super) struct Collocated<'a> {
     problem: &'a Problem,
     rpm: f64,
+    deepest_m: f64,
     /// For all multipliers at once.
     coarse: Period,
     /// For limits.
     period: Period,
     characteristic: Characteristic,
     workspace: Workspace,
+    /// For errors, once one is asked for.
+    finer: Option<Characteristic>,
 }
 
 impl<'a> Collocated<'a> {
@@ -64,17 +73,19 @@ impl<'a> Collocated<'a> {
         Self {
             problem,
             rpm,
+            deepest_m,
             coarse: Period::new(problem, rpm, deepest_m, Resolution::SCAN),
             period,
             workspace: characteristic.workspace(),
             characteristic,
+            finer: None,
         }
     }
 }
 
 impl Spectrum for Collocated<'_> {
     fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
-        period_map::multipliers(&self.coarse, depth_m)
+        period_map::larger_than(&self.coarse, depth_m, FOLLOWED, SHARE)
     }
 
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64> {
@@ -99,5 +110,17 @@ impl Spectrum for Collocated<'_> {
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64> {
         let Crossing { multiplier, depth_m } = *crossing;
         chatter_hz(self.problem, self.rpm, &self.period, multiplier, depth_m)
+    }
+
+    /// As that of a point: what a finer period changes, with room.
+    fn error(&mut self, crossing: &Crossing) -> Option<f64> {
+        let Crossing { multiplier, depth_m } = *crossing;
+        let (problem, rpm, deepest_m) = (self.problem, self.rpm, self.deepest_m);
+        let finer = self.finer.get_or_insert_with(|| {
+            let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::FINE);
+            Characteristic::new(&period, 2.0 * deepest_m)
+        });
+        let fine = finer.multiplier_near(multiplier, depth_m, 0.05, &mut self.workspace)?;
+        Some((10.0 * (fine - multiplier).norm()).max(LEAST_ERROR))
     }
 }

@@ -73,6 +73,19 @@ impl<D: Discretization> Discretized<D> {
             dominant.eigenvalues.first().copied()
         })
     }
+
+    /// The error of a multiplier of the steps asked for, from twice and four times as many.
+    fn error(&self, rpm: f64, depth_mm: f64, multiplier: Complex64) -> Result<f64, StabilityError> {
+        let finer = |times: usize| {
+            with_dominant(self, rpm, depth_mm, times * self.steps, |dominant, _| {
+                let distance = |value: &Complex64| (value - multiplier).norm();
+                let values = dominant.eigenvalues.iter().copied();
+                values.min_by(|p, q| distance(p).total_cmp(&distance(q)))
+            })
+        };
+        let order = self.discretization.order();
+        Ok(step_error(multiplier, finer(2)?, finer(4)?, order, ROUNDING))
+    }
 }
 
 impl<D: Discretization> Method for Discretized<D> {
@@ -99,26 +112,20 @@ impl<D: Discretization> Method for Discretized<D> {
                 .and_then(|vector| map.chatter_hz(multiplier, &vector));
             Some((multiplier, chatter_hz))
         })?;
-        let finer = |times: usize| {
-            with_dominant(self, rpm, depth_mm, times * self.steps, |dominant, _| {
-                let distance = |value: &Complex64| (value - multiplier).norm();
-                let values = dominant.eigenvalues.iter().copied();
-                values.min_by(|p, q| distance(p).total_cmp(&distance(q)))
-            })
-        };
-        let order = self.discretization.order();
-        let error = step_error(multiplier, finer(2)?, finer(4)?, order, ROUNDING);
+        let error = self.error(rpm, depth_mm, multiplier)?;
         Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
-    /// Limits are those of the steps asked for.
+    /// Limits are those of the steps asked for, their errors those of the multipliers there.
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         let mesh = Mesh::new(&self.pitched, rpm, self.steps);
         line_of(rpm, depth_mm, samples, |deepest_m| {
-            MapSpectrum::new(deepest_m, |depth_m| {
-                self.discretization.map(&self.pitched, &mesh, depth_m)
-            })
+            MapSpectrum::new(
+                deepest_m,
+                |depth_m| self.discretization.map(&self.pitched, &mesh, depth_m),
+                |multiplier, depth_m| self.error(rpm, depth_m * 1e3, multiplier).ok(),
+            )
         })
     }
 }

@@ -19,6 +19,19 @@ pub(crate) struct Element {
     pub(crate) drive: DMatrix<f64>,
     /// What each port is, in the order of the rows of E.
     pub(crate) ports: Vec<Port>,
+    /// The axial displacement, where edge and feed forces depend on it.
+    pub(crate) axial: Option<Axial>,
+}
+
+/// The axial displacement at the nodes, z = E_z x + Q_z f, and the force that it makes by itself.
+#[derive(Clone, Debug)]
+pub(crate) struct Axial {
+    /// E_z, nodes × n.
+    pub(crate) observe: DMatrix<f64>,
+    /// Q_z, nodes × ports, per meter of depth.
+    pub(crate) kernel: DMatrix<f64>,
+    /// The forces, N/m.
+    pub(crate) ports: Vec<Port>,
 }
 
 /// One cutting tooth at one node.
@@ -28,7 +41,7 @@ pub(crate) struct Port {
     pub(crate) time_s: f64,
     /// Quadrature weight, s.
     pub(crate) weight_s: f64,
-    /// Force on the tool per depth and displacement along the chip normal, Pa.
+    /// Force on the tool per depth and displacement along the chip normal, Pa; per axial displacement, N/m, of [`Axial`].
     pub(crate) force: Vector3<f64>,
 }
 
@@ -141,6 +154,7 @@ impl<'a> Step<'a> {
                     force: ports.force[port],
                 })
                 .collect(),
+            axial: None,
         };
         if process.axial_depth_modulation {
             without_modulation(&whole, nodes, count)
@@ -208,11 +222,18 @@ fn without_modulation(whole: &Element, nodes: usize, per_node: usize) -> Element
     let observe = solve(&whole.observe);
     let kernel = solve(&whole.kernel.select_columns(&teeth));
     let push = whole.drive.select_columns(&axial);
+    let of = |ports: &[usize]| ports.iter().map(|&port| whole.ports[port]).collect();
+    let seen = Axial {
+        observe: observe.select_rows(&axial),
+        kernel: kernel.select_rows(&axial),
+        ports: of(&axial),
+    };
     Element {
-        flow: &whole.flow + &push * observe.select_rows(&axial),
+        flow: &whole.flow + &push * &seen.observe,
         observe: observe.select_rows(&teeth),
-        drive: whole.drive.select_columns(&teeth) + &push * kernel.select_rows(&axial),
+        drive: whole.drive.select_columns(&teeth) + &push * &seen.kernel,
         kernel: kernel.select_rows(&teeth),
-        ports: teeth.iter().map(|&port| whole.ports[port]).collect(),
+        ports: of(&teeth),
+        axial: Some(seen),
     }
 }

@@ -93,6 +93,6 @@ impl Discretization for FullDiscretization {
             steps.push(step);
             known = Some(weights);
         }
-        Some(Stepped::new(pitched, mesh, steps))
+        Some(Stepped::new(pitched, mesh, depth_m, steps))
     }
 }

@@ -102,6 +102,15 @@ pub(super) fn largest(map: &impl LinearMap, share: f64) -> Option<Vec<Complex64>
     Some(found.eigenvalues)
 }
 
+/// The eigenvalues larger than `least`, or than `share` of the largest where that is less, largest first; else as [`largest`].
+pub(super) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Option<Vec<Complex64>> {
+    let found = arnoldi(map, map.size() / 2, ROUGH, &|values| {
+        let largest = values.first().map_or(0.0, |value| value.norm());
+        values.retain(|value| value.norm() > least.min(share * largest));
+    })?;
+    Some(found.eigenvalues)
+}
+
 /// Block Arnoldi with full orthogonalization until those eigenvalues are settled that `keep` keeps of all of them, largest
 /// first; `None` where the space would have to grow beyond `most`.
 fn arnoldi(
@@ -112,8 +121,9 @@ fn arnoldi(
 ) -> Option<Dominant> {
     let size = map.size();
     // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
-    let mut basis = DMatrix::zeros(size, most + BLOCK);
-    let mut projected = DMatrix::zeros(most + BLOCK, most);
+    let mut room = most.min(4 * LOOK * BLOCK);
+    let mut basis = DMatrix::zeros(size, room + BLOCK);
+    let mut projected = DMatrix::zeros(room + BLOCK, room);
     let first = start(size);
     let scale = first.norm();
     let (first, _) = orthonormal(first, scale);
@@ -122,6 +132,12 @@ fn arnoldi(
     for count in 1.. {
         if done + width > most {
             return None;
+        }
+        if done + width > room {
+            // Few maps need much room, and so much of it takes longer than they do.
+            room = most.min(2 * room);
+            basis = basis.resize_horizontally(room + BLOCK, 0.0);
+            projected = projected.resize(room + BLOCK, room, 0.0);
         }
         let mut image = map.apply(&basis.columns(done, width).into_owned())?;
         let scale = image.norm();

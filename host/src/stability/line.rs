@@ -29,11 +29,17 @@ const FAR: f64 = 0.5;
 /// Distance from the circle within which multipliers are polished: far above the error of the scan.
 const POLISHED: f64 = 1e-3;
 
+/// To what crossings are solved for, relative to the depth.
+const ROOT: f64 = 1e-9;
+
 /// A crossing of the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Switch {
     /// Axial depth, mm.
     pub depth_mm: f64,
+    /// An estimate of its error, mm: within it |μ| is as near to 1 as the error of the multiplier. Absent where the method has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_mm: Option<f64>,
     /// How the multiplier crosses.
     pub kind: Kind,
     /// True where it goes inside: stability is gained (if no other is outside).
@@ -47,6 +53,9 @@ pub struct Switch {
 pub struct Limit {
     /// Axial depth, mm.
     pub depth_mm: f64,
+    /// As that of its [`Switch`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_mm: Option<f64>,
     /// How.
     pub kind: Kind,
     /// Chatter frequency, Hz.
@@ -60,6 +69,10 @@ pub struct SpeedLine {
     pub rpm: f64,
     /// Depths that are stable, mm, as intervals in order, from 0 to the last depth.
     pub stable_mm: Vec<[f64; 2]>,
+    /// Depths, mm, at which the error leaves open on which side they are, as intervals in order: around the ends of those that are
+    /// stable.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub undecided_mm: Vec<[f64; 2]>,
     /// Depths at which two stable forced orbits exist, mm: only nonlinear structures have them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bistable_mm: Vec<[f64; 2]>,
@@ -285,18 +298,55 @@ impl<S: Spectrum> Scan<S> {
         }])
     }
 
-    fn finish(self, start: i32, depth_mm: f64) -> SpeedLine {
-        let switches = self
-            .crossings
+    fn finish(mut self, start: i32, depth_mm: f64) -> SpeedLine {
+        let crossings = std::mem::take(&mut self.crossings);
+        let switches = crossings
             .iter()
             .map(|Found { crossing, outward }| Switch {
                 depth_mm: crossing.depth_m * 1e3,
+                error_mm: Some(1e3 * self.error_m(crossing, *outward, depth_mm * 1e-3)),
                 kind: Kind::of(crossing.multiplier),
                 gain: !outward,
                 chatter_hz: self.spectrum.chatter_hz(crossing),
             })
             .collect();
         SpeedLine::of_switches(self.rpm, depth_mm, start, switches)
+    }
+
+    /// How far from a crossing, m, |μ| of its branch is beyond the error of the multiplier on both sides.
+    ///
+    /// First that error over d|μ|/dw; where |μ| bends too much for that, twice as far, and so on. `deepest_m` where it never is.
+    fn error_m(&mut self, crossing: &Crossing, outward: bool, deepest_m: f64) -> f64 {
+        let Crossing { multiplier, depth_m } = *crossing;
+        let (Some(error), Some(slope)) = (
+            self.spectrum.error(crossing),
+            self.spectrum.sensitivity(multiplier, depth_m),
+        ) else {
+            return deepest_m;
+        };
+        let mut reach_m = 1.01 * error / (multiplier.conj() * slope).re.abs() + ROOT * depth_m;
+        while reach_m < deepest_m {
+            let sides = [(-reach_m, outward), (reach_m, !outward)];
+            let mut is_beyond = |(shift_m, inside): (f64, bool)| {
+                // No cut is shallower than none.
+                depth_m + shift_m <= 0.0 || {
+                    let guess = multiplier + slope * shift_m;
+                    let there = self.spectrum.multiplier_near(guess, depth_m + shift_m, 0.1);
+                    there.is_some_and(|there| {
+                        if inside {
+                            there.norm() <= 1.0 - error
+                        } else {
+                            there.norm() >= 1.0 + error
+                        }
+                    })
+                }
+            };
+            if sides.into_iter().all(&mut is_beyond) {
+                return reach_m;
+            }
+            reach_m *= 2.0;
+        }
+        deepest_m
     }
 }
 
@@ -306,6 +356,7 @@ impl SpeedLine {
     pub(super) fn of_switches(rpm: f64, depth_mm: f64, mut outside: i32, switches: Vec<Switch>) -> Self {
         let mut stable_from = (outside == 0).then_some(0.0);
         let mut stable_mm = Vec::new();
+        let mut undecided_mm = Vec::new();
         let mut first_limit = None;
         for switch in &switches {
             let count = switch.kind.count();
@@ -314,15 +365,17 @@ impl SpeedLine {
                 (Some(from), 1..) => {
                     stable_mm.push([from, switch.depth_mm]);
                     stable_from = None;
-                    first_limit = first_limit.or(Some(Limit {
-                        depth_mm: switch.depth_mm,
-                        kind: switch.kind,
-                        chatter_hz: switch.chatter_hz,
-                    }));
+                    first_limit = first_limit.or(Some(Limit::from(switch)));
                 }
                 (None, ..=0) => stable_from = Some(switch.depth_mm),
-                _ => {}
+                _ => continue,
             }
+            undecided_mm.extend(switch.error_mm.map(|error_mm| {
+                [
+                    (switch.depth_mm - error_mm).max(0.0),
+                    (switch.depth_mm + error_mm).min(depth_mm),
+                ]
+            }));
         }
         if let Some(from) = stable_from {
             stable_mm.push([from, depth_mm]);
@@ -330,12 +383,37 @@ impl SpeedLine {
         Self {
             rpm,
             stable_mm,
+            undecided_mm: union(undecided_mm),
             bistable_mm: Vec::new(),
             first_limit,
             switches,
             spread: None,
         }
     }
+}
+
+impl From<&Switch> for Limit {
+    fn from(switch: &Switch) -> Self {
+        Self {
+            depth_mm: switch.depth_mm,
+            error_mm: switch.error_mm,
+            kind: switch.kind,
+            chatter_hz: switch.chatter_hz,
+        }
+    }
+}
+
+/// Overlapping intervals joined, in order.
+pub(crate) fn union(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut joined: Vec<[f64; 2]> = Vec::with_capacity(intervals.len());
+    for interval in intervals {
+        match joined.last_mut() {
+            Some(last) if interval[0] <= last[1] => last[1] = last[1].max(interval[1]),
+            _ => joined.push(interval),
+        }
+    }
+    joined
 }
 
 /// By how many the number outside changes.

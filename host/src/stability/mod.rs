@@ -14,7 +14,7 @@ mod fdm;
 mod frequency;
 pub(crate) mod gauss;
 mod krylov;
-mod line;
+pub(crate) mod line;
 mod method;
 pub(crate) mod multiplier;
 mod one_period;
@@ -56,11 +56,15 @@ mod agreement;
 #[cfg(test)]
 mod cells_tests;
 #[cfg(test)]
+mod line_tests;
+#[cfg(test)]
 mod properties;
 #[cfg(test)]
 mod random_tests;
 #[cfg(test)]
 mod sensitivity_tests;
+#[cfg(test)]
+mod taylor;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -7,7 +7,14 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::Problem;
-use super::period::Period;
+use super::element::Port;
+use super::period::{Period, Rates};
+
+/// How much more than the motion of a multiplier anything may grow over a part of the period: as many digits are lost.
+const GROWTH: f64 = 1e3;
+
+/// The largest system of parts that is solved.
+const CYCLIC_MAX: usize = 256;
 
 /// How a multiplier leaves the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -87,8 +94,9 @@ impl Verdict {
 
 /// The vibration frequency, Hz, of the motion u(t) = e^{st} v(t) with v of tooth period τ and e^{sτ} = μ.
 ///
-/// The motion has the frequencies |Im ln μ + 2πk|/(2πτ); the one with the largest displacement is given. With
-/// F̂_k the k-th harmonic of the regenerative force along the eigenfunction, displacement is H(s_k) F̂_k.
+/// The motion has the frequencies |Im ln μ + 2πk|/(2πτ). Named is the one whose harmonic of the displacement of the tool,
+/// û_k = 1/τ ∫₀^τ u(t) e^{−s_k t} dt as a vector, is largest. With F̂_k the k-th harmonic of all forces along the eigenfunction,
+/// û_k is H(s_k) F̂_k; without forces the motion has the frequency of its mode alone.
 pub(crate) fn chatter_hz(
     problem: &Problem,
     rpm: f64,
@@ -97,7 +105,11 @@ pub(crate) fn chatter_hz(
     depth_m: f64,
 ) -> Option<f64> {
     let forces = eigenfunction_forces(period, multiplier, depth_m)?;
-    loudest_hz(problem, problem.tooth_period_s(rpm), multiplier, |s| {
+    let period_s = problem.tooth_period_s(rpm);
+    if forces.iter().all(|(_, force)| force.norm() == 0.0) {
+        return free_hz(problem, period_s, multiplier);
+    }
+    loudest_hz(problem, depth_m, period_s, multiplier, |s| {
         let mut harmonic = Vector3::<Complex64>::zeros();
         for (time_s, force) in &forces {
             harmonic += force * (-s * *time_s).exp();
@@ -106,23 +118,27 @@ pub(crate) fn chatter_hz(
     })
 }
 
+/// The frequency, Hz, of the mode that a period of free vibration multiplies by about μ.
+fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f64> {
+    let miss = |pole: &Complex64| ((pole * period_s).exp() - multiplier).norm();
+    let poles = problem.structure.poles();
+    let pole = poles.iter().min_by(|p, q| miss(p).total_cmp(&miss(q)))?;
+    Some(pole.im.abs() / TAU)
+}
+
 /// The frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest; `size` gives its size at an exponent
 /// s with e^{sT} = μ.
 pub(super) fn loudest_hz(
     problem: &Problem,
+    depth_m: f64,
     period_s: f64,
     multiplier: Complex64,
     size: impl Fn(Complex64) -> Option<f64>,
 ) -> Option<f64> {
     let growth = multiplier.ln();
-    let fastest = problem
-        .structure
-        .poles()
-        .iter()
-        .map(|pole| pole.im)
-        .fold(0.0, f64::max);
-    // Above the fastest pole the receptance only falls; one harmonic beyond is enough.
-    let highest = (fastest * period_s / TAU).ceil() as i32 + 1;
+    // The cut makes modes stiffer; above the fastest the motion only falls, and one harmonic beyond is enough.
+    let kappa_m = (Complex64::ONE - multiplier.inv()).norm() * depth_m;
+    let highest = (Rates::new(problem).at(kappa_m) * period_s / TAU).ceil() as i32 + 1;
     (-highest..=highest)
         .filter_map(|k| {
             let s = (growth + Complex64::new(0.0, TAU * f64::from(k))) / period_s;
@@ -139,35 +155,91 @@ fn eigenfunction_forces(
     depth_m: f64,
 ) -> Option<Vec<(f64, Vector3<Complex64>)>> {
     let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
-    let order = period.order();
     let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
-    let mut transition = DMatrix::<Complex64>::identity(order, order);
-    let mut observed = Vec::with_capacity(period.elements.len());
+    // The period in parts, each from a state of its own, and what is seen in each element from the state of its part.
+    let identity = DMatrix::<Complex64>::identity(period.order(), period.order());
+    let mut parts = Vec::new();
+    let mut part = identity.clone();
+    let mut seen_from = Vec::with_capacity(period.elements.len());
+    let (mut length, share) = (0.0, 1.0 / period.elements.len().max(1) as f64);
     for element in &period.elements {
+        // What grows faster than the motion itself would drown it.
+        if part.norm() > GROWTH * multiplier.norm().powf(length) {
+            parts.push(std::mem::replace(&mut part, identity.clone()));
+            length = 0.0;
+        }
         let ports = element.kernel.nrows();
         let implicit = DMatrix::identity(ports, ports) - complex(&element.kernel) * kappa;
-        let seen = implicit.lu().solve(&(complex(&element.observe) * &transition))?;
-        transition = complex(&element.flow) * &transition + complex(&element.drive) * &seen * kappa;
-        observed.push(seen);
+        let chips = implicit.lu().solve(&(complex(&element.observe) * &part))?;
+        let axial = element
+            .axial
+            .as_ref()
+            .map(|axial| complex(&axial.observe) * &part + complex(&axial.kernel) * &chips * kappa);
+        part = complex(&element.flow) * &part + complex(&element.drive) * &chips * kappa;
+        seen_from.push((parts.len(), chips, axial));
+        length += share;
     }
-    let transition = complex(&period.flight) * transition;
-    let start = eigenvector(&transition, multiplier)?;
+    parts.push(complex(&period.flight) * part);
+    let starts = cyclic_vector(&parts, multiplier)?;
     let mut forces = Vec::new();
-    for (element, seen) in period.elements.iter().zip(&observed) {
-        let seen = seen * &start;
-        for (port, seen) in element.ports.iter().zip(seen.iter()) {
-            let force = port.force.map(Complex64::from) * (seen * kappa * port.weight_s);
-            forces.push((port.time_s, force));
+    for (element, (part, chips, axial)) in period.elements.iter().zip(seen_from) {
+        let start = &starts[part];
+        let mut push = |ports: &[Port], seen: DVector<Complex64>, factor: Complex64| {
+            forces.extend(ports.iter().zip(seen.iter()).map(|(port, seen)| {
+                let force = port.force.map(Complex64::from) * (seen * factor * port.weight_s);
+                (port.time_s, force)
+            }));
+        };
+        push(&element.ports, chips * start, kappa);
+        if let (Some(ports), Some(seen)) = (&element.axial, axial) {
+            push(&ports.ports, seen * start, Complex64::ONE);
         }
     }
     Some(forces)
+}
+
+/// The states x_g at the start of each part with T_g x_g = x_{g+1}, and μ x_0 after the last.
+///
+/// All at once: a start that is good to rounding would be of no use where parts together grow by far more than μ.
+fn cyclic_vector(parts: &[DMatrix<Complex64>], multiplier: Complex64) -> Option<Vec<DVector<Complex64>>> {
+    let [single] = parts else {
+        let (order, count) = (parts.first()?.nrows(), parts.len());
+        if order * count > CYCLIC_MAX {
+            return None;
+        }
+        let mut whole = DMatrix::zeros(order * count, order * count);
+        for (g, part) in parts.iter().enumerate() {
+            whole
+                .view_mut((g * order, g * order), (order, order))
+                .copy_from(part);
+            let (to, factor) = if g + 1 < count {
+                ((g + 1) * order, Complex64::ONE)
+            } else {
+                (0, multiplier)
+            };
+            for i in 0..order {
+                whole[(g * order + i, to + i)] -= factor;
+            }
+        }
+        let vector = eigenvector(&whole, Complex64::ZERO)?;
+        return Some(
+            (0..count)
+                .map(|g| vector.rows(g * order, order).into_owned())
+                .collect(),
+        );
+    };
+    Some(vec![eigenvector(single, multiplier)?])
 }
 
 /// A vector that the matrix multiplies by about `eigenvalue`, by inverse iteration.
 pub(super) fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
     let order = matrix.nrows();
     // A shift a little off the eigenvalue keeps the matrix regular and separates the vector by 1e8 at each step.
-    let shift = eigenvalue * (1.0 + 1e-8);
+    let shift = if eigenvalue.norm() > 0.0 {
+        eigenvalue * (1.0 + 1e-8)
+    } else {
+        Complex64::from(1e-10 * matrix.norm())
+    };
     let lu = (matrix - DMatrix::identity(order, order) * shift).lu();
     let mut vector = DVector::from_fn(order, |i, _| Complex64::new(1.0, 0.3 * i as f64));
     for _ in 0..3 {

@@ -28,19 +28,22 @@ struct Known {
     beside: Option<Vec<Complex64>>,
 }
 
-/// The multipliers of maps at any depth; `map` makes that of a depth, m.
-pub(super) struct MapSpectrum<F> {
+/// The multipliers of maps at any depth; `map` makes that of a depth, m, and `error` says how far a multiplier at a depth, m,
+/// may be off.
+pub(super) struct MapSpectrum<F, E> {
     map: F,
+    error: E,
     /// The step for differences, m.
     step_m: f64,
     known: Option<Known>,
 }
 
-impl<M: PeriodMap, F: Fn(f64) -> Option<M>> MapSpectrum<F> {
+impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> MapSpectrum<F, E> {
     /// For depths up to `deepest_m`.
-    pub(super) fn new(deepest_m: f64, map: F) -> Self {
+    pub(super) fn new(deepest_m: f64, map: F, error: E) -> Self {
         Self {
             map,
+            error,
             step_m: DIFFERENCE * deepest_m.max(1e-9),
             known: None,
         }
@@ -63,7 +66,8 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>> MapSpectrum<F> {
     }
 }
 
-fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Complex64> {
+/// The nearest to a guess, real ones for real guesses.
+pub(super) fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Complex64> {
     multipliers
         .iter()
         .copied()
@@ -71,7 +75,9 @@ fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Complex64> {
         .min_by(|p, q| (p - guess).norm().total_cmp(&(q - guess).norm()))
 }
 
-impl<M: PeriodMap, F: Fn(f64) -> Option<M>> Spectrum for MapSpectrum<F> {
+impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> Spectrum
+    for MapSpectrum<F, E>
+{
     fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
         Some(self.at(depth_m)?.dominant.eigenvalues.clone())
     }
@@ -130,5 +136,9 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>> Spectrum for MapSpectrum<F> {
         let dominant = Dominant::of(&map, LEAST)?;
         let multiplier = nearest(&dominant.eigenvalues, crossing.multiplier)?;
         map.chatter_hz(multiplier, &dominant.vector(multiplier)?)
+    }
+
+    fn error(&mut self, crossing: &Crossing) -> Option<f64> {
+        (self.error)(crossing.multiplier, crossing.depth_m)
     }
 }

@@ -85,6 +85,23 @@ pub(super) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Vec<C
     Some(all)
 }
 
+/// All multipliers larger than `least`, or than `share` of the largest where that is less, largest first; with others that are
+/// smaller where the map is small.
+///
+/// Of large maps by block Arnoldi, to begin Newton with. `None` as for [`largest`].
+pub(super) fn larger_than(period: &Period, depth_m: f64, least: f64, share: f64) -> Option<Vec<Complex64>> {
+    let size = period.order() + period.ports();
+    if size > WHOLE
+        && let Some(found) = krylov::larger_than(&Map::new(period, depth_m)?, least, share)
+    {
+        return Some(found);
+    }
+    if size > WHOLE_MAX {
+        return None;
+    }
+    multipliers(period, depth_m)
+}
+
 /// The map (x, p_τ) → (x⁺, p) by what it does, element by element.
 struct Map<'a> {
     period: &'a Period,

@@ -244,6 +244,7 @@ fn cut(
                 kernel: DMatrix::zeros(0, 0),
                 drive: DMatrix::zeros(order, 0),
                 ports: Vec::new(),
+                axial: None,
             },
             pasts: Vec::new(),
         });
@@ -400,7 +401,7 @@ impl PeriodMap for RevolutionMap<'_> {
         );
         let trace = self.trace(&parts)?;
         let problem = &self.revolution.pitched.problem;
-        loudest_hz(problem, self.revolution.period_s, multiplier, |s| {
+        loudest_hz(problem, self.depth_m, self.revolution.period_s, multiplier, |s| {
             let mut harmonic = Vector3::<Complex64>::zeros();
             for (piece, chips) in self.revolution.pieces.iter().zip(&trace.chips) {
                 for (port, chip) in piece.element.ports.iter().zip(chips.row_iter()) {

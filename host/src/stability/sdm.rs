@@ -72,6 +72,6 @@ impl Discretization for SemiDiscretization {
             step
         });
         let steps = steps.collect();
-        Some(Stepped::new(pitched, mesh, steps))
+        Some(Stepped::new(pitched, mesh, depth_m, steps))
     }
 }

@@ -34,4 +34,7 @@ pub(super) trait Spectrum {
 
     /// The frequency of the vibration that is born or dies at a crossing, Hz.
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64>;
+
+    /// An estimate of |error| of the multiplier of a crossing; `None` where a finer computation does not know it.
+    fn error(&mut self, crossing: &Crossing) -> Option<f64>;
 }

@@ -138,6 +138,7 @@ impl Step {
 pub(super) struct Stepped<'a> {
     pitched: &'a Pitched,
     mesh: &'a Mesh,
+    depth_m: f64,
     steps: Vec<Step>,
     /// K.
     history: usize,
@@ -148,8 +149,8 @@ pub(super) struct Stepped<'a> {
 }
 
 impl<'a> Stepped<'a> {
-    /// From all steps of a mesh.
-    pub(super) fn new(pitched: &'a Pitched, mesh: &'a Mesh, mut steps: Vec<Step>) -> Self {
+    /// From all steps of a mesh at a depth, m.
+    pub(super) fn new(pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64, mut steps: Vec<Step>) -> Self {
         let structure = &pitched.problem.structure;
         let seen: Vec<usize> = (0..3)
             .filter(|&axis| structure.c.row(axis).amax() > 0.0)
@@ -165,6 +166,7 @@ impl<'a> Stepped<'a> {
         Self {
             pitched,
             mesh,
+            depth_m,
             steps,
             history: earliest.unsigned_abs(),
             observe: DMatrix::from_fn(seen.len(), structure.order(), |i, j| structure.c[(seen[i], j)]),
@@ -238,6 +240,7 @@ impl PeriodMap for Stepped<'_> {
         let (_, trace) = self.trace(&parts);
         loudest_hz(
             &self.pitched.problem,
+            self.depth_m,
             self.mesh.passages.period_s,
             multiplier,
             |s| {

@@ -12,7 +12,7 @@ pub(super) fn problem(name: &str) -> Problem {
 }
 
 /// Chapter 6 without dimensions: speed from τ, w from the depth.
-fn rpm_of(tau: f64) -> f64 {
+pub(super) fn rpm_of(tau: f64) -> f64 {
     30.0 * 109.6416 / tau
 }
 const W_PER_MM: f64 = 0.033628;

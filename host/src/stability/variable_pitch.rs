@@ -8,7 +8,7 @@ use super::StabilityError;
 use super::krylov::Dominant;
 use super::line::{SpeedLine, line_of};
 use super::method::Method;
-use super::one_period::{MapSpectrum, PeriodMap};
+use super::one_period::{self, MapSpectrum, PeriodMap};
 use super::pitched::Pitched;
 use super::point::{LEAST_ERROR, Point, check_depth, check_speed};
 use super::revolution::{Fineness, Revolution};
@@ -54,15 +54,28 @@ impl Method for RevolutionCollocation {
         let chatter_hz = dominant
             .vector(multiplier)
             .and_then(|vector| fine.chatter_hz(multiplier, &vector));
-        // The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
-        let error = (10.0 * (coarse - multiplier).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
+        let error = error(coarse, multiplier);
         Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
         line_of(rpm, depth_mm, samples, |deepest_m| {
             let revolution = Revolution::new(&self.pitched, rpm, deepest_m, Fineness::WORKING).map(Rc::new);
-            MapSpectrum::new(deepest_m, move |depth_m| revolution.clone()?.map(depth_m))
+            MapSpectrum::new(
+                deepest_m,
+                move |depth_m| revolution.clone()?.map(depth_m),
+                |multiplier, depth_m| {
+                    let finer = Revolution::new(&self.pitched, rpm, depth_m, Fineness::FINE)?;
+                    let finer = Dominant::any(&Rc::new(finer).map(depth_m)?)?;
+                    let nearest = one_period::nearest(&finer.eigenvalues, multiplier)?;
+                    Some(error(multiplier, nearest))
+                },
+            )
         })
     }
+}
+
+/// The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
+fn error(coarse: Complex64, fine: Complex64) -> f64 {
+    (10.0 * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
 }

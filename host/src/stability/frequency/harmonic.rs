@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
 
-use super::limits::Limit;
+use super::limits::{Limit, limits};
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::{FrequencyProblem, Resonance};
 use crate::complex_eigenvalues;
@@ -70,6 +70,19 @@ impl<'a> HarmonicLoop<'a> {
     /// K.
     pub(super) fn harmonics(&self) -> usize {
         self.harmonics
+    }
+
+    /// The limits with every second line of a table, none where they cannot be had; `None` without a table.
+    pub(super) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<Limit>> {
+        let problem = self.problem.thinned()?;
+        let thinned = HarmonicLoop {
+            problem: &problem,
+            passing: self.passing,
+            harmonics: self.harmonics,
+            coefficients: self.coefficients.clone(),
+            axes: self.axes.clone(),
+        };
+        Some(limits(&thinned, depth_m).unwrap_or_default())
     }
 
     /// Number of frequencies.

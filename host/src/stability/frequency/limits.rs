@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::loci::{crossings, trace, turning};
 use super::open_loop::OpenLoop;
-use crate::stability::{Kind, SpeedLine, StabilityError, Switch};
+use crate::stability::{Kind, LEAST_ERROR, SpeedLine, StabilityError, Switch};
 
 /// Distance from an end where loci are real, as a share of the frequency beside it, at which their direction is read.
 const BESIDE: f64 = 1e-5;
@@ -98,7 +98,24 @@ pub(super) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
     ((half_turns - rounded).abs() < 0.2).then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
 }
 
-/// The line of given limits at a speed; `chatter_hz` says at which frequency the cut vibrates there.
+/// Limits that differ by more than this share are not the same.
+const SAME: f64 = 0.1;
+
+/// An estimate of the error of a limit, m: what other computations change (with every second line of a table, with another number
+/// of harmonics), and what has been checked against other methods. `None` where one of them has no such limit.
+fn error_m(limit: &Limit, others: &[Vec<Limit>]) -> Option<f64> {
+    others.iter().try_fold(LEAST_ERROR * limit.depth_m, |sum, other| {
+        let changes = other
+            .iter()
+            .filter(|other| other.kind == limit.kind && other.outward == limit.outward)
+            .map(|other| (other.depth_m - limit.depth_m).abs());
+        let change = changes.min_by(f64::total_cmp)?;
+        (change < SAME * limit.depth_m).then_some(sum + change)
+    })
+}
+
+/// The line of given limits at a speed; `others` are those of computations from which errors are told, `chatter_hz` says at which
+/// frequency the cut vibrates there.
 ///
 /// # Errors
 /// The number unstable at depth 0 cannot be told, or a vibration has a frequency that was not measured.
@@ -107,6 +124,7 @@ pub(super) fn speed_line(
     rpm: f64,
     depth_mm: f64,
     limits: &[Limit],
+    others: &[Vec<Limit>],
     chatter_hz: impl Fn(&Limit) -> Option<f64>,
 ) -> Result<SpeedLine, StabilityError> {
     let outside = outside_at_no_depth(open_loop).ok_or(StabilityError::BrokeDown {
@@ -119,6 +137,7 @@ pub(super) fn speed_line(
         .map(|limit| {
             let switch = Switch {
                 depth_mm: limit.depth_m * 1e3,
+                error_mm: error_m(limit, others).map(|error_m| 1e3 * error_m),
                 kind: limit.kind,
                 gain: !limit.outward,
                 chatter_hz: chatter_hz(limit),

@@ -70,6 +70,6 @@ impl Method for ModeCoupling {
             depth_mm,
             what: "receptances are not finite",
         })?;
-        speed_line(&open_loop, rpm, depth_mm, &found, hertz)
+        speed_line(&open_loop, rpm, depth_mm, &found, &[], hertz)
     }
 }

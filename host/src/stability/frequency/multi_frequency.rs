@@ -40,8 +40,8 @@ impl MultiFrequency {
         HarmonicLoop::new(&self.problem, rpm, harmonics)
     }
 
-    /// The limits with as many harmonics as they need, and the loop they belong to.
-    fn settled(&self, rpm: f64, depth_mm: f64) -> Result<(HarmonicLoop<'_>, Vec<Limit>), StabilityError> {
+    /// The limits with as many harmonics as they need, the loop they belong to, and the limits with another number of harmonics.
+    fn settled(&self, rpm: f64, depth_mm: f64) -> Result<Settled<'_>, StabilityError> {
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
         let find = |harmonics| {
             let open_loop = self.open_loop(rpm, harmonics);
@@ -50,7 +50,9 @@ impl MultiFrequency {
                 .ok_or(broke_down("receptances are not finite"))
         };
         if let Some(harmonics) = self.harmonics {
-            return find(harmonics);
+            let (open_loop, limits) = find(harmonics)?;
+            let (_, other) = find(2 * harmonics + 1)?;
+            return Ok((open_loop, limits, other));
         }
         let mut harmonics = HarmonicLoop::least_harmonics(&self.problem, rpm);
         let mut found = find(harmonics)?;
@@ -58,9 +60,9 @@ impl MultiFrequency {
             harmonics *= 2;
             let finer = find(harmonics)?;
             let change = largest_change(&found.1, &finer.1, depth_mm * 1e-3);
-            found = finer;
+            let (_, coarser) = std::mem::replace(&mut found, finer);
             if change.is_some_and(|change| change <= LIMIT_SETTLED) {
-                return Ok(found);
+                return Ok((found.0, found.1, coarser));
             }
         }
         Err(broke_down(
@@ -68,6 +70,8 @@ impl MultiFrequency {
         ))
     }
 }
+
+type Settled<'a> = (HarmonicLoop<'a>, Vec<Limit>, Vec<Limit>);
 
 /// The largest relative change from one list of limits to another; `None` where they are not the same limits.
 fn largest_change(coarse: &[Limit], fine: &[Limit], depth_m: f64) -> Option<f64> {
@@ -138,8 +142,10 @@ impl Method for MultiFrequency {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, depth_mm)?;
-        let (open_loop, limits) = self.settled(rpm, depth_mm)?;
-        speed_line(&open_loop, rpm, depth_mm, &limits, |limit| {
+        let (open_loop, limits, other) = self.settled(rpm, depth_mm)?;
+        let mut others = vec![other];
+        others.extend(open_loop.thinned_limits(depth_mm * 1e-3));
+        speed_line(&open_loop, rpm, depth_mm, &limits, &others, |limit| {
             open_loop.chatter_hz(limit)
         })
     }

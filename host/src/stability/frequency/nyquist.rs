@@ -116,11 +116,19 @@ impl Method for Nyquist {
         if self.harmonics == 0 {
             let open_loop = self.averaged(rpm);
             let found = confirmed(&open_loop, rpm, depth_mm)?;
-            return speed_line(&open_loop, rpm, depth_mm, &found, hertz);
+            let thinned = self.problem.thinned();
+            let thinned = thinned
+                .iter()
+                .map(|problem| limits(&AveragedLoop::new(problem, Some(rpm)), depth_mm * 1e-3));
+            let others: Vec<Vec<Limit>> = thinned.map(Option::unwrap_or_default).collect();
+            return speed_line(&open_loop, rpm, depth_mm, &found, &others, hertz);
         }
         let open_loop = self.periodic(rpm);
         let found = confirmed(&open_loop, rpm, depth_mm)?;
-        speed_line(&open_loop, rpm, depth_mm, &found, |limit| {
+        let finer = HarmonicLoop::new(&self.problem, rpm, 2 * self.harmonics + 1);
+        let mut others = vec![limits(&finer, depth_mm * 1e-3).unwrap_or_default()];
+        others.extend(open_loop.thinned_limits(depth_mm * 1e-3));
+        speed_line(&open_loop, rpm, depth_mm, &found, &others, |limit| {
             open_loop.chatter_hz(limit)
         })
     }

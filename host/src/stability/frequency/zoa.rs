@@ -50,18 +50,36 @@ impl Zoa {
         )
     }
 
-    fn line_of(&self, samples: &[Sample], rpm: f64, depth_mm: f64) -> Result<SpeedLine, StabilityError> {
+    /// With every second line of a table; `None` where there is no table.
+    fn thinned(&self) -> Option<Self> {
+        let problem = self.problem.thinned()?;
+        Some(Self { problem })
+    }
+
+    /// `others` are other tables with their eigenvalues, from which errors are told.
+    fn line_of(
+        &self,
+        samples: &[Sample],
+        others: &[(Self, Vec<Sample>)],
+        rpm: f64,
+        depth_mm: f64,
+    ) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
-        let open_loop = AveragedLoop::new(&self.problem, Some(rpm));
         let delay_s = self.problem.tooth_period_s(rpm);
-        let limits = self
-            .limits(samples, delay_s, depth_mm * 1e-3)
-            .ok_or(StabilityError::BrokeDown {
-                rpm,
-                depth_mm,
-                what: "receptances are not finite",
-            })?;
-        speed_line(&open_loop, rpm, depth_mm, &limits, hertz)
+        let find = |zoa: &Self, samples: &[Sample]| {
+            zoa.limits(samples, delay_s, depth_mm * 1e-3)
+                .ok_or(StabilityError::BrokeDown {
+                    rpm,
+                    depth_mm,
+                    what: "receptances are not finite",
+                })
+        };
+        let others: Vec<Vec<Limit>> = others
+            .iter()
+            .map(|(zoa, samples)| find(zoa, samples))
+            .collect::<Result<_, _>>()?;
+        let open_loop = AveragedLoop::new(&self.problem, Some(rpm));
+        speed_line(&open_loop, rpm, depth_mm, &find(self, samples)?, &others, hertz)
     }
 
     /// All limits at a delay, s, up to a depth, m.
@@ -152,14 +170,22 @@ impl Method for Zoa {
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, depth_mm)?;
         let rpm = speeds_rpm.first().copied().unwrap_or_default();
-        let samples = self.samples(depth_mm * 1e-3).ok_or(StabilityError::BrokeDown {
-            rpm,
-            depth_mm,
-            what: "receptances are not finite",
-        })?;
+        let find = |zoa: &Self| {
+            zoa.samples(depth_mm * 1e-3).ok_or(StabilityError::BrokeDown {
+                rpm,
+                depth_mm,
+                what: "receptances are not finite",
+            })
+        };
+        let samples = find(self)?;
+        let others = self.thinned().map(|zoa| {
+            let samples = find(&zoa)?;
+            Ok((zoa, samples))
+        });
+        let others: Vec<(Self, Vec<Sample>)> = others.into_iter().collect::<Result<_, StabilityError>>()?;
         let lines: Vec<Result<SpeedLine, StabilityError>> = speeds_rpm
             .par_iter()
-            .map(|&rpm| self.line_of(&samples, rpm, depth_mm))
+            .map(|&rpm| self.line_of(&samples, &others, rpm, depth_mm))
             .collect();
         lines.into_iter().collect()
     }

@@ -1,0 +1,136 @@
+//! Errors of limits against motions by Taylor series, and of methods that discretize against the default.
+
+use super::taylor::{Series, largest_abs};
+use super::tests::{problem, random_case, rpm_of};
+use super::*;
+
+/// |μ| by Taylor series, with an error of 1e-9.
+fn reference(problem: &Problem, rpm: f64, depth_mm: f64) -> f64 {
+    largest_abs(problem, rpm, depth_mm * 1e-3, Series::FINE)
+        .unwrap()
+        .0
+}
+
+/// The stable depths end, and begin again, within the errors stated.
+fn check(problem: &Problem, rpm: f64, depth_mm: f64) -> usize {
+    let found = line(problem, rpm, depth_mm, 40).unwrap();
+    for [from, to] in &found.stable_mm {
+        for (end, outward) in [(*from, -1.0), (*to, 1.0)] {
+            let Some(switch) = found.switches.iter().find(|switch| switch.depth_mm == end) else {
+                continue;
+            };
+            let error_mm = switch.error_mm.unwrap();
+            let inside = reference(problem, rpm, end - outward * error_mm);
+            let outside = reference(problem, rpm, end + outward * error_mm);
+            assert!(
+                inside < 1.0 && outside > 1.0,
+                "{inside} {outside} {switch:?} {rpm}"
+            );
+            let band = found.undecided_mm.iter();
+            let mut around = band.filter(|band| band[0] < end && end < band[1]);
+            assert!(around.next().is_some(), "{found:?}");
+        }
+    }
+    found.switches.len()
+}
+
+#[test]
+fn the_limits_of_the_thesis_lie_within_their_errors() {
+    let full = problem("kuka-kr90-full");
+    for tau in [1.34, 2.0, 2.7, 2.9, 3.13, 4.0, 6.0, 6.4] {
+        assert!(check(&full, rpm_of(tau), 12.0) > 0);
+    }
+    let acetal = problem("kuka-kr90-acetal");
+    for rpm in [
+        600.0, 800.0, 900.0, 1036.0, 1050.0, 1100.0, 1200.0, 1600.0, 2000.0, 2400.0,
+    ] {
+        assert!(check(&acetal, rpm, 6.0) > 0);
+    }
+    assert!(check(&problem("staubli-tx200"), 500.0, 2.0) > 0);
+    let limit = line(&acetal, 1200.0, 6.0, 40).unwrap().first_limit.unwrap();
+    // Errors are of use: d|μ|/d depth is about 0.1/mm there, and 1e-7 of the multiplier is stated.
+    assert!(limit.error_mm.unwrap() < 1e-5, "{limit:?}");
+}
+
+#[test]
+fn limits_of_random_machines_lie_within_their_errors() {
+    use rand::{RngExt, SeedableRng};
+
+    let seed = 20_261_123;
+    println!("seed {seed}");
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut switches = 0;
+    for _ in 0..60 {
+        let problem = Problem::new(&random_case(&mut rng), CubicTerms::Refuse).unwrap();
+        let poles = problem.structure.poles();
+        let fastest = poles.iter().map(|pole| pole.im).fold(0.0, f64::max);
+        let vibrations = rng.random_range(0.3..8.0);
+        let rpm = 60.0 / problem.teeth as f64 * fastest / std::f64::consts::TAU / vibrations;
+        switches += check(&problem, rpm, 5.0);
+    }
+    assert!(switches > 60, "{switches}");
+}
+
+#[test]
+fn limits_of_few_steps_err_by_less_than_they_state() {
+    for (name, rpm, depth_mm) in [
+        ("kuka-kr90-acetal", 1200.0, 4.0),
+        ("kuka-kr90-acetal", 1036.0, 4.0),
+        ("insperger-1dof-ad1", 5000.0, 1.0),
+        ("insperger-2dof-ad0.5", 9100.0, 4.0),
+    ] {
+        let problem = problem(name);
+        let exact = line(&problem, rpm, depth_mm, 40).unwrap();
+        let pitched = Pitched::from(problem);
+        let methods: [&dyn Method; 2] = [
+            &Sdm {
+                pitched: pitched.clone(),
+                discretization: SemiDiscretization(SdmOrder::First),
+                steps: 60,
+            },
+            &Fdm {
+                pitched: pitched.clone(),
+                discretization: FullDiscretization,
+                steps: 60,
+            },
+        ];
+        for method in methods {
+            let found = method.line(rpm, depth_mm, 40).unwrap();
+            assert_eq!(
+                found.stable_mm.len(),
+                exact.stable_mm.len(),
+                "{found:?} {exact:?}"
+            );
+            for (found, exact) in found.switches.iter().zip(&exact.switches) {
+                let error_mm = (found.depth_mm - exact.depth_mm).abs();
+                assert!(
+                    error_mm < found.error_mm.unwrap(),
+                    "{} {name} {rpm}: {error_mm} {found:?}",
+                    method.name()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_error_stands_in_undecided_depths_only_where_the_side_depends_on_it() {
+    let switch = |depth_mm: f64, kind, gain| Switch {
+        depth_mm,
+        error_mm: Some(0.2),
+        kind,
+        gain,
+        chatter_hz: None,
+    };
+    let switches = vec![
+        switch(0.1, Kind::Flip, false),
+        switch(1.0, Kind::Hopf, false),
+        switch(2.0, Kind::Hopf, true),
+        switch(3.0, Kind::Flip, true),
+        switch(3.3, Kind::Hopf, false),
+    ];
+    let line = SpeedLine::of_switches(1000.0, 4.0, 0, switches);
+    assert_eq!(line.stable_mm, [[0.0, 0.1], [3.0, 3.3]]);
+    // The pair at 1 and 2 mm leaves what the flip has made unstable.
+    assert_eq!(line.undecided_mm, [[0.0, 0.1 + 0.2], [3.0 - 0.2, 3.3 + 0.2]]);
+}
