@@ -19,6 +19,8 @@ pub(crate) fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex64>> {
     if matrix.iter().any(|entry| !entry.is_finite()) {
         return None;
     }
+    let unit = unit(matrix.amax());
+    matrix /= unit;
     balance_parlett_reinsch(&mut matrix);
     let size = matrix.nrows();
     let mut rows = Rows {
@@ -26,7 +28,21 @@ pub(crate) fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex64>> {
         entries: matrix.transpose().as_slice().to_vec(),
     };
     rows.reduce_to_hessenberg();
-    rows.iterate()
+    let mut found = rows.iterate()?;
+    for value in &mut found {
+        *value *= unit;
+    }
+    Some(found)
+}
+
+/// A power of two near the largest entry where squares of entries would leave the range of numbers, else 1: balancing would not
+/// end.
+fn unit(largest: f64) -> f64 {
+    if (1e-100..1e100).contains(&largest) || largest == 0.0 {
+        1.0
+    } else {
+        largest.log2().floor().exp2()
+    }
 }
 
 /// A square matrix by rows.
@@ -350,6 +366,13 @@ mod tests {
         let found = sorted(eigenvalues(wide).unwrap());
         for (found, expected) in found.iter().zip([1e-6, 1e-4, 1e-2, 1.0]) {
             assert!((found - expected).norm() < 1e-9 * expected, "{found}");
+        }
+        // Squares of the entries are no numbers.
+        for unit in [1e-250, 1e250] {
+            let far = DMatrix::from_row_slice(2, 2, &[0.0, unit, -unit, unit * 1e-40]);
+            for eigenvalue in eigenvalues(far).unwrap() {
+                assert!((eigenvalue.norm() / unit - 1.0).abs() < 1e-12);
+            }
         }
         assert!(eigenvalues(DMatrix::from_element(2, 2, f64::NAN)).is_none());
         assert!(

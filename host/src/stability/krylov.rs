@@ -16,7 +16,7 @@ const BLOCK: usize = 3;
 /// Up to this size all eigenvalues are computed from the whole matrix: it is as fast.
 const WHOLE: usize = 90;
 
-/// After so many blocks the eigenvalues are looked at, and again after as many more.
+/// After so many blocks the eigenvalues are looked at, and again after a third more, but not fewer.
 const LOOK: usize = 10;
 
 /// Residual ‖M v − μ v‖ with ‖v‖ = 1 below which an eigenvalue is taken: rounding in a map of some hundred steps.
@@ -129,6 +129,7 @@ fn arnoldi(
     let (first, _) = orthonormal(first, scale);
     basis.columns_mut(0, first.ncols()).copy_from(&first);
     let (mut done, mut width) = (0, first.ncols());
+    let mut look = LOOK;
     for count in 1.. {
         if done + width > most {
             return None;
@@ -155,7 +156,8 @@ fn arnoldi(
             .view_mut((end, done), (next.ncols(), width))
             .copy_from(&coupling);
         basis.columns_mut(end, next.ncols()).copy_from(&next);
-        if next.ncols() == 0 || count % LOOK == 0 {
+        if next.ncols() == 0 || count == look {
+            look += LOOK.max(look / 3);
             let within = projected.view((0, 0), (end, end)).into_owned();
             let mut eigenvalues = larger(&within, 0.0)?;
             keep(&mut eigenvalues);
@@ -176,6 +178,8 @@ fn arnoldi(
 }
 
 /// True where ‖K y‖ is small for the last part y of every eigenvector: the residual of M at μ.
+///
+/// Of eigenvalues that are themselves below it nothing more is asked: compact maps have a crowd of them.
 fn are_settled(
     projected: &DMatrix<f64>,
     coupling: &DMatrix<f64>,
@@ -185,7 +189,10 @@ fn are_settled(
     let complex = projected.map(Complex64::from);
     let coupling = coupling.map(Complex64::from);
     let width = coupling.ncols();
-    eigenvalues.iter().filter(|value| value.im >= 0.0).all(|&value| {
+    let mut of_interest = eigenvalues
+        .iter()
+        .filter(|value| value.im >= 0.0 && value.norm() > residual);
+    of_interest.all(|&value| {
         eigenvector(&complex, value).is_some_and(|vector| {
             let last = vector.rows(vector.len() - width, width);
             (&coupling * last).norm() < residual * value.norm().max(1.0)

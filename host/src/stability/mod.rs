@@ -25,6 +25,7 @@ mod pitched;
 mod point;
 mod problem;
 mod revolution;
+mod revolution_map;
 mod root;
 mod sampling;
 mod sdm;

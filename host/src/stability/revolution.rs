@@ -9,17 +9,11 @@
 //! The state of the delay equation is x at the start of the revolution, and p of the elements of the revolution before
 //! that are still to be cut again.
 
-use std::rc::Rc;
-
-use nalgebra::{DMatrix, DVector, Dyn, LU, Vector3};
-use num_complex::Complex64;
+use nalgebra::DMatrix;
 
 use super::element::{CuttingTooth, Element, Step};
 use super::exponential::Exponential;
 use super::gauss::Gauss;
-use super::krylov::LinearMap;
-use super::multiplier::loudest_hz;
-use super::one_period::PeriodMap;
 use super::passages::{Passages, distinct};
 use super::period::{DECAY_MAX, Rates};
 use super::pitched::Pitched;
@@ -55,15 +49,15 @@ const KINKS_MAX: usize = 300;
 
 /// Number of a passage's values among those of an element: of all nodes, those of one tooth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Series {
-    element: usize,
+pub(super) struct Series {
+    pub(super) element: usize,
     /// Which of the teeth that cut in that element.
-    tooth: usize,
+    pub(super) tooth: usize,
 }
 
 /// Where the values of the tooth before are found.
 #[derive(Clone, Copy, Debug)]
-enum Source {
+pub(super) enum Source {
     /// In this revolution.
     Own(Series),
     /// In the revolution before: in the state, from this row on.
@@ -72,32 +66,32 @@ enum Source {
 
 /// Where the tooth before was when it cut what a port sees now.
 #[derive(Clone, Debug)]
-struct Past {
-    source: Source,
+pub(super) struct Past {
+    pub(super) source: Source,
     /// Lagrange polynomials of the nodes at that time.
-    weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
 }
 
 /// An element and where it stands.
-struct Piece {
+pub(super) struct Piece {
     start_s: f64,
     duration_s: f64,
-    gauss: &'static Gauss,
+    pub(super) gauss: &'static Gauss,
     /// Number of the tooth for each port of a node.
-    teeth: Vec<usize>,
-    element: Element,
+    pub(super) teeth: Vec<usize>,
+    pub(super) element: Element,
     /// Of each port.
-    pasts: Vec<Past>,
+    pub(super) pasts: Vec<Past>,
 }
 
 /// One revolution at one speed.
 pub(super) struct Revolution<'a> {
-    pitched: &'a Pitched,
-    period_s: f64,
-    pieces: Vec<Piece>,
+    pub(super) pitched: &'a Pitched,
+    pub(super) period_s: f64,
+    pub(super) pieces: Vec<Piece>,
     /// What of the revolution before acts in this one, with the first row in the state.
-    kept: Vec<(Series, usize)>,
-    size: usize,
+    pub(super) kept: Vec<(Series, usize)>,
+    pub(super) size: usize,
 }
 
 impl<'a> Revolution<'a> {
@@ -173,22 +167,6 @@ impl<'a> Revolution<'a> {
         self.kept.push((series, first));
         self.size += self.pieces[series.element].gauss.nodes.len();
         first
-    }
-
-    /// The map at a depth, m; `None` where the collocation equations are singular.
-    pub(super) fn map(self: Rc<Self>, depth_m: f64) -> Option<RevolutionMap<'a>> {
-        let factors = self.pieces.iter().map(|piece| {
-            let size = piece.element.kernel.nrows();
-            let implicit = DMatrix::identity(size, size) - &piece.element.kernel * depth_m;
-            let factor = implicit.lu();
-            factor.is_invertible().then_some(factor)
-        });
-        let factors = factors.collect::<Option<_>>()?;
-        Some(RevolutionMap {
-            revolution: self,
-            depth_m,
-            factors,
-        })
     }
 }
 
@@ -305,118 +283,11 @@ fn lagrange(nodes: &[f64], place: f64) -> Vec<f64> {
     (0..nodes.len()).map(weight).collect()
 }
 
-/// The map of a revolution at one depth.
-pub(super) struct RevolutionMap<'a> {
-    revolution: Rc<Revolution<'a>>,
-    depth_m: f64,
-    /// I − w Q of each element.
-    factors: Vec<LU<f64, Dyn, Dyn>>,
-}
-
-/// A revolution of several columns at once.
-struct Trace {
-    /// x at the end, n × columns.
-    state: DMatrix<f64>,
-    /// p of each element, columns × ports.
-    seen: Vec<DMatrix<f64>>,
-    /// p − p_τ of each element, ports × columns.
-    chips: Vec<DMatrix<f64>>,
-}
-
-impl RevolutionMap<'_> {
-    fn trace(&self, columns: &DMatrix<f64>) -> Option<Trace> {
-        let revolution = self.revolution.as_ref();
-        let order = revolution.pitched.problem.structure.order();
-        let width = columns.ncols();
-        let mut trace = Trace {
-            state: columns.rows(0, order).into_owned(),
-            seen: Vec::with_capacity(revolution.pieces.len()),
-            chips: Vec::with_capacity(revolution.pieces.len()),
-        };
-        let before = columns.transpose();
-        for (piece, factor) in revolution.pieces.iter().zip(&self.factors) {
-            let ports = piece.pasts.len();
-            let mut past = DMatrix::zeros(width, ports);
-            for (port, of) in piece.pasts.iter().enumerate() {
-                let mut sum = past.column_mut(port);
-                for (node, weight) in of.weights.iter().enumerate() {
-                    let seen = match of.source {
-                        Source::Earlier(first) => before.column(first + node),
-                        Source::Own(Series { element, tooth }) => {
-                            // A delay shorter than an element would end in the element itself.
-                            let values = trace.seen.get(element)?;
-                            values.column(node * revolution.pieces[element].teeth.len() + tooth)
-                        }
-                    };
-                    sum.axpy(*weight, &seen, 1.0);
-                }
-            }
-            // p − w Q p = E x − w Q p_τ
-            let past = past.transpose();
-            let mut seen = &piece.element.observe * &trace.state;
-            seen.gemm(-self.depth_m, &piece.element.kernel, &past, 1.0);
-            if ports > 0 && !factor.solve_mut(&mut seen) {
-                return None;
-            }
-            let chips = &seen - past;
-            let mut next = &piece.element.flow * &trace.state;
-            next.gemm(self.depth_m, &piece.element.drive, &chips, 1.0);
-            trace.state = next;
-            trace.seen.push(seen.transpose());
-            trace.chips.push(chips);
-        }
-        Some(trace)
-    }
-}
-
-impl LinearMap for RevolutionMap<'_> {
-    fn size(&self) -> usize {
-        self.revolution.size
-    }
-
-    fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let trace = self.trace(columns)?;
-        let mut image = DMatrix::zeros(self.size(), columns.ncols());
-        image.rows_mut(0, trace.state.nrows()).copy_from(&trace.state);
-        for (series, first) in &self.revolution.kept {
-            let piece = &self.revolution.pieces[series.element];
-            let values = &trace.seen[series.element];
-            for node in 0..piece.gauss.nodes.len() {
-                let column = values.column(node * piece.teeth.len() + series.tooth);
-                image.row_mut(first + node).tr_copy_from(&column);
-            }
-        }
-        image.iter().all(|entry| entry.is_finite()).then_some(image)
-    }
-}
-
-impl PeriodMap for RevolutionMap<'_> {
-    fn chatter_hz(&self, multiplier: Complex64, vector: &DVector<Complex64>) -> Option<f64> {
-        let parts = DMatrix::from_fn(
-            vector.len(),
-            2,
-            |i, j| {
-                if j == 0 { vector[i].re } else { vector[i].im }
-            },
-        );
-        let trace = self.trace(&parts)?;
-        let problem = &self.revolution.pitched.problem;
-        loudest_hz(problem, self.depth_m, self.revolution.period_s, multiplier, |s| {
-            let mut harmonic = Vector3::<Complex64>::zeros();
-            for (piece, chips) in self.revolution.pieces.iter().zip(&trace.chips) {
-                for (port, chip) in piece.element.ports.iter().zip(chips.row_iter()) {
-                    let chip = Complex64::new(chip[0], chip[1]) * port.weight_s;
-                    harmonic += port.force.map(Complex64::from) * (chip * (-s * port.time_s).exp());
-                }
-            }
-            Some((problem.structure.transfer(s)? * harmonic).norm())
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
+
+    use num_complex::Complex64;
 
     use super::*;
 

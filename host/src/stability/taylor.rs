@@ -354,8 +354,9 @@ fn arnoldi(period: &TaylorPeriod, tails: &mut [f64]) -> Option<(f64, f64)> {
                 .into_iter()
                 .max_by(|p, q| p.norm_sqr().total_cmp(&q.norm_sqr()))?;
             let size = found.norm();
+            let left_out = period.series.tail * within.norm();
             if k + 1 == period.size || left <= 1e-14 * whole {
-                return Some((size, 0.0));
+                return Some((size, left_out));
             }
             // Maps far from normal keep no more than rounding of their norm.
             let scale = SETTLED * size.max(within.norm());
@@ -363,7 +364,7 @@ fn arnoldi(period: &TaylorPeriod, tails: &mut [f64]) -> Option<(f64, f64)> {
             if change < scale {
                 let vector = eigenvector(&within.map(Complex64::from), found)?;
                 if left * vector[k].norm() < scale {
-                    return Some((size, change));
+                    return Some((size, change + left_out));
                 }
             }
             before = size;

@@ -12,6 +12,7 @@ use super::one_period::{self, MapSpectrum, PeriodMap};
 use super::pitched::Pitched;
 use super::point::{LEAST_ERROR, Point, check_depth, check_speed};
 use super::revolution::{Fineness, Revolution};
+use super::revolution_map::RevolutionMap;
 
 /// Collocation over the revolution, for teeth at any angles.
 ///
@@ -39,7 +40,7 @@ impl Method for RevolutionCollocation {
         };
         let map = |fineness| {
             let revolution = Revolution::new(&self.pitched, rpm, depth_m, fineness)?;
-            Rc::new(revolution).map(depth_m)
+            RevolutionMap::new(Rc::new(revolution), depth_m)
         };
         let coarse = map(Fineness::WORKING)
             .and_then(|map| Dominant::any(&map)?.eigenvalues.first().copied())
@@ -63,10 +64,10 @@ impl Method for RevolutionCollocation {
             let revolution = Revolution::new(&self.pitched, rpm, deepest_m, Fineness::WORKING).map(Rc::new);
             MapSpectrum::new(
                 deepest_m,
-                move |depth_m| revolution.clone()?.map(depth_m),
+                move |depth_m| RevolutionMap::new(revolution.clone()?, depth_m),
                 |multiplier, depth_m| {
                     let finer = Revolution::new(&self.pitched, rpm, depth_m, Fineness::FINE)?;
-                    let finer = Dominant::any(&Rc::new(finer).map(depth_m)?)?;
+                    let finer = Dominant::any(&RevolutionMap::new(Rc::new(finer), depth_m)?)?;
                     let nearest = one_period::nearest(&finer.eigenvalues, multiplier)?;
                     Some(error(multiplier, nearest))
                 },

@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 
 use super::krylov::Dominant;
 use super::revolution::{Fineness, Revolution};
+use super::revolution_map::RevolutionMap;
 use super::tests::{case, random_case};
 use super::*;
 
@@ -188,7 +189,7 @@ fn check_random(seed: u64, count: usize) {
         };
         let point = method.point(rpm, depth_mm).unwrap();
         let finest = Revolution::new(&pitched, rpm, depth_mm * 1e-3, FINEST).unwrap();
-        let map = std::rc::Rc::new(finest).map(depth_mm * 1e-3).unwrap();
+        let map = RevolutionMap::new(std::rc::Rc::new(finest), depth_mm * 1e-3).unwrap();
         let exact = Dominant::any(&map).unwrap().eigenvalues[0].norm();
         let error = (point.multiplier_abs - exact).abs();
         assert!(
