@@ -61,6 +61,8 @@ pub struct Fit {
     pub revolutions: usize,
     /// Feeds that differ.
     pub feeds: usize,
+    /// Feed per tooth, mean of the tests, m.
+    pub feed_per_tooth_m: f64,
 }
 
 /// Why there is none.
@@ -453,7 +455,13 @@ impl Fitter<'_> {
             relative_error: (sums.left.sum() / sums.all.max(f64::MIN_POSITIVE)).sqrt(),
             revolutions: sums.revolutions,
             feeds,
+            feed_per_tooth_m: self.mean_feed_m(),
         }
+    }
+
+    fn mean_feed_m(&self) -> f64 {
+        let feeds = self.tests.iter().map(|prepared| prepared.test.feed_per_tooth_m);
+        feeds.sum::<f64>() / self.tests.len() as f64
     }
 
     fn feeds(&self) -> usize {
@@ -508,15 +516,22 @@ impl Fitter<'_> {
 
 impl Fit {
     /// The coefficients whose values by mean forces and over the arc differ by more than the sum of both half intervals and a
-    /// twentieth.
+    /// twentieth of the largest force of a chip: small coefficients may differ by much of their own.
     pub fn apart(&self) -> Vec<&'static str> {
         let averaged = self.averaged.unwrap_or_default();
+        let largest = |values: &[Option<Value>]| {
+            let sizes = values.iter().flatten().map(|value| value.value.abs());
+            sizes.fold(0.0, f64::max)
+        };
+        let cutting = largest(&self.coefficients[..3]);
+        // N/mm, from MPa and m.
+        let edge = largest(&self.coefficients[3..]).max(1e3 * self.feed_per_tooth_m * cutting);
         let differs = |&(index, _): &(usize, &'static str)| {
             let (Some(one), Some(other)) = (self.coefficients[index], averaged[index]) else {
                 return false;
             };
-            (one.value - other.value).abs()
-                > NINETY_PERCENT * (one.deviation + other.deviation) + 0.05 * one.value.abs()
+            let least = 0.05 * if index < 3 { cutting } else { edge };
+            (one.value - other.value).abs() > NINETY_PERCENT * (one.deviation + other.deviation) + least
         };
         KEYS.into_iter()
             .enumerate()
