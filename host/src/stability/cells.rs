@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::StabilityError;
 use super::method::{Label, Method};
 use super::multiplier::Verdict;
-use super::point::{LEAST_ERROR, Point, check_depth, check_speed};
+use super::point::{LEAST_ERROR, Point, UNCONFIRMED, check_depth, check_speed};
 use super::root::Root;
 use super::spectrum::Spectrum;
 
@@ -34,10 +34,6 @@ const INTERVALS: usize = 10;
 
 /// Share of the depth range that is computed first; then ranges double.
 const FIRST_PART: f64 = 0.125;
-
-/// Error of a multiplier that all multipliers of the collocated map gave and Newton did not confirm, relative to
-/// max(1, |μ|). The map is cut for 1e-8; rounding in large maps is less.
-const UNCONFIRMED: f64 = 1e-6;
 
 /// The dominant multiplier at one speed and depth.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -25,6 +25,9 @@ const RESIDUAL: f64 = 1e-11;
 /// The same where Newton goes on from there.
 const ROUGH: f64 = 1e-7;
 
+/// So many eigenvalues of nearly one size are no candidates for the largest but a crowd near zero.
+const CROWD: usize = 24;
+
 /// What is left of a vector that depends on others, relative to it: rounding of a map of some hundred steps, and far below
 /// any residual.
 const DEPENDENT: f64 = 1e-14;
@@ -91,13 +94,15 @@ impl Dominant {
     }
 }
 
-/// The eigenvalues within `share` of the largest, largest first, to a relative residual of about 1e-7: to begin Newton with.
+/// The eigenvalues within `share` of the largest, but no more than [`CROWD`], largest first, to a relative residual of about
+/// 1e-7: to begin Newton with.
 ///
 /// `None` where block Arnoldi does not settle in a space of half the size, or nothing finite comes out.
 pub(super) fn largest(map: &impl LinearMap, share: f64) -> Option<Vec<Complex64>> {
     let found = arnoldi(map, map.size() / 2, ROUGH, &|values| {
         let largest = values.first().map_or(0.0, |value| value.norm());
         values.retain(|value| value.norm() >= share * largest);
+        values.truncate(CROWD);
     })?;
     Some(found.eigenvalues)
 }

