@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Error;
+use super::{Error, non_negative};
 use crate::case::Case;
 use crate::continuation::ForcedProblem;
 use crate::frf::{FrfTable, Interpolation};
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
-    Nyquist, Pitched, Problem, RevolutionCollocation, Sdm, SdmOrder, SemiDiscretization, Zoa,
+    Nyquist, Pitched, Problem, RevolutionCollocation, Sdm, SdmOrder, SemiDiscretization, Zoa, after,
+    needs_orbit,
 };
 
 /// Steps per tooth period where none are asked for.
@@ -38,6 +39,10 @@ pub(super) struct MethodChoice {
     /// Leave out the cubic terms of a structure: the limits for vanishing feed.
     #[arg(long)]
     linear: bool,
+    /// How long the machine has worked, in s: where the case has drift or wear, the limits hold for that moment. Between two
+    /// moments they lie between those of both.
+    #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
+    after_s: Option<f64>,
     /// Steps per tooth period of sdm and fdm; 100 where nothing is said.
     #[arg(long, value_name = "N", value_parser = steps)]
     steps: Option<usize>,
@@ -74,12 +79,20 @@ impl MethodChoice {
     /// The method is not defined for the case, or an option is not one of the method.
     pub(super) fn on(&self, case: &Case) -> Result<Box<dyn Method>, Error> {
         self.check_options()?;
+        let moved;
+        let case = match self.after_s {
+            Some(after_s) => {
+                moved = after(case, after_s)?;
+                &moved
+            }
+            None => case,
+        };
         if let Some(path) = &self.frf {
             let table = FrfTable::read(path).map_err(Error::input)?;
             tell_what_is_missing(&table)?;
             return self.by_receptances(FrequencyProblem::of_table(case, &table)?, path);
         }
-        let has_cubic_terms = case.structure().map_err(Error::input)?.is_nonlinear() && !self.linear;
+        let about_orbit = needs_orbit(case) && !self.linear;
         // All but the default know limits for vanishing feed only: they refuse cubic terms unless these are left out.
         let cubic = if self.linear {
             CubicTerms::LeaveOut
@@ -88,7 +101,7 @@ impl MethodChoice {
         };
         let steps = self.steps.unwrap_or(STEPS);
         Ok(match self.name() {
-            MethodName::Collocation if has_cubic_terms => Box::new(ForcedProblem::new(case)?),
+            MethodName::Collocation if about_orbit => Box::new(ForcedProblem::new(case)?),
             MethodName::Collocation if case.tool().map_err(Error::input)?.has_variable_pitch() => {
                 Box::new(RevolutionCollocation {
                     pitched: Pitched::new(case, cubic)?,

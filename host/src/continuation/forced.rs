@@ -1,21 +1,83 @@
-//! The forced problem: a structure with cubic terms under the forces of feed and edges.
+//! The forced problem: a structure with smooth terms under the forces of feed and edges.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::case::Case;
+use crate::simulate::{At, ChipLaw, ProcessDamping, Term};
+use crate::stability::extension::about_orbit;
 use crate::stability::{CubicTerms, Problem, StabilityError};
+use crate::structure::FirstOrder;
 
 /// ẋ = A x + B F(t, x) − N(x), u = C x: eqs 6.1 and 3.6 in first-order form.
 ///
 /// States x as in [`FirstOrder`](crate::structure::FirstOrder): for matrices x = (q, q̇/s). N holds the cubic terms
 /// M⁻¹(C₃ q̇∘³ + K₃ q∘³)/s in the lower half. On an orbit of the tooth period
 /// F = (w − z)·Σ_teeth (cutting·n_x f_t + edge), with z the axial displacement where the depth follows it, else 0.
+///
+/// Extensions of the case add smooth terms −B f_r(u, u̇), a chip law in place of n_x f_t, and the damping of the flank
+/// −w D(φ) u̇.
 #[derive(Clone, Debug)]
 pub struct ForcedProblem {
     /// The linear part and the cutting process.
     pub linear: Problem,
     /// The cubic terms; `None` where the structure is linear.
     pub(super) cubic: Option<Cubic>,
+    /// Smooth terms of the equation of motion, and the structure in whose axes they are.
+    smooth: Option<Smooth>,
+    /// `None` for a force in proportion to the chip.
+    chip: Option<ChipLaw>,
+    /// `None` where the flank does not touch.
+    flank: Option<Flank>,
+}
+
+/// f_r along the machine's axes.
+#[derive(Clone, Debug)]
+struct Smooth {
+    terms: Vec<Arc<dyn Term>>,
+    /// B in the machine's axes.
+    b: DMatrix<f64>,
+    /// C and C A in the machine's axes.
+    displacement: DMatrix<f64>,
+    velocity: DMatrix<f64>,
+}
+
+/// The damping of the flank.
+#[derive(Clone, Debug)]
+struct Flank {
+    law: ProcessDamping,
+    radius_m: f64,
+    /// C A in feed, normal and axial direction.
+    velocity: DMatrix<f64>,
+}
+
+impl Smooth {
+    fn new(terms: Vec<Arc<dyn Term>>, machine: &FirstOrder) -> Self {
+        let part = |rows: usize, columns: usize, of: &dyn Fn(usize, usize) -> f64| {
+            DMatrix::from_fn(rows, columns, of)
+        };
+        let order = machine.order();
+        Self {
+            terms,
+            b: part(order, 3, &|i, j| machine.b[(i, j)]),
+            displacement: part(3, order, &|i, j| machine.c[(i, j)]),
+            velocity: part(3, order, &|i, j| {
+                machine.c.row(i).dot(&machine.a.column(j).transpose())
+            }),
+        }
+    }
+
+    fn at(&self, state: &[f64]) -> At {
+        let row =
+            |matrix: &DMatrix<f64>, axis: usize| matrix.row(axis).iter().zip(state).map(|(a, b)| a * b).sum();
+        At {
+            t: 0.0,
+            x: std::array::from_fn(|axis| row(&self.displacement, axis)),
+            v: std::array::from_fn(|axis| row(&self.velocity, axis)),
+        }
+    }
 }
 
 /// N(x) = stiffness·q∘³ + damping·(q̇/s)∘³ in the lower half of the states.
@@ -33,7 +95,7 @@ impl ForcedProblem {
     /// # Errors
     /// As [`Problem::new`], but for cubic terms, which are kept.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
-        let linear = Problem::new(case, CubicTerms::LeaveOut)?;
+        let linear = Problem::new(case, CubicTerms::Kept)?;
         let structure = case.structure()?;
         let cubic = match structure.equation() {
             Some(matrices) if structure.is_nonlinear() => {
@@ -60,7 +122,81 @@ impl ForcedProblem {
             }
             _ => None,
         };
-        Ok(Self { linear, cubic })
+        let about = about_orbit(case)?;
+        let machine = linear.structure.turned(-case.cut()?.feed_direction_deg);
+        let jump = (&machine.c * &machine.b).amax();
+        let inertial = jump <= 1e-6 * machine.c.amax() * machine.b.amax() * machine.order() as f64;
+        if !inertial && (about.law.process_damping.is_some() || !about.terms.is_empty()) {
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "its modes add up to no mass (their residues do not sum to zero), so that a force on the velocity or \
+                       on a nonlinear spring has no motion of its own; use mass, damping and stiffness matrices for \
+                       process-damping and smooth terms",
+            });
+        }
+        let flank = match (about.law.process_damping, case.tool()?.diameter_mm) {
+            (Some(law), Some(diameter_mm)) => Some(Flank {
+                law,
+                radius_m: 0.5e-3 * diameter_mm,
+                velocity: Smooth::new(Vec::new(), &linear.structure).velocity,
+            }),
+            _ => None,
+        };
+        Ok(Self {
+            smooth: (!about.terms.is_empty()).then(|| Smooth::new(about.terms, &machine)),
+            chip: about.law.chip,
+            flank,
+            linear,
+            cubic,
+        })
+    }
+
+    /// True where an orbit is the solution of linear equations.
+    pub(super) fn is_linear(&self) -> bool {
+        self.cubic.is_none() && self.smooth.is_none()
+    }
+
+    /// The damping of the flank per depth, N s/m², of all cutting teeth at a phase, rad, while the tool turns at a speed,
+    /// rad/s, in feed, normal and axial direction; `None` where there is none.
+    pub(super) fn damping_per_depth(
+        &self,
+        teeth: usize,
+        phase: f64,
+        speed_rad_per_s: f64,
+    ) -> Option<Matrix3<f64>> {
+        let flank = self.flank.as_ref()?;
+        let size = flank.law.n_per_m / (flank.radius_m * speed_rad_per_s);
+        let process = &self.linear.process;
+        let sum: Matrix3<f64> = (0..teeth)
+            .map(|tooth| {
+                let angle = process.engagement.angle(tooth, phase);
+                let normal = process.force.normal.at(angle);
+                let tangent = Vector3::new(-angle.cos(), angle.sin(), 0.0);
+                (normal - tangent * flank.law.friction) * normal.transpose()
+            })
+            .sum();
+        Some(sum * size)
+    }
+
+    /// B D C A: what the damping of the flank makes of a state, per depth.
+    pub(super) fn damped(&self, damping: &Matrix3<f64>) -> DMatrix<f64> {
+        let Some(flank) = &self.flank else {
+            return DMatrix::zeros(self.order(), self.order());
+        };
+        &self.linear.structure.b * damping * &flank.velocity
+    }
+
+    /// The slope of the chip law about the forced chip at an angle, rad.
+    pub(super) fn chip_slope(&self, angle: f64) -> f64 {
+        let process = &self.linear.process;
+        self.chip.map_or(1.0, |chip| {
+            chip.slope(process.force.normal.at(angle).x * process.feed_per_tooth_m)
+        })
+    }
+
+    /// Angular speed at which a tooth period takes `period_s`, rad/s.
+    pub(super) fn speed_rad_per_s(&self, period_s: f64) -> f64 {
+        TAU / (period_s * self.linear.teeth as f64)
     }
 
     /// Number of states.
@@ -75,13 +211,26 @@ impl ForcedProblem {
         (0..teeth)
             .map(|tooth| {
                 let angle = process.engagement.angle(tooth, phase);
-                process.force.forced(angle, process.feed_per_tooth_m)
+                match self.chip {
+                    None => process.force.forced(angle, process.feed_per_tooth_m),
+                    Some(chip) => {
+                        let thickness_m = process.force.normal.at(angle).x * process.feed_per_tooth_m;
+                        process.force.cutting.at(angle) * chip.effective_m(thickness_m)
+                            + process.force.edge.at(angle)
+                    }
+                }
             })
             .sum()
     }
 
-    /// N(x), added to `rate` with a minus sign.
-    pub(super) fn subtract_cubic(&self, state: &[f64], rate: &mut DVector<f64>) {
+    /// N(x) and B f_r, added to `rate` with a minus sign.
+    pub(super) fn subtract_smooth(&self, state: &[f64], rate: &mut DVector<f64>) {
+        if let Some(smooth) = &self.smooth {
+            let at = smooth.at(state);
+            for term in &smooth.terms {
+                *rate -= &smooth.b * Vector3::from(term.restoring_n(0, &at, &[]));
+            }
+        }
         let Some(cubic) = &self.cubic else { return };
         let size = cubic.stiffness.nrows();
         for i in 0..size {
@@ -94,7 +243,8 @@ impl ForcedProblem {
         }
     }
 
-    /// A − ∂N/∂x − (force per depth)·∂z/∂x: the Jacobian of the orbit's equation at a state.
+    /// A − ∂N/∂x − B ∂f_r/∂x − (force per depth)·∂z/∂x: the Jacobian of the orbit's equation at a state, without the damping
+    /// of the flank.
     pub(super) fn jacobian(&self, state: &[f64], force_per_depth: &Vector3<f64>) -> DMatrix<f64> {
         let structure = &self.linear.structure;
         let mut jacobian = structure.a.clone();
@@ -106,6 +256,15 @@ impl ForcedProblem {
                     jacobian[(size + i, size + j)] -=
                         3.0 * cubic.damping[(i, j)] * state[size + j] * state[size + j];
                 }
+            }
+        }
+        if let Some(smooth) = &self.smooth {
+            let at = smooth.at(state);
+            for slopes in smooth.terms.iter().filter_map(|term| term.slopes(&at)) {
+                let part = |rows: [[f64; 3]; 3]| Matrix3::from_fn(|i, j| rows[i][j]);
+                jacobian -= &smooth.b
+                    * (part(slopes.stiffness) * &smooth.displacement
+                        + part(slopes.damping) * &smooth.velocity);
             }
         }
         if self.linear.process.axial_depth_modulation {

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::forced::ForcedProblem;
 use crate::stability::gauss::Gauss;
+use crate::structure::FirstOrder;
 
 /// The largest angle, rad, by which the fastest pole turns within a piece.
 pub(super) const PIECE_ANGLE: f64 = 4.0;
@@ -59,6 +60,8 @@ pub(super) struct Piece {
     pub(super) teeth: usize,
     /// Force per depth at the nodes, N/m.
     pub(super) forces: Vec<Vector3<f64>>,
+    /// B D C A per depth of the damping of the flank at the nodes; empty where there is none.
+    pub(super) damping: Vec<DMatrix<f64>>,
 }
 
 /// The tooth period at one speed, cut into pieces.
@@ -102,6 +105,7 @@ impl Mesh {
             .map(|pole| pole.norm())
             .fold(0.0, f64::max);
         let gauss = Gauss::new(NODES);
+        let speed_rad_per_s = problem.speed_rad_per_s(linear.tooth_period_s(rpm));
         let mut pieces = Vec::new();
         for interval in engagement.intervals() {
             let length = interval.to - interval.from;
@@ -116,6 +120,18 @@ impl Mesh {
                     turn,
                     duration: turn * seconds_per_radian,
                     teeth: interval.teeth,
+                    damping: gauss
+                        .nodes
+                        .iter()
+                        .filter_map(|node| {
+                            let at = problem.damping_per_depth(
+                                interval.teeth,
+                                phase + turn * node,
+                                speed_rad_per_s,
+                            )?;
+                            Some(problem.damped(&at))
+                        })
+                        .collect(),
                     forces: gauss
                         .nodes
                         .iter()
@@ -137,10 +153,22 @@ pub(super) struct Linearized {
 }
 
 impl Linearized {
-    pub(super) fn new(problem: &ForcedProblem, gauss: &Gauss, piece: &Piece, states: &DMatrix<f64>) -> Self {
+    pub(super) fn new(
+        problem: &ForcedProblem,
+        gauss: &Gauss,
+        piece: &Piece,
+        states: &DMatrix<f64>,
+        depth_m: f64,
+    ) -> Self {
         let (order, nodes) = (problem.order(), gauss.nodes.len());
         let jacobians: Vec<DMatrix<f64>> = (0..nodes)
-            .map(|j| problem.jacobian(states.column(j).as_slice(), &piece.forces[j]))
+            .map(|j| {
+                let jacobian = problem.jacobian(states.column(j).as_slice(), &piece.forces[j]);
+                match piece.damping.get(j) {
+                    Some(damping) => jacobian - damping * depth_m,
+                    None => jacobian,
+                }
+            })
             .collect();
         let mut matrix = DMatrix::identity(order * nodes, order * nodes);
         for i in 0..nodes {
@@ -188,10 +216,22 @@ fn rates(problem: &ForcedProblem, piece: &Piece, states: &DMatrix<f64>, depth_m:
                 0.0
             };
             let mut rate = &structure.a * state + &structure.b * (force * (depth_m - axial));
-            problem.subtract_cubic(state.as_slice(), &mut rate);
+            problem.subtract_smooth(state.as_slice(), &mut rate);
+            if let Some(damping) = piece.damping.get(j) {
+                rate -= damping * state * depth_m;
+            }
             rate
         })
         .collect()
+}
+
+/// What a meter more of depth adds to the rate at a node.
+fn per_depth(structure: &FirstOrder, piece: &Piece, states: &DMatrix<f64>, node: usize) -> DVector<f64> {
+    let push: DVector<f64> = &structure.b * piece.forces[node];
+    match piece.damping.get(node) {
+        Some(damping) => push - damping * states.column(node),
+        None => push,
+    }
 }
 
 /// Solves for the states at the nodes of a piece by Newton from a guess.
@@ -207,7 +247,7 @@ fn settle(
     let mut states = guess.clone();
     for _ in 0..12 {
         let rates = rates(problem, piece, &states, depth_m);
-        let linearized = Linearized::new(problem, gauss, piece, &states);
+        let linearized = Linearized::new(problem, gauss, piece, &states, depth_m);
         let mut residual = DMatrix::zeros(order * nodes, 1);
         for i in 0..nodes {
             let mut row = start - states.column(i);
@@ -222,8 +262,8 @@ fn settle(
             return None;
         }
         // Where the structure is linear one step is exact.
-        if problem.cubic.is_none() || step.amax() <= TOLERANCE * states.amax() {
-            let linearized = Linearized::new(problem, gauss, piece, &states);
+        if problem.is_linear() || step.amax() <= TOLERANCE * states.amax() {
+            let linearized = Linearized::new(problem, gauss, piece, &states, depth_m);
             return Some((states, linearized));
         }
     }
@@ -253,15 +293,16 @@ pub(super) fn pass(
                 .view_mut((i * order, 0), (order, order))
                 .fill_with_identity();
             let mut push = DVector::zeros(order);
-            for (j, force) in piece.forces.iter().enumerate() {
-                push += &structure.b * force * (piece.duration * mesh.gauss.integrals[(i, j)]);
+            for j in 0..nodes {
+                push +=
+                    per_depth(structure, piece, &states, j) * (piece.duration * mesh.gauss.integrals[(i, j)]);
             }
             right.view_mut((i * order, order), (order, 1)).copy_from(&push);
         }
         let values = linearized.solve(&right)?;
         let mut gathered = linearized.gather(&mesh.gauss, piece, &values);
-        for (j, force) in piece.forces.iter().enumerate() {
-            let push = &structure.b * force * (piece.duration * mesh.gauss.weights[j]);
+        for j in 0..nodes {
+            let push = per_depth(structure, piece, &states, j) * (piece.duration * mesh.gauss.weights[j]);
             let mut column = gathered.column_mut(order);
             column += push;
         }

@@ -17,7 +17,7 @@ pub(super) fn about(problem: &ForcedProblem, mesh: &Mesh, orbit: &Orbit) -> Opti
     let mut elements = Vec::new();
     let mut flight = DMatrix::identity(order, order);
     for (piece, states) in mesh.pieces.iter().zip(&orbit.states) {
-        let linearized = Linearized::new(problem, &mesh.gauss, piece, states);
+        let linearized = Linearized::new(problem, &mesh.gauss, piece, states, orbit.depth_m);
         if piece.teeth == 0 {
             flight = flow(&linearized, &mesh.gauss, piece)?.0 * flight;
         } else {
@@ -74,7 +74,7 @@ fn element(
         for tooth in 0..teeth {
             let angle = process.engagement.angle(tooth, phase);
             let port = j * teeth + tooth;
-            let force = process.force.cutting.at(angle) * modulation;
+            let force = process.force.cutting.at(angle) * (modulation * problem.chip_slope(angle));
             seen.row_mut(port)
                 .copy_from(&(process.force.normal.at(angle).transpose() * &structure.c));
             push.column_mut(port).copy_from(&(&structure.b * force));

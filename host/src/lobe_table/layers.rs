@@ -11,7 +11,7 @@ use crate::case::Case;
 use crate::continuation::ForcedProblem;
 use crate::stability::{
     Collocation, CubicTerms, Limit, Method, Pitched, Problem, RevolutionCollocation, SpeedLine,
-    StabilityError, Uncertainty, chart,
+    StabilityError, Uncertainty, chart, needs_orbit,
 };
 
 /// Feed per tooth, mm, up to which a layer holds whose limits do not depend on the feed.
@@ -53,7 +53,7 @@ impl Family {
                 what: "--percentile needs deviations, keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa",
             });
         }
-        let pitched = Pitched::new(&case, CubicTerms::LeaveOut)?;
+        let pitched = Pitched::new(&case, CubicTerms::Kept)?;
         let linear = pitched.with_mean_pitch().clone();
         Ok(Self {
             method: method(&case)?,
@@ -164,7 +164,7 @@ fn up_to(line: SpeedLine, limit_mm: Option<f64>, depth_mm: f64) -> SpeedLine {
 }
 
 fn method(case: &Case) -> Result<Box<dyn Method>, StabilityError> {
-    Ok(if is_nonlinear(case) {
+    Ok(if needs_orbit(case) {
         Box::new(ForcedProblem::new(case)?)
     } else if has_variable_pitch(case) {
         Box::new(RevolutionCollocation {
@@ -177,12 +177,6 @@ fn method(case: &Case) -> Result<Box<dyn Method>, StabilityError> {
     })
 }
 
-fn is_nonlinear(case: &Case) -> bool {
-    case.structure
-        .as_ref()
-        .is_some_and(crate::structure::Structure::is_nonlinear)
-}
-
 fn has_variable_pitch(case: &Case) -> bool {
     case.tool
         .as_ref()
@@ -190,7 +184,7 @@ fn has_variable_pitch(case: &Case) -> bool {
 }
 
 fn depends_on_feed(case: &Case) -> bool {
-    case.axial_depth_modulation() || is_nonlinear(case)
+    case.axial_depth_modulation() || needs_orbit(case)
 }
 
 /// A place where a table is checked: a layer, or half way between two that lookups interpolate between.
@@ -307,7 +301,7 @@ pub(super) fn families(cases: &[Case], request: &TableRequest) -> Result<Vec<Fam
                 expected,
             });
         }
-        let is_followed = !is_nonlinear(case) && !has_variable_pitch(case) && request.percentile.is_none();
+        let is_followed = !needs_orbit(case) && !has_variable_pitch(case) && request.percentile.is_none();
         if request.derivatives && !is_followed {
             return Err(BuildError::NotPossible {
                 path: case.path.clone(),

@@ -42,6 +42,11 @@ impl ChipLaw {
                 .powf(self.exponent)
                 .copysign(thickness_m)
     }
+
+    /// The slope p·(h/h₀)^(p − 1) of it; infinite at 0 for p < 1.
+    pub fn slope(self, thickness_m: f64) -> f64 {
+        self.exponent * (thickness_m.abs() / self.reference_m).powf(self.exponent - 1.0)
+    }
 }
 
 /// The force −(C/V)·b·v_n of the flank on the surface just cut.

@@ -35,7 +35,7 @@ pub use passage::Passage;
 pub use record::Recorder;
 pub use sensor::{Accelerometer, Sampler, TachometerModel};
 pub use spindle::{Fluctuation, Spindle};
-pub use term::{At, Branch, Term};
+pub use term::{At, Branch, Slopes, Term};
 pub use virtual_cut::{Entry, Heard, VirtualCut, VirtualCutError};
 
 use nalgebra::{Matrix3, Vector3};

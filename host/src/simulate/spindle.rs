@@ -53,6 +53,11 @@ impl Spindle {
         }
     }
 
+    /// How its speed fluctuates; `None` where it does not.
+    pub fn fluctuation(&self) -> Option<Fluctuation> {
+        self.fluctuation
+    }
+
     /// The mean speed Ω₀, rad/s.
     pub fn speed_rad_per_s(&self) -> f64 {
         self.speed_rad_per_s

@@ -17,6 +17,15 @@ pub struct At {
     pub v: [f64; 3],
 }
 
+/// How f_r changes with the motion, rows force, columns motion along x, y, z.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Slopes {
+    /// ∂f_r/∂x, N/m.
+    pub stiffness: [[f64; 3]; 3],
+    /// ∂f_r/∂v, N s/m.
+    pub damping: [[f64; 3]; 3],
+}
+
 /// Which of the smooth pieces of a term holds; each term counts its own.
 pub type Branch = u8;
 
@@ -36,6 +45,11 @@ pub trait Term: Debug + Send + Sync {
 
     /// f_r, N.
     fn restoring_n(&self, branch: Branch, at: &At, own: &[f64]) -> [f64; 3];
+
+    /// Slopes of f_r; `None` for a term that has no slope everywhere, or states of its own.
+    fn slopes(&self, _at: &At) -> Option<Slopes> {
+        None
+    }
 
     /// Rates of its own states.
     fn rate(&self, _branch: Branch, _at: &At, _own: &[f64], _rate: &mut [f64]) {}

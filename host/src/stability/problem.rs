@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use crate::case::{AXIAL_DEPTH_MODULATION, Case, CaseError};
+use super::extension::{self, Treated};
+use crate::case::{Case, CaseError};
 use crate::frf::FrfError;
 use crate::milling::Process;
+use crate::simulate::SimulateError;
 use crate::structure::{FirstOrder, StructureError};
 
 /// ẋ = A x + B F, u = C x, F = w K α(φ)(u − u_τ) − (β_e + β_f)(φ) u (eqs 3.7, 7.1), about the forced motion.
@@ -27,6 +29,18 @@ pub enum CubicTerms {
     Refuse,
     /// They are left out: the limits for vanishing feed.
     LeaveOut,
+    /// Whoever asks knows them, and whatever else acts about a forced orbit: this is the linear part.
+    Kept,
+}
+
+impl CubicTerms {
+    fn treated(self) -> Treated {
+        match self {
+            Self::Refuse => Treated::Linear,
+            Self::LeaveOut => Treated::WithoutSmooth,
+            Self::Kept => Treated::AboutOrbit,
+        }
+    }
 }
 
 /// Why stability cannot be computed.
@@ -42,6 +56,14 @@ pub enum StabilityError {
         path: PathBuf,
         /// What is wrong with it.
         cause: StructureError,
+    },
+    /// An extension that the case cannot have.
+    #[error("{}: {cause}", path.display())]
+    Extension {
+        /// The case file.
+        path: PathBuf,
+        /// What is wrong.
+        cause: Box<SimulateError>,
     },
     /// The method does not cover the case.
     #[error("{}: {what}", path.display())]
@@ -141,14 +163,14 @@ impl Problem {
     ///
     /// # Errors
     /// A section is missing, the structure is indefinite, or the case has what the equation above has not:
-    /// variable pitch, cubic terms (see `cubic`), extensions other than axial-depth-modulation.
+    /// variable pitch, cubic terms and other smooth ones (see `cubic`), extensions that it cannot treat.
     pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
-        Self::of(case, cubic, cutting(case)?)
+        Self::of(case, cubic, cutting(case, cubic.treated())?)
     }
 
     /// As [`new`](Self::new), but unequal pitches are replaced by their mean.
     pub(super) fn with_mean_pitch(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
-        Self::of(case, cubic, cutting_with_mean_pitch(case)?)
+        Self::of(case, cubic, cutting_with_mean_pitch(case, cubic.treated())?)
     }
 
     fn of(
@@ -164,14 +186,8 @@ impl Problem {
                        forced motion; ask for the linear part (--linear) or leave them out",
             });
         }
-        let first_order = structure
-            .first_order()
-            .map_err(|cause| StabilityError::Structure {
-                path: case.path.clone(),
-                cause,
-            })?;
         Ok(Self {
-            structure: first_order.turned(case.cut()?.feed_direction_deg),
+            structure: extension::structure(case)?.turned(case.cut()?.feed_direction_deg),
             process,
             teeth,
         })
@@ -195,34 +211,36 @@ impl Problem {
 /// The cutting process of a case and its number of teeth, whatever the structure.
 ///
 /// # Errors
-/// A section is missing, or there is variable pitch, an extension other than axial-depth-modulation, or runout with it.
-pub(super) fn cutting(case: &Case) -> Result<(Process, usize), StabilityError> {
+/// A section is missing, or there is variable pitch, an extension that is not treated, or runout with
+/// axial-depth-modulation.
+pub(super) fn cutting(case: &Case, treated: Treated) -> Result<(Process, usize), StabilityError> {
     if case.tool()?.has_variable_pitch() {
         return Err(StabilityError::NotCovered {
             path: case.path.clone(),
             what: "tool.pitch_deg: teeth at unequal distances have several delays; equal pitch is needed here",
         });
     }
-    cutting_with_mean_pitch(case)
+    cutting_with_mean_pitch(case, treated)
 }
 
 /// The same, with unequal pitches replaced by their mean.
-fn cutting_with_mean_pitch(case: &Case) -> Result<(Process, usize), StabilityError> {
-    let (tool, material, cut) = (case.tool()?, case.material()?, case.cut()?);
-    case.refuse_extensions_but(
-        &[AXIAL_DEPTH_MODULATION],
-        "linear stability has no term for it; remove the table to see the limits without it",
-    )?;
+fn cutting_with_mean_pitch(case: &Case, treated: Treated) -> Result<(Process, usize), StabilityError> {
+    let (tool, cut) = (case.tool()?, case.cut()?);
+    extension::refuse_others(case, treated)?;
+    let material = extension::material(case)?;
     let not_covered = |what| StabilityError::NotCovered {
         path: case.path.clone(),
         what,
     };
     let modulated = case.axial_depth_modulation();
-    if modulated && tool.runout.is_some_and(|runout| runout.offset_um > 0.0) {
+    if modulated
+        && (tool.runout.is_some_and(|runout| runout.offset_um > 0.0)
+            || case.extensions.contains_key("runout"))
+    {
         return Err(not_covered(
             "tool.runout_um: with axial-depth-modulation the feed force would differ from tooth to tooth; \
              leave out one of them",
         ));
     }
-    Ok((Process::new(tool, material, cut, modulated), tool.teeth))
+    Ok((Process::new(tool, &material, cut, modulated), tool.teeth))
 }

@@ -13,6 +13,7 @@ pub(super) const KIND: Kind = Kind {
             name: KIND.name,
             coefficients: [parameters.main("k3_n_per_m3")?, 0.0],
             law: |[k3, _], x, _| k3 * x.powi(3),
+            slopes: |[k3, _], x, _| [3.0 * k3 * x.powi(2), 0.0],
             direction: parameters.direction("direction")?,
         }))
     },

@@ -2,7 +2,7 @@
 
 use super::place::{along, axis_of};
 use super::{Effect, EffectError};
-use crate::simulate::{At, Branch, Term};
+use crate::simulate::{At, Branch, Slopes, Term};
 use crate::structure::{Direction, Structure};
 
 /// f_r, N, from up to two coefficients, the displacement x, m, and the velocity v, m/s.
@@ -16,6 +16,8 @@ pub(super) struct LocalForce {
     /// What the law takes; a law of one coefficient leaves the second at 0.
     pub(super) coefficients: [f64; 2],
     pub(super) law: Law,
+    /// ∂f_r/∂x and ∂f_r/∂v of the law.
+    pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
     /// Where it acts; `None` for the only direction of a structure.
     pub(super) direction: Option<Direction>,
 }
@@ -24,6 +26,7 @@ pub(super) struct LocalForce {
 struct Force {
     coefficients: [f64; 2],
     law: Law,
+    slopes: fn([f64; 2], f64, f64) -> [f64; 2],
     axis: usize,
 }
 
@@ -36,6 +39,7 @@ impl Effect for LocalForce {
         Ok(vec![Box::new(Force {
             coefficients: self.coefficients,
             law: self.law,
+            slopes: self.slopes,
             axis: axis_of(structure, self.direction, self.name)?,
         })])
     }
@@ -45,5 +49,13 @@ impl Term for Force {
     fn restoring_n(&self, _: Branch, at: &At, _: &[f64]) -> [f64; 3] {
         let force = (self.law)(self.coefficients, at.x[self.axis], at.v[self.axis]);
         along(self.axis, force)
+    }
+
+    fn slopes(&self, at: &At) -> Option<Slopes> {
+        let [by_x, by_v] = (self.slopes)(self.coefficients, at.x[self.axis], at.v[self.axis]);
+        let mut slopes = Slopes::default();
+        slopes.stiffness[self.axis][self.axis] = by_x;
+        slopes.damping[self.axis][self.axis] = by_v;
+        Some(slopes)
     }
 }

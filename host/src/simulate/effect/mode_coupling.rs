@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::place::axis_of;
 use super::{Effect, EffectError, Kind};
-use crate::simulate::{At, Branch, Term};
+use crate::simulate::{At, Branch, Slopes, Term};
 use crate::structure::{Direction, Structure};
 
 pub(super) const KIND: Kind = Kind {
@@ -85,5 +85,16 @@ impl Term for Shared {
         force[self.axes[0]] = x * y * (self.quartic * y + 2.0 * self.cubic);
         force[self.axes[1]] = x * x * (self.quartic * y + self.cubic);
         force
+    }
+
+    fn slopes(&self, at: &At) -> Option<Slopes> {
+        let [a, b] = self.axes;
+        let (x, y) = (at.x[a], at.x[b]);
+        let mut slopes = Slopes::default();
+        slopes.stiffness[a][a] = y * (self.quartic * y + 2.0 * self.cubic);
+        slopes.stiffness[a][b] = 2.0 * x * (self.quartic * y + self.cubic);
+        slopes.stiffness[b][a] = slopes.stiffness[a][b];
+        slopes.stiffness[b][b] = x * x * self.quartic;
+        Some(slopes)
     }
 }

@@ -13,6 +13,7 @@ pub(super) const KIND: Kind = Kind {
             name: KIND.name,
             coefficients: [parameters.main("k2_n_per_m2")?, 0.0],
             law: |[k2, _], x, _| k2 * x.powi(2),
+            slopes: |[k2, _], x, _| [2.0 * k2 * x, 0.0],
             direction: parameters.direction("direction")?,
         }))
     },

@@ -13,6 +13,7 @@ pub(super) const KIND: Kind = Kind {
             name: KIND.name,
             coefficients: [parameters.main("k3_n_per_m3")?, parameters.needed("k5_n_per_m5")?],
             law: |[k3, k5], x, _| x * x * x * (k3 + k5 * x * x),
+            slopes: |[k3, k5], x, _| [x * x * (3.0 * k3 + 5.0 * k5 * x * x), 0.0],
             direction: parameters.direction("direction")?,
         }))
     },

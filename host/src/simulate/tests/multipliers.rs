@@ -4,7 +4,8 @@
 //! Newton, which agree to 2e-8.
 
 use super::*;
-use crate::stability::{CubicTerms, Method, Pitched, RevolutionCollocation};
+use crate::continuation::ForcedProblem;
+use crate::stability::{CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
 
 /// The force of a cut without vibration, thesis eq. 3.6, turned round: with it a tool at rest stays at rest.
 struct Counterforce {
@@ -213,39 +214,124 @@ fn a_small_disturbance_of_a_real_cut_grows_as_the_multiplier_says() {
         ("insperger-1dof-ad0.05", 6200.0, 0.5, 0.7714190218160983, 2),
     ] {
         let case = case(name);
-        let mut model = steady(&case, spindle_rpm, depth_mm);
-        let period_s = case.tool().unwrap().tooth_period_s(spindle_rpm);
-        // Transients to 1e-10 of the feed, or as far as errors allow; a push of 1e-5 of the feed or so.
-        let calm = (-23.0 / f64::ln(expected)).min(1500.0);
-        // Until a thousandth of it is left.
-        let watched = (-7.0 / f64::ln(expected)).min(60.0);
-        let force_n = 1e-3 * depth_mm;
-        let mut run = |force_n: f64| {
-            model.drive = Some(Box::new(Push {
-                at_s: calm * period_s,
-                length_s: 0.2 * period_s,
-                force_n,
-            }));
-            let (first_s, end_s) = ((calm + 3.37) * period_s, (calm + watched) * period_s);
-            motions(&model, exact(1e-12), first_s, period_s, end_s)
-        };
-        let (with, without) = (run(force_n), run(0.0));
-        let difference = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| a[axis] - b[axis]);
-        let disturbance: Vec<Motion> = with
-            .iter()
-            .zip(&without)
-            .map(|(a, b)| Motion {
-                displacement_m: difference(a.displacement_m, b.displacement_m),
-                velocity_m_per_s: difference(a.velocity_m_per_s, b.velocity_m_per_s),
-                acceleration_m_per_s2: None,
-                force_n: [0.0; 3],
-            })
-            .collect();
-        let found = largest_root(&disturbance[8..], order);
+        let model = steady(&case, spindle_rpm, depth_mm);
+        let found = growth_of_a_push(model, case.tool().unwrap(), expected, order);
         // The share of other multipliers, and of what loss of contact the disturbance still causes.
         assert!(
             (found - expected).abs() < 1e-4,
             "{name} {spindle_rpm}: {found}, not {expected}"
+        );
+    }
+}
+
+/// The multiplier of a small disturbance of a cut, `expected` about as large.
+fn growth_of_a_push(mut model: Model, tool: &crate::milling::Tool, expected: f64, order: usize) -> f64 {
+    let cutting = model.cutting.as_ref().unwrap();
+    let period_s = std::f64::consts::TAU / (cutting.spindle.speed_rad_per_s() * tool.teeth as f64);
+    // Transients to 1e-10 of the feed, or as far as errors allow; a push of 1e-5 of the feed or so.
+    let calm = (-23.0 / f64::ln(expected)).min(1500.0);
+    // Until a thousandth of it is left.
+    let watched = (-7.0 / f64::ln(expected)).min(60.0);
+    let force_n = cutting.cutter.depth_m;
+    let mut run = |force_n: f64| {
+        model.drive = Some(Box::new(Push {
+            at_s: calm * period_s,
+            length_s: 0.2 * period_s,
+            force_n,
+        }));
+        let (first_s, end_s) = ((calm + 3.37) * period_s, (calm + watched) * period_s);
+        motions(&model, exact(1e-12), first_s, period_s, end_s)
+    };
+    let (with, without) = (run(force_n), run(0.0));
+    let difference = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| a[axis] - b[axis]);
+    let disturbance: Vec<Motion> = with
+        .iter()
+        .zip(&without)
+        .map(|(a, b)| Motion {
+            displacement_m: difference(a.displacement_m, b.displacement_m),
+            velocity_m_per_s: difference(a.velocity_m_per_s, b.velocity_m_per_s),
+            acceleration_m_per_s2: None,
+            force_n: [0.0; 3],
+        })
+        .collect();
+    largest_root(&disturbance[8..], order)
+}
+
+#[test]
+fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
+    let flank = "[extension.process-damping]\nprocess_damping_n_per_m = 3e4\nfriction = 0.3\n";
+    let chip = "[extension.force-exponent]\nexponent = 0.7\nreference_chip_mm = 0.05\n";
+    let spring = "[extension.cubic-stiffness]\nk3_n_per_m3 = 8e14\ndirection = \"x\"\n";
+    let turn =
+        "[extension.softening-hardening]\nk3_n_per_m3 = -4e14\nk5_n_per_m5 = 3e24\ndirection = \"x\"\n";
+    let shared =
+        "[extension.mode-coupling]\nkxyy_n_per_m3 = 4e14\nkxxy_n_per_m2 = 2e9\ndirections = [\"x\", \"y\"]\n";
+    let mode = "[extension.missing-mode]\nfrequency_hz = 700.0\nmodal_mass_kg = 0.1\ndirection = \"x\"\n";
+    let material = "[extension.force-coefficients]\nktc_mpa = 750.0\n[extension.stiffness]\nstiffness_n_per_m = 1.5e6\ndirection = \"x\"\n";
+    let two = "insperger-2dof-ad0.5";
+    for (name, extension) in [
+        ("insperger-1dof-ad0.5", flank),
+        (two, flank),
+        (two, chip),
+        (two, spring),
+        (two, turn),
+        (two, shared),
+        (two, mode),
+        (two, material),
+    ] {
+        let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        // Where the chip ends in nothing a chip law has no slope: between 60 and 120 degrees it has one.
+        let text = std::fs::read_to_string(&path).unwrap();
+        let text = text
+            .replace("teeth = 2", "teeth = 2\ndiameter_mm = 20.0")
+            .replace("start_deg = 90.0", "start_deg = 60.0")
+            .replace("exit_deg = 180.0", "exit_deg = 120.0");
+        let extended = Case::parse(path.as_ref(), &format!("{text}\n{extension}")).unwrap();
+        let rpm = 6200.0;
+        let at = |depth_mm: f64| {
+            if crate::stability::needs_orbit(&extended) {
+                ForcedProblem::new(&extended)
+                    .unwrap()
+                    .point(rpm, depth_mm)
+                    .unwrap()
+            } else {
+                let problem = Problem::new(&extended, CubicTerms::Refuse).unwrap();
+                crate::stability::point(&problem, rpm, depth_mm).unwrap()
+            }
+        };
+        // Deep enough that a disturbance lives long enough to be measured.
+        let (depth_mm, expected) = (1..40)
+            .map(|step| 0.1 * f64::from(step))
+            .map(|depth_mm| (depth_mm, at(depth_mm)))
+            .find(|(_, point)| (0.88..0.97).contains(&point.multiplier_abs))
+            .unwrap();
+        let plain = Case::parse(path.as_ref(), &text).unwrap();
+        let plain =
+            crate::stability::point(&Problem::new(&plain, CubicTerms::Refuse).unwrap(), rpm, depth_mm)
+                .unwrap();
+        let cut = VirtualCut {
+            entry: Entry::None,
+            ..VirtualCut::new(rpm, depth_mm, 1.0)
+        };
+        let order = if name == two { 4 } else { 2 };
+        let found = growth_of_a_push(
+            cut.model(&extended).unwrap(),
+            extended.tool().unwrap(),
+            expected.multiplier_abs,
+            order,
+        );
+        println!(
+            "{name} {extension}: {found} {} plain {}",
+            expected.multiplier_abs, plain.multiplier_abs
+        );
+        // The share of the other direction's multiplier, nearly as large; the extension itself moves the multiplier by far more.
+        assert!(
+            (found - expected.multiplier_abs).abs() < 5e-4,
+            "{extension}: {found} {expected:?}"
+        );
+        assert!(
+            (plain.multiplier_abs - expected.multiplier_abs).abs() > 1.5e-3,
+            "{extension}"
         );
     }
 }

@@ -6,6 +6,7 @@ use num_complex::Complex64;
 use crate::case::Case;
 use crate::frf::{FrfTable, Interpolation};
 use crate::milling::Process;
+use crate::stability::extension::Treated;
 use crate::stability::problem::cutting;
 use crate::stability::{CubicTerms, Problem, StabilityError};
 use crate::structure::FirstOrder;
@@ -71,7 +72,7 @@ impl FrequencyProblem {
     /// # Errors
     /// The case lacks a section or has what the equations do not cover; the table has fewer than four lines.
     pub fn of_table(case: &Case, table: &FrfTable) -> Result<Self, StabilityError> {
-        let (process, teeth) = cutting(case)?;
+        let (process, teeth) = cutting(case, Treated::LinearProcess)?;
         let interpolation = Interpolation::new(table)?.turned(case.cut()?.feed_direction_deg);
         Ok(Self {
             receptance: Receptance::Table(interpolation),
