@@ -6,8 +6,10 @@ use std::fmt;
 
 use num_complex::Complex64;
 
+use super::cut::CutForce;
 use super::record::Record;
 use super::scene::{Scene, direction_of};
+use crate::recording::Quantity;
 use crate::structure::Direction;
 
 /// Where a cause acts.
@@ -79,6 +81,8 @@ pub struct Regressor {
     pub restoring_n: [Vec<f64>; 3],
     /// What it adds to what each channel reads, at the samples of the record; empty for channels that it leaves alone.
     pub observed: Vec<Vec<f64>>,
+    /// What it adds to the force of a cut.
+    pub cut: Option<CutForce>,
 }
 
 impl Regressor {
@@ -86,15 +90,23 @@ impl Regressor {
     pub fn of_force(restoring_n: [Vec<f64>; 3]) -> Self {
         Self {
             restoring_n,
-            observed: Vec::new(),
+            ..Self::default()
         }
     }
 
     /// One that acts on channels.
     pub fn of_channels(observed: Vec<Vec<f64>>) -> Self {
         Self {
-            restoring_n: std::array::from_fn(|_| Vec::new()),
             observed,
+            ..Self::default()
+        }
+    }
+
+    /// One that acts by the force of a cut.
+    pub fn of_cut(force: CutForce) -> Self {
+        Self {
+            cut: Some(force),
+            ..Self::default()
         }
     }
 
@@ -107,6 +119,14 @@ impl Regressor {
                 _ => vec![0.0; count],
             })
             .collect();
+        if let Some(force) = &self.cut {
+            for (column, added) in columns.iter_mut().zip(record.read_cut(force)) {
+                column
+                    .iter_mut()
+                    .zip(added)
+                    .for_each(|(column, added)| *column += added);
+            }
+        }
         if self.restoring_n.iter().all(Vec::is_empty) {
             return columns;
         }
@@ -116,6 +136,10 @@ impl Regressor {
                 .then(|| record.grid.spectrum_of_fine(force))
         });
         for (channel, column) in record.channels.iter().zip(&mut columns) {
+            // The force of a cut is what it is: a spring moves the tool.
+            if record.domain == super::Domain::Response && channel.pickup.quantity == Quantity::Force {
+                continue;
+            }
             let added: Vec<f64> = match record.domain {
                 super::Domain::Response => {
                     let response = record.read_response(&spectra, channel);

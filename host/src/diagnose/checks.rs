@@ -35,11 +35,14 @@ pub(super) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<D
             .lacks("a channel of motion, such as x [m] or ax [m/s^2]")
             .into());
     }
+    let kind = recording.sidecar.kind;
+    if kind == Some(Kind::Cutting) {
+        return Ok(Domain::Response);
+    }
     let driven_by_motion = input
         .iter()
         .filter_map(|name| recording.channel(name))
         .any(|channel| motion.contains(&channel.quantity));
-    let kind = recording.sidecar.kind;
     if driven_by_motion || (baseline.is_free() && kind != Some(Kind::FreeDecay)) {
         if !has(Quantity::Force) {
             return Err(recording
@@ -49,9 +52,10 @@ pub(super) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<D
         return Ok(Domain::Force);
     }
     match kind {
-        Some(Kind::Cutting | Kind::Idle) => Err(DiagnoseError::record(
+        Some(Kind::Idle) => Err(DiagnoseError::record(
             &recording.path,
-            "recordings of cuts are not diagnosed yet: shaker, step-sine, sweep, hammer and free-decay are",
+            "an idle record has nothing that drives the structure as far as the case knows: shaker, step-sine, sweep, \
+             hammer, free-decay and cutting are diagnosed",
         )),
         Some(Kind::FreeDecay) => Ok(Domain::Response),
         _ if has(Quantity::Force) => Ok(Domain::Response),

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::record::Record;
 use super::scene::{Baseline, derivatives};
+use crate::recording::Quantity;
 
 /// The decay of each state of the baseline as each channel reads it, and how much of each the record holds.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +26,9 @@ impl Decays {
             .iter()
             .map(|channel| {
                 let mut row = DMatrix::zeros(1, order);
+                if channel.pickup.quantity == Quantity::Force {
+                    return vec![vec![0.0; count]; order];
+                }
                 for (axis, weight) in channel.pickup.weights.iter().enumerate() {
                     row += first_order.c.row(axis) * *weight;
                 }

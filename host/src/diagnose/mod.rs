@@ -10,6 +10,10 @@ pub mod cause;
 mod causes;
 mod checks;
 mod cubic;
+pub mod cut;
+mod cutting;
+#[cfg(test)]
+mod cutting_tests;
 mod decay;
 mod error;
 pub mod evidence;
@@ -31,9 +35,11 @@ mod scene;
 mod stiffness;
 #[cfg(test)]
 mod tests;
+pub mod turning;
 mod views;
 
 pub use answer::Diagnosis;
+pub use cutting::Cutting;
 pub use error::DiagnoseError;
 pub use grid::Grid;
 pub use path::{Motion, restoring_along};

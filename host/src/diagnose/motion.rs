@@ -79,7 +79,7 @@ fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
     let of_axis: Vec<(&Observed, Vec<Complex64>)> = record
         .channels
         .iter()
-        .filter(|channel| main_axis(channel) == Some(axis))
+        .filter(|channel| channel.pickup.quantity != Quantity::Force && main_axis(channel) == Some(axis))
         .map(|channel| (channel, grid.continued_spectrum(&channel.residual())))
         .collect();
     let mut spectrum = vec![Complex64::ZERO; bins];

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use super::checks;
+use super::cutting::Cutting;
 use super::decay::Decays;
 use super::grid::Grid;
 use super::motion;
@@ -16,6 +17,9 @@ use super::path::{Motion, restoring_along};
 use super::scene::{Baseline, Domain, derivatives};
 use crate::recording::{Kind, Quantity, Recording};
 use crate::simulate::effect::Pickup;
+
+/// Finer samples per sample of a cut, at least: its force jumps.
+const FINER_IN_CUTS: usize = 8;
 
 /// A channel that the baseline predicts.
 #[derive(Clone, Debug)]
@@ -64,6 +68,8 @@ pub struct Record {
     pub transfer: Vec<Matrix3<Complex64>>,
     /// Free decays of the baseline, as the channels read them.
     pub decays: Decays,
+    /// The cut, where it is the record of one.
+    pub cut: Option<Cutting>,
 }
 
 impl Observed {
@@ -90,14 +96,20 @@ impl Record {
     /// A record that tells nothing: too short, clipped, without a channel that is needed, of a kind that is not judged.
     pub fn new(baseline: &Baseline<'_>, index: usize, recording: &Recording) -> Result<Self, DiagnoseError> {
         let domain = checks::domain(baseline, recording)?;
-        let force_n = forces(baseline, recording);
+        let is_cut = recording.sidecar.kind == Some(Kind::Cutting);
+        // What drives a cut is its model; forces that were measured are compared with it.
+        let force_n = if is_cut {
+            std::array::from_fn(|_| Vec::new())
+        } else {
+            forces(baseline, recording)
+        };
         let channels = channels(baseline, recording, domain);
         checks::record(baseline, recording, &channels)?;
         let highest_hz = highest_hz(recording);
         let rate_hz = recording.sample_rate_hz;
         // Harmonics of terms of the motion up to the sixteenth stay below half the finer rate.
         let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
-            .clamp(1, 8)
+            .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
             .next_power_of_two();
         let grid = Grid::new(recording.len(), rate_hz, 8.0 * baseline.slowest_decay_s(), finer);
         let transfer = match domain {
@@ -117,13 +129,23 @@ impl Record {
             motion: Motion::default(),
             displacement: std::array::from_fn(|_| Vec::new()),
             highest_hz,
-            band_hz: (6.0 * highest_hz).min(0.5 * rate_hz),
+            // Forces of a cut reach to the end of the band.
+            band_hz: if is_cut {
+                0.5 * rate_hz
+            } else {
+                (6.0 * highest_hz).min(0.5 * rate_hz)
+            },
             transfer,
             decays: Decays::default(),
+            cut: None,
         };
         match domain {
             Domain::Response => {
-                record.compare_responses(baseline);
+                if is_cut {
+                    record.compare_cut(baseline, recording)?;
+                } else {
+                    record.compare_responses(baseline);
+                }
                 record
                     .channels
                     .iter()
@@ -183,7 +205,7 @@ impl Record {
     /// Predicts all channels from the forces and the terms of the baseline along the motion, and learns the motion from
     /// what is left; terms move the motion, so that it takes a few rounds.
     fn compare_responses(&mut self, baseline: &Baseline<'_>) {
-        self.decays = Decays::of(baseline, self);
+        self.prepare_decays(baseline);
         let rounds = if baseline.terms.is_empty() { 1 } else { 4 };
         let outside: [Option<Vec<Complex64>>; 3] = std::array::from_fn(|axis| {
             (!self.force_n[axis].is_empty()).then(|| self.grid.spectrum(&self.force_n[axis]))
@@ -204,7 +226,7 @@ impl Record {
     }
 
     /// −f_r of the baseline's terms along the motion, as forces.
-    fn add_terms(&self, baseline: &Baseline<'_>, force: &mut [Option<Vec<Complex64>>; 3]) {
+    pub(super) fn add_terms(&self, baseline: &Baseline<'_>, force: &mut [Option<Vec<Complex64>>; 3]) {
         for term in &baseline.terms {
             let restoring = restoring_along(&**term, &self.motion);
             for &axis in &baseline.axes {
@@ -228,6 +250,16 @@ impl Record {
             .par_iter()
             .map(|channel| self.read_response(force, channel))
             .collect();
+        self.accept(predicted);
+    }
+
+    /// The free decays of the baseline in every channel.
+    pub(super) fn prepare_decays(&mut self, baseline: &Baseline<'_>) {
+        self.decays = Decays::of(baseline, self);
+    }
+
+    /// Takes a prediction without free decay, adds the one that fits best, and looks at the noise of what is left.
+    pub(super) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
         for (channel, predicted) in self.channels.iter_mut().zip(predicted) {
             channel.predicted = predicted;
         }
@@ -295,7 +327,10 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             let pickup = baseline.pickup(&channel.name)?;
             let axes_known = (0..3).all(|axis| pickup.weights[axis] == 0.0 || baseline.axes.contains(&axis));
             let is_force = pickup.quantity == Quantity::Force;
-            (axes_known && is_force == (domain == Domain::Force)).then(|| Observed {
+            // The force of a cut is an answer as well.
+            let compared =
+                is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(Kind::Cutting);
+            (axes_known && compared).then(|| Observed {
                 pickup,
                 measured: channel.samples.clone(),
                 predicted: Vec::new(),

@@ -2,6 +2,7 @@
 
 mod linear;
 mod missing_mode;
+mod process;
 mod restoring;
 mod sensor;
 
@@ -13,6 +14,7 @@ pub(super) fn all() -> Vec<Box<dyn Cause>> {
     all.extend(linear::all());
     all.push(Box::new(missing_mode::MissingMode));
     all.extend(restoring::all());
+    all.extend(process::all());
     all.extend(sensor::all());
     all
 }

@@ -1,0 +1,93 @@
+//! What a cutting process may have otherwise: every one changes the force of the cut along the measured motion.
+//!
+//! The force with the cause is that of the simulation's own [`Cutter`](crate::simulate::Cutter) and
+//! [`ForceLaw`](crate::simulate::ForceLaw). What it adds is filtered by the structure where motion is compared, and compared
+//! as it is where the force was measured.
+
+mod axial_depth_modulation;
+mod common_factor;
+mod edge_force;
+mod force_coefficients;
+mod force_exponent;
+mod process_damping;
+mod runout;
+mod speed_fluctuation;
+mod wear;
+
+use crate::diagnose::cause::{Cause, Place, Regressor};
+use crate::diagnose::cut::Variation;
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::Scene;
+use crate::simulate::Cutter;
+
+pub(super) fn all() -> Vec<Box<dyn Cause>> {
+    vec![
+        Box::new(common_factor::CommonFactor { with_edge: false }),
+        Box::new(common_factor::CommonFactor { with_edge: true }),
+        Box::new(force_coefficients::ForceCoefficients),
+        Box::new(edge_force::EdgeForce),
+        Box::new(force_exponent::ForceExponent),
+        Box::new(runout::OfTool),
+        Box::new(process_damping::OfFlank),
+        Box::new(axial_depth_modulation::OfDepth),
+        Box::new(speed_fluctuation::OfSpindle),
+        Box::new(wear::OfEdge),
+    ]
+}
+
+/// The whole cut, where the scene has one that is not known to have the cause already.
+fn everywhere(scene: &Scene<'_>, name: &str) -> Vec<Place> {
+    let known = scene.baseline.case.extensions.contains_key(name);
+    if known || cutter(scene).is_none() {
+        Vec::new()
+    } else {
+        vec![Place::Everywhere]
+    }
+}
+
+/// The tool of the first cut of a scene.
+fn cutter<'a>(scene: &'a Scene<'_>) -> Option<&'a Cutter> {
+    scene
+        .records
+        .iter()
+        .find_map(|record| Some(&record.cut.as_ref()?.cut.cutter))
+}
+
+/// True where the axial direction is part of the cut: it moves, or its force is seen.
+fn has_axial(scene: &Scene<'_>) -> bool {
+    scene.baseline.axes.contains(&2)
+}
+
+/// What a cut adds per unit when it changes from `before` to `after`, `over` units apart; nothing in a record without a cut.
+fn added(
+    record: &Record,
+    before: impl Fn(&mut Variation),
+    after: impl Fn(&mut Variation),
+    over: f64,
+) -> Regressor {
+    let Some(cut) = &record.cut else {
+        return Regressor::default();
+    };
+    let force = |change: &dyn Fn(&mut Variation)| {
+        let mut variation = cut.cut.believed();
+        change(&mut variation);
+        cut.cut.force(&variation, &record.motion, record.grid.finer())
+    };
+    Regressor::of_cut(force(&after).difference(&force(&before), over))
+}
+
+/// What a cut adds per unit when it changes from the one that is believed.
+fn changed(record: &Record, after: impl Fn(&mut Variation), over: f64) -> Regressor {
+    let Some(cut) = &record.cut else {
+        return Regressor::default();
+    };
+    let mut variation = cut.cut.believed();
+    after(&mut variation);
+    let force = cut.cut.force(&variation, &record.motion, record.grid.finer());
+    Regressor::of_cut(force.difference(&cut.force, over))
+}
+
+/// A step that stands for a size that may vanish.
+fn step(size: f64, least: f64) -> f64 {
+    if size.abs() < least { least } else { size }
+}

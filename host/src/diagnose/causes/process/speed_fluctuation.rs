@@ -1,0 +1,77 @@
+//! The spindle does not turn steadily: Ω = Ω₀(1 + δ·sin(2πf_m t + ψ)).
+//!
+//! The tachometer says how: the swing that comes nearest to its edges is looked for up to half a swing per turn. The force
+//! with that swing less the one at steady speed then has the coefficient 1.
+
+use super::{changed, everywhere};
+use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::Scene;
+use crate::diagnose::turning::{Turning, swing};
+use crate::simulate::Fluctuation;
+
+pub(super) struct OfSpindle;
+
+/// How far from 1 the coefficient may be.
+const ROUNDING: f64 = 0.5;
+
+impl Cause for OfSpindle {
+    fn name(&self) -> &'static str {
+        "speed-fluctuation"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        everywhere(scene, self.name())
+    }
+
+    fn shapes(&self, scene: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
+        let turnings: Vec<&Turning> = scene
+            .records
+            .iter()
+            .filter_map(|record| Some(&record.cut.as_ref()?.cut.turning))
+            .collect();
+        let found = swing(&turnings).map(|found| vec![found.frequency_hz, found.delta, found.phase_rad]);
+        found.into_iter().collect()
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, shape: &[f64]) -> Option<Vec<Regressor>> {
+        let &[frequency_hz, delta, phase_rad] = shape else {
+            return None;
+        };
+        let fluctuation = Fluctuation {
+            delta,
+            frequency_hz,
+            phase_rad,
+        };
+        Some(vec![changed(
+            record,
+            |variation| variation.turning = variation.turning.with(fluctuation),
+            1.0,
+        )])
+    }
+
+    /// The shape is the tachometer's, not one that the fit chose.
+    fn settled(&self, shape: &[f64], _: &[f64]) -> Option<Vec<f64>> {
+        Some(shape.to_vec())
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        shape: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let &[frequency_hz, delta, phase_rad] = shape else {
+            return None;
+        };
+        let share = *coefficients.first()?;
+        ((share - 1.0).abs() < ROUNDING).then(|| {
+            vec![
+                ("delta", share * delta),
+                ("frequency_hz", frequency_hz),
+                ("phase_deg", phase_rad.to_degrees()),
+            ]
+        })
+    }
+}

@@ -1,0 +1,38 @@
+//! The edge wears: all forces of the cut grow, × (1 + r·t).
+
+use super::{changed, everywhere};
+use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::Scene;
+
+pub(super) struct OfEdge;
+
+impl Cause for OfEdge {
+    fn name(&self) -> &'static str {
+        "wear"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        everywhere(scene, self.name())
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+        Some(vec![changed(
+            record,
+            |variation| variation.cutter.force.wear_per_s += 1.0,
+            1.0,
+        )])
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        coefficients
+            .first()
+            .map(|rate| vec![("relative_rate_per_s", *rate)])
+    }
+}

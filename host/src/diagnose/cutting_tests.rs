@@ -1,0 +1,122 @@
+//! Virtual cuts that hide something of the process, diagnosed with the plain case.
+
+use std::path::Path;
+
+use super::{Diagnosis, Options, diagnose};
+use crate::case::Case;
+use crate::recording::{Quantity, Recording};
+use crate::simulate::rig::Noise;
+use crate::simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
+
+fn case(feed_mm: &str, more: &str) -> Case {
+    let path = format!(
+        "{}/../tests/cases/kuka-kr90-half.toml",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let text = std::fs::read_to_string(&path).unwrap();
+    let text = text
+        .replace(
+            "feed_per_tooth_mm = 0.15",
+            &format!("feed_per_tooth_mm = {feed_mm}"),
+        )
+        .replace("teeth = 2", "teeth = 3");
+    Case::parse(Path::new("believed.toml"), &format!("{text}\n{more}")).unwrap()
+}
+
+/// Two cuts at different speeds and feeds, with two percent of noise.
+fn records(effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
+    [(900.0, 0.8, "0.15"), (1230.0, 0.6, "0.09")]
+        .into_iter()
+        .enumerate()
+        .map(|(index, (rpm, depth_mm, feed_mm))| {
+            let seconds = 4.0;
+            let mut measured = vec![Quantity::Displacement];
+            if forces {
+                measured.insert(0, Quantity::Force);
+            }
+            let cut = VirtualCut {
+                effects: Effects::parse_over(effects.iter().copied(), Some(seconds)).unwrap(),
+                entry: Entry::None,
+                measured,
+                ..VirtualCut::new(rpm, depth_mm, seconds)
+            };
+            let path = format!("cut-{index}.csv");
+            let recorder = Recorder::Ideal { rate_hz: 2048.0 };
+            let tachometer = TachometerModel {
+                jitter_s: 0.0,
+                ..TachometerModel::ONE_MARK
+            };
+            let (mut recording, _) = cut
+                .record(&case(feed_mm, ""), recorder, tachometer, Path::new(&path))
+                .unwrap();
+            let noise = Noise {
+                relative: 0.02,
+                ..Noise::default()
+            };
+            noise.add(&mut recording, seed + index as u64);
+            recording
+        })
+        .collect()
+}
+
+fn told(diagnosis: &Diagnosis) -> String {
+    format!(
+        "{:?} {:?} extended {:?} gain {:?}",
+        diagnosis.outcome,
+        diagnosis
+            .causes
+            .iter()
+            .map(|cause| (cause.name, &cause.parameters))
+            .collect::<Vec<_>>(),
+        diagnosis.extended,
+        diagnosis.gain
+    )
+}
+
+/// What is hidden, with or without force channels.
+const HIDDEN: [(&str, &[&str], bool); 6] = [
+    ("force-coefficients", &["force-coefficients=0.2"], true),
+    (
+        "edge-force",
+        &["edge-force=1.5", "edge-force.kre_n_per_mm=1"],
+        false,
+    ),
+    (
+        "force-exponent",
+        &["force-exponent=0.75", "force-exponent.reference_chip_mm=0.1"],
+        false,
+    ),
+    ("process-damping", &["process-damping=2e5"], false),
+    (
+        "speed-fluctuation",
+        &["speed-fluctuation=0.01", "speed-fluctuation.frequency_hz=2"],
+        false,
+    ),
+    ("wear", &["wear=0.1"], true),
+];
+
+#[test]
+fn what_a_cut_hides_is_named_with_and_without_force() {
+    let mut wrong = Vec::new();
+    for (name, effects, forces) in HIDDEN {
+        let diagnosis = diagnose(
+            &case("0.15", ""),
+            &records(effects, forces, 7),
+            &Options::default(),
+        )
+        .unwrap();
+        println!("{name}, forces {forces}: {}", told(&diagnosis));
+        if diagnosis.causes.first().map(|cause| cause.name) != Some(name) {
+            wrong.push((name, forces, told(&diagnosis)));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn a_cut_without_tachometer_or_depth_is_refused() {
+    let mut records = records(&[], false, 1);
+    records[0].channels.retain(|channel| channel.name != "tacho");
+    let error = diagnose(&case("0.15", ""), &records, &Options::default()).unwrap_err();
+    assert!(error.to_string().contains("tacho"), "{error}");
+}
