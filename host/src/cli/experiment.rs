@@ -69,6 +69,10 @@ pub(super) enum Kind {
     Hammer,
     /// Pulled and let go.
     FreeDecay,
+    /// A cut in porous material, whose force is broad-band.
+    Porous,
+    /// A cut at a speed that glides; one for each of three or more immersions.
+    SpeedSweep,
 }
 
 /// What a rig shares with a cut.
@@ -157,6 +161,13 @@ pub(super) fn run(
     output.answer(&answer, text)
 }
 
+impl Kind {
+    /// True where a tool cuts.
+    pub(super) fn is_milling(self) -> bool {
+        matches!(self, Self::Porous | Self::SpeedSweep)
+    }
+}
+
 fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, String> {
     let first = structure
         .directions
@@ -233,6 +244,11 @@ fn signal(kind: Kind, options: &Experiment, common: &Common<'_>) -> Result<Signa
             options.spacing_s,
             common.seed,
         ),
+        Kind::Porous | Kind::SpeedSweep => {
+            return Err(Error::input(
+                "a cut drives itself; porous and speed-sweep need --rpm and --depth-mm",
+            ));
+        }
         Kind::FreeDecay => Signal::Release {
             force_n: force(1..=1, "the pull has one force")?[0],
             pull_s: 2.0,

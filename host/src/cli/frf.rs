@@ -56,6 +56,9 @@ pub struct Args {
     /// Time constant in s of the exponential window on hammer blows. It adds 1/τ to the decay of every mode.
     #[arg(long, value_name = "TAU", value_parser = positive, allow_negative_numbers = true)]
     exponential_window_s: Option<f64>,
+    /// The force in N that is meant, where a step-sine test has several levels.
+    #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
+    force_n: Option<f64>,
     /// Tool-tip calibration: FRF from the tool tip to the sensor on the housing.
     #[arg(long, value_name = "FILE", requires = "tip")]
     housing: Option<PathBuf>,
@@ -178,6 +181,7 @@ impl Args {
                 segment_s: None,
                 exponential_s: self.exponential_window_s,
             },
+            force_n: self.force_n,
         }
     }
 }

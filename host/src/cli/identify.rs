@@ -5,14 +5,16 @@ mod checks;
 mod cutting;
 mod joints;
 mod methods;
+mod modes;
 mod records;
 mod without_force;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
 use super::{Error, Output, finite, non_negative, positive};
+use crate::case::Case;
 use crate::identify::law::Extra;
 use crate::recording::Recording;
 use answer::Answer;
@@ -20,10 +22,10 @@ use answer::Answer;
 /// A model of the structure from recordings: parameters with 90 % intervals, and what does not fit.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2,60 --out robot.toml"
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2,60 --out robot.toml\n  quietcut identify frf.csv --method modes --stabilization poles.svg --case tests/cases/kuka-kr90-acetal.toml --out modes.toml"
 )]
 pub struct Args {
-    /// The recordings; for inverse-stability a table of cuts, rpm,depth_mm,chatter_hz,verdict with verdict stable, chatter, hopf
+    /// The recordings; for modes also a table of receptances; for inverse-stability a table of cuts, rpm,depth_mm,chatter_hz,verdict with verdict stable, chatter, hopf
     /// or period-doubling, and chatter_hz empty where nothing was heard.
     #[arg(value_name = "REC", required = true)]
     recordings: Vec<PathBuf>,
@@ -61,7 +63,7 @@ pub struct Args {
     /// The mass, where restoring-force is to take it as known: needed where no force acts.
     #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     mass_kg: Option<f64>,
-    /// The band in Hz, from and to: of restoring-force, without it where the motion stands out of its noise; of joints; and of
+    /// The band in Hz, from and to: of restoring-force, without it where the motion stands out of its noise; of joints and modes; and of
     /// output-only, which needs it.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, value_parser = non_negative)]
     band_hz: Vec<f64>,
@@ -96,6 +98,11 @@ pub struct Args {
     /// From when to when the tool is in full cut, in s, for force-coefficients; without it where the force says so.
     #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, value_parser = finite)]
     cut_s: Vec<f64>,
+    /// The case whose tool, material, cut and limits go into the case that is written.
+    #[arg(long, value_name = "CASE", requires = "out")]
+    case: Option<PathBuf>,
+    #[command(flatten)]
+    modes: modes::Options,
     #[command(flatten)]
     output: Output,
 }
@@ -103,6 +110,8 @@ pub struct Args {
 /// The methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Method {
+    /// Complex modes with left and right shapes (eq. 7.15) from receptances, or from recordings that give them.
+    Modes,
     /// Mass, damping, stiffness and nonlinear terms from step-sine tests, without the bias of hfrf.
     HarmonicBalance,
     /// Higher-order FRF as in the thesis (eqs 5.15 to 5.17).
@@ -138,8 +147,9 @@ enum SurfaceTerm {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
+    let other = args.case.as_deref().map(sections).transpose()?;
     let recordings = match args.method {
-        Method::InverseStability => Vec::new(),
+        Method::InverseStability | Method::Modes => Vec::new(),
         _ => args
             .recordings
             .iter()
@@ -156,9 +166,10 @@ pub fn run(args: Args) -> Result<(), Error> {
         Method::InverseStability => without_force::inverse_stability(&args)?,
         Method::Joints => joints::joints(&args, &recordings)?,
         Method::ForceCoefficients => cutting::force_coefficients(&args, &recordings)?,
+        Method::Modes => modes::modes(&args)?,
     };
     if let Some(path) = &args.out {
-        let text = answer.case(path)?;
+        let text = answer.case(path, other.as_ref())?;
         crate::file::write(path, text.as_bytes())?;
         answer.case = Some(path.clone());
     }
@@ -166,6 +177,25 @@ pub fn run(args: Args) -> Result<(), Error> {
         tracing::warn!("{warning}");
     }
     args.output.answer(&answer, text(&answer))
+}
+
+/// A case file as it stands, once it has been found to be one.
+fn sections(path: &Path) -> Result<toml::Table, Error> {
+    Case::read(path).map_err(Error::input)?;
+    let text = crate::file::read_text(path)?;
+    text.parse()
+        .map_err(|error| Error::input(format!("{}: {error}", path.display())))
+}
+
+/// From and to of `--band-hz`, Hz.
+fn band(args: &Args) -> Result<Option<[f64; 2]>, Error> {
+    match args.band_hz[..] {
+        [] => Ok(None),
+        [low, high] if low < high => Ok(Some([low, high])),
+        _ => Err(Error::input(
+            "--band-hz: two frequencies are needed, the lower first, as in 5,60",
+        )),
+    }
 }
 
 fn text(answer: &Answer) -> String {

@@ -13,6 +13,7 @@ pub mod info;
 pub mod lobes;
 mod lobes_cells;
 mod method;
+mod milling_rig;
 pub mod monitor;
 mod number;
 mod output;

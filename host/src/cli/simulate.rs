@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::channels::Channels;
 use super::experiment::{self, Experiment};
+use super::milling_rig::{self, MillingRig};
 use super::{Error, Output, finite, non_negative, positive};
 use crate::case::Case;
 use crate::recording::{Quantity, Sidecar};
@@ -20,7 +21,7 @@ use crate::simulate::{
 /// a virtual test rig.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 20 --sample-rate-hz 128 --noise-percent 1 --out steps.csv"
+    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 20 --sample-rate-hz 128 --noise-percent 1 --out steps.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment porous --rpm 820 --depth-mm 2 --start-deg 0 --exit-deg 180 --seconds 60 --sample-rate-hz 1024 --noise-percent 1 --out porous.csv"
 )]
 pub struct Args {
     /// The case file: structure, tool, material, cut.
@@ -42,6 +43,7 @@ pub struct Args {
     /// Of a cut, do not record the forces.
     #[arg(long, conflicts_with = "experiment")]
     no_force: bool,
+    milling_rig: MillingRig,
     /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated.
     #[arg(long, value_name = "NAME=VALUE")]
     effect: Vec<String>,
@@ -130,11 +132,6 @@ pub fn run(args: Args) -> Result<(), Error> {
         )));
     }
     if let Some(kind) = args.experiment.experiment {
-        if args.rpm.is_some() || args.depth_mm.is_some() {
-            return Err(Error::input(
-                "--rpm and --depth-mm belong to a cut, not to this --experiment; leave them out",
-            ));
-        }
         let common = experiment::Common {
             seconds: args.seconds,
             sample_rate_hz: args.sample_rate_hz,
@@ -143,6 +140,26 @@ pub fn run(args: Args) -> Result<(), Error> {
             effects: &args.effect,
             channels: &args.channels,
         };
+        if kind.is_milling() {
+            let (Some(rpm), Some(depth_mm)) = (args.rpm, args.depth_mm) else {
+                return Err(Error::input(
+                    "--rpm and --depth-mm are needed: this --experiment is a cut",
+                ));
+            };
+            return milling_rig::run(
+                &case,
+                kind,
+                (rpm, depth_mm),
+                &args.milling_rig,
+                &common,
+                args.output,
+            );
+        }
+        if args.rpm.is_some() || args.depth_mm.is_some() {
+            return Err(Error::input(
+                "--rpm and --depth-mm belong to a cut, not to this --experiment; leave them out",
+            ));
+        }
         return experiment::run(&case, kind, &args.experiment, &common, args.output);
     }
     let tachometer = tachometer(&args)?;

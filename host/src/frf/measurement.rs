@@ -9,10 +9,10 @@ use super::cross_spectra::{CrossSpectra, Segments, averaged, smoothed};
 use super::driven::Driven;
 use super::estimate::{self, DEPENDENT, Estimator, Line, Shape};
 use super::hammer::{self, Blow, HammerWindows};
-use super::step_sine;
+use super::step_sine::{self, Level};
 use super::window::{Window, fast_length};
 use super::{Frf, FrfError, FrfTable};
-use crate::recording::{Kind, Recording};
+use crate::recording::{Kind, Recording, Sidecar};
 use crate::structure::Direction;
 
 /// How the structure was driven, which decides how a record is cut.
@@ -29,9 +29,11 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// What a kind of test is driven by.
-    fn of(kind: Option<Kind>) -> Self {
-        match kind {
+    /// What a test is driven by.
+    fn of(sidecar: &Sidecar) -> Self {
+        let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
+        match sidecar.kind {
+            Some(Kind::Cutting) if glides => Self::Sweep,
             Some(Kind::Hammer) => Self::Hammer,
             Some(Kind::StepSine) => Self::StepSine,
             Some(Kind::Sweep) => Self::Sweep,
@@ -70,6 +72,8 @@ pub struct MeasurementSettings {
     pub channels: Vec<String>,
     /// Windows of hammer blows.
     pub hammer: HammerWindows,
+    /// The force that is meant, N, where a step-sine test has several levels.
+    pub force_n: Option<f64>,
 }
 
 impl Default for MeasurementSettings {
@@ -83,6 +87,7 @@ impl Default for MeasurementSettings {
             band_hz: None,
             channels: Vec::new(),
             hammer: HammerWindows::default(),
+            force_n: None,
         }
     }
 }
@@ -145,7 +150,7 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     for driven in driven {
         let excitation = settings
             .excitation
-            .unwrap_or_else(|| Excitation::of(driven.recording.sidecar.kind));
+            .unwrap_or_else(|| Excitation::of(&driven.recording.sidecar));
         let same = groups.iter_mut().find(|(other, members)| {
             members[0].force_directions() == driven.force_directions()
                 && members[0].response_kinds() == driven.response_kinds()
@@ -476,7 +481,7 @@ fn stepped(
                     .into(),
         });
     }
-    let steps = step_sine::steps(first)?;
+    let steps = level(first, settings.force_n)?.steps;
     let unsettled: Vec<String> = steps
         .iter()
         .filter(|step| !step.is_settled)
@@ -520,6 +525,33 @@ fn stepped(
         .collect();
     part.averages = 1.0;
     Ok(receptances(part, &lines, first, warnings))
+}
+
+/// The level of a step-sine test that is meant.
+fn level(driven: &Driven<'_>, force_n: Option<f64>) -> Result<Level, FrfError> {
+    let mut levels = step_sine::levels(driven)?;
+    let all: Vec<String> = levels
+        .iter()
+        .map(|level| format!("{:.4}", level.force_n))
+        .collect();
+    let off = |level: &Level, wanted: f64| (level.force_n / wanted).ln().abs();
+    let found = match force_n {
+        None if levels.len() == 1 => Some(0),
+        None => None,
+        Some(wanted) => (0..levels.len())
+            .min_by(|&a, &b| off(&levels[a], wanted).total_cmp(&off(&levels[b], wanted)))
+            .filter(|&index| off(&levels[index], wanted) < SAME_FORCE.ln()),
+    };
+    match found {
+        Some(index) => Ok(levels.swap_remove(index)),
+        None => Err(FrfError::Content {
+            path: driven.recording.path.clone(),
+            what: format!(
+                "a step-sine test at {} N; say by --force-n which of these is meant",
+                all.join(", ")
+            ),
+        }),
+    }
 }
 
 /// Ratio of forces that count as one level.

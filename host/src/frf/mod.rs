@@ -7,7 +7,7 @@ mod estimate;
 mod hammer;
 mod interpolation;
 mod measurement;
-mod rational_fit;
+pub(crate) mod rational_fit;
 mod small_matrix;
 mod step_sine;
 mod table;

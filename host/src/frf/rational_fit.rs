@@ -1,8 +1,8 @@
 //! A sum of modes through measured receptances: common poles by vector fitting.
 //!
 //! Gustavsen and Semlyen (1999), with the poles of all functions in common and each function eliminated by itself
-//! (Deschrijver and others, 2008). This is what tool-tip calibration needs of modal analysis: poles and residues in a
-//! band.
+//! (Deschrijver and others, 2008). This is what tool-tip calibration needs of modal analysis, poles and residues in
+//! a band, and where the fit of complex modes begins.
 
 use std::f64::consts::TAU;
 
@@ -14,13 +14,13 @@ const ROUNDS: usize = 20;
 
 /// A sum of modes H_k(s) = Σ_r R_kr/(s − λ_r) + R*_kr/(s − λ*_r) + d_k + e_k/s², s = iω.
 #[derive(Clone, Debug)]
-pub(super) struct RationalFit {
+pub(crate) struct RationalFit {
     /// The poles with positive imaginary part, 1/s, by rising frequency.
-    pub(super) poles: Vec<Complex64>,
+    pub(crate) poles: Vec<Complex64>,
     /// Residues, functions by poles.
-    pub(super) residues: Vec<Vec<Complex64>>,
+    pub(crate) residues: Vec<Vec<Complex64>>,
     /// Root mean square of what is left, as a part of that of the functions.
-    pub(super) rest: f64,
+    pub(crate) rest: f64,
 }
 
 impl RationalFit {
@@ -166,7 +166,11 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Option<Vec<Complex64>> {
 }
 
 /// Residues by least squares, for poles that are settled.
-fn residues(frequency_hz: &[f64], functions: &[&[Complex64]], poles: Vec<Complex64>) -> Option<RationalFit> {
+pub(crate) fn residues(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+    poles: Vec<Complex64>,
+) -> Option<RationalFit> {
     let scale = TAU * frequency_hz.last()?;
     let width = 2 * poles.len() + 2;
     let mut matrix = DMatrix::<f64>::zeros(2 * frequency_hz.len(), width);

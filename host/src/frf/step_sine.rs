@@ -47,15 +47,26 @@ pub(super) struct Step {
     pub(super) is_settled: bool,
 }
 
-/// The steps of a record, by rising frequency; of a frequency that comes again the longest is taken, and the last of
-/// equally long ones.
+/// The steps of a record at one force.
+#[derive(Clone, Debug)]
+pub(super) struct Level {
+    /// Median of the amplitudes of the force, N.
+    pub(super) force_n: f64,
+    /// By rising frequency; of a frequency that comes again the longest is taken, and the last of equally long ones.
+    pub(super) steps: Vec<Step>,
+}
+
+/// Forces within this ratio are one level.
+const SAME_LEVEL: f64 = 1.05;
+
+/// The levels of a record in their order: frequencies that come again at another force are another level.
 ///
 /// # Errors
 /// Several forces, or no stretch of constant frequency.
-pub(super) fn steps(driven: &Driven<'_>) -> Result<Vec<Step>, FrfError> {
+pub(super) fn levels(driven: &Driven<'_>) -> Result<Vec<Level>, FrfError> {
     let force = driven.only_force("a step-sine test")?;
     let rate = driven.recording.sample_rate_hz;
-    let mut steps: Vec<Step> = stretches(&force.samples, rate)
+    let steps: Vec<Step> = stretches(&force.samples, rate)
         .into_iter()
         .filter_map(|stretch| demodulated(driven, &force.samples, stretch, rate))
         .collect();
@@ -68,11 +79,57 @@ pub(super) fn steps(driven: &Driven<'_>) -> Result<Vec<Step>, FrfError> {
             ),
         });
     }
+    let mut levels: Vec<Level> = Vec::new();
+    for pass in passes(steps) {
+        let force_n = median_force(&pass);
+        let same = levels
+            .iter_mut()
+            .find(|level| (level.force_n / force_n).ln().abs() < SAME_LEVEL.ln());
+        match same {
+            Some(level) => level.steps.extend(pass),
+            None => levels.push(Level { force_n, steps: pass }),
+        }
+    }
+    for level in &mut levels {
+        level.steps = by_frequency(std::mem::take(&mut level.steps));
+    }
+    Ok(levels)
+}
+
+/// Steps in their order, cut where a frequency comes again that is not that of the step before.
+fn passes(steps: Vec<Step>) -> Vec<Vec<Step>> {
+    let mut passes: Vec<Vec<Step>> = Vec::new();
+    for step in steps {
+        let goes_on = |pass: &[Step]| match pass {
+            [earlier @ .., last] => {
+                is_same(last, &step) || !earlier.iter().any(|other| is_same(other, &step))
+            }
+            [] => true,
+        };
+        match passes.last_mut() {
+            Some(pass) if goes_on(pass) => pass.push(step),
+            _ => passes.push(vec![step]),
+        }
+    }
+    passes
+}
+
+fn is_same(a: &Step, b: &Step) -> bool {
+    (a.frequency_hz - b.frequency_hz).abs() < STEP * a.frequency_hz
+}
+
+fn median_force(steps: &[Step]) -> f64 {
+    let mut forces: Vec<f64> = steps.iter().map(|step| step.force_n).collect();
+    forces.sort_by(f64::total_cmp);
+    forces[forces.len() / 2]
+}
+
+fn by_frequency(mut steps: Vec<Step>) -> Vec<Step> {
     steps.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let mut kept: Vec<Step> = Vec::with_capacity(steps.len());
     for step in steps {
         match kept.last_mut() {
-            Some(last) if step.frequency_hz - last.frequency_hz < STEP * last.frequency_hz => {
+            Some(last) if is_same(last, &step) => {
                 if step.samples as f64 > 0.9 * last.samples as f64 {
                     *last = step;
                 }
@@ -80,7 +137,7 @@ pub(super) fn steps(driven: &Driven<'_>) -> Result<Vec<Step>, FrfError> {
             _ => kept.push(step),
         }
     }
-    Ok(kept)
+    kept
 }
 
 /// Samples of constant frequency and its period, by the upward crossings of the force.

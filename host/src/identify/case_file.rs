@@ -1,8 +1,10 @@
 //! What was identified, as the text of a case file.
 
 use nalgebra::{DMatrix, Vector3};
+use num_complex::Complex64;
 use toml::{Table, Value};
 
+use super::modes::ModalModel;
 use crate::milling::Runout;
 use crate::structure::{Direction, Joint, Robot};
 
@@ -30,6 +32,67 @@ pub enum CaseFileError {
         "[extension.{0}] is needed in two directions; a case holds one: identify the directions one by one"
     )]
     Twice(&'static str),
+    /// Modes that are driven in other directions than they are seen in.
+    #[error(
+        "no direction is both driven and measured, so the modes are not those of a tool; drive where the motion is measured"
+    )]
+    NoDirection,
+}
+
+/// The sections of a case that are not the machine's dynamics.
+const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
+
+/// The text of a case with the tool, material, cut and limits of another one, as they stand there.
+pub fn with_sections(text: &str, other: &Table) -> String {
+    let mut case: Table = text.parse().unwrap_or_default();
+    for section in OTHERS {
+        if let Some(value) = other.get(section) {
+            case.insert(section.into(), value.clone());
+        }
+    }
+    toml::to_string(&case).unwrap_or_default()
+}
+
+/// The text of a case with complex modes, in the directions that are both driven and measured.
+///
+/// # Errors
+/// There is no such direction.
+pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileError> {
+    let directions = model.directions();
+    if directions.is_empty() {
+        return Err(CaseFileError::NoDirection);
+    }
+    let pairs = |all: &[Direction], shape: &[[f64; 2]]| -> Value {
+        let entry = |direction: &Direction| {
+            let index = all.iter().position(|known| known == direction)?;
+            Some(Value::Array(
+                shape[index].iter().map(|part| Value::Float(*part)).collect(),
+            ))
+        };
+        Value::Array(directions.iter().filter_map(entry).collect())
+    };
+    let parts = |shape: &[Complex64]| -> Vec<[f64; 2]> { shape.iter().map(|z| [z.re, z.im]).collect() };
+    let modes = model.modes.iter().map(|found| {
+        let mut mode = Table::new();
+        mode.insert("frequency_hz".into(), found.mode.frequency_hz.into());
+        mode.insert("frequency_hz_std".into(), found.frequency_std_hz.into());
+        mode.insert("damping_ratio".into(), found.mode.damping_ratio.into());
+        mode.insert("damping_ratio_std".into(), found.damping_ratio_std.into());
+        mode.insert("left".into(), pairs(&model.forces, &parts(&found.mode.left)));
+        mode.insert("left_std".into(), pairs(&model.forces, &found.left_std));
+        mode.insert("right".into(), pairs(&model.responses, &parts(&found.mode.right)));
+        mode.insert("right_std".into(), pairs(&model.responses, &found.right_std));
+        Value::Table(mode)
+    });
+    let mut structure = Table::new();
+    structure.insert("kind".into(), "modes".into());
+    let names = directions.iter().map(|direction| Value::from(direction.name()));
+    structure.insert("directions".into(), Value::Array(names.collect()));
+    structure.insert("mode".into(), Value::Array(modes.collect()));
+    let mut case = Table::new();
+    case.insert("name".into(), name.into());
+    case.insert("structure".into(), Value::Table(structure));
+    Ok(toml::to_string(&case).unwrap_or_default())
 }
 
 /// A case of a robot at its posture; `deviations` are those of stiffness, damping and mass of each joint, where they are known.

@@ -19,6 +19,7 @@ pub mod inverse_stability;
 pub mod joints;
 pub mod law;
 pub mod linearity;
+pub mod modes;
 pub mod ncma;
 pub mod observed_cut;
 pub mod periodic_fit;

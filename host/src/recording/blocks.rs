@@ -65,7 +65,7 @@ impl Sensed {
         let teeth = teeth(recording, speed)?;
         let wheel = wheel(recording);
         let cut = recording.sidecar.cut.unwrap_or_default();
-        let rpm = speed.rpm.or(cut.spindle_rpm);
+        let rpm = speed.rpm.or(cut.spindle_rpm.filter(|_| cut.last_rpm.is_none()));
         if wheel.is_none() && rpm.is_none() {
             return Err(recording.lacks(
                 "tacho channel; without one the spindle speed must be given (--rpm, or cut.spindle_rpm beside the recording)",

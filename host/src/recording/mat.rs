@@ -2,38 +2,49 @@
 //!
 //! The format is documented by MathWorks ("MAT-File Format", level 5). Text, structures, objects and sparse arrays
 //! are passed over; level 7.3 is HDF5 and is refused. A vector of which there is one sample is a parameter, no channel.
+//!
+//! A file is read in pieces and its numbers go straight to their channels: a long record is in memory once.
 
-use std::io::Read;
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind, Read, copy, sink};
 use std::path::Path;
 
-use flate2::read::ZlibDecoder;
+use flate2::bufread::ZlibDecoder;
 
 use super::{Raw, RawColumn, RecordingError};
+use crate::file::FileError;
 
 /// Bytes of the file header.
 const HEADER: usize = 128;
 
+/// Bytes that are read at once; a multiple of every number's size.
+const PIECE: usize = 1 << 16;
+
 /// What a compressed element may grow to: far beyond any recording, and less than memory.
 const INFLATED_MAX: u64 = 4 << 30;
+
+/// The most that deflate packs into a byte.
+const INFLATION_MAX: u64 = 1032;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
 
 pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
-    let bytes = crate::file::read(path)?;
+    let unreadable = |cause| FileError::Read {
+        path: path.into(),
+        cause,
+    };
+    let file = File::open(path).map_err(unreadable)?;
+    let length = file.metadata().map_err(unreadable)?.len();
     let content = |what: String| RecordingError::Content {
         path: path.into(),
         what,
     };
-    let variables = variables(&bytes).map_err(content)?;
-    let longest = variables
-        .iter()
-        .map(|variable| variable.rows.max(variable.columns))
-        .max()
-        .unwrap_or(0);
+    let variables = variables(&mut BufReader::with_capacity(PIECE, file), length).map_err(content)?;
+    let longest = variables.iter().map(Variable::samples).max().unwrap_or(0);
     let columns: Vec<RawColumn> = variables
         .into_iter()
-        .filter(|variable| longest > 1 && variable.rows.max(variable.columns) == longest)
+        .filter(|variable| longest > 1 && variable.samples() == longest)
         .flat_map(Variable::into_columns)
         .collect();
     if columns.is_empty() {
@@ -49,43 +60,52 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     })
 }
 
-/// A real numeric matrix, column by column.
+/// A real numeric matrix: a vector is one column, however it lies.
 struct Variable {
     name: String,
     rows: usize,
     columns: usize,
-    values: Vec<f64>,
+    values: Vec<Vec<f64>>,
 }
 
 impl Variable {
+    /// The longer side.
+    fn samples(&self) -> usize {
+        self.rows.max(self.columns)
+    }
+
     fn into_columns(self) -> Vec<RawColumn> {
-        let length = self.rows.max(self.columns);
-        // A row of samples is one channel, as a column is; a matrix has one channel per column.
-        if self.values.len() == length {
-            return vec![RawColumn {
-                name: self.name,
-                unit: None,
-                samples: self.values,
-            }];
-        }
+        let is_one = self.values.len() == 1;
+        let name = |index: usize| match is_one {
+            true => self.name.clone(),
+            false => format!("{}{}", self.name, index + 1),
+        };
         self.values
-            .chunks_exact(self.rows.max(1))
+            .into_iter()
             .enumerate()
             .map(|(index, samples)| RawColumn {
-                name: format!("{}{}", self.name, index + 1),
+                name: name(index),
                 unit: None,
-                samples: samples.to_vec(),
+                samples,
             })
             .collect()
     }
 }
 
-/// All real numeric matrices of a file.
-fn variables(bytes: &[u8]) -> Result<Vec<Variable>, String> {
-    let header = bytes
-        .get(..HEADER)
-        .ok_or_else(|| format!("{} bytes; a MAT-file has a header of {HEADER}", bytes.len()))?;
-    if bytes.starts_with(b"MATLAB 7.3") || header.starts_with(b"\x89HDF") {
+/// All real numeric matrices of a file of `length` bytes.
+fn variables(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Variable>, String> {
+    let mut header = Vec::with_capacity(HEADER);
+    reader
+        .take(HEADER as u64)
+        .read_to_end(&mut header)
+        .map_err(|error| error.to_string())?;
+    if header.len() < HEADER {
+        return Err(format!(
+            "{} bytes; a MAT-file has a header of {HEADER}",
+            header.len()
+        ));
+    }
+    if header.starts_with(b"MATLAB 7.3") || header.starts_with(b"\x89HDF") {
         return Err("level 7.3 (HDF5) is not read; save it with -v7".into());
     }
     let big_endian = match &header[126..128] {
@@ -97,80 +117,92 @@ fn variables(bytes: &[u8]) -> Result<Vec<Variable>, String> {
             ));
         }
     };
-    let mut cursor = Cursor {
-        bytes,
-        at: HEADER,
+    let mut source = Source {
+        reader,
+        at: HEADER as u64,
+        room: length,
         big_endian,
     };
     let mut variables = Vec::new();
-    while cursor.at < bytes.len() {
-        let (kind, data) = cursor.element()?;
-        match kind {
-            COMPRESSED => {
-                let mut inflated = Vec::new();
-                ZlibDecoder::new(data)
-                    .take(INFLATED_MAX)
-                    .read_to_end(&mut inflated)
-                    .map_err(|error| {
-                        format!(
-                            "a compressed element before byte {} is damaged: {error}",
-                            cursor.at
-                        )
-                    })?;
-                let mut inner = Cursor {
-                    bytes: &inflated,
-                    at: 0,
-                    big_endian,
-                };
-                let (kind, data) = inner.element()?;
-                if kind == MATRIX {
-                    variables.extend(matrix(data, big_endian)?);
-                }
-            }
-            MATRIX => variables.extend(matrix(data, big_endian)?),
-            _ => {}
+    while !source.is_at_end()? {
+        let tag = source.tag()?;
+        match tag.kind {
+            COMPRESSED => variables.extend(inflated(&mut source, tag.length)?),
+            MATRIX => variables.extend(source.within(&tag, matrix)?),
+            _ => source.skip(&tag)?,
         }
     }
     Ok(variables)
 }
 
-/// The matrix in the data of a matrix element; `None` where it is none of real numbers.
-fn matrix(data: &[u8], big_endian: bool) -> Result<Option<Variable>, String> {
-    let mut cursor = Cursor {
-        bytes: data,
+/// The matrix in a compressed element of `length` bytes.
+fn inflated(source: &mut Source<'_>, length: u64) -> Result<Option<Variable>, String> {
+    let before = source.at + length;
+    let mut packed = (&mut *source.reader).take(length);
+    let mut inflated = BufReader::with_capacity(PIECE, ZlibDecoder::new(&mut packed).take(INFLATED_MAX));
+    let mut inner = Source {
+        reader: &mut inflated,
         at: 0,
-        big_endian,
+        room: length.saturating_mul(INFLATION_MAX).min(INFLATED_MAX),
+        big_endian: source.big_endian,
     };
-    let (_, flags) = cursor.element()?;
+    let found = inner.tag().and_then(|tag| match tag.kind {
+        MATRIX => inner.within(&tag, matrix),
+        _ => Ok(None),
+    });
+    let found =
+        found.map_err(|what| format!("a compressed element before byte {before} is damaged: {what}"))?;
+    drop(inflated);
+    copy(&mut packed, &mut sink()).map_err(|error| error.to_string())?;
+    source.at = before;
+    Ok(found)
+}
+
+/// The matrix in the data of a matrix element; `None` where it is none of real numbers.
+fn matrix(source: &mut Source<'_>) -> Result<Option<Variable>, String> {
+    let flags = source.small()?;
     let Some(flags) = flags.get(..4) else {
         return Ok(None);
     };
-    let flags = word(flags, big_endian);
+    let flags = word(flags, source.big_endian);
     let (class, complex, logical) = (flags & 0xff, flags & 0x800 != 0, flags & 0x200 != 0);
     // Classes 6 to 15 are double, single and the integers.
     if !(6..=15).contains(&class) || complex || logical {
         return Ok(None);
     }
-    let (_, dimensions) = cursor.element()?;
-    let dimensions: Vec<usize> = dimensions
+    let dimensions: Vec<usize> = source
+        .small()?
         .chunks_exact(4)
-        .map(|bytes| word(bytes, big_endian) as usize)
+        .map(|bytes| word(bytes, source.big_endian) as usize)
         .collect();
     let &[rows, columns] = dimensions.as_slice() else {
         return Ok(None);
     };
-    let (_, name) = cursor.element()?;
-    let name = String::from_utf8_lossy(name).into_owned();
-    let (kind, data) = cursor.element()?;
-    let values = numbers(kind, data, big_endian).ok_or_else(|| {
-        format!("variable \"{name}\" has data of type {kind}; a number type from 1 to 13 was expected")
+    let name = String::from_utf8_lossy(&source.small()?).into_owned();
+    let tag = source.tag()?;
+    let size = size_of_kind(tag.kind).ok_or_else(|| {
+        format!(
+            "variable \"{name}\" has data of type {}; a number type from 1 to 13 was expected",
+            tag.kind
+        )
     })?;
-    if rows.checked_mul(columns) != Some(values.len()) {
+    let count = (tag.length / size as u64) as usize;
+    if rows.checked_mul(columns) != Some(count) {
         return Err(format!(
-            "variable \"{name}\" is {rows} by {columns}, but has {} values",
-            values.len()
+            "variable \"{name}\" is {rows} by {columns}, but has {count} values"
         ));
     }
+    // A row of samples is one channel, as a column is; a matrix has one channel per column.
+    let samples = if rows.max(columns) == count { count } else { rows };
+    let mut values: Vec<Vec<f64>> = Vec::new();
+    source.numbers(&tag, |value| match values.last_mut() {
+        Some(column) if column.len() < samples => column.push(value),
+        _ => {
+            let mut column = Vec::with_capacity(samples);
+            column.push(value);
+            values.push(column);
+        }
+    })?;
     Ok(Some(Variable {
         name,
         rows,
@@ -179,24 +211,33 @@ fn matrix(data: &[u8], big_endian: bool) -> Result<Option<Variable>, String> {
     }))
 }
 
+/// Bytes of a number as it is stored; `None` where a type is no number.
+fn size_of_kind(kind: u32) -> Option<usize> {
+    Some(match kind {
+        1 | 2 => 1,
+        3 | 4 => 2,
+        5..=7 => 4,
+        9 | 12 | 13 => 8,
+        _ => return None,
+    })
+}
+
 /// Numbers as they are stored: a matrix of doubles may be stored in a smaller type where that loses nothing.
-fn numbers(kind: u32, data: &[u8], big_endian: bool) -> Option<Vec<f64>> {
+fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
     macro_rules! decode {
         ($type:ty) => {
-            data.chunks_exact(size_of::<$type>())
-                .map(|bytes| {
-                    let mut array = [0; size_of::<$type>()];
-                    array.copy_from_slice(bytes);
-                    if big_endian {
-                        <$type>::from_be_bytes(array) as f64
-                    } else {
-                        <$type>::from_le_bytes(array) as f64
-                    }
-                })
-                .collect()
+            for bytes in data.chunks_exact(size_of::<$type>()) {
+                let mut array = [0; size_of::<$type>()];
+                array.copy_from_slice(bytes);
+                take(if big_endian {
+                    <$type>::from_be_bytes(array) as f64
+                } else {
+                    <$type>::from_le_bytes(array) as f64
+                });
+            }
         };
     }
-    Some(match kind {
+    match kind {
         1 => decode!(i8),
         2 => decode!(u8),
         3 => decode!(i16),
@@ -207,8 +248,8 @@ fn numbers(kind: u32, data: &[u8], big_endian: bool) -> Option<Vec<f64>> {
         9 => decode!(f64),
         12 => decode!(i64),
         13 => decode!(u64),
-        _ => return None,
-    })
+        _ => {}
+    }
 }
 
 fn word(bytes: &[u8], big_endian: bool) -> u32 {
@@ -220,47 +261,152 @@ fn word(bytes: &[u8], big_endian: bool) -> u32 {
     }
 }
 
-struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
+/// What stands before the data of an element.
+struct Tag {
+    kind: u32,
+    /// Bytes of data.
+    length: u64,
+    /// The data, where it stands within the tag: up to four bytes do.
+    inside: Option<[u8; 4]>,
+}
+
+/// Bytes in their order.
+struct Source<'a> {
+    reader: &'a mut dyn BufRead,
+    at: u64,
+    /// More bytes than this there cannot be.
+    room: u64,
     big_endian: bool,
 }
 
-impl<'a> Cursor<'a> {
-    fn take(&mut self, length: usize) -> Result<&'a [u8], String> {
-        let end = self.at.checked_add(length);
-        let taken = end.and_then(|end| self.bytes.get(self.at..end)).ok_or_else(|| {
-            format!(
-                "the file ends at byte {}, within an element of {length} bytes at {}: it is cut off",
-                self.bytes.len(),
-                self.at
-            )
-        })?;
-        self.at += length;
-        Ok(taken)
+impl Source<'_> {
+    fn is_at_end(&mut self) -> Result<bool, String> {
+        self.reader
+            .fill_buf()
+            .map(<[u8]>::is_empty)
+            .map_err(|error| error.to_string())
     }
 
-    /// The next element: its type and its data. Elements are padded to 8 bytes, but for compressed ones; up to four
-    /// bytes of data may stand within the tag.
-    fn element(&mut self) -> Result<(u32, &'a [u8]), String> {
-        let first = word(self.take(4)?, self.big_endian);
-        let small = (first >> 16) as usize;
-        if small > 0 {
-            let data = self.take(4)?;
-            let kind = first & 0xffff;
-            let data = data
-                .get(..small)
-                .ok_or_else(|| format!("an element at byte {} has {small} bytes in 4", self.at - 8))?;
-            return Ok((kind, data));
+    fn fill(&mut self, bytes: &mut [u8]) -> Result<(), String> {
+        self.reader
+            .read_exact(bytes)
+            .map_err(|error| match error.kind() {
+                ErrorKind::UnexpectedEof => self.cut_off(bytes.len() as u64),
+                _ => format!("after byte {}: {error}", self.at),
+            })?;
+        self.at += bytes.len() as u64;
+        Ok(())
+    }
+
+    fn cut_off(&self, length: u64) -> String {
+        format!(
+            "it ends within an element of {length} bytes at byte {}: it is cut off",
+            self.at
+        )
+    }
+
+    /// The next tag.
+    fn tag(&mut self) -> Result<Tag, String> {
+        let mut bytes = [0; 4];
+        self.fill(&mut bytes)?;
+        let first = word(&bytes, self.big_endian);
+        self.fill(&mut bytes)?;
+        let small = first >> 16;
+        if small > 4 {
+            return Err(format!(
+                "an element at byte {} has {small} bytes in 4",
+                self.at - 8
+            ));
         }
-        let length = word(self.take(4)?, self.big_endian) as usize;
-        let data = self.take(length)?;
-        if first != COMPRESSED {
-            let padding = length.next_multiple_of(8) - length;
-            // The padding of the last element may be missing.
-            self.at = (self.at + padding).min(self.bytes.len());
+        Ok(if small > 0 {
+            Tag {
+                kind: first & 0xffff,
+                length: u64::from(small),
+                inside: Some(bytes),
+            }
+        } else {
+            Tag {
+                kind: first,
+                length: u64::from(word(&bytes, self.big_endian)),
+                inside: None,
+            }
+        })
+    }
+
+    /// The data of the next element, which is a few bytes.
+    fn small(&mut self) -> Result<Vec<u8>, String> {
+        let tag = self.tag()?;
+        let mut data = Vec::new();
+        self.pieces(&tag, |piece| data.extend_from_slice(piece))?;
+        Ok(data)
+    }
+
+    /// The numbers of an element.
+    fn numbers(&mut self, tag: &Tag, mut take: impl FnMut(f64)) -> Result<(), String> {
+        let big_endian = self.big_endian;
+        self.pieces(tag, |piece| decode(tag.kind, piece, big_endian, &mut take))
+    }
+
+    /// The data of an element piece by piece, and what pads it to 8 bytes.
+    fn pieces(&mut self, tag: &Tag, mut take: impl FnMut(&[u8])) -> Result<(), String> {
+        if let Some(inside) = &tag.inside {
+            take(&inside[..tag.length as usize]);
+            return Ok(());
         }
-        Ok((first, data))
+        if tag.length > self.room {
+            return Err(self.cut_off(tag.length));
+        }
+        let mut piece = vec![0; PIECE.min(tag.length as usize)];
+        let mut left = tag.length as usize;
+        while left > 0 {
+            let length = left.min(PIECE);
+            self.fill(&mut piece[..length])?;
+            take(&piece[..length]);
+            left -= length;
+        }
+        self.pad(tag.length)
+    }
+
+    /// Reads over the padding; that of the last element may be missing.
+    fn pad(&mut self, length: u64) -> Result<(), String> {
+        let padding = length.next_multiple_of(8) - length;
+        let read = copy(&mut (&mut *self.reader).take(padding), &mut sink());
+        self.at += read.map_err(|error| error.to_string())?;
+        Ok(())
+    }
+
+    /// What `read` finds in the data of an element, and nothing behind it.
+    fn within<T>(
+        &mut self,
+        tag: &Tag,
+        read: impl FnOnce(&mut Source<'_>) -> Result<T, String>,
+    ) -> Result<T, String> {
+        if tag.length > self.room {
+            return Err(self.cut_off(tag.length));
+        }
+        let end = self.at + tag.length;
+        let mut data = (&mut *self.reader).take(tag.length);
+        let found = read(&mut Source {
+            reader: &mut data,
+            at: self.at,
+            room: tag.length,
+            big_endian: self.big_endian,
+        })?;
+        copy(&mut data, &mut sink()).map_err(|error| error.to_string())?;
+        if data.limit() > 0 {
+            return Err(self.cut_off(tag.length));
+        }
+        self.at = end;
+        self.pad(tag.length)?;
+        Ok(found)
+    }
+
+    /// Passes an element over.
+    fn skip(&mut self, tag: &Tag) -> Result<(), String> {
+        if tag.inside.is_some() {
+            return Ok(());
+        }
+        self.within(tag, |_| Ok(()))
     }
 }
 

@@ -66,6 +66,9 @@ pub struct RecordedCut {
     /// Spindle speed, rev/min.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_rpm: Option<f64>,
+    /// The speed to which it glides by the end of the record, rev/min; not there where it stays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_rpm: Option<f64>,
     /// Axial depth, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axial_depth_mm: Option<f64>,
@@ -141,6 +144,7 @@ impl Sidecar {
         let positive = [
             ("sample_rate_hz", self.sample_rate_hz),
             ("cut.spindle_rpm", cut.spindle_rpm),
+            ("cut.last_rpm", cut.last_rpm),
             ("cut.teeth", cut.teeth.map(f64::from)),
         ];
         let not_negative = [

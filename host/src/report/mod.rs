@@ -10,6 +10,7 @@ pub mod marks;
 pub mod page;
 mod picture;
 pub mod spectrum;
+pub mod stabilization_chart;
 pub mod stroboscope;
 pub mod time_signal;
 pub mod words;

@@ -133,7 +133,8 @@ impl<'a> Contact<'a> {
         let mut sum = [0.0; 3];
         for tooth in self.cutting_teeth() {
             let chip = self.chip(tooth, t, x);
-            let force = cutter.force.force_n(chip.place, chip.thickness_m, depth_m);
+            let depths_m = self.shares(tooth, t).map(|share| depth_m * share);
+            let force = cutter.force.force_of_n(chip.place, chip.thickness_m, depths_m);
             for (sum, force) in sum.iter_mut().zip(force) {
                 *sum += force;
             }
@@ -150,6 +151,8 @@ impl<'a> Contact<'a> {
         let depth_m = self.depth_m(t, x);
         let mut sum = [[0.0; 3]; 3];
         for tooth in self.cutting_teeth() {
+            // The flank presses towards the axis.
+            let depth_m = depth_m * self.shares(tooth, t)[1];
             let damping = cutter
                 .force
                 .damping_ns_per_m(self.place(tooth, t), depth_m, speed_m_per_s);
@@ -158,6 +161,14 @@ impl<'a> Contact<'a> {
             }
         }
         Some(sum)
+    }
+
+    /// What of the depth counts where a tooth stands: see [`super::Pores`].
+    fn shares(&self, tooth: &Tooth, t: f64) -> [f64; 3] {
+        match &self.cutting.pores {
+            Some(pores) => pores.met(&self.cutting.cutter, &self.cutting.spindle, tooth, t),
+            None => [1.0; 3],
+        }
     }
 
     /// The teeth that touch material.

@@ -133,14 +133,20 @@ impl ForceLaw {
 
     /// Force of the chip on the tool, N, with the chip thickness and depth in m; without process damping and wear.
     pub fn force_n(&self, at: Immersion, thickness_m: f64, depth_m: f64) -> [f64; 3] {
+        self.force_of_n(at, thickness_m, [depth_m; 3])
+    }
+
+    /// As [`Self::force_n`], with a depth for the tangential force, one for that towards the axis and one for that along
+    /// it: in solid material they are the same.
+    pub fn force_of_n(&self, at: Immersion, thickness_m: f64, depths_m: [f64; 3]) -> [f64; 3] {
         let thickness_m = self
             .chip
             .map_or(thickness_m, |chip| chip.effective_m(thickness_m));
-        let of = |cutting: f64, edge: f64| depth_m * (cutting * thickness_m + edge);
+        let of = |cutting: f64, edge: f64, depth_m: f64| depth_m * (cutting * thickness_m + edge);
         Coefficients {
-            tangential: of(self.cutting.tangential, self.edge.tangential),
-            inward: of(self.cutting.inward, self.edge.inward),
-            axial: of(self.cutting.axial, self.edge.axial),
+            tangential: of(self.cutting.tangential, self.edge.tangential, depths_m[0]),
+            inward: of(self.cutting.inward, self.edge.inward, depths_m[1]),
+            axial: of(self.cutting.axial, self.edge.axial, depths_m[2]),
         }
         .force(at)
     }

@@ -4,6 +4,7 @@
 //! angles, a chip is as thick as the surface left by *all* earlier passes leaves it (eqs 6.20 to 6.27), and a tooth
 //! off the surface feels no force.
 
+mod anti_aliasing;
 mod contact;
 mod crossing;
 mod cutter;
@@ -14,6 +15,7 @@ mod error;
 mod force_law;
 mod integrator;
 mod passage;
+mod pores;
 mod record;
 pub mod rig;
 mod sensor;
@@ -32,6 +34,7 @@ pub use error::SimulateError;
 pub use force_law::{ChipLaw, ForceLaw, ProcessDamping};
 pub use integrator::{Motion, Room, Segment, Statistics};
 pub use passage::Passage;
+pub use pores::Pores;
 pub use record::Recorder;
 pub use sensor::{Accelerometer, Sampler, TachometerModel};
 pub use spindle::{Fluctuation, Spindle};
@@ -67,6 +70,8 @@ pub struct Cutting {
     pub passage: Passage,
     /// What a tooth finds in front of it.
     pub regeneration: Regeneration,
+    /// Pores of the material; `None` where it is solid.
+    pub pores: Option<Pores>,
 }
 
 /// Which earlier vibration a chip feels.

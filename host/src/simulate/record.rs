@@ -5,6 +5,7 @@ use std::path::Path;
 
 use quietcut_core::tachometer::Wheel;
 
+use super::anti_aliasing::decimated;
 use super::effect::{Effects, Pickup};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{Model, Room, Segment, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
@@ -28,13 +29,28 @@ pub enum Recorder {
         /// Samples per second.
         rate_hz: f64,
     },
+    /// As [`Self::Ideal`], all channels but the tachometer through one anti-aliasing filter of linear phase, flat to 0.35
+    /// and closed from 0.5 of the rate, without delay.
+    Filtered {
+        /// Samples per second.
+        rate_hz: f64,
+        /// The motion is taken this many times as often, and then filtered.
+        oversampling: usize,
+    },
 }
 
 impl Recorder {
     fn rate_hz(self) -> f64 {
         match self {
             Self::Sensor { accelerometer, .. } => accelerometer.rate_hz(),
-            Self::Ideal { rate_hz } => rate_hz,
+            Self::Ideal { rate_hz } | Self::Filtered { rate_hz, .. } => rate_hz,
+        }
+    }
+
+    fn oversampling(self) -> usize {
+        match self {
+            Self::Filtered { oversampling, .. } => oversampling.max(1),
+            Self::Sensor { .. } | Self::Ideal { .. } => 1,
         }
     }
 }
@@ -60,7 +76,13 @@ impl VirtualCut {
         let rate_hz = recorder.rate_hz();
         let samples = (self.seconds * rate_hz).floor() as usize + 1;
         let pickups = self.pickups(case)?;
-        let mut truth = Truth::new(&model, rate_hz, samples, pickups.clone());
+        let oversampling = recorder.oversampling();
+        let mut truth = Truth::new(
+            &model,
+            rate_hz * oversampling as f64,
+            (samples - 1) * oversampling + 1,
+            pickups.clone(),
+        );
         let mut sensors = Sensors::new(&model, recorder, &pickups);
         let tail_s = sensors.tail_s().max(1.0 / rate_hz);
         let statistics = model.run(self.seconds + tail_s, Settings::default(), |segment| {
@@ -69,7 +91,7 @@ impl VirtualCut {
         })?;
         let seed = match recorder {
             Recorder::Sensor { seed, .. } => Some(seed),
-            Recorder::Ideal { .. } => None,
+            Recorder::Ideal { .. } | Recorder::Filtered { .. } => None,
         };
         let mut channels: Vec<Channel> = pickups
             .iter()
@@ -83,7 +105,7 @@ impl VirtualCut {
                         .take(samples)
                         .map(|value| pickup.read(*value))
                         .collect(),
-                    None => truth,
+                    None => decimated(truth, oversampling),
                 },
             })
             .collect();
@@ -131,6 +153,7 @@ impl VirtualCut {
             kind: Some(Kind::Cutting),
             cut: Some(RecordedCut {
                 spindle_rpm: Some(self.spindle_rpm),
+                last_rpm: self.last_rpm,
                 axial_depth_mm: Some(self.depth_mm),
                 start_deg: Some(cut.start_deg),
                 exit_deg: Some(cut.exit_deg),
@@ -161,7 +184,7 @@ impl VirtualCut {
         samples: usize,
         seed: Option<u64>,
     ) -> Result<Vec<f64>, VirtualCutError> {
-        let pitch_s = spindle.time_s(TAU / f64::from(tachometer.wheel.positions));
+        let [pitch_s, _] = spindle.bounds_s(TAU / f64::from(tachometer.wheel.positions));
         // A rise and a fall of two samples each and a flat between.
         let least = 6.0 / rate_hz;
         if pitch_s < least {

@@ -4,11 +4,54 @@ use std::f64::consts::TAU;
 
 /// A spindle; its angle is 0 at t = 0, where tooth 1 stands at immersion angle 0.
 ///
-/// Its speed is constant, or fluctuates: Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)).
+/// Its speed is constant, fluctuates as Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)), or glides from one speed to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spindle {
     speed_rad_per_s: f64,
-    fluctuation: Option<Fluctuation>,
+    turning: Turning,
+}
+
+/// How the speed changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Turning {
+    Steady,
+    Fluctuating(Fluctuation),
+    Gliding(Glide),
+}
+
+/// A speed that grows or falls evenly from t = 0 on, and is constant before and afterwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Glide {
+    /// First and last speed, rad/s.
+    speeds: [f64; 2],
+    seconds: f64,
+}
+
+impl Glide {
+    fn speed(self, t: f64) -> f64 {
+        let share = (t / self.seconds).clamp(0.0, 1.0);
+        self.speeds[0] * (1.0 - share) + self.speeds[1] * share
+    }
+
+    fn angle_rad(self, t: f64) -> f64 {
+        let within = t.clamp(0.0, self.seconds);
+        // The mean speed of the way so far, and what is before or beyond.
+        0.5 * (self.speeds[0] + self.speed(within)) * within + self.speed(t) * (t - within)
+    }
+
+    fn time_s(self, angle_rad: f64) -> f64 {
+        let [first, last] = self.speeds;
+        let whole = self.angle_rad(self.seconds);
+        if angle_rad <= 0.0 {
+            return angle_rad / first;
+        }
+        if angle_rad >= whole {
+            return self.seconds + (angle_rad - whole) / last;
+        }
+        // first·t + ½·a·t² = angle, in the form that does not cancel.
+        let acceleration = (last - first) / self.seconds;
+        2.0 * angle_rad / (first + (first * first + 2.0 * acceleration * angle_rad).sqrt())
+    }
 }
 
 /// How a speed fluctuates.
@@ -40,15 +83,25 @@ impl Spindle {
     pub fn new(spindle_rpm: f64) -> Self {
         Self {
             speed_rad_per_s: spindle_rpm * TAU / 60.0,
-            fluctuation: None,
+            turning: Turning::Steady,
         }
     }
 
-    /// The same with a speed that fluctuates.
+    /// A spindle whose speed glides evenly from one to the other in `seconds`; all must be positive. Its mean speed is
+    /// that in the middle.
+    pub fn gliding(first_rpm: f64, last_rpm: f64, seconds: f64) -> Self {
+        let speeds = [first_rpm, last_rpm].map(|rpm| rpm * TAU / 60.0);
+        Self {
+            speed_rad_per_s: 0.5 * (speeds[0] + speeds[1]),
+            turning: Turning::Gliding(Glide { speeds, seconds }),
+        }
+    }
+
+    /// The same with a speed that fluctuates about the mean one.
     #[must_use]
     pub fn fluctuating(self, fluctuation: Fluctuation) -> Self {
         Self {
-            fluctuation: Some(fluctuation),
+            turning: Turning::Fluctuating(fluctuation),
             ..self
         }
     }
@@ -65,39 +118,47 @@ impl Spindle {
 
     /// The speed at `t`, rad/s.
     pub fn speed_at_rad_per_s(&self, t: f64) -> f64 {
-        self.speed_rad_per_s * self.fluctuation.map_or(1.0, |fluctuation| fluctuation.share(t))
+        match self.turning {
+            Turning::Steady => self.speed_rad_per_s,
+            Turning::Fluctuating(fluctuation) => self.speed_rad_per_s * fluctuation.share(t),
+            Turning::Gliding(glide) => glide.speed(t),
+        }
     }
 
     /// The angle turned through since t = 0, rad.
     pub fn angle_rad(&self, t: f64) -> f64 {
-        self.speed_rad_per_s
-            * self
-                .fluctuation
-                .map_or(t, |fluctuation| t + fluctuation.ahead_s(t))
+        match self.turning {
+            Turning::Steady => self.speed_rad_per_s * t,
+            Turning::Fluctuating(fluctuation) => self.speed_rad_per_s * (t + fluctuation.ahead_s(t)),
+            Turning::Gliding(glide) => glide.angle_rad(t),
+        }
     }
 
     /// When the spindle has turned through `angle_rad` since t = 0, s.
     pub fn time_s(&self, angle_rad: f64) -> f64 {
         let mean_s = angle_rad / self.speed_rad_per_s;
-        match self.fluctuation {
-            None => mean_s,
-            Some(fluctuation) => inverse(fluctuation, mean_s),
+        match self.turning {
+            Turning::Steady => mean_s,
+            Turning::Fluctuating(fluctuation) => inverse(fluctuation, mean_s),
+            Turning::Gliding(glide) => glide.time_s(angle_rad),
         }
     }
 
     /// How long before `t` the spindle stood `angle_rad` back, s.
     pub fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
-        match self.fluctuation {
-            None => angle_rad / self.speed_rad_per_s,
-            Some(_) => t - self.time_s(self.angle_rad(t) - angle_rad),
+        match self.turning {
+            Turning::Steady => angle_rad / self.speed_rad_per_s,
+            Turning::Fluctuating(_) | Turning::Gliding(_) => t - self.time_s(self.angle_rad(t) - angle_rad),
         }
     }
 
     /// [`Self::delay_s`] over that at the mean speed.
     pub fn delay_share(&self, t: f64, angle_rad: f64) -> f64 {
-        match self.fluctuation {
-            None => 1.0,
-            Some(_) => self.delay_s(t, angle_rad) * self.speed_rad_per_s / angle_rad,
+        match self.turning {
+            Turning::Steady => 1.0,
+            Turning::Fluctuating(_) | Turning::Gliding(_) => {
+                self.delay_s(t, angle_rad) * self.speed_rad_per_s / angle_rad
+            }
         }
     }
 
@@ -109,10 +170,15 @@ impl Spindle {
     /// The shortest and the longest time in which the spindle ever turns through `angle_rad`, s: bounds, and exact
     /// where the speed is constant.
     pub fn bounds_s(&self, angle_rad: f64) -> [f64; 2] {
-        let delta = self
-            .fluctuation
-            .map_or(0.0, |fluctuation| fluctuation.delta.abs());
-        [1.0 + delta, 1.0 - delta].map(|share| angle_rad / (self.speed_rad_per_s * share))
+        let fastest_and_slowest = match self.turning {
+            Turning::Steady => [self.speed_rad_per_s; 2],
+            Turning::Fluctuating(fluctuation) => {
+                let delta = fluctuation.delta.abs();
+                [1.0 + delta, 1.0 - delta].map(|share| self.speed_rad_per_s * share)
+            }
+            Turning::Gliding(Glide { speeds: [a, b], .. }) => [a.max(b), a.min(b)],
+        };
+        fastest_and_slowest.map(|speed| angle_rad / speed)
     }
 }
 
@@ -147,6 +213,29 @@ fn inverse(fluctuation: Fluctuation, mean_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_gliding_spindle_reaches_its_last_speed_and_time_and_angle_are_inverse() {
+        for (first, last) in [(450.0, 690.0), (690.0, 450.0)] {
+            let spindle = Spindle::gliding(first, last, 60.0);
+            let rpm = |t: f64| spindle.speed_at_rad_per_s(t) * 60.0 / TAU;
+            assert!((rpm(-1.0) - first).abs() < 1e-9 && (rpm(61.0) - last).abs() < 1e-9);
+            // The mean speed for a minute.
+            assert!((spindle.angle_rad(60.0) / TAU - 570.0).abs() < 1e-9);
+            for i in -20..700 {
+                let t = 0.1 * f64::from(i);
+                assert!((spindle.time_s(spindle.angle_rad(t)) - t).abs() < 1e-12);
+                let h = 1e-4;
+                let rate = (spindle.angle_rad(t + h) - spindle.angle_rad(t - h)) / (2.0 * h);
+                // Half a step of the change of speed where it begins and ends, and rounding of angles of 4000 rad.
+                assert!((rate - spindle.speed_at_rad_per_s(t)).abs() < 1e-4, "{t}");
+                let [shortest, longest] = spindle.bounds_s(3.0);
+                assert!(
+                    (shortest..=longest * (1.0 + 1e-12)).contains(&(spindle.delay_s(t, 3.0) * (1.0 + 1e-12)))
+                );
+            }
+        }
+    }
 
     #[test]
     fn time_and_angle_of_a_fluctuating_spindle_are_inverse_and_its_speed_is_the_rate() {

@@ -6,7 +6,7 @@ use quietcut_core::tachometer::Edge;
 use super::Statistics;
 use super::effect::{EffectError, Effects};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
-use super::{Cutter, Cutting, Model, Passage, Regeneration, Settings, SimulateError, Spindle};
+use super::{Cutter, Cutting, Model, Passage, Pores, Regeneration, Settings, SimulateError, Spindle};
 use crate::case::{Case, CaseError};
 use crate::recording::Quantity;
 
@@ -15,6 +15,9 @@ use crate::recording::Quantity;
 pub struct VirtualCut {
     /// Spindle speed, rev/min.
     pub spindle_rpm: f64,
+    /// The speed to which it glides by the end, rev/min; `None` where it stays. The feed axis moves steadily, with the
+    /// feed per tooth of the case at the speed in the middle.
+    pub last_rpm: Option<f64>,
     /// Axial depth of cut, mm.
     pub depth_mm: f64,
     /// How long it is watched, s.
@@ -23,6 +26,8 @@ pub struct VirtualCut {
     pub entry: Entry,
     /// Air before and after the cut, s.
     pub air_s: f64,
+    /// Pores of the material; `None` where it is solid.
+    pub pores: Option<Pores>,
     /// What the case does not have, or has otherwise.
     pub effects: Effects,
     /// What a recording of it has, besides the tachometer, in every direction of the structure.
@@ -109,10 +114,12 @@ impl VirtualCut {
     pub fn new(spindle_rpm: f64, depth_mm: f64, seconds: f64) -> Self {
         Self {
             spindle_rpm,
+            last_rpm: None,
             depth_mm,
             seconds,
             entry: Entry::Feed,
             air_s: 0.2,
+            pores: None,
             effects: Effects::default(),
             measured: vec![Quantity::Force, Quantity::Displacement, Quantity::Acceleration],
         }
@@ -137,7 +144,10 @@ impl VirtualCut {
                 seconds: self.seconds,
             });
         }
-        let spindle = effects.spindle(Spindle::new(self.spindle_rpm));
+        if self.pores.is_some() && cutter.radius_m.is_none() {
+            return Err(SimulateError::NoDiameter.into());
+        }
+        let spindle = effects.spindle(self.turning());
         let passage = self.passage(&cutter, &spindle)?;
         let (dynamics, terms) = effects.dynamics(case.structure()?)?;
         if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !terms.is_empty() {
@@ -156,6 +166,7 @@ impl VirtualCut {
                 spindle,
                 passage,
                 regeneration: Regeneration::AllPasses,
+                pores: self.pores,
             }),
             drive: None,
             terms,
@@ -168,7 +179,15 @@ impl VirtualCut {
     /// The case has an extension that cannot be simulated.
     pub fn spindle(&self, case: &Case) -> Result<Spindle, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
-        Ok(effects.spindle(Spindle::new(self.spindle_rpm)))
+        Ok(effects.spindle(self.turning()))
+    }
+
+    /// How the spindle is told to turn.
+    fn turning(&self) -> Spindle {
+        match self.last_rpm {
+            Some(last_rpm) => Spindle::gliding(self.spindle_rpm, last_rpm, self.seconds),
+            None => Spindle::new(self.spindle_rpm),
+        }
     }
 
     /// When the tool is in full cut, from and to in s.

@@ -9,6 +9,7 @@ use super::Error;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::homogeneity::Region;
 use crate::identify::linearity::Verdict;
+use crate::identify::modes::{ModalModel, Rejected};
 use crate::identify::ncma::Map;
 use crate::identify::reciprocity::Reciprocity;
 use crate::identify::steady_fit::NINETY_PERCENT;
@@ -19,6 +20,15 @@ use crate::structure::Direction;
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Answer {
     pub(super) method: &'static str,
+    /// Complex modes by rising frequency.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) modes: Vec<OfMode>,
+    /// Poles that are no modes, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) rejected: Vec<Rejected>,
+    /// Median coherence of each response.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) coherence: BTreeMap<&'static str, f64>,
     /// Parameters by the directions that they belong to.
     pub(super) models: Vec<Model>,
     /// Root mean square of what is left over that of the data.
@@ -48,6 +58,9 @@ pub(super) struct Answer {
     /// A case that is no equation of motion.
     #[serde(skip)]
     pub(super) table: Option<toml::Table>,
+    /// Of complex modes: what becomes a case.
+    #[serde(skip)]
+    pub(super) modal: Option<ModalModel>,
     /// What becomes a case.
     #[serde(skip)]
     pub(super) estimates: Vec<Estimate>,
@@ -73,6 +86,22 @@ pub(super) struct Model {
 pub(super) struct Figure {
     pub(super) value: f64,
     pub(super) ci90: [f64; 2],
+}
+
+/// A complex mode.
+#[derive(Debug, Serialize)]
+pub(super) struct OfMode {
+    pub(super) frequency_hz: Figure,
+    pub(super) damping_ratio: Figure,
+    pub(super) left: BTreeMap<&'static str, Parts>,
+    pub(super) right: BTreeMap<&'static str, Parts>,
+}
+
+/// Real and imaginary part of an entry of a shape.
+#[derive(Debug, Serialize)]
+pub(super) struct Parts {
+    pub(super) re: Figure,
+    pub(super) im: Figure,
 }
 
 /// What `--method linearity` finds.
@@ -237,11 +266,26 @@ impl Answer {
         }
     }
 
-    /// The case file of the model.
-    pub(super) fn case(&self, path: &Path) -> Result<String, Error> {
+    /// The case file of the model; `other` has the sections that are not the structure.
+    pub(super) fn case(&self, path: &Path, other: Option<&toml::Table>) -> Result<String, Error> {
+        let text = self.structure(path)?;
+        Ok(match other {
+            Some(other) => case_file::with_sections(&text, other),
+            None => text,
+        })
+    }
+
+    fn structure(&self, path: &Path) -> Result<String, Error> {
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let refused = |error| Error::input(format!("--out {}: {error}", path.display()));
         if let Some(table) = &self.table {
             // A table of numbers and words is always TOML.
             return Ok(toml::to_string(table).unwrap_or_default());
+        }
+        if let Some(model) = &self.modal {
+            return case_file::text_of_modes(&name, model).map_err(refused);
         }
         if self.estimates.is_empty() {
             return Err(Error::input(format!(
@@ -250,10 +294,6 @@ impl Answer {
                 self.method
             )));
         }
-        let name = path
-            .file_stem()
-            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        case_file::text(&name, &self.directions, &self.estimates)
-            .map_err(|error| Error::input(format!("--out {}: {error}", path.display())))
+        case_file::text(&name, &self.directions, &self.estimates).map_err(refused)
     }
 }

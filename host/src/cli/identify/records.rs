@@ -98,15 +98,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<A
         motion,
         quantity,
     } = along(recording)?;
-    let band_hz = match args.band_hz[..] {
-        [] => None,
-        [low, high] if low < high => Some([low, high]),
-        _ => {
-            return Err(Error::input(
-                "--band-hz: two frequencies are needed, the lower first, as in 5,60",
-            ));
-        }
-    };
+    let band_hz = super::band(args)?;
     let options = Options {
         terms: args.surface.iter().map(|term| term.term()).collect(),
         mass_kg: args.mass_kg,

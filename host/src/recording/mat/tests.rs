@@ -44,6 +44,11 @@ fn doubles(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
+fn of(mut bytes: &[u8]) -> Result<Vec<Variable>, String> {
+    let length = bytes.len() as u64;
+    variables(&mut bytes, length)
+}
+
 #[test]
 fn vectors_plain_and_compressed_and_stored_small_are_read() {
     let bytes = file(&[
@@ -54,7 +59,7 @@ fn vectors_plain_and_compressed_and_stored_small_are_read() {
         // Text (class 4) is passed over.
         matrix_element("text", 4, 1, 3, 4, &[b'a', 0, b'b', 0, b'c', 0]),
     ]);
-    let read: Vec<(String, Vec<f64>)> = variables(&bytes)
+    let read: Vec<(String, Vec<f64>)> = of(&bytes)
         .unwrap()
         .into_iter()
         .flat_map(Variable::into_columns)
@@ -74,7 +79,7 @@ fn vectors_plain_and_compressed_and_stored_small_are_read() {
 #[test]
 fn what_is_no_such_file_is_refused_with_the_reason() {
     let whole = file(&[matrix_element("ax", 6, 3, 1, 9, &doubles(&[1.0, 2.0, 3.0]))]);
-    let said = |bytes: &[u8]| variables(bytes).map(|_| ()).unwrap_err();
+    let said = |bytes: &[u8]| of(bytes).map(|_| ()).unwrap_err();
     assert!(said(b"hello").contains("5 bytes"));
     assert!(said(&whole[..whole.len() - 9]).contains("cut off"));
     assert!(said(&[b'x'; 200]).contains("IM or MI"));
@@ -98,6 +103,6 @@ proptest! {
             bytes[at % length] = value;
         }
         bytes.truncate(bytes.len().saturating_sub(cut % 60));
-        let _ = variables(&bytes);
+        let _ = of(&bytes);
     }
 }

@@ -3,6 +3,7 @@
 mod brute_force;
 mod closed_form;
 mod facts;
+mod milling_rigs;
 mod multipliers;
 mod sensors;
 
@@ -40,6 +41,7 @@ fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
             spindle: Spindle::new(spindle_rpm),
             passage: Passage::Steady,
             regeneration: Regeneration::AllPasses,
+            pores: None,
         }),
         drive: None,
         terms: Vec::new(),

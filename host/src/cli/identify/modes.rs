@@ -1,0 +1,276 @@
+//! `--method modes`: complex modes of receptances.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use maud::html;
+
+use super::answer::{Answer, Figure, OfMode, Parts};
+use super::{Args, Error, positive};
+use crate::frf::{Estimator, FrfTable, MeasurementSettings, measure};
+use crate::identify::modes::{self, IdentifiedMode, ModalModel, Receptances};
+use crate::recording::Recording;
+use crate::report::page::{figure, page};
+use crate::report::stabilization_chart::stabilization_chart;
+use crate::structure::Direction;
+
+/// The options of the method.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Modes")]
+pub(super) struct Options {
+    /// The number of modes; without it all poles that are stable.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    modes: Option<u16>,
+    /// The highest order of the models whose poles are compared.
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u16).range(5..=80))]
+    order: u16,
+    /// The stabilization diagram to draw, svg or html by its ending.
+    #[arg(long, value_name = "FILE")]
+    stabilization: Option<PathBuf>,
+    /// Distance of the frequencies in Hz where recordings are given; as that of frf.
+    #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
+    resolution_hz: Option<f64>,
+    /// The recordings are several cuts whose forces are dependent each by itself: pseudo-inverse, as that of frf.
+    #[arg(long)]
+    pseudo_inverse: bool,
+}
+
+/// Identifies modes.
+pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
+    let options = &args.modes;
+    if let Some(path) = &options.stabilization {
+        ending(path)?;
+    }
+    let source = source(args)?;
+    let band_hz = super::band(args)?;
+    let refused =
+        |error: modes::ModesError| Error::input(format!("{}: {error}", source.table.path().display()));
+    let data = Receptances::new(&source.table, source.deviation.as_deref(), band_hz).map_err(refused)?;
+    let wanted = modes::Options {
+        highest_order: usize::from(options.order),
+        modes: options.modes.map(usize::from),
+    };
+    let model = modes::identify(&data, &wanted).map_err(refused)?;
+    if let Some(path) = &options.stabilization {
+        draw(path, &data, &model)?;
+    }
+    let mut warnings = source.warnings;
+    warnings.extend(model.warnings.iter().cloned());
+    warnings.extend(not_in_case(args, &model));
+    Ok(Answer {
+        method: "modes",
+        modes: model.modes.iter().map(|mode| of_mode(&model, mode)).collect(),
+        rejected: model.rejected.clone(),
+        coherence: coherence(&source.table, data.band_hz()),
+        fit_error: Some(model.fit_error),
+        misfit: model.misfit,
+        warnings,
+        said: said(&model),
+        modal: Some(model),
+        ..Answer::default()
+    })
+}
+
+/// Receptances and what is known of them.
+struct Source {
+    table: FrfTable,
+    deviation: Option<Vec<Vec<f64>>>,
+    warnings: Vec<String>,
+}
+
+fn source(args: &Args) -> Result<Source, Error> {
+    if let [path] = args.recordings.as_slice()
+        && is_table(path)?
+    {
+        return Ok(Source {
+            table: FrfTable::read(path)?,
+            deviation: None,
+            warnings: Vec::new(),
+        });
+    }
+    let read = args.recordings.iter().map(Recording::read);
+    let recordings = read.collect::<Result<Vec<_>, _>>()?;
+    let settings = MeasurementSettings {
+        resolution_hz: args.modes.resolution_hz,
+        estimator: if args.modes.pseudo_inverse {
+            Estimator::PseudoInverse
+        } else {
+            Estimator::H1
+        },
+        band_hz: super::band(args)?.map(|[low, high]| (low, high)),
+        ..MeasurementSettings::default()
+    };
+    let measurement = measure(&recordings, &settings)?;
+    Ok(Source {
+        table: measurement.table,
+        deviation: Some(measurement.deviation),
+        warnings: measurement.warnings,
+    })
+}
+
+/// True where a file holds receptances, not a recording.
+fn is_table(path: &Path) -> Result<bool, Error> {
+    match crate::file::ending(path).as_str() {
+        "uff" | "unv" | "bunv" => Ok(FrfTable::read(path).is_ok()),
+        "csv" => {
+            let text = crate::file::read_text(path)?;
+            let header = text
+                .lines()
+                .find(|line| !line.starts_with('#'))
+                .unwrap_or_default();
+            Ok(header.split(',').any(|title| title.trim() == "frequency_hz"))
+        }
+        _ => Ok(false),
+    }
+}
+
+/// Median coherence of each response within the band.
+fn coherence(table: &FrfTable, [from_hz, to_hz]: [f64; 2]) -> BTreeMap<&'static str, f64> {
+    let mut medians = BTreeMap::new();
+    for entry in table.entries() {
+        let Some(coherence) = &entry.coherence else {
+            continue;
+        };
+        let mut inside: Vec<f64> = coherence
+            .iter()
+            .zip(table.frequency_hz())
+            .filter(|(_, hertz)| (from_hz..=to_hz).contains(*hertz))
+            .map(|(value, _)| *value)
+            .collect();
+        inside.sort_by(f64::total_cmp);
+        if let Some(median) = inside.get(inside.len() / 2) {
+            medians.insert(entry.response.name(), *median);
+        }
+    }
+    medians
+}
+
+fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> OfMode {
+    let shape = |directions: &[Direction], values: &[num_complex::Complex64], deviations: &[[f64; 2]]| {
+        let entries = directions.iter().zip(values).zip(deviations);
+        entries
+            .map(|((direction, value), deviation)| {
+                let parts = Parts {
+                    re: Figure::new(value.re, deviation[0]),
+                    im: Figure::new(value.im, deviation[1]),
+                };
+                (direction.name(), parts)
+            })
+            .collect()
+    };
+    OfMode {
+        frequency_hz: Figure::new(found.mode.frequency_hz, found.frequency_std_hz),
+        damping_ratio: Figure::new(found.mode.damping_ratio, found.damping_ratio_std),
+        left: shape(&model.forces, &found.mode.left, &found.left_std),
+        right: shape(&model.responses, &found.mode.right, &found.right_std),
+    }
+}
+
+/// Directions that the case leaves out.
+fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
+    args.out.as_ref()?;
+    let directions = model.directions();
+    let left_out: Vec<&str> = model
+        .responses
+        .iter()
+        .chain(&model.forces)
+        .filter(|direction| !directions.contains(direction))
+        .map(|direction| direction.name())
+        .collect();
+    (!left_out.is_empty() && !directions.is_empty()).then(|| {
+        format!(
+            "{} is left out of the case: shapes are known only where a direction is both driven and measured",
+            left_out.join(", ")
+        )
+    })
+}
+
+fn said(model: &ModalModel) -> Vec<String> {
+    let mut lines = Vec::new();
+    for found in &model.modes {
+        let frequency = Figure::new(found.mode.frequency_hz, found.frequency_std_hz);
+        let damping = Figure::new(found.mode.damping_ratio, found.damping_ratio_std);
+        lines.push(format!(
+            "mode at {:.4} Hz (90 % interval {:.4} to {:.4}), damping ratio {:.5} ({:.5} to {:.5})",
+            frequency.value,
+            frequency.ci90[0],
+            frequency.ci90[1],
+            damping.value,
+            damping.ci90[0],
+            damping.ci90[1]
+        ));
+        let shapes = [
+            ("right", &model.responses, &found.mode.right, &found.right_std),
+            ("left", &model.forces, &found.mode.left, &found.left_std),
+        ];
+        for (name, directions, values, deviations) in shapes {
+            let entries: Vec<String> = directions
+                .iter()
+                .zip(values.iter().zip(deviations))
+                .map(|(direction, (value, [re, im]))| {
+                    format!(
+                        "{direction} {:.3}{:+.3}i (±{:.3}, ±{:.3})",
+                        1e3 * value.re,
+                        1e3 * value.im,
+                        1e3 * re,
+                        1e3 * im
+                    )
+                })
+                .collect();
+            lines.push(format!(
+                "  {name} shape, 1e-3 (one standard deviation): {}",
+                entries.join(", ")
+            ));
+        }
+    }
+    for pole in &model.rejected {
+        lines.push(format!(
+            "no mode: {:.3} Hz, damping ratio {:.4}: {}",
+            pole.frequency_hz, pole.damping_ratio, pole.why
+        ));
+    }
+    lines
+}
+
+#[derive(Clone, Copy)]
+enum Form {
+    Svg,
+    Html,
+}
+
+fn ending(path: &Path) -> Result<Form, Error> {
+    match crate::file::ending(path).as_str() {
+        "svg" => Ok(Form::Svg),
+        "html" => Ok(Form::Html),
+        other => Err(Error::input(format!(
+            "--stabilization {}: it ends in \"{other}\"; svg or html is needed",
+            path.display()
+        ))),
+    }
+}
+
+fn draw(path: &Path, data: &Receptances, model: &ModalModel) -> Result<(), Error> {
+    let title = "Stabilization diagram";
+    let svg = stabilization_chart(title, data, model).map_err(Error::input)?;
+    let text = match ending(path)? {
+        Form::Svg => svg,
+        Form::Html => {
+            let body = html! {
+                h1 { (title) }
+                (figure(&svg, "Poles that come again with the same frequency, damping and shape as the order of the model grows are modes; below, the receptances and their fit."))
+                table {
+                    tr { th { "frequency" } th { "damping ratio" } th { "why it is no mode" } }
+                    @for pole in &model.rejected {
+                        tr {
+                            td { (format!("{:.3} Hz", pole.frequency_hz)) }
+                            td { (format!("{:.4}", pole.damping_ratio)) }
+                            td { (pole.why) }
+                        }
+                    }
+                }
+            };
+            page(title, &body)
+        }
+    };
+    Ok(crate::file::write(path, text.as_bytes())?)
+}

@@ -1,0 +1,151 @@
+//! From virtual cuts that excite the machine to its modes, and to the lobes that these give: all by the command.
+#![allow(clippy::expect_used)]
+
+use std::path::Path;
+
+use quietcut_tests::command::{cases, folder, quietcut};
+use serde_json::Value;
+
+/// Table 7.1: frequency in Hz and damping ratio.
+const TRUTH: [(f64, f64); 2] = [(16.99, 0.0285), (18.48, 0.0996)];
+
+fn case(name: &str) -> String {
+    cases().join(format!("{name}.toml")).display().to_string()
+}
+
+fn run(folder: &Path, words: &str) -> Value {
+    let arguments: Vec<&str> = words.split_whitespace().collect();
+    quietcut(folder, &arguments).json()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// The modes of the answer: value and half the interval of frequency and damping ratio.
+fn assert_modes(answer: &Value, way: &str) {
+    let modes = answer["modes"].as_array().expect("modes");
+    assert_eq!(modes.len(), TRUTH.len(), "{way}: {answer}");
+    for (mode, (frequency_hz, damping_ratio)) in modes.iter().zip(TRUTH) {
+        let (frequency, damping) = (&mode["frequency_hz"], &mode["damping_ratio"]);
+        let off = number(&frequency["value"]) / frequency_hz - 1.0;
+        let off_damping = number(&damping["value"]) / damping_ratio - 1.0;
+        println!(
+            "{way}: {:.4} Hz ({:+.3} %, 90 % interval {} to {}), damping ratio {:.5} ({:+.2} %, {} to {})",
+            number(&frequency["value"]),
+            100.0 * off,
+            frequency["ci90"][0],
+            frequency["ci90"][1],
+            number(&damping["value"]),
+            100.0 * off_damping,
+            damping["ci90"][0],
+            damping["ci90"][1],
+        );
+        assert!(off.abs() < 0.002 && off_damping.abs() < 0.05, "{way}: {mode}");
+    }
+}
+
+/// First limits in mm from 600 to 2 400 rev/min, all speeds times a factor.
+fn limits(folder: &Path, case: &str, factor: f64) -> Vec<f64> {
+    let words = format!(
+        "lobes {case} --nominal --rpm {}:{}:37 --depth-mm 0:7:36 --json",
+        600.0 * factor,
+        2400.0 * factor
+    );
+    let answer = run(folder, &words);
+    let speeds = answer["speeds"].as_array().expect("speeds");
+    speeds
+        .iter()
+        .map(|speed| number(&speed["first_limit"]["depth_mm"]))
+        .collect()
+}
+
+/// Within 3 % in depth, or between the limits of the truth at speeds 0.3 % off.
+fn assert_lobes(folder: &Path, found: &str, way: &str) {
+    let truth = [0.997, 1.0, 1.003].map(|factor| limits(folder, &case("kuka-kr90-acetal"), factor));
+    let mut worst = 0.0_f64;
+    for (k, found) in limits(folder, found, 1.0).into_iter().enumerate() {
+        let rpm = 600.0 + 50.0 * k as f64;
+        let near = truth.each_ref().map(|limits| limits[k]);
+        let [low, high] = near.iter().fold([f64::INFINITY, 0.0_f64], |[low, high], &limit| {
+            [low.min(limit), high.max(limit)]
+        });
+        let off = found / near[1] - 1.0;
+        if k % 4 == 0 {
+            println!(
+                "{way}: {rpm} rev/min: {found:.4} mm, truth {:.4} mm, {:+.2} %",
+                near[1],
+                100.0 * off
+            );
+        }
+        assert!(
+            off.abs() < 0.03 || (low..=high).contains(&found),
+            "{way}: {rpm} rev/min: {found} mm, truth {near:?} mm"
+        );
+        worst = worst.max(off.abs());
+    }
+    println!("{way}: at most {:.2} % off in depth", 100.0 * worst);
+}
+
+#[test]
+fn porous_milling_gives_the_modes_of_table_7_1_and_their_lobes() {
+    let folder = folder();
+    let robot = case("kuka-kr90-acetal");
+    run(
+        folder.path(),
+        &format!(
+            "simulate {robot} --experiment porous --rpm 820 --depth-mm 2 --start-deg 0 --exit-deg 180 --seconds 240 \
+             --sample-rate-hz 1024 --measure displacement --noise-percent 1 --seed 1 --out porous.csv --json"
+        ),
+    );
+    let frf = run(
+        folder.path(),
+        "frf porous.csv --band-hz 10:28 --resolution-hz 0.1 --out frf.csv --json",
+    );
+    println!(
+        "porous: smallest singular value of the forces {}",
+        frf["parts"][0]["least_singular_value"]
+    );
+    let answer = run(
+        folder.path(),
+        &format!(
+            "identify frf.csv --method modes --case {robot} --stabilization poles.svg --out found.toml --json"
+        ),
+    );
+    assert_modes(&answer, "porous");
+    assert_lobes(folder.path(), "found.toml", "porous");
+    let drawn = std::fs::read_to_string(folder.path().join("poles.svg")).expect("a picture");
+    assert!(drawn.contains("stable pole") && drawn.contains("Hyy"));
+}
+
+#[test]
+fn speed_sweeps_in_three_immersions_give_the_modes_of_table_7_1_and_their_lobes() {
+    let folder = folder();
+    let robot = case("kuka-kr90-acetal");
+    // Thesis section 7.2.2: central, down- and up-milling; teeth pass at 15 to 23 Hz.
+    for (seed, (start, exit)) in (1..).zip([(68.4, 109.8), (138.6, 180.0), (0.0, 41.4)]) {
+        run(
+            folder.path(),
+            &format!(
+                "simulate {robot} --experiment speed-sweep --rpm 390 --to-rpm 750 --depth-mm 2 --start-deg {start} \
+                 --exit-deg {exit} --seconds 180 --sample-rate-hz 1024 --measure displacement --noise-percent 1 \
+                 --seed {seed} --out sweep{seed}.csv --json"
+            ),
+        );
+    }
+    let frf = run(
+        folder.path(),
+        "frf sweep1.csv sweep2.csv sweep3.csv --method pseudo-inverse --band-hz 14:24 --resolution-hz 0.08 --out frf.csv --json",
+    );
+    assert_eq!(frf["parts"][0]["excitation"], "sweep");
+    println!(
+        "speed sweep: smallest singular value of the forces {}",
+        frf["parts"][0]["least_singular_value"]
+    );
+    let answer = run(
+        folder.path(),
+        &format!("identify frf.csv --method modes --case {robot} --out found.toml --json"),
+    );
+    assert_modes(&answer, "speed sweep");
+    assert_lobes(folder.path(), "found.toml", "speed sweep");
+}
