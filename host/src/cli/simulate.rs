@@ -43,6 +43,7 @@ pub struct Args {
     /// Of a cut, do not record the forces.
     #[arg(long, conflicts_with = "experiment")]
     no_force: bool,
+    #[command(flatten)]
     milling_rig: MillingRig,
     /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated.
     #[arg(long, value_name = "NAME=VALUE")]

@@ -482,7 +482,7 @@ impl<'a> Integrator<'a> {
     fn longest_step(&self, end_s: f64) -> f64 {
         self.contact
             .as_ref()
-            .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s(self.t))
+            .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s())
     }
 
     /// The step that leaves no stub before `stop_s`.
