@@ -95,7 +95,7 @@ fn porous_milling_gives_the_modes_of_table_7_1_and_their_lobes() {
         folder.path(),
         &format!(
             "simulate {robot} --experiment porous --rpm 820 --depth-mm 2 --start-deg 0 --exit-deg 180 --seconds 240 \
-             --sample-rate-hz 1024 --measure displacement --noise-percent 1 --seed 1 --out porous.csv --json"
+             --sample-rate-hz 512 --measure displacement --seed 1 --out porous.csv --json"
         ),
     );
     let frf = run(
@@ -148,4 +148,70 @@ fn speed_sweeps_in_three_immersions_give_the_modes_of_table_7_1_and_their_lobes(
     );
     assert_modes(&answer, "speed sweep");
     assert_lobes(folder.path(), "found.toml", "speed sweep");
+}
+
+/// First limit in mm at a speed.
+fn limit(folder: &Path, case: &str, rpm: f64) -> f64 {
+    let answer = run(
+        folder,
+        &format!("lobes {case} --nominal --rpm {rpm}:{rpm}:1 --depth-mm 0:25:51 --json"),
+    );
+    number(&answer["speeds"][0]["first_limit"]["depth_mm"])
+}
+
+#[test]
+fn a_hammer_misses_the_limits_of_the_nonlinear_robot_and_cuts_miss_them_less() {
+    let folder = folder();
+    let folder = folder.path();
+    let robot = case("kuka-kr90-half-cubic");
+    for direction in ["x", "y"] {
+        run(
+            folder,
+            &format!(
+                "simulate {robot} --experiment hammer --direction {direction} --force-n 300 --impacts 5 --spacing-s 12 \
+                 --sample-rate-hz 512 --noise-percent 0.1 --measure displacement --out hammer_{direction}.csv --json"
+            ),
+        );
+    }
+    run(
+        folder,
+        "frf hammer_x.csv hammer_y.csv --band-hz 12:25 --out hammer.csv --json",
+    );
+    run(
+        folder,
+        &format!("identify hammer.csv --method modes --case {robot} --out hammered.toml --json"),
+    );
+    for (seed, rpm) in (1..).zip([520.0, 540.0, 560.0]) {
+        let truth = limit(folder, &robot, rpm);
+        let hammer = limit(folder, "hammered.toml", rpm);
+        // Porous material, of which what is solid is a little less deep than the hammer's lobes allow.
+        let depth_mm = hammer * 0.95 / 0.7;
+        run(
+            folder,
+            &format!(
+                "simulate {robot} --experiment porous --rpm {rpm} --depth-mm {depth_mm} --pores-percent 30 --pore-mm 0.5 \
+                 --seconds 120 --sample-rate-hz 512 --measure displacement --seed {seed} --out cut.csv --json"
+            ),
+        );
+        run(
+            folder,
+            "frf cut.csv --band-hz 12:25 --resolution-hz 0.1 --out cut_frf.csv --json",
+        );
+        run(
+            folder,
+            &format!("identify cut_frf.csv --method modes --case {robot} --out cut_modes.toml --json"),
+        );
+        let cut = limit(folder, "cut_modes.toml", rpm);
+        let off = |found: f64| 100.0 * (found / truth - 1.0);
+        println!(
+            "{rpm} rev/min: truth {truth:.2} mm; by hammer {hammer:.2} mm ({:+.0} %), in process {cut:.2} mm ({:+.0} %)",
+            off(hammer),
+            off(cut)
+        );
+        assert!(off(hammer) < -10.0, "{rpm}: {hammer} {truth}");
+        assert!(
+            off(cut).abs() < off(hammer).abs(),
+            "{rpm}: {cut} {hammer} {truth}"
+        );
+    }
 }

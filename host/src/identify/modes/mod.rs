@@ -3,8 +3,8 @@
 //! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugate at the conjugate pole, λ = −ζω + iω√(1 − ζ²), s = iω;
 //! no conjugation and no further factor in the residue. Left and right shapes may differ: nothing is taken for reciprocal.
 //!
-//! [`denominator`] gives poles of every order of model, [`stabilization`] those that come again from order to order,
-//! [`pole_residue`] the modes that fit best with their covariance.
+//! `denominator` gives poles of every order of model, [`stabilization`] those that come again from order to order,
+//! `pole_residue` the modes that fit best with their covariance.
 
 mod denominator;
 mod pole_residue;
