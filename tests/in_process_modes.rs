@@ -24,7 +24,7 @@ fn number(value: &Value) -> f64 {
 
 /// The modes of the answer: value and half the interval of frequency and damping ratio.
 fn assert_modes(answer: &Value, way: &str) {
-    let modes = answer["modes"].as_array().expect("modes");
+    let modes = answer["complex_modes"].as_array().expect("modes");
     assert_eq!(modes.len(), TRUTH.len(), "{way}: {answer}");
     for (mode, (frequency_hz, damping_ratio)) in modes.iter().zip(TRUTH) {
         let (frequency, damping) = (&mode["frequency_hz"], &mode["damping_ratio"]);

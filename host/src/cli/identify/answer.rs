@@ -22,7 +22,7 @@ pub(super) struct Answer {
     pub(super) method: &'static str,
     /// Complex modes by rising frequency.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) modes: Vec<OfMode>,
+    pub(super) complex_modes: Vec<ComplexMode>,
     /// Poles that are no modes, and why.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<Rejected>,
@@ -90,7 +90,7 @@ pub(super) struct Figure {
 
 /// A complex mode.
 #[derive(Debug, Serialize)]
-pub(super) struct OfMode {
+pub(super) struct ComplexMode {
     pub(super) frequency_hz: Figure,
     pub(super) damping_ratio: Figure,
     pub(super) left: BTreeMap<&'static str, Parts>,

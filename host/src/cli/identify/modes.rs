@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use maud::html;
 
-use super::answer::{Answer, Figure, OfMode, Parts};
+use super::answer::{Answer, ComplexMode, Figure, Parts};
 use super::{Args, Error, positive};
 use crate::frf::{Estimator, FrfTable, MeasurementSettings, measure};
 use crate::identify::modes::{self, IdentifiedMode, ModalModel, Receptances};
@@ -59,7 +59,7 @@ pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
     warnings.extend(not_in_case(args, &model));
     Ok(Answer {
         method: "modes",
-        modes: model.modes.iter().map(|mode| of_mode(&model, mode)).collect(),
+        complex_modes: model.modes.iter().map(|mode| of_mode(&model, mode)).collect(),
         rejected: model.rejected.clone(),
         coherence: coherence(&source.table, data.band_hz()),
         fit_error: Some(model.fit_error),
@@ -145,7 +145,7 @@ fn coherence(table: &FrfTable, [from_hz, to_hz]: [f64; 2]) -> BTreeMap<&'static 
     medians
 }
 
-fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> OfMode {
+fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
     let shape = |directions: &[Direction], values: &[num_complex::Complex64], deviations: &[[f64; 2]]| {
         let entries = directions.iter().zip(values).zip(deviations);
         entries
@@ -158,7 +158,7 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> OfMode {
             })
             .collect()
     };
-    OfMode {
+    ComplexMode {
         frequency_hz: Figure::new(found.mode.frequency_hz, found.frequency_std_hz),
         damping_ratio: Figure::new(found.mode.damping_ratio, found.damping_ratio_std),
         left: shape(&model.forces, &found.mode.left, &found.left_std),

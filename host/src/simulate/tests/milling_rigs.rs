@@ -96,7 +96,7 @@ fn the_force_of_a_gliding_spindle_in_foam_is_that_of_the_solid_chip() {
         }
         compared += 1;
     }
-    assert!(compared > 1000 && largest > 5.0, "{compared}, {largest} N");
+    assert!(compared > 500 && largest > 5.0, "{compared}, {largest} N");
 }
 
 #[test]
