@@ -369,6 +369,9 @@ impl fmt::Display for Report {
             .iter()
             .map(|finding| finding.said.seconds)
             .fold(0.0, f64::max);
-        writeln!(out, "  drawn again: {redrawn}; longest diagnosis {longest:.2} s")
+        writeln!(
+            out,
+            "  drawn again: {redrawn}; longest diagnosis, beside others, {longest:.2} s"
+        )
     }
 }

@@ -289,6 +289,19 @@ impl CutBench {
             .collect()
     }
 
+    /// What the file beside a recording says of the cut.
+    fn said_of(&self, run: &Run) -> RecordedCut {
+        serde_json::from_value(serde_json::json!({
+            "spindle_rpm": run.rpm,
+            "axial_depth_mm": run.depth_mm,
+            "start_deg": self.job.start_deg,
+            "exit_deg": self.job.exit_deg,
+            "feed_per_tooth_mm": run.feed_mm,
+            "teeth": self.job.teeth,
+        }))
+        .unwrap()
+    }
+
     /// Recordings of an output with white noise of `sigma` per sensor.
     pub(crate) fn recordings(
         &self,
@@ -320,14 +333,7 @@ impl CutBench {
                 });
                 let mut sidecar = Sidecar {
                     kind: Some(RecordKind::Cutting),
-                    cut: Some(RecordedCut {
-                        spindle_rpm: Some(run.rpm),
-                        axial_depth_mm: Some(run.depth_mm),
-                        start_deg: Some(self.job.start_deg),
-                        exit_deg: Some(self.job.exit_deg),
-                        feed_per_tooth_mm: Some(run.feed_mm),
-                        teeth: u32::try_from(self.job.teeth).ok(),
-                    }),
+                    cut: Some(self.said_of(run)),
                     ..Sidecar::default()
                 };
                 let tacho = RecordedChannel {
