@@ -72,6 +72,39 @@ pub enum Parameter {
 }
 
 impl Parameter {
+    /// Where it stands in the case file; rows, columns and modes count from 1.
+    pub fn key(self) -> String {
+        let entry = |matrix: &str, i: usize, j: usize| format!("structure.{matrix}[{}][{}]", i + 1, j + 1);
+        let shape = |mode: usize, side: &str, index: usize, imaginary: bool| {
+            let part = if imaginary { "imaginary" } else { "real" };
+            format!("structure.mode[{}].{side}[{}] {part}", mode + 1, index + 1)
+        };
+        match self {
+            Self::Mass(i, j) => entry("mass", i, j),
+            Self::Damping(i, j) => entry("damping", i, j),
+            Self::Stiffness(i, j) => entry("stiffness", i, j),
+            Self::CubicDamping(i, j) => entry("cubic_damping", i, j),
+            Self::CubicStiffness(i, j) => entry("cubic_stiffness", i, j),
+            Self::Frequency(mode) => format!("structure.mode[{}].frequency_hz", mode + 1),
+            Self::DampingRatio(mode) => format!("structure.mode[{}].damping_ratio", mode + 1),
+            Self::Left(mode, index, imaginary) => shape(mode, "left", index, imaginary),
+            Self::Right(mode, index, imaginary) => shape(mode, "right", index, imaginary),
+            Self::EdgeAngle => "tool.edge_angle_deg".into(),
+            Self::RunoutOffset => "tool.runout_um".into(),
+            Self::RunoutAngle => "tool.runout_angle_deg".into(),
+            Self::Ktc => "material.ktc_mpa".into(),
+            Self::Krc => "material.krc_mpa".into(),
+            Self::Kac => "material.kac_mpa".into(),
+            Self::Kte => "material.kte_n_per_mm".into(),
+            Self::Kre => "material.kre_n_per_mm".into(),
+            Self::Kae => "material.kae_n_per_mm".into(),
+            Self::Start => "cut.start_deg".into(),
+            Self::Exit => "cut.exit_deg".into(),
+            Self::FeedPerTooth => "cut.feed_per_tooth_mm".into(),
+            Self::FeedDirection => "cut.feed_direction_deg".into(),
+        }
+    }
+
     /// The value of the parameter in a case; `None` where the case has no such thing.
     pub fn value(self, case: &Case) -> Option<f64> {
         // Looking at a value and changing it must not be two lists: a copy is looked at.

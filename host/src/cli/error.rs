@@ -7,7 +7,9 @@ use crate::case::CaseError;
 use crate::device::DeviceError;
 use crate::file::FileError;
 use crate::lobe_table::BuildError;
+use crate::plan::PlanError;
 use crate::stability::StabilityError;
+use crate::test_cuts::TestCutsError;
 
 type Cause = Box<dyn StdError + Send + Sync>;
 
@@ -105,6 +107,24 @@ impl From<BuildError> for Error {
     fn from(error: BuildError) -> Self {
         match error {
             BuildError::Stability(error) => error.into(),
+            _ => Self::input(error),
+        }
+    }
+}
+
+impl From<TestCutsError> for Error {
+    fn from(error: TestCutsError) -> Self {
+        match error {
+            TestCutsError::File(cause) => cause.into(),
+            other => Self::input(other),
+        }
+    }
+}
+
+impl From<PlanError> for Error {
+    fn from(error: PlanError) -> Self {
+        match error {
+            PlanError::Stability(error) => error.into(),
             _ => Self::input(error),
         }
     }

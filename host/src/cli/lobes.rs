@@ -11,8 +11,10 @@ use super::{Error, Output, Range, lobes_cells};
 use crate::case::Case;
 use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
+use crate::report::marks::Mark;
 use crate::report::page::{figure, page};
 use crate::stability::{Chart, Label, LimitSpread, Method, Point, SpeedLine, Uncertainty, chart};
+use crate::test_cuts::{self, Calls, TestCut};
 
 /// Stability limits over speed, or the dominant multiplier at points.
 #[derive(Debug, clap::Args)]
@@ -42,6 +44,10 @@ pub struct Args {
     /// The share of machines that are stable at every speed and depth of the ranges, where the case has deviations.
     #[arg(long, requires = "rpm", conflicts_with_all = ["nominal", "cells"])]
     probability: bool,
+    /// Cuts that were tried, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal):
+    /// they are drawn, and those that are called wrong are counted.
+    #[arg(long, value_name = "FILE", requires = "rpm", conflicts_with = "cells")]
+    cuts: Option<PathBuf>,
     /// Where the draws of the deviations begin.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -81,10 +87,12 @@ pub fn run(args: Args) -> Result<(), Error> {
             } else {
                 Uncertainty::new(&case, &maker, args.seed)
             };
+            let cuts = args.cuts.as_deref().map(test_cuts::read).transpose()?;
             let ranges = Ranges {
                 rpm,
                 depth_mm,
                 probability: args.probability,
+                cuts,
             };
             run_chart(
                 &case,
@@ -130,6 +138,15 @@ struct Ranges {
     rpm: Range,
     depth_mm: Range,
     probability: bool,
+    cuts: Option<Vec<TestCut>>,
+}
+
+#[derive(Serialize)]
+struct Answer<'a> {
+    #[serde(flatten)]
+    chart: &'a Chart,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cuts: Option<Calls>,
 }
 
 fn run_chart(
@@ -144,6 +161,7 @@ fn run_chart(
         rpm,
         depth_mm,
         probability,
+        cuts,
     } = ranges;
     if probability && uncertainty.is_none() {
         return Err(Error::input(format!(
@@ -152,13 +170,7 @@ fn run_chart(
         )));
     }
     let deepest_mm = depth_mm.first().max(depth_mm.last());
-    let widest_step_mm = (depth_mm.last() - depth_mm.first()).abs() / depth_mm.count().max(2) as f64;
-    let samples = if widest_step_mm > 0.0 {
-        (deepest_mm / widest_step_mm).ceil() as usize
-    } else {
-        depth_mm.count()
-    };
-    let mut chart = chart(method, &rpm.values(), deepest_mm, samples)?;
+    let mut chart = chart(method, &rpm.values(), deepest_mm, depth_mm.steps_from_zero())?;
     if let Some(uncertainty) = uncertainty {
         let cells_mm = if probability {
             depth_mm.values()
@@ -167,14 +179,27 @@ fn run_chart(
         };
         chart = chart.with_spread(uncertainty, deepest_mm, &cells_mm)?;
     }
+    let calls = cuts.as_deref().map(|cuts| Calls::new(method, cuts)).transpose()?;
     if let Some(path) = &out {
-        write_chart(case, &chart, deepest_mm, path)?;
+        let marks: Vec<Mark> = cuts.iter().flatten().map(Mark::from).collect();
+        write_chart(case, &chart, deepest_mm, &marks, path)?;
     }
     let mut text = limits_as_text(&chart);
+    if let Some(calls) = &calls {
+        let _ = write!(
+            text,
+            "\n{} of {} cuts are called wrong: {} chattered that are called stable, {} were stable that are called unstable; {} undecided",
+            calls.wrong, calls.cuts, calls.missed_chatter, calls.false_alarms, calls.undecided
+        );
+    }
     if let Some(path) = &out {
         let _ = write!(text, "\n{}", path.display());
     }
-    output.answer(&chart, text)
+    let answer = Answer {
+        chart: &chart,
+        cuts: calls,
+    };
+    output.answer(&answer, text)
 }
 
 fn limits_as_text(chart: &Chart) -> String {
@@ -225,12 +250,12 @@ fn depth_or(depth_mm: Option<f64>, beyond: &str) -> String {
     depth_mm.map_or_else(|| beyond.into(), |depth_mm| format!("{depth_mm:.4}"))
 }
 
-fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, path: &Path) -> Result<(), Error> {
+fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: &Path) -> Result<(), Error> {
     let text = match file::ending(path).as_str() {
         "json" => serde_json::to_string(chart).map_err(Error::other)?,
         "csv" => as_csv(chart)?,
-        "svg" => picture(case, chart, depth_mm)?,
-        "html" => as_page(case, chart, depth_mm)?,
+        "svg" => picture(case, chart, depth_mm, marks)?,
+        "html" => as_page(case, chart, depth_mm, marks)?,
         _ => {
             return Err(Error::input(format!(
                 "{}: the ending says what to write; .svg, .html, .csv or .json is needed",
@@ -241,20 +266,21 @@ fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, path: &Path) -> Result
     Ok(file::write(path, text.as_bytes())?)
 }
 
-fn picture(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
+fn picture(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
     let mut columns: Vec<Column> = chart.speeds.iter().map(Column::from).collect();
     columns.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
     // What can be wrong with a picture is what was asked for: a single speed.
     let title = format!("{}, by {}", case.name, chart.label);
-    lobe_chart(&title, &columns, depth_mm, &[]).map_err(Error::input)
+    lobe_chart(&title, &columns, depth_mm, marks).map_err(Error::input)
 }
 
-fn as_page(case: &Case, chart: &Chart, depth_mm: f64) -> Result<String, Error> {
-    let svg = picture(case, chart, depth_mm)?;
+fn as_page(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
+    let svg = picture(case, chart, depth_mm, marks)?;
     let caption = format!(
         "Stable depths over spindle speed, by {}. Lines: where stability is first lost. Grey areas, where there are any: \
          undecided, within the error of the method. A grey band with lines, where there is one: the first limits of 5 to \
-         95 % of the machines that the deviations of the case describe, with their median.",
+         95 % of the machines that the deviations of the case describe, with their median. Circles, crosses and squares, \
+         where there are any: cuts that were stable, that chattered, and of which it cannot be told.",
         chart.label
     );
     let body = maud::html! {

@@ -17,6 +17,7 @@ mod milling_rig;
 pub mod monitor;
 mod number;
 mod output;
+pub mod plan;
 pub mod port;
 mod range;
 pub mod replay;
@@ -56,6 +57,7 @@ enum Verb {
     Identify(Box<identify::Args>),
     Diagnose(diagnose::Args),
     Lobes(lobes::Args),
+    Plan(plan::Args),
     Table(table::Args),
     Upload(upload::Args),
     Info(info::Args),
@@ -91,6 +93,7 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::Identify(args) => identify::run(*args),
         Verb::Diagnose(args) => diagnose::run(args),
         Verb::Lobes(args) => lobes::run(args),
+        Verb::Plan(args) => plan::run(args),
         Verb::Table(args) => table::run(args),
         Verb::Upload(args) => upload::run(args),
         Verb::Info(args) => info::run(args),

@@ -42,6 +42,16 @@ impl Range {
             .collect()
     }
 
+    /// How many equal steps from 0 to the larger end are no wider than those of the range.
+    pub fn steps_from_zero(&self) -> usize {
+        let widest = (self.last - self.first).abs() / self.count.max(2) as f64;
+        if widest > 0.0 {
+            (self.first.max(self.last) / widest).ceil() as usize
+        } else {
+            self.count
+        }
+    }
+
     /// A value parser for ranges of numbers greater than 0.
     pub fn positive(text: &str) -> Result<Self, String> {
         let range: Self = text.parse()?;

@@ -1,5 +1,7 @@
 //! The cutting process: what turns a displacement of the tool into a force.
 
+use nalgebra::Vector3;
+
 use super::{Cut, Engagement, Material, Tool, ToothForce};
 
 /// Everything that turns a displacement into a force.
@@ -24,5 +26,16 @@ impl Process {
             feed_per_tooth_m: cut.feed_per_tooth_mm * 1e-3,
             axial_depth_modulation,
         }
+    }
+
+    /// Force per depth, N/m, of the `teeth` that cut at a phase of the tooth period, rad, where the chip is that of the feed:
+    /// on every orbit of the tooth period.
+    pub fn forced(&self, teeth: usize, phase: f64) -> Vector3<f64> {
+        (0..teeth)
+            .map(|tooth| {
+                let angle = self.engagement.angle(tooth, phase);
+                self.force.forced(angle, self.feed_per_tooth_m)
+            })
+            .sum()
     }
 }

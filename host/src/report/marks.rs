@@ -5,6 +5,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
 
 use super::picture::{Axes, CHATTER, Canvas, INK, PictureError, QUIET, text};
+use crate::test_cuts::{Outcome, TestCut};
 
 /// What a marked point is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +14,8 @@ pub enum MarkKind {
     Chatter,
     /// A cut that was quiet.
     Quiet,
+    /// A cut of which it cannot be told.
+    Marginal,
 }
 
 /// A point on the chart.
@@ -28,6 +31,22 @@ pub struct Mark {
     pub label: String,
     /// Spindle speed and depth that were advised here: an arrow goes there.
     pub advice: Option<(f64, f64)>,
+}
+
+impl From<&TestCut> for Mark {
+    fn from(cut: &TestCut) -> Self {
+        Self {
+            rpm: cut.rpm,
+            depth_mm: cut.depth_mm,
+            kind: match cut.outcome {
+                Outcome::Stable => MarkKind::Quiet,
+                Outcome::Chatter => MarkKind::Chatter,
+                Outcome::Marginal => MarkKind::Marginal,
+            },
+            label: String::new(),
+            advice: None,
+        }
+    }
 }
 
 /// A box on the paper: left, top, right, bottom.
@@ -57,12 +76,19 @@ pub(super) fn draw_marks(
         let color = match mark.kind {
             MarkKind::Chatter => CHATTER,
             MarkKind::Quiet => QUIET,
+            MarkKind::Marginal => INK,
         };
         match mark.kind {
             MarkKind::Chatter => canvas.draw(&Cross::new(at, RADIUS, color.stroke_width(4)))?,
             MarkKind::Quiet => {
                 canvas.draw(&Circle::new(at, RADIUS, WHITE.filled()))?;
                 canvas.draw(&Circle::new(at, RADIUS - 1, color.filled()))?;
+            }
+            MarkKind::Marginal => {
+                let side = RADIUS - 1;
+                let corners = [(at.0 - side, at.1 - side), (at.0 + side, at.1 + side)];
+                canvas.draw(&Rectangle::new(corners, WHITE.filled()))?;
+                canvas.draw(&Rectangle::new(corners, color.stroke_width(2)))?;
             }
         }
         if !mark.label.is_empty() {

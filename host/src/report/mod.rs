@@ -9,6 +9,7 @@ pub mod lobe_chart;
 pub mod marks;
 pub mod page;
 mod picture;
+pub mod plan_chart;
 pub mod spectrum;
 pub mod stabilization_chart;
 pub mod stroboscope;

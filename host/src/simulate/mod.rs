@@ -36,7 +36,7 @@ pub use integrator::{Motion, Room, Segment, Statistics};
 pub use passage::Passage;
 pub use pores::Pores;
 pub use record::Recorder;
-pub use sensor::{Accelerometer, Sampler, TachometerModel};
+pub use sensor::{Accelerometer, STANDARD_GRAVITY, Sampler, TachometerModel};
 pub use spindle::{Fluctuation, Spindle};
 pub use term::{At, Branch, Slopes, Term};
 pub use virtual_cut::{Entry, Heard, VirtualCut, VirtualCutError};

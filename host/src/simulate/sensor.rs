@@ -12,7 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::{Model, Room, Segment, Spindle};
 
 /// Standard gravity, m/s².
-const GRAVITY: f64 = 9.806_65;
+pub const STANDARD_GRAVITY: f64 = 9.806_65;
 /// The motion is taken this many times as often as the sensor samples, and then filtered.
 const OVERSAMPLING: usize = 4;
 /// Half the length of the filter, in oversampled steps.
@@ -62,14 +62,14 @@ impl Accelerometer {
         Sensor {
             nominal_rate: Hertz(self.nominal_rate_hz as f32),
             meters_per_second2_per_count: self.count() as f32,
-            noise_meters_per_second2_per_root_hertz: (self.noise_g_per_root_hertz * GRAVITY) as f32,
+            noise_meters_per_second2_per_root_hertz: (self.noise_g_per_root_hertz * STANDARD_GRAVITY) as f32,
         }
     }
 
     /// m/s² per count.
     fn count(&self) -> f64 {
         // The data sheet's 0.488 mg at 16 g, in proportion.
-        0.488e-3 / 16.0 * self.range_g * GRAVITY
+        0.488e-3 / 16.0 * self.range_g * STANDARD_GRAVITY
     }
 }
 
@@ -175,7 +175,7 @@ impl Sampler {
         let rate_hz = self.accelerometer.rate_hz();
         let count = self.accelerometer.count();
         // White to half the sample rate.
-        let noise = noise_g_per_root_hertz * GRAVITY * (0.5 * rate_hz).sqrt();
+        let noise = noise_g_per_root_hertz * STANDARD_GRAVITY * (0.5 * rate_hz).sqrt();
         let mut noise_source = stream(seed, Stream::Noise);
         let mut stamp_source = stream(seed, Stream::Stamps);
         let mut blocks = Vec::with_capacity(self.samples.len() / MAX_BLOCK_SAMPLES + 1);

@@ -42,6 +42,16 @@ impl Variable {
         variables
     }
 
+    /// Parameters that vary together; a negative standard deviation is that of one that falls while others rise.
+    pub fn together(parts: Vec<Deviation>) -> Self {
+        Self { parts }
+    }
+
+    /// The parameters that vary together.
+    pub fn parts(&self) -> &[Deviation] {
+        &self.parts
+    }
+
     /// Moves the parameters by so many standard deviations; false where no machine has such a value.
     pub fn shift(&self, case: &mut Case, deviations: f64) -> bool {
         self.parts
@@ -64,13 +74,13 @@ fn mirrored(parameter: Parameter) -> Option<Parameter> {
 
 /// An orthonormal basis of the space of the variables whose first vectors span the directions that matter most.
 #[derive(Clone, Debug)]
-pub(super) struct Basis {
+pub(crate) struct Basis {
     vectors: Vec<DVector<f64>>,
 }
 
 impl Basis {
     /// `leading` by falling importance; those that the ones before them span, or that vanish, are passed over.
-    pub(super) fn new(size: usize, leading: &[DVector<f64>]) -> Self {
+    pub(crate) fn new(size: usize, leading: &[DVector<f64>]) -> Self {
         let unit = |index: usize| DVector::from_fn(size, |i, _| if i == index { 1.0 } else { 0.0 });
         let mut vectors: Vec<DVector<f64>> = Vec::with_capacity(size);
         for candidate in leading.iter().cloned().chain((0..size).map(unit)) {
@@ -106,7 +116,7 @@ impl Basis {
     /// equal probability, along the first two a Hammersley set, along the others Latin, with random shifts.
     ///
     /// Along the first vector the points of 2, 4, 8 … batches, counted from 0, lie between one another.
-    pub(super) fn points(&self, count: u32, seed: u64, stream: u64, batch: u32) -> Vec<DVector<f64>> {
+    pub(crate) fn points(&self, count: u32, seed: u64, stream: u64, batch: u32) -> Vec<DVector<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
         let size = self.vectors.len();

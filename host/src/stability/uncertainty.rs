@@ -17,11 +17,11 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::StabilityError;
 use super::line::SpeedLine;
 use super::method::Method;
+use super::plane::{Linearized, Plane};
 use super::sampling::{Basis, Variable};
-use super::sensitivity::{Sensitivity, Tangent};
-use super::{CubicTerms, Problem, StabilityError};
 use crate::case::Case;
 
 /// Machines in a batch: a power of 2.
@@ -104,15 +104,9 @@ pub struct Uncertainty<'a> {
     case: &'a Case,
     maker: &'a Maker<'a>,
     variables: Vec<Variable>,
-    /// The linear problem with its change along each variable, per standard deviation: where draws are stratified.
-    linear: Option<(Problem, Vec<Tangent>)>,
+    /// How limits move with the variables: where draws are stratified.
+    linear: Option<Linearized>,
     seed: u64,
-}
-
-/// A limit as a plane over the variables: depth, mm, and its gradient, mm per standard deviation.
-struct Plane {
-    depth_mm: f64,
-    gradient: DVector<f64>,
 }
 
 impl<'a> Uncertainty<'a> {
@@ -120,33 +114,12 @@ impl<'a> Uncertainty<'a> {
     pub fn new(case: &'a Case, maker: &'a Maker<'a>, seed: u64) -> Option<Self> {
         let variables = Variable::of_case(case);
         (!variables.is_empty()).then(|| Self {
-            linear: Self::linear(case, &variables),
+            linear: Linearized::new(case, &variables),
             case,
             maker,
             variables,
             seed,
         })
-    }
-
-    fn linear(case: &Case, variables: &[Variable]) -> Option<(Problem, Vec<Tangent>)> {
-        let problem = Problem::new(case, CubicTerms::LeaveOut).ok()?;
-        // A difference over a tenth of a deviation; where only one side is a machine, over that side.
-        const STEP: f64 = 0.05;
-        let tangents = variables.iter().map(|variable| {
-            let at = |deviations: f64| {
-                let mut moved = case.clone();
-                let is_possible = variable.shift(&mut moved, deviations);
-                is_possible.then(|| Problem::new(&moved, CubicTerms::LeaveOut).ok())?
-            };
-            match (at(-STEP), at(STEP)) {
-                (Some(low), Some(high)) => Some(Tangent::between(&low, &high, 2.0 * STEP)),
-                (None, Some(high)) => Some(Tangent::between(&problem, &high, STEP)),
-                (Some(low), None) => Some(Tangent::between(&low, &problem, STEP)),
-                (None, None) => None,
-            }
-        });
-        let tangents = tangents.collect::<Option<Vec<_>>>()?;
-        Some((problem, tangents))
     }
 
     /// The spread of the first limit at the speed of a line, searched up to `depth_mm`, and the probability of stability at
@@ -212,7 +185,10 @@ impl<'a> Uncertainty<'a> {
         least: u32,
         shares: &[f64],
     ) -> Result<Batches, StabilityError> {
-        let planes = self.planes(nominal);
+        let planes = self
+            .linear
+            .as_ref()
+            .map_or_else(Vec::new, |linear| linear.planes(nominal));
         let gradients: Vec<DVector<f64>> = planes.iter().map(|plane| plane.gradient.clone()).collect();
         let mut basis = Basis::new(self.variables.len(), &gradients);
         let mut batches = Batches(Vec::new());
@@ -254,26 +230,6 @@ impl<'a> Uncertainty<'a> {
             });
         }
         Ok(())
-    }
-
-    /// The losses of stability along the nominal line with their gradients, the first limit first.
-    fn planes(&self, nominal: &SpeedLine) -> Vec<Plane> {
-        let Some((problem, tangents)) = &self.linear else {
-            return Vec::new();
-        };
-        let losses = nominal.switches.iter().filter(|switch| !switch.gain);
-        let plane = |switch| {
-            let sensitivity = Sensitivity::new(problem, nominal.rpm, switch).ok()?;
-            let slopes: Option<Vec<f64>> = tangents
-                .iter()
-                .map(|tangent| Some(sensitivity.slope(tangent)?.depth_mm))
-                .collect();
-            Some(Plane {
-                depth_mm: switch.depth_mm,
-                gradient: DVector::from_vec(slopes?),
-            })
-        };
-        losses.filter_map(plane).collect()
     }
 
     /// The line of a machine, at least up to its first limit; `None` where there is no such machine.

@@ -1,0 +1,254 @@
+//! `quietcut plan`: the fewest tests that make a chart trustworthy.
+
+use std::fmt::Write;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::{Error, Output, Range, positive};
+use crate::case::Case;
+use crate::file;
+use crate::plan::{Means, Plan, Prior, Request, Step, Test, plan};
+use crate::report::page::{figure, page};
+use crate::report::plan_chart::plan_chart;
+
+/// The fewest cuts and tests that make the chart trustworthy to a wanted width.
+///
+/// How well parameters are known stands in the case, in keys that end in _std; of a case without such keys the options
+/// --assume-… are taken. Every limit of the chart gets a 90 % interval; that of the widest is the width of the chart.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  quietcut plan tests/cases/kuka-kr90-acetal.toml --rpm 700:2000:40 --depth-mm 0:6:60 --width-percent 15 --out plan.svg\n  quietcut plan tests/cases/insperger-1dof-ad1.toml --rpm 5000:15000:40 --depth-mm 0:4:60 --width-percent 10 --json"
+)]
+pub struct Args {
+    /// The case file: structure, tool, material, cut.
+    #[arg(value_name = "CASE")]
+    case: PathBuf,
+    /// Spindle speeds in rev/min, first:last:count.
+    #[arg(long, value_name = "R", value_parser = Range::positive)]
+    rpm: Range,
+    /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
+    #[arg(long, value_name = "R", value_parser = Range::non_negative)]
+    depth_mm: Range,
+    /// Width of the 90 % interval that every limit is to have, in percent of the limit.
+    #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]
+    width_percent: f64,
+    /// Leave out the cubic terms of a structure.
+    #[arg(long)]
+    linear: bool,
+    #[command(flatten)]
+    assumed: Assumed,
+    #[command(flatten)]
+    tests: Tests,
+    /// Picture or page to write: svg or html by its ending.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Standard deviations of a case that states none.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "What is not known, where the case has no keys that end in _std")]
+struct Assumed {
+    /// Of natural frequencies.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().frequency, value_parser = positive)]
+    assume_frequency_percent: f64,
+    /// Of damping ratios.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().damping, value_parser = positive)]
+    assume_damping_percent: f64,
+    /// Of modal stiffnesses.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().stiffness, value_parser = positive)]
+    assume_stiffness_percent: f64,
+    /// Of the cutting coefficients.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().force, value_parser = positive)]
+    assume_force_percent: f64,
+}
+
+/// What tests are like.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Tests")]
+struct Tests {
+    /// To what width cuts bracket a limit, in percent of it.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().bracket, value_parser = positive)]
+    bracket_percent: f64,
+    /// Standard deviation of a measured chatter frequency.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().chatter_frequency, value_parser = positive)]
+    chatter_frequency_percent: f64,
+    /// Blows of a hammer test.
+    #[arg(long, value_name = "N", default_value_t = Means::default().blows as u16, value_parser = clap::value_parser!(u16).range(1..))]
+    blows: u16,
+    /// Peak force of a blow in N.
+    #[arg(long, value_name = "F", default_value_t = Means::default().peak_n, value_parser = positive)]
+    peak_n: f64,
+    /// Noise of the accelerometer in µg per √Hz.
+    #[arg(long, value_name = "N", default_value_t = 1e6 * Means::default().accelerometer_g_per_root_hertz, value_parser = positive)]
+    noise_ug: f64,
+    /// Standard deviation of the gains of hammer with accelerometer, and of the dynamometer.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().calibration, value_parser = positive)]
+    calibration_percent: f64,
+    /// Standard deviation of how much frequencies differ between standstill and cutting.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().standstill_frequency, value_parser = positive)]
+    standstill_frequency_percent: f64,
+    /// Standard deviation of how much damping ratios differ between standstill and cutting.
+    #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().standstill_damping, value_parser = positive)]
+    standstill_damping_percent: f64,
+}
+
+/// Runs the verb.
+pub fn run(args: Args) -> Result<(), Error> {
+    let case = Case::read(&args.case)?;
+    let request = request(&args);
+    let bar = progress_bar(request.speeds_rpm.len());
+    let found = plan(&case, &request, || bar.inc(1))?;
+    bar.finish_and_clear();
+    if let Some(path) = &args.out {
+        write(&case, &found, request.depth_mm, path)?;
+    }
+    let mut said = text(&found);
+    if let Some(path) = &args.out {
+        let _ = write!(said, "\n{}", path.display());
+    }
+    args.output.answer(&found, said)
+}
+
+fn request(args: &Args) -> Request {
+    let share = |percent: f64| 0.01 * percent;
+    let (assumed, tests) = (&args.assumed, &args.tests);
+    Request {
+        speeds_rpm: args.rpm.values(),
+        depth_mm: args.depth_mm.first().max(args.depth_mm.last()),
+        samples: args.depth_mm.steps_from_zero(),
+        width: share(args.width_percent),
+        prior: Prior {
+            frequency: share(assumed.assume_frequency_percent),
+            damping: share(assumed.assume_damping_percent),
+            stiffness: share(assumed.assume_stiffness_percent),
+            force: share(assumed.assume_force_percent),
+        },
+        means: Means {
+            bracket: share(tests.bracket_percent),
+            chatter_frequency: share(tests.chatter_frequency_percent),
+            blows: usize::from(tests.blows),
+            peak_n: tests.peak_n,
+            accelerometer_g_per_root_hertz: 1e-6 * tests.noise_ug,
+            calibration: share(tests.calibration_percent),
+            standstill_frequency: share(tests.standstill_frequency_percent),
+            standstill_damping: share(tests.standstill_damping_percent),
+            ..Means::default()
+        },
+        linear: args.linear,
+    }
+}
+
+fn progress_bar(speeds: usize) -> ProgressBar {
+    let target = if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let bar = ProgressBar::with_draw_target(Some(speeds as u64), target);
+    match ProgressStyle::with_template("limits {bar:40} {pos}/{len}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+/// A test in words.
+fn words(step: &Step) -> String {
+    match &step.test {
+        Test::Hammer { direction, blows } => {
+            format!(
+                "{blows} blows of a hammer on the tool tip in {direction}, acceleration there in every direction"
+            )
+        }
+        Test::Force {
+            rpm,
+            depth_mm,
+            seconds,
+        } => format!("cut on a dynamometer for {seconds} s at {rpm:.0} rev/min, {depth_mm:.3} mm"),
+        Test::Cuts {
+            rpm,
+            about_mm,
+            bracket_mm,
+        } => format!(
+            "{} cuts at {rpm:.0} rev/min that bracket the limit, near {about_mm:.3} mm, to {bracket_mm:.3} mm; note the chatter frequency",
+            step.cuts_or_tests
+        ),
+    }
+}
+
+fn text(plan: &Plan) -> String {
+    let mut text = format!(
+        "widest 90 % interval of a limit: {:.1} % at {:.0} rev/min (median {:.1} %), wanted {:.1} %",
+        plan.before.widest_percent, plan.before.at_rpm, plan.before.median_percent, plan.wanted_percent
+    );
+    // Writing to a String cannot fail.
+    if !plan.stated {
+        let _ = write!(
+            text,
+            "\nthe case has no keys that end in _std; assumed: {}",
+            plan.unknowns.join("; ")
+        );
+    }
+    for (index, step) in plan.tests.iter().enumerate() {
+        let _ = write!(
+            text,
+            "\n{:>2}. {}\n    then {:.1} % at {:.0} rev/min (median {:.1} %)",
+            index + 1,
+            words(step),
+            step.after.widest_percent,
+            step.after.at_rpm,
+            step.after.median_percent
+        );
+    }
+    let _ = match (plan.reached, plan.tests.is_empty()) {
+        (true, true) => write!(text, "\nno test is needed"),
+        (true, false) => write!(text, "\nreached with {} cuts and tests", plan.cuts_and_tests),
+        (false, _) => write!(text, "\nnot reached with {} cuts and tests", plan.cuts_and_tests),
+    };
+    if let Some(obstacle) = &plan.obstacle {
+        let _ = write!(
+            text,
+            ": if every test is done a thousand times {:.1} % are left at {:.0} rev/min",
+            obstacle.at_best.widest_percent, obstacle.at_best.at_rpm
+        );
+        for one in &obstacle.if_known {
+            let _ = write!(text, "\n    {:.1} % if known: {}", one.widest_percent, one.name);
+        }
+    }
+    if !plan.without_limit_rpm.is_empty() {
+        let _ = write!(
+            text,
+            "\nnothing is lost up to the last depth at {} of the speeds: they do not count",
+            plan.without_limit_rpm.len()
+        );
+    }
+    text
+}
+
+fn write(case: &Case, plan: &Plan, depth_mm: f64, path: &Path) -> Result<(), Error> {
+    let title = format!("{}: limits before and after the tests", case.name);
+    let picture = || plan_chart(&title, plan, depth_mm).map_err(Error::input);
+    let text = match file::ending(path).as_str() {
+        "svg" => picture()?,
+        "html" => {
+            let caption = "Grey: where the limits lie with 90 %, as the case is known. Blue: after the tests, if they find it as \
+                           it stands. Points: where cuts bracket a limit.";
+            let body = maud::html! {
+                h1 { (case.name) ": what to test" }
+                (figure(&picture()?, caption))
+                pre { (self::text(plan)) }
+            };
+            page(&case.name, &body)
+        }
+        _ => {
+            return Err(Error::input(format!(
+                "{}: the ending says what to write; .svg or .html is needed",
+                path.display()
+            )));
+        }
+    };
+    Ok(file::write(path, text.as_bytes())?)
+}

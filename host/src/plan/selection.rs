@@ -1,0 +1,190 @@
+//! Which tests to do: the fewest that make every limit as well known as wanted.
+//!
+//! Tests are added one by one, each the one that takes most from the excess Σ max(0, (width/wanted)² − 1) for its cost;
+//! then tests are dropped and exchanged for cheaper ones while the width stays reached. Cuts that bracket a limit cost as
+//! many halvings as their interval needs at that time.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::candidate::{Candidate, Test};
+use super::chart::KnownChart;
+
+/// More tests than anyone does.
+const MOST: usize = 30;
+
+/// A test that takes less than this share of the excess is not worth it.
+const WORTH: f64 = 1e-3;
+
+/// A test that is done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Chosen {
+    /// Which.
+    pub(super) candidate: usize,
+    /// Number of cuts, or 1.
+    pub(super) cost: usize,
+}
+
+/// The search.
+pub(super) struct Selection<'a> {
+    chart: &'a KnownChart,
+    candidates: &'a [Candidate],
+    width: f64,
+    nothing: DMatrix<f64>,
+}
+
+impl<'a> Selection<'a> {
+    pub(super) fn new(chart: &'a KnownChart, candidates: &'a [Candidate], width: f64) -> Self {
+        let size = chart
+            .limits
+            .first()
+            .map_or(0, |limit| limit.planes[0].gradient.len());
+        Self {
+            chart,
+            candidates,
+            width,
+            nothing: DMatrix::identity(size, size),
+        }
+    }
+
+    /// Λ after these tests.
+    pub(super) fn information(&self, chosen: &[Chosen]) -> DMatrix<f64> {
+        chosen.iter().fold(self.nothing.clone(), |sum, one| {
+            sum + &self.candidates[one.candidate].information
+        })
+    }
+
+    /// True where every limit is known as well as wanted.
+    pub(super) fn is_reached(&self, information: &DMatrix<f64>) -> bool {
+        self.excess(information) == 0.0
+    }
+
+    /// The cheapest set that was found; one that does not reach the width where none does.
+    pub(super) fn fewest(&self) -> Vec<Chosen> {
+        let mut chosen = self.greedy();
+        if self.is_reached(&self.information(&chosen)) {
+            while let Some(cheaper) = self.without_one(&chosen).or_else(|| self.with_another(&chosen)) {
+                chosen = cheaper;
+            }
+        }
+        chosen
+    }
+
+    fn excess(&self, information: &DMatrix<f64>) -> f64 {
+        self.chart
+            .widths(information)
+            .iter()
+            .map(|width| ((width / self.width).powi(2) - 1.0).max(0.0))
+            .sum()
+    }
+
+    /// True of cuts that bracket a limit.
+    pub(super) fn is_bracket(&self, candidate: usize) -> bool {
+        self.candidates[candidate].limit.is_some()
+    }
+
+    /// How many cuts, or tests, one more of these is.
+    fn cost(&self, candidate: usize, information: &DMatrix<f64>) -> usize {
+        let Candidate {
+            limit: Some(limit),
+            test: Test::Cuts { bracket_mm, .. },
+            ..
+        } = &self.candidates[candidate]
+        else {
+            return 1;
+        };
+        let [from, to] = self.chart.intervals(information)[*limit];
+        // Each cut halves; below and above the limit one is needed at least.
+        let halvings = ((to - from) / bracket_mm).log2().ceil();
+        if halvings.is_finite() {
+            (halvings as usize).max(2)
+        } else {
+            2
+        }
+    }
+
+    /// The tests with their costs, in this order.
+    pub(super) fn priced(&self, order: impl IntoIterator<Item = usize>) -> Vec<Chosen> {
+        let mut information = self.nothing.clone();
+        order
+            .into_iter()
+            .map(|candidate| {
+                let cost = self.cost(candidate, &information);
+                information += &self.candidates[candidate].information;
+                Chosen { candidate, cost }
+            })
+            .collect()
+    }
+
+    fn greedy(&self) -> Vec<Chosen> {
+        let mut order = Vec::new();
+        let mut information = self.nothing.clone();
+        let mut excess = self.excess(&information);
+        while excess > 0.0 && order.len() < MOST {
+            let gains: Vec<(f64, f64)> = (0..self.candidates.len())
+                .into_par_iter()
+                .map(|candidate| {
+                    let after = self.excess(&(&information + &self.candidates[candidate].information));
+                    let cost = self.cost(candidate, &information) as f64;
+                    // What reaches the width is compared by its cost alone.
+                    ((excess - after) / cost, after)
+                })
+                .collect();
+            let best = (0..gains.len()).max_by(|&a, &b| gains[a].0.total_cmp(&gains[b].0).then(b.cmp(&a)));
+            let Some(best) = best.filter(|&best| excess - gains[best].1 > WORTH * excess) else {
+                break;
+            };
+            order.push(best);
+            information += &self.candidates[best].information;
+            excess = gains[best].1;
+        }
+        self.priced(order)
+    }
+
+    fn total(chosen: &[Chosen]) -> usize {
+        chosen.iter().map(|one| one.cost).sum()
+    }
+
+    /// These tests where they reach the width and cost less than `than`.
+    fn if_cheaper(&self, order: Vec<usize>, than: usize) -> Option<Vec<Chosen>> {
+        let priced = self.priced(order);
+        (Self::total(&priced) < than && self.is_reached(&self.information(&priced))).then_some(priced)
+    }
+
+    /// The same without the dearest test that is not needed.
+    fn without_one(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
+        let mut dearest: Vec<usize> = (0..chosen.len()).collect();
+        dearest.sort_by_key(|&index| std::cmp::Reverse(chosen[index].cost));
+        dearest.into_iter().find_map(|left_out| {
+            let order = chosen
+                .iter()
+                .enumerate()
+                .filter(|(index, _)| *index != left_out)
+                .map(|(_, one)| one.candidate);
+            self.if_cheaper(order.collect(), Self::total(chosen))
+        })
+    }
+
+    /// The same with one test, or two, exchanged for one other.
+    fn with_another(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
+        let total = Self::total(chosen);
+        let count = chosen.len();
+        let pairs: Vec<(usize, usize)> = (0..count).flat_map(|a| (a..count).map(move |b| (a, b))).collect();
+        pairs
+            .par_iter()
+            .filter_map(|&(a, b)| {
+                (0..self.candidates.len())
+                    .filter_map(|other| {
+                        let kept = (0..count)
+                            .filter(|&index| index != a && index != b)
+                            .map(|index| chosen[index].candidate);
+                        // What is done once for all comes first: brackets are narrower then.
+                        let mut order: Vec<usize> = kept.chain([other]).collect();
+                        order.sort_by_key(|&candidate| self.is_bracket(candidate));
+                        self.if_cheaper(order, total)
+                    })
+                    .min_by_key(|priced| Self::total(priced))
+            })
+            .min_by_key(|priced| Self::total(priced))
+    }
+}

@@ -1,0 +1,105 @@
+//! What tests would make of a chart: the 90 % intervals of its limits before and after them, and where to cut.
+
+use plotters::chart::SeriesLabelPosition;
+use plotters::prelude::{LineSeries, PathElement, Polygon, Rectangle, WHITE};
+use plotters::style::{Color, RGBColor};
+
+use super::marks::{Mark, MarkKind, draw_marks};
+use super::picture::{Axes, BLUE, INK, Labels, PictureError, axes, draw, text};
+use crate::plan::{Plan, Speed, Test};
+
+/// Size of the picture in pixels.
+const SIZE: (u32, u32) = (960, 480);
+
+/// Draws the chart as SVG, depths from 0 to `depth_max_mm`; speeds are put into order.
+///
+/// # Errors
+/// With fewer than two speeds, or where the drawing library refuses.
+pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String, PictureError> {
+    let mut speeds = plan.chart.clone();
+    speeds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+    let (Some(first), Some(last)) = (speeds.first(), speeds.last()) else {
+        return Err(PictureError::nothing("a chart needs at least two speeds"));
+    };
+    if last.rpm <= first.rpm {
+        return Err(PictureError::nothing("a chart needs at least two speeds"));
+    }
+    let labels = Labels {
+        title,
+        x: "spindle speed [rev/min]",
+        y: "axial depth of cut [mm]",
+    };
+    let brackets = plan
+        .tests
+        .iter()
+        .enumerate()
+        .filter_map(|(index, step)| match step.test {
+            Test::Cuts { rpm, about_mm, .. } => Some(Mark {
+                rpm,
+                depth_mm: about_mm.min(depth_max_mm),
+                kind: MarkKind::Quiet,
+                label: format!("test {}: {} cuts", index + 1, step.cuts_or_tests),
+                advice: None,
+            }),
+            _ => None,
+        });
+    let marks: Vec<Mark> = brackets.collect();
+    draw(SIZE, |canvas| {
+        let mut chart = axes(canvas, &labels, first.rpm..last.rpm, 0.0..depth_max_mm)?;
+        let bands: [(fn(&Speed) -> [f64; 2], RGBColor, f64, &str); 2] = [
+            (|speed| speed.before_mm, INK, 0.14, "90 % interval as it is known"),
+            (
+                |speed| speed.after_mm,
+                BLUE,
+                0.45,
+                "90 % interval after the tests",
+            ),
+        ];
+        for (interval, color, strength, name) in bands {
+            draw_band(
+                &mut chart,
+                &speeds,
+                depth_max_mm,
+                interval,
+                (color, strength, name),
+            )?;
+        }
+        let limits = speeds
+            .iter()
+            .map(|speed| (speed.rpm, speed.limit_mm.min(depth_max_mm)));
+        chart
+            .draw_series(LineSeries::new(limits, INK.stroke_width(2)))?
+            .label("limit of the case")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], INK.stroke_width(2)));
+        draw_marks(canvas, &mut chart, &marks)?;
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperLeft)
+            .background_style(WHITE.mix(0.85))
+            .border_style(INK.mix(0.3))
+            .label_font(text(13, INK))
+            .draw()?;
+        Ok(())
+    })
+}
+
+fn draw_band(
+    chart: &mut Axes<'_, '_>,
+    speeds: &[Speed],
+    depth_max_mm: f64,
+    interval: fn(&Speed) -> [f64; 2],
+    (color, strength, name): (RGBColor, f64, &str),
+) -> Result<(), PictureError> {
+    let end = |index: usize| {
+        speeds
+            .iter()
+            .map(move |speed| (speed.rpm, interval(speed)[index].clamp(0.0, depth_max_mm)))
+    };
+    let band: Vec<(f64, f64)> = end(0).chain(end(1).rev()).collect();
+    let fill = color.mix(strength);
+    chart
+        .draw_series([Polygon::new(band, fill)])?
+        .label(name)
+        .legend(move |(x, y)| Rectangle::new([(x, y - 4), (x + 18, y + 4)], fill.filled()));
+    Ok(())
+}
