@@ -46,7 +46,7 @@ fn case(name: &str) -> Case {
 fn matrices(case: &Case) -> &Matrices {
     match &case.structure().expect("a structure").form {
         Form::Matrices(matrices) => matrices,
-        Form::Modes(_) => panic!("{}: matrices are needed", case.name),
+        _ => panic!("{}: matrices are needed", case.name),
     }
 }
 

@@ -45,6 +45,14 @@ fn first_limit(case: &Case, rpm: f64, depth_mm: f64) -> SpeedLine {
     line(&problem, rpm, depth_mm, 40).unwrap()
 }
 
+/// The rows of a matrix of these columns.
+fn rows(columns: &[Vec<f64>]) -> Vec<DVector<f64>> {
+    let matrix = DMatrix::from_fn(columns[0].len(), columns.len(), |row, column| {
+        columns[column][row]
+    });
+    matrix.row_iter().map(|row| row.transpose()).collect()
+}
+
 /// A campaign: what is measured is computed anew for a machine, in units of its noise.
 struct Campaign<'a> {
     case: &'a Case,
@@ -149,9 +157,7 @@ impl Campaign<'_> {
                     .collect()
             })
             .collect();
-        for row in 0..columns[0].len() {
-            slopes.push(DVector::from_fn(u.len(), |index, _| columns[index][row]));
-        }
+        slopes.extend(rows(&columns));
     }
 
     /// Forces at 360 angles of a revolution, by the formulas of one tooth.
@@ -197,9 +203,7 @@ impl Campaign<'_> {
                     .collect()
             })
             .collect();
-        for row in 0..now.len() {
-            slopes.push(DVector::from_fn(u.len(), |index, _| columns[index][row]));
-        }
+        slopes.extend(rows(&columns));
         values.extend(now);
     }
 

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use super::Means;
 use crate::case::{Case, Deviation, Parameter};
 use crate::stability::Variable;
-use crate::structure::{Form, Matrices, Mode};
+use crate::structure::{Form, Joint, Matrices, Mode};
 
 /// Standard deviations, relative, of a case that states none.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +48,9 @@ pub(super) struct Unknowns {
     /// True where the case states its deviations.
     pub(super) stated: bool,
 }
+
+/// A matrix, as the parameter that an entry of it is.
+type Entry = fn(usize, usize) -> Parameter;
 
 /// A variable and what it is.
 struct Named {
@@ -134,13 +137,14 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Vec<Named> {
     let Some(structure) = &case.structure else {
         return Vec::new();
     };
-    let modes: Vec<(f64, [Vec<Deviation>; 3])> = match &structure.form {
+    let modes: Vec<(String, [Vec<Deviation>; 3])> = match &structure.form {
         Form::Modes(modes) => modes.iter().enumerate().map(of_mode).collect(),
         Form::Matrices(matrices) => of_matrices(matrices),
+        Form::Joints(robot) => robot.joints.iter().enumerate().map(of_joint).collect(),
     };
     let words = ["frequency", "damping ratio", "modal stiffness"];
     let mut named = Vec::new();
-    for (frequency_hz, parts) in modes {
+    for (what, parts) in modes {
         for ((parts, relative), word) in parts.into_iter().zip(relative).zip(words) {
             let parts: Vec<Deviation> = parts
                 .into_iter()
@@ -153,10 +157,7 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Vec<Named> {
             if !parts.is_empty() {
                 named.push(Named {
                     variable: Variable::together(parts),
-                    name: format!(
-                        "{word} of the mode at {frequency_hz:.2} Hz{suffix}, {} %",
-                        percent(relative)
-                    ),
+                    name: format!("{word} of {what}{suffix}, {} %", percent(relative)),
                 });
             }
         }
@@ -165,7 +166,7 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Vec<Named> {
 }
 
 /// Frequency, and what changes with a relative change of frequency, damping ratio and compliance.
-fn of_mode((index, mode): (usize, &Mode)) -> (f64, [Vec<Deviation>; 3]) {
+fn of_mode((index, mode): (usize, &Mode)) -> (String, [Vec<Deviation>; 3]) {
     let one = |parameter, std| vec![Deviation { parameter, std }];
     let shape = mode.left.iter().enumerate().flat_map(|(entry, value)| {
         [(value.re, false), (value.im, true)].map(|(std, imaginary)| Deviation {
@@ -174,7 +175,7 @@ fn of_mode((index, mode): (usize, &Mode)) -> (f64, [Vec<Deviation>; 3]) {
         })
     });
     (
-        mode.frequency_hz,
+        the_mode(mode.frequency_hz),
         [
             one(Parameter::Frequency(index), mode.frequency_hz),
             one(Parameter::DampingRatio(index), mode.damping_ratio),
@@ -183,11 +184,40 @@ fn of_mode((index, mode): (usize, &Mode)) -> (f64, [Vec<Deviation>; 3]) {
     )
 }
 
+fn the_mode(frequency_hz: f64) -> String {
+    format!("the mode at {frequency_hz:.2} Hz")
+}
+
+/// The same of a joint with its link, were it alone.
+fn of_joint((index, joint): (usize, &Joint)) -> (String, [Vec<Deviation>; 3]) {
+    let part = |parameter, std| Deviation { parameter, std };
+    let stiffness = |factor: f64| {
+        part(
+            Parameter::JointStiffness(index),
+            factor * joint.stiffness_nm_per_rad,
+        )
+    };
+    let damping = part(Parameter::JointDamping(index), joint.damping_nms_per_rad);
+    (
+        format!("joint {}", index + 1),
+        [
+            // k ~ ω² and c ~ ω.
+            vec![stiffness(2.0), damping],
+            vec![damping],
+            vec![
+                stiffness(1.0),
+                damping,
+                part(Parameter::LinkMass(index), joint.mass_kg),
+            ],
+        ],
+    )
+}
+
 /// The same of matrices, by their undamped modes Kφ = ω²Mφ, φᵀMφ = 1, with the damping φᵀCφ = 2ζω: what belongs to a mode
 /// alone are multiples of Mφφᵀ M.
 ///
 /// Only the symmetric parts have such modes; couplings by damping stay as they are.
-fn of_matrices(matrices: &Matrices) -> Vec<(f64, [Vec<Deviation>; 3])> {
+fn of_matrices(matrices: &Matrices) -> Vec<(String, [Vec<Deviation>; 3])> {
     let symmetric = |matrix: &DMatrix<f64>| (matrix + matrix.transpose()) * 0.5;
     let (mass, damping, stiffness) = (
         symmetric(&matrices.mass),
@@ -213,7 +243,7 @@ fn of_matrices(matrices: &Matrices) -> Vec<(f64, [Vec<Deviation>; 3])> {
         let unit = &driven * driven.transpose();
         let modal_damping = (shape.transpose() * &damping * &shape)[(0, 0)];
         let parts = |of_mass: f64, of_damping: f64, of_stiffness: f64| {
-            let each: [(f64, fn(usize, usize) -> Parameter); 3] = [
+            let each: [(f64, Entry); 3] = [
                 (of_mass, Parameter::Mass),
                 (of_damping, Parameter::Damping),
                 (of_stiffness, Parameter::Stiffness),
@@ -232,7 +262,7 @@ fn of_matrices(matrices: &Matrices) -> Vec<(f64, [Vec<Deviation>; 3])> {
             parts
         };
         Some((
-            squared.sqrt() / TAU,
+            the_mode(squared.sqrt() / TAU),
             [
                 // ω and with it 2ζω.
                 parts(0.0, modal_damping, 2.0 * squared),

@@ -46,23 +46,20 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
     let marks: Vec<Mark> = brackets.collect();
     draw(SIZE, |canvas| {
         let mut chart = axes(canvas, &labels, first.rpm..last.rpm, 0.0..depth_max_mm)?;
-        let bands: [(fn(&Speed) -> [f64; 2], RGBColor, f64, &str); 2] = [
-            (|speed| speed.before_mm, INK, 0.14, "90 % interval as it is known"),
-            (
-                |speed| speed.after_mm,
-                BLUE,
-                0.45,
-                "90 % interval after the tests",
-            ),
-        ];
-        for (interval, color, strength, name) in bands {
-            draw_band(
-                &mut chart,
-                &speeds,
-                depth_max_mm,
-                interval,
-                (color, strength, name),
-            )?;
+        let before = Band {
+            interval: |speed| speed.before_mm,
+            color: INK,
+            strength: 0.14,
+            name: "90 % interval as it is known",
+        };
+        let after = Band {
+            interval: |speed| speed.after_mm,
+            color: BLUE,
+            strength: 0.45,
+            name: "90 % interval after the tests",
+        };
+        for band in [before, after] {
+            draw_band(&mut chart, &speeds, depth_max_mm, &band)?;
         }
         let limits = speeds
             .iter()
@@ -83,23 +80,30 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
     })
 }
 
+/// An interval over the speeds, and how it looks.
+struct Band {
+    interval: fn(&Speed) -> [f64; 2],
+    color: RGBColor,
+    strength: f64,
+    name: &'static str,
+}
+
 fn draw_band(
     chart: &mut Axes<'_, '_>,
     speeds: &[Speed],
     depth_max_mm: f64,
-    interval: fn(&Speed) -> [f64; 2],
-    (color, strength, name): (RGBColor, f64, &str),
+    band: &Band,
 ) -> Result<(), PictureError> {
     let end = |index: usize| {
         speeds
             .iter()
-            .map(move |speed| (speed.rpm, interval(speed)[index].clamp(0.0, depth_max_mm)))
+            .map(move |speed| (speed.rpm, (band.interval)(speed)[index].clamp(0.0, depth_max_mm)))
     };
-    let band: Vec<(f64, f64)> = end(0).chain(end(1).rev()).collect();
-    let fill = color.mix(strength);
+    let outline: Vec<(f64, f64)> = end(0).chain(end(1).rev()).collect();
+    let fill = band.color.mix(band.strength);
     chart
-        .draw_series([Polygon::new(band, fill)])?
-        .label(name)
+        .draw_series([Polygon::new(outline, fill)])?
+        .label(band.name)
         .legend(move |(x, y)| Rectangle::new([(x, y - 4), (x + 18, y + 4)], fill.filled()));
     Ok(())
 }
