@@ -153,7 +153,7 @@ fn the_banded_damper_has_friction_behind_a_play() {
                     .collect()
             };
             // Inches and kips.
-            let (displacement, force) = (column(1, 0.0254), column(2, 4448.221_6));
+            let (displacement, force) = (column(1, 0.0254), column(2, 4_448.221_6));
             recording(name, 1024.0, &force, &displacement, Some("x"))
         })
         .collect();

@@ -316,7 +316,7 @@ fn lobes_of_the_linear_part_call_cuts_in_the_pockets_wrong_and_those_with_cubic_
     let (truth, belief) = (case(TRUTH), case(BELIEF));
     let folder = folder();
     tapped(folder.path());
-    let table = FrfTable::read(&folder.path().join("frf.csv")).expect("a table");
+    let table = FrfTable::read(folder.path().join("frf.csv")).expect("a table");
     let hammer = MultiFrequency {
         problem: FrequencyProblem::of_table(&belief, &table).expect("receptances"),
         harmonics: None,
