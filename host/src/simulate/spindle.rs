@@ -108,7 +108,10 @@ impl Spindle {
 
     /// How its speed fluctuates; `None` where it does not.
     pub fn fluctuation(&self) -> Option<Fluctuation> {
-        self.fluctuation
+        match self.turning {
+            Turning::Fluctuating(fluctuation) => Some(fluctuation),
+            _ => None,
+        }
     }
 
     /// The mean speed Ω₀, rad/s.
