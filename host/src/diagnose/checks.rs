@@ -132,13 +132,14 @@ const WRONG_BY: f64 = 4.0;
 
 /// Refuses a channel whose size cannot be that of the case: a wrong unit.
 ///
-/// The factor is that by which the prediction fits best; it counts where the two look alike.
-pub(super) fn unit(path: &std::path::Path, channel: &Observed) -> Result<(), DiagnoseError> {
+/// `response` is what the case predicts of the forces alone. The factor is that by which it fits best; it counts where the two look alike.
+pub(super) fn unit(
+    path: &std::path::Path,
+    channel: &Observed,
+    response: &[f64],
+) -> Result<(), DiagnoseError> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let (own, cross) = (
-        dot(&channel.predicted, &channel.predicted),
-        dot(&channel.predicted, &channel.measured),
-    );
+    let (own, cross) = (dot(response, response), dot(response, &channel.measured));
     let whole = dot(&channel.measured, &channel.measured);
     if own <= 0.0 || whole <= 0.0 {
         return Ok(());

@@ -95,6 +95,17 @@ impl Decays {
             .collect();
     }
 
+    /// What a channel reads without the decay of the record.
+    pub(super) fn without(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
+        let mut without = samples.to_vec();
+        for (column, start) in self.columns[channel].iter().zip(&self.start) {
+            for (sample, value) in without.iter_mut().zip(column) {
+                *sample -= start * value;
+            }
+        }
+        without
+    }
+
     /// Adds the decay of the record to what a channel reads.
     pub(super) fn add_to(&self, channel: usize, samples: &mut [f64]) {
         for (column, start) in self.columns[channel].iter().zip(&self.start) {

@@ -3,7 +3,7 @@
 use super::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
 use super::evidence::{Explanation, Library, gain};
 use super::named::{by_common_factor, named};
-use super::output_error::corrected;
+use super::output_error::{corrected, left_by_baseline};
 use super::refine::refine;
 use super::regression::{Regression, Share};
 use super::scene::{Domain, Scene};
@@ -102,12 +102,16 @@ fn select(
         let Some(best) = found.first() else { break };
         let gained = gain(regression, best, inflation);
         let held_out = library.left_held_out(regression, best);
-        if gained < reached + BELIEVED || held_out > regression.residual(Share::HeldOut) {
+        // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
+        let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
+        if gained < reached + BELIEVED || held_out > regression.residual(Share::HeldOut) + chance {
             continue;
         }
         reached = gained;
+        let best = &simplest(scene, library, regression, &found, inflation);
+        let gained = gain(regression, best, inflation).max(gained);
         let who = names(library, best);
-        let rivals: Vec<&Explanation> = found[1..]
+        let rivals: Vec<&Explanation> = found
             .iter()
             .filter(|other| other.freedoms <= best.freedoms && names(library, other) != who)
             .collect();
@@ -120,9 +124,34 @@ fn select(
             .filter(|other| gained - gain(regression, other, inflation) < APART)
             .map(|other| (*other).clone())
             .collect();
-        selection.best = Some(corrected(scene, library, regression, best));
+        selection.best = Some(best.clone());
     }
     selection
+}
+
+/// The first of `found`, corrected by simulation, or one with fewer parameters that leaves as little once it is corrected:
+/// more parameters may mend what sampling hides.
+fn simplest(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    found: &[Explanation],
+    inflation: f64,
+) -> Explanation {
+    let first = corrected(scene, library, regression, &found[0]);
+    let candidate = found[1..]
+        .iter()
+        .filter(|other| other.freedoms < first.freedoms)
+        .find(|other| excess(regression, other.fit.left).1 < SAMPLING);
+    let Some(candidate) = candidate else {
+        return first;
+    };
+    let simpler = corrected(scene, library, regression, candidate);
+    if gain(regression, &simpler, inflation) > gain(regression, &first, inflation) - APART {
+        simpler
+    } else {
+        first
+    }
 }
 
 fn names(library: &Library, explanation: &Explanation) -> Vec<&'static str> {
@@ -186,7 +215,15 @@ fn answer(
         .best
         .as_ref()
         .map_or(regression.residual(Share::Whole), |best| best.fit.left);
-    let (of_noise, of_excess) = excess(regression, left);
+    let (mut of_noise, of_excess) = excess(regression, left);
+    // Along the measured motion terms of the baseline carry the noise of that motion: in closed loop they do not.
+    if selection.best.is_none()
+        && !scene.baseline.terms.is_empty()
+        && of_noise > WITHIN_NOISE
+        && let Some(left) = left_by_baseline(scene, library, regression)
+    {
+        of_noise = of_noise.min(excess(regression, left).0);
+    }
     let allowed = if scene.all_in(Domain::Force) {
         LEFT_OF_FORCE
     } else {

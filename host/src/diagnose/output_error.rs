@@ -10,7 +10,7 @@ use super::evidence::{Explanation, Library};
 use super::grid::Grid;
 use super::named::extensions;
 use super::record::Record;
-use super::regression::{Regression, Share};
+use super::regression::{Fit, Regression, Share};
 use super::scene::{Domain, Scene};
 use crate::recording::{Kind, Quantity};
 use crate::simulate::{Drive, Effects, Model, Room, Settings};
@@ -158,6 +158,29 @@ pub(super) fn corrected(
         Some(best) if best.fit.left < 1.02 * explanation.fit.left + 10.0 => best,
         _ => explanation.clone(),
     }
+}
+
+/// What the baseline alone leaves in closed loop, in units of the noise; `None` where it cannot be simulated.
+pub(super) fn left_by_baseline(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &mut Regression,
+) -> Option<f64> {
+    if !scene.records.iter().all(can) {
+        return None;
+    }
+    let nothing = Explanation {
+        choices: Vec::new(),
+        fit: Fit {
+            coefficients: Vec::new(),
+            covariance: nalgebra::DMatrix::zeros(0, 0),
+            left: 0.0,
+        },
+        freedoms: 0,
+    };
+    let left = left_in_closed_loop(scene, library, &nothing)?;
+    let column = regression.add(scene, &left);
+    Some(regression.energy(column))
 }
 
 /// Measured less simulated, by record and channel.

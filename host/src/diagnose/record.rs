@@ -146,10 +146,10 @@ impl Record {
                 } else {
                     record.compare_responses(baseline);
                 }
-                record
-                    .channels
-                    .iter()
-                    .try_for_each(|channel| checks::unit(&record.path, channel))?;
+                for (index, channel) in record.channels.iter().enumerate() {
+                    let response = record.decays.without(index, &channel.predicted);
+                    checks::unit(&record.path, channel, &response)?;
+                }
             }
             Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,
         }

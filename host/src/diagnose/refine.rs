@@ -5,7 +5,7 @@ use super::regression::{Regression, Share};
 use super::scene::Scene;
 
 /// Explanations whose shapes are refined.
-const REFINED: usize = 6;
+const REFINED: usize = 3;
 
 /// Refines the shapes of the best few explanations.
 pub(super) fn refine(

@@ -1,6 +1,6 @@
 //! Least squares of all regressors at once, in units of the noise, with free decays taken out.
 //!
-//! Every record is cut into a part that is fitted and a part that is held out. In each part residual and regressors are
+//! Every record is looked at as a whole, and cut into blocks that are fitted and blocks that are held out. In each of these residual and regressors are
 //! transformed, cut to the band, divided by the noise of their channel, and freed of what decays of the initial state and
 //! constant offsets of the sensors could explain. Their products (Gram matrices) then give the fit of any set of regressors.
 
@@ -11,13 +11,14 @@ use super::decay::dot;
 use super::grid::Stretch;
 use super::record::Record;
 use super::scene::{Domain, Scene};
+use crate::recording::Kind;
 
 /// A part of a record.
 #[derive(Clone, Debug)]
 struct Part {
     record: usize,
     range: std::ops::Range<usize>,
-    held_out: bool,
+    share: Share,
     bins: usize,
     /// By channel: one over the deviation of each transformed number.
     weights: Vec<Vec<f64>>,
@@ -32,7 +33,7 @@ pub enum Share {
     Fitted,
     /// Those that are held out.
     HeldOut,
-    /// All.
+    /// Each record as a whole.
     Whole,
 }
 
@@ -65,7 +66,7 @@ pub struct Regression {
     /// By column, by part.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
-    /// Fitted, held out, and both.
+    /// Fitted, held out, whole.
     products: [Products; 3],
 }
 
@@ -96,11 +97,9 @@ impl Regression {
             products: std::array::from_fn(|_| Products::default()),
         };
         for (part, residual) in regression.parts.iter().zip(&regression.residuals) {
-            for share in [part.share(), Share::Whole] {
-                let products = &mut regression.products[share as usize];
-                products.residual += dot(residual, residual);
-                products.count += residual.len() - part.nuisance.len();
-            }
+            let products = &mut regression.products[part.share as usize];
+            products.residual += dot(residual, residual);
+            products.count += residual.len() - part.nuisance.len();
         }
         regression
     }
@@ -125,11 +124,9 @@ impl Regression {
                 .par_iter()
                 .map(|column| dot(&column[index], new))
                 .collect();
-            for share in [part.share(), Share::Whole] {
-                right[share as usize] += with_residual;
-                for (sum, product) in rows[share as usize].iter_mut().zip(&products) {
-                    *sum += product;
-                }
+            right[part.share as usize] += with_residual;
+            for (sum, product) in rows[part.share as usize].iter_mut().zip(&products) {
+                *sum += product;
             }
         }
         for ((products, row), right) in self.products.iter_mut().zip(rows).zip(right) {
@@ -156,7 +153,7 @@ impl Regression {
     /// Root mean square of the residual over that of what was measured, on what is held out; channels count alike.
     pub fn missed(&self, scene: &Scene<'_>) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
-        for part in self.parts.iter().filter(|part| part.held_out) {
+        for part in self.parts.iter().filter(|part| part.share == Share::HeldOut) {
             for channel in &scene.records[part.record].channels {
                 let energy =
                     |samples: &[f64]| dot(&samples[part.range.clone()], &samples[part.range.clone()]);
@@ -262,42 +259,47 @@ impl Regression {
     }
 }
 
-impl Part {
-    fn share(&self) -> Share {
-        if self.held_out {
-            Share::HeldOut
-        } else {
-            Share::Fitted
-        }
-    }
-}
-
 impl Products {
     fn entry(&self, i: usize, j: usize) -> f64 {
         self.gram[i.max(j)][i.min(j)]
     }
 }
 
-/// Each record in four blocks of a third, a sixth, a third and a sixth: the short ones are held out. They hold other times,
-/// and of a sweep other frequencies, than what is fitted.
+/// Each record as a whole, and in four blocks of a third, a sixth, a third and a sixth of which the short ones are held out:
+/// they hold other times, and of a sweep other frequencies, than what is fitted. Of several free decays the last is held out
+/// whole: the end of a decay tells nothing.
 fn split(scene: &Scene<'_>) -> Vec<Part> {
+    let several = scene.records.len() > 1;
+    let last = scene.records.len().saturating_sub(1);
     scene
         .records
         .iter()
         .enumerate()
         .flat_map(|(index, record)| {
             let count = record.grid.count();
-            let edges = [0, count / 3, count / 2, 5 * count / 6, count];
-            (0..4).map(move |block| {
-                let range = edges[block]..edges[block + 1];
-                Part {
-                    record: index,
-                    bins: bins_of(record, range.len()),
-                    range,
-                    held_out: block % 2 == 1,
-                    weights: Vec::new(),
-                    nuisance: Vec::new(),
-                }
+            let mut ranges = vec![(0..count, Share::Whole)];
+            if several && record.kind == Some(Kind::FreeDecay) {
+                let share = if index == last {
+                    Share::HeldOut
+                } else {
+                    Share::Fitted
+                };
+                ranges.push((0..count, share));
+            } else {
+                ranges.extend([
+                    (0..count / 3, Share::Fitted),
+                    (count / 3..count / 2, Share::HeldOut),
+                    (count / 2..5 * count / 6, Share::Fitted),
+                    (5 * count / 6..count, Share::HeldOut),
+                ]);
+            }
+            ranges.into_iter().map(move |(range, share)| Part {
+                record: index,
+                bins: bins_of(record, range.len()),
+                range,
+                share,
+                weights: Vec::new(),
+                nuisance: Vec::new(),
             })
         })
         .collect()
