@@ -1,6 +1,6 @@
 //! A cause: a physical term with few parameters that the baseline may lack.
 //!
-//! To add one: write its file in `causes/` and name it in [`super::causes::all`].
+//! To add one: write its file in `causes/` and name it in `causes::all`.
 
 use std::fmt;
 

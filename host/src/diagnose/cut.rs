@@ -159,7 +159,7 @@ impl RecordedCut {
         }
     }
 
-    /// True where a tooth enters or leaves within [`BESIDE`] of a sample of `t`.
+    /// True where a tooth enters or leaves within `BESIDE` of a sample of `t`.
     pub fn is_beside(&self, t: f64) -> bool {
         let near_rad = BESIDE / self.rate_hz * self.turning.speed_rad_per_s(t);
         self.cutter.teeth.iter().any(|tooth| {

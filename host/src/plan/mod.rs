@@ -1,9 +1,9 @@
 //! The fewest tests that make a chart trustworthy.
 //!
-//! What is not known of a machine is a normal distribution over its parameters ([`unknowns`]). Exact derivatives make of it
-//! the distribution of every limit ([`chart`]), and of every test what it tells of the parameters: its Fisher information
-//! ([`candidate`]). Where tests add up, Λ = I + Σ J_t is the inverse of the covariance that they leave, in units of the deviations
-//! before them. [`selection`] looks for the cheapest set of tests with which all limits are known well enough.
+//! What is not known of a machine is a normal distribution over its parameters (`unknowns`). Exact derivatives make of it
+//! the distribution of every limit (`chart`), and of every test what it tells of the parameters: its Fisher information
+//! (`candidate`). Where tests add up, Λ = I + Σ J_t is the inverse of the covariance that they leave, in units of the deviations
+//! before them. `selection` looks for the cheapest set of tests with which all limits are known well enough.
 
 mod candidate;
 mod chart;
