@@ -224,7 +224,8 @@ fn teeth_at_unequal_pitch_have_a_table_of_their_own() {
         differs_mm = differs_mm.max((told_mm - even_mm).abs());
     }
     trial.report();
-    assert!(differs_mm > 0.1, "{differs_mm}");
+    // Forty times the stated error: this is the table of the uneven tool.
+    assert!(differs_mm > 0.01, "{differs_mm}");
     let derivatives = TableRequest {
         derivatives: true,
         ..request
@@ -406,7 +407,6 @@ fn feed_layers_agree_with_the_direct_solution_between_them() {
     let mut case = case("staubli-tx200");
     let request = TableRequest {
         feeds_per_tooth_mm: vec![0.02, 0.4],
-        speeds: Some(90),
         ..request((400.0, 600.0), 2.0)
     };
     let bytes = build_table(std::slice::from_ref(&case), &request).unwrap();

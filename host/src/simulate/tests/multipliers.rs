@@ -290,19 +290,17 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         let rpm = 6200.0;
         let at = |depth_mm: f64| {
             if crate::stability::needs_orbit(&extended) {
-                ForcedProblem::new(&extended)
-                    .unwrap()
-                    .point(rpm, depth_mm)
-                    .unwrap()
+                // An orbit may be lost in a fold before this depth: then there is nothing to disturb.
+                ForcedProblem::new(&extended).unwrap().point(rpm, depth_mm).ok()
             } else {
                 let problem = Problem::new(&extended, CubicTerms::Refuse).unwrap();
-                crate::stability::point(&problem, rpm, depth_mm).unwrap()
+                Some(crate::stability::point(&problem, rpm, depth_mm).unwrap())
             }
         };
         // Deep enough that a disturbance lives long enough to be measured.
         let (depth_mm, expected) = (1..20)
             .map(|step| 0.1 * f64::from(step))
-            .map(|depth_mm| (depth_mm, at(depth_mm)))
+            .filter_map(|depth_mm| Some((depth_mm, at(depth_mm)?)))
             .min_by_key(|(_, point)| (1e9 * (point.multiplier_abs - 0.92).abs()) as u64)
             .unwrap();
         let plain = Case::parse(path.as_ref(), &text).unwrap();
