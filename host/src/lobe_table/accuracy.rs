@@ -25,7 +25,8 @@ pub(super) struct Miss {
 }
 
 impl Miss {
-    /// Where two sets of stable depths up to `depth_mm` disagree; depth 0 is a limit where nothing is stable.
+    /// Where two sets of stable depths up to `depth_mm` disagree; depth 0 is a limit where nothing is stable, and
+    /// `depth_mm` where all is.
     pub(super) fn between(truth: &[[f64; 2]], told: &[[f64; 2]], depth_mm: f64) -> Self {
         let ends = |set: &[[f64; 2]]| -> Vec<f64> { set.iter().flatten().copied().collect() };
         let mut limits: Vec<f64> = ends(truth)
@@ -34,6 +35,8 @@ impl Miss {
             .collect();
         if truth.is_empty() {
             limits.push(0.0);
+        } else if limits.is_empty() {
+            limits.push(depth_mm);
         }
         let mut all = ends(truth);
         all.extend(ends(told));
