@@ -25,8 +25,7 @@ pub(super) struct Miss {
 }
 
 impl Miss {
-    /// Where two sets of stable depths up to `depth_mm` disagree; depth 0 is a limit where nothing is stable, and
-    /// `depth_mm` where all is.
+    /// Where two sets of stable depths up to `depth_mm` disagree; depth 0 is a limit where nothing is stable.
     pub(super) fn between(truth: &[[f64; 2]], told: &[[f64; 2]], depth_mm: f64) -> Self {
         let ends = |set: &[[f64; 2]]| -> Vec<f64> { set.iter().flatten().copied().collect() };
         let mut limits: Vec<f64> = ends(truth)
@@ -35,12 +34,12 @@ impl Miss {
             .collect();
         if truth.is_empty() {
             limits.push(0.0);
-        } else if limits.is_empty() {
-            limits.push(depth_mm);
         }
         let mut all = ends(truth);
         all.extend(ends(told));
         all.extend([0.0, depth_mm]);
+        // The last depth of a table is rounded, and may lie beyond.
+        all.retain(|&end| end <= depth_mm);
         all.sort_by(f64::total_cmp);
         let is_in = |set: &[[f64; 2]], depth: f64| set.iter().any(|&[from, to]| from <= depth && depth <= to);
         let distance = |depth: f64| {

@@ -320,6 +320,8 @@ fn a_miss_is_measured_from_the_limits_of_the_method() {
     // Nothing is stable; everything is.
     assert!(close(miss(&[], &[[0.0, 0.4]]), [0.4, 0.0]));
     assert!(close(miss(&[[0.0, 5.0]], &[[0.0, 1.0]]), [0.0, f64::INFINITY]));
+    // The same, but for the rounding of the last depth.
+    assert!(close(miss(&[[0.0, 5.0]], &[[0.0, 5.000_000_3]]), [0.0, 0.0]));
 }
 
 #[test]
