@@ -355,7 +355,7 @@ fn verdicts_of_some_random_machines_are_right() {
 /// `QUIETCUT_RANDOM_CASES` sets how many, `QUIETCUT_RANDOM_FIRST` the first, `QUIETCUT_SEED` the seed, `QUIETCUT_WINDING_PORTS` up to
 /// which size the winding number is asked too.
 #[test]
-#[ignore = "a quarter of an hour; the command stands above"]
+#[ignore = "hours; the command stands above"]
 fn verdicts_of_a_hundred_thousand_random_machines_are_right() {
     run(
         number("QUIETCUT_SEED", 20_261_121) as u64,

@@ -5,6 +5,7 @@
 //! as it is where the force was measured.
 
 mod axial_depth_modulation;
+mod coefficients;
 mod common_factor;
 mod edge_force;
 mod force_coefficients;
@@ -24,8 +25,8 @@ pub(super) fn all() -> Vec<Box<dyn Cause>> {
     vec![
         Box::new(common_factor::CommonFactor { with_edge: false }),
         Box::new(common_factor::CommonFactor { with_edge: true }),
-        Box::new(force_coefficients::ForceCoefficients),
-        Box::new(edge_force::EdgeForce),
+        Box::new(force_coefficients::FORCE_COEFFICIENTS),
+        Box::new(edge_force::EDGE_FORCE),
         Box::new(force_exponent::ForceExponent),
         Box::new(runout::OfTool),
         Box::new(process_damping::OfFlank),

@@ -6,11 +6,13 @@
 //! `denominator` gives poles of every order of model, [`stabilization`] those that come again from order to order,
 //! `pole_residue` the modes that fit best with their covariance.
 
+mod covariance;
 mod denominator;
 mod pole_residue;
 mod receptances;
 mod shape;
 pub mod stabilization;
+mod weights;
 
 #[cfg(test)]
 mod tests;

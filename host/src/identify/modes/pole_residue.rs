@@ -2,19 +2,14 @@
 //!
 //! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugates + U_pq + L_pq/s² with real U (compliance of modes above) and L (inertia
 //! of those below), by Levenberg and Marquardt with exact derivatives. Residues are of rank one throughout.
-//!
-//! Receptances by nearly dependent forces share large errors that cancel in other directions of the force: what is left
-//! of a first fit says how the receptances of a line are correlated, and the next weighs by that.
-//!
-//! Covariance: Gauss's, N⁻¹ M N⁻¹, where M has what is left as it is correlated: between receptances of one line, as they
-//! share a response's noise, and between neighbouring lines, as windows make it (thesis chapter 7 measures by Welch's
-//! method). Correlations are pooled over all lines.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
+use super::covariance::covariance;
 use super::stabilization::matrix_of;
+use super::weights::{Weights, root_mean_square};
 use super::{IdentifiedMode, Receptances, shape};
 use crate::frf::rational_fit::residues;
 use crate::structure::Mode;
@@ -53,18 +48,6 @@ const SETTLED: f64 = 1e-10;
 
 /// Rounds of weighing each receptance by what is left of it.
 const ROUNDS: usize = 3;
-
-/// Lines over which what is left is correlated: a Hann window joins two on each side.
-const LAGS: usize = 2;
-
-/// Lines for each receptance from which on the correlation between receptances is known well enough to weigh by.
-const LINES_PER_RECEPTANCE: usize = 6;
-
-/// What is added to a correlation, as a part of it: directions in which less is left than that weigh no more.
-const CORRELATION_RIDGE: f64 = 1e-5;
-
-/// A receptance of which less than this part is left weighs no more than if this much were.
-const LEAST_LEFT: f64 = 1e-6;
 
 impl PoleResidue {
     /// Residues of the poles by linear least squares, each cut to rank one.
@@ -127,12 +110,12 @@ impl PoleResidue {
     }
 
     /// Numbers of a mode: its pole, right and left shape.
-    fn width(data: &Receptances) -> usize {
+    pub(super) fn width(data: &Receptances) -> usize {
         2 + 2 * (data.responses.len() + data.forces.len())
     }
 
     /// Each mode: Re λ, Im λ, right shape (real and imaginary parts in turn), left shape; then U and L of each receptance.
-    fn parameters(&self) -> DVector<f64> {
+    pub(super) fn parameters(&self) -> DVector<f64> {
         let modes = self.modes.iter().flat_map(|mode| {
             let numbers = std::iter::once(&mode.pole).chain(&mode.right).chain(&mode.left);
             numbers.flat_map(|z| [z.re, z.im]).collect::<Vec<f64>>()
@@ -160,7 +143,7 @@ impl PoleResidue {
     }
 
     /// What is left of receptance `k`, each value over its deviation.
-    fn left_of(&self, data: &Receptances, deviation: &[Vec<f64>], k: usize) -> Vec<Complex64> {
+    pub(super) fn left_of(&self, data: &Receptances, deviation: &[Vec<f64>], k: usize) -> Vec<Complex64> {
         data.frequency_hz
             .iter()
             .enumerate()
@@ -172,7 +155,7 @@ impl PoleResidue {
     }
 
     /// What is left of all receptances, as it is weighed.
-    fn left(&self, data: &Receptances, weights: &Weights) -> Vec<DVector<Complex64>> {
+    pub(super) fn left(&self, data: &Receptances, weights: &Weights) -> Vec<DVector<Complex64>> {
         let plain: Vec<DVector<Complex64>> = (0..data.values.len())
             .map(|k| DVector::from_vec(self.left_of(data, &weights.deviation, k)))
             .collect();
@@ -205,80 +188,8 @@ impl PoleResidue {
     }
 }
 
-/// How what is left counts.
-#[derive(Clone)]
-struct Weights {
-    /// Deviation of every value of every receptance.
-    deviation: Vec<Vec<f64>>,
-    /// Turns values over their deviations, receptance by receptance, into ones that are not correlated.
-    whitening: Option<DMatrix<Complex64>>,
-}
-
-impl Weights {
-    fn of(deviation: &[Vec<f64>]) -> Self {
-        Self {
-            deviation: deviation.to_vec(),
-            whitening: None,
-        }
-    }
-
-    /// Sums over the receptances by the rows of the whitening matrix, which is lower triangular.
-    fn mixed<C: nalgebra::Dim>(
-        &self,
-        plain: Vec<nalgebra::OMatrix<Complex64, nalgebra::Dyn, C>>,
-    ) -> Vec<nalgebra::OMatrix<Complex64, nalgebra::Dyn, C>>
-    where
-        nalgebra::DefaultAllocator: nalgebra::allocator::Allocator<nalgebra::Dyn, C>,
-    {
-        let Some(whitening) = &self.whitening else {
-            return plain;
-        };
-        (0..plain.len())
-            .map(|k| {
-                let mut sum = &plain[0] * whitening[(k, 0)];
-                for (j, of) in plain.iter().enumerate().take(k + 1).skip(1) {
-                    sum += of * whitening[(k, j)];
-                }
-                sum
-            })
-            .collect()
-    }
-
-    /// The weights by what is left of a fit.
-    fn again(&mut self, data: &Receptances, fit: &PoleResidue) {
-        let mut left = Vec::with_capacity(data.values.len());
-        for k in 0..data.values.len() {
-            let values = fit.left_of(data, &self.deviation, k);
-            let least = LEAST_LEFT * root_mean_square(&data.values[k]) / mean(&self.deviation[k]);
-            // Real and imaginary part have the stated deviation each.
-            let scale = (root_mean_square(&values) / 2.0_f64.sqrt()).max(least);
-            for value in &mut self.deviation[k] {
-                *value *= scale;
-            }
-            left.push(DVector::from_vec(values) / Complex64::from(scale));
-        }
-        self.whitening = whitening(&left);
-    }
-}
-
-/// L⁻¹ of the correlation L Lᴴ of what is left, real and imaginary part having a variance of one each; `None` from too
-/// few lines.
-fn whitening(left: &[DVector<Complex64>]) -> Option<DMatrix<Complex64>> {
-    let (count, lines) = (left.len(), left.first().map_or(0, |left| left.len()));
-    if lines < LINES_PER_RECEPTANCE * count {
-        return None;
-    }
-    let mut correlation =
-        DMatrix::from_fn(count, count, |k, j| left[j].dotc(&left[k]) / (2.0 * lines as f64));
-    for k in 0..count {
-        correlation[(k, k)] += CORRELATION_RIDGE;
-    }
-    let lower = Cholesky::new(correlation)?.unpack();
-    lower.solve_lower_triangular(&DMatrix::identity(count, count))
-}
-
 /// Directions that are both driven and seen, as indices of right and left shape.
-fn shared(data: &Receptances) -> Vec<(usize, usize)> {
+pub(super) fn shared(data: &Receptances) -> Vec<(usize, usize)> {
     let of = |(p, direction)| Some((p, data.forces.iter().position(|force| force == direction)?));
     data.responses.iter().enumerate().filter_map(of).collect()
 }
@@ -308,10 +219,6 @@ pub(super) fn refine(data: &Receptances, start: PoleResidue) -> Option<Refined> 
     })
 }
 
-fn root_mean_square(values: &[Complex64]) -> f64 {
-    (values.iter().map(|value| value.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
 fn relative_error(data: &Receptances, fit: &PoleResidue) -> f64 {
     let plain: Vec<Vec<f64>> = data
         .values
@@ -322,12 +229,8 @@ fn relative_error(data: &Receptances, fit: &PoleResidue) -> f64 {
     (fit.squares(data, &Weights::of(&plain)) / values as f64).sqrt()
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
 /// Derivatives of all values as they are weighed: parameters by lines, one matrix per receptance.
-fn jacobian(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Vec<DMatrix<Complex64>> {
+pub(super) fn jacobian(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Vec<DMatrix<Complex64>> {
     let unknowns = fit.parameters().len();
     let mut row = vec![Complex64::ZERO; unknowns];
     let plain = (0..data.values.len())
@@ -346,7 +249,7 @@ fn jacobian(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Vec<DMa
 }
 
 /// Re(Jᴴ J) of all receptances.
-fn normal(jacobian: &[DMatrix<Complex64>]) -> DMatrix<f64> {
+pub(super) fn normal(jacobian: &[DMatrix<Complex64>]) -> DMatrix<f64> {
     let size = jacobian.first().map_or(0, DMatrix::nrows);
     jacobian.iter().fold(DMatrix::zeros(size, size), |sum, of| {
         let (re, im) = (of.map(|z| z.re), of.map(|z| z.im));
@@ -398,131 +301,6 @@ fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<
     let solution = Cholesky::new(scaled)?.solve(&gradient.component_mul(&scale));
     let step = solution.component_mul(&scale);
     step.iter().all(|value| value.is_finite()).then_some(step)
-}
-
-/// The covariance of the parameters under the constraints of [`shape::normalize`].
-fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Option<DMatrix<f64>> {
-    let jacobian = jacobian(data, fit, weights);
-    let normal = normal(&jacobian);
-    let bread = constrained_inverse(data, fit, &normal)?;
-    let left = fit.left(data, weights);
-    let same_line = &bread * meat(&jacobian, &left, 0) * &bread;
-    let all = &bread * meat(&jacobian, &left, LAGS) * &bread;
-    // Correlations from few lines may cancel more than there is.
-    let is_more = |i: usize| all[(i, i)] >= same_line[(i, i)];
-    let scale = DVector::from_fn(all.nrows(), |i, _| {
-        if is_more(i) || all[(i, i)] <= 0.0 {
-            1.0
-        } else {
-            (same_line[(i, i)] / all[(i, i)]).sqrt()
-        }
-    });
-    let scaled = DMatrix::from_fn(all.nrows(), all.ncols(), |i, j| {
-        if all[(i, i)] <= 0.0 || all[(j, j)] <= 0.0 {
-            same_line[(i, j)]
-        } else {
-            all[(i, j)] * scale[i] * scale[j]
-        }
-    });
-    Some(scaled)
-}
-
-/// ½ Σ Re(J(f)ᴴ C_l J(f + l)) over lines f and lags l to both sides, with C_l the mean of left(f) left(f + l)ᴴ over all lines.
-fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usize) -> DMatrix<f64> {
-    let size = jacobian.first().map_or(0, DMatrix::nrows);
-    let lines = left.first().map_or(0, |left| left.len());
-    let mut meat = DMatrix::<f64>::zeros(size, size);
-    for lag in 0..=lags.min(lines.saturating_sub(1)) {
-        let count = lines - lag;
-        for (k, first) in left.iter().enumerate() {
-            // Σ_k' C_l[k, k'] J_k'(f + l), then Re of J_k(f) conjugate times it.
-            let mut other = DMatrix::<Complex64>::zeros(size, count);
-            for (j, second) in left.iter().enumerate() {
-                let sum: Complex64 = (0..count)
-                    .map(|line| first[line] * second[line + lag].conj())
-                    .sum();
-                other += jacobian[j].columns(lag, count) * (sum / lines as f64);
-            }
-            let own = jacobian[k].columns(0, count);
-            let (a, b) = (own.map(|z| z.re), own.map(|z| z.im));
-            let product = &a * other.map(|z| z.re).transpose() + &b * other.map(|z| z.im).transpose();
-            // Both directions of a lag are each other's transpose.
-            let part = if lag == 0 {
-                0.5 * (&product + product.transpose())
-            } else {
-                &product + product.transpose()
-            };
-            meat += 0.5 * part;
-        }
-    }
-    meat
-}
-
-/// The upper left block of [N Gᵀ; G 0]⁻¹ with the gradients G of the constraints: scale and phase of the shapes of each
-/// mode are not in the data.
-fn constrained_inverse(data: &Receptances, fit: &PoleResidue, normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let size = normal.nrows();
-    let scale = normal
-        .diagonal()
-        .map(|entry| if entry > 0.0 { entry.sqrt().recip() } else { 1.0 });
-    let mut bordered = DMatrix::<f64>::zeros(size + 2 * fit.modes.len(), size + 2 * fit.modes.len());
-    for i in 0..size {
-        for j in 0..size {
-            bordered[(i, j)] = normal[(i, j)] * scale[i] * scale[j];
-        }
-    }
-    let gradients = constraints(data, fit, size);
-    for (c, gradient) in gradients.iter().enumerate() {
-        let scaled = gradient.component_mul(&scale);
-        let norm = scaled.norm();
-        for i in 0..size {
-            bordered[(size + c, i)] = scaled[i] / norm;
-            bordered[(i, size + c)] = scaled[i] / norm;
-        }
-    }
-    let inverse = bordered.try_inverse()?;
-    Some(DMatrix::from_fn(size, size, |i, j| {
-        inverse[(i, j)] * scale[i] * scale[j]
-    }))
-}
-
-fn constraints(data: &Receptances, fit: &PoleResidue, size: usize) -> Vec<DVector<f64>> {
-    let (width, rights) = (PoleResidue::width(data), data.responses.len());
-    let both = shared(data);
-    let mut gradients = Vec::new();
-    for (r, mode) in fit.modes.iter().enumerate() {
-        let mut norms = DVector::zeros(size);
-        let mut phase = DVector::zeros(size);
-        let right_at = |p: usize| r * width + 2 + 2 * p;
-        let left_at = |q: usize| r * width + 2 + 2 * (rights + q);
-        let mut of_norm = |at: usize, z: Complex64, sign: f64| {
-            norms[at] = sign * z.re;
-            norms[at + 1] = sign * z.im;
-        };
-        if both.is_empty() {
-            (0..rights).for_each(|p| of_norm(right_at(p), mode.right[p], 1.0));
-            (0..mode.left.len()).for_each(|q| of_norm(left_at(q), mode.left[q], -1.0));
-            // Without a shared entry the phase stays that of the largest entry of the right shape.
-            let p = (0..rights)
-                .max_by(|&a, &b| mode.right[a].norm().total_cmp(&mode.right[b].norm()))
-                .unwrap_or(0);
-            phase[right_at(p)] = -mode.right[p].im;
-            phase[right_at(p) + 1] = mode.right[p].re;
-        }
-        for &(p, q) in &both {
-            let (right, left) = (mode.right[p], mode.left[q]);
-            of_norm(right_at(p), right, 1.0);
-            of_norm(left_at(q), left, -1.0);
-            // Im(right·conj(left)) summed is 0.
-            phase[right_at(p)] = -left.im;
-            phase[right_at(p) + 1] = left.re;
-            phase[left_at(q)] = right.im;
-            phase[left_at(q) + 1] = -right.re;
-        }
-        gradients.push(norms);
-        gradients.push(phase);
-    }
-    gradients
 }
 
 impl Refined {

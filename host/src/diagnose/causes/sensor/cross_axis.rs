@@ -1,0 +1,52 @@
+//! A channel that sees another direction too: y = y_t + p·(the other direction).
+
+use num_complex::Complex64;
+
+use super::{channels, of_meant};
+use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::Scene;
+
+pub(super) struct CrossAxis;
+
+impl Cause for CrossAxis {
+    fn name(&self) -> &'static str {
+        "cross-axis"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        if scene.baseline.case.extensions.contains_key(self.name()) {
+            return Vec::new();
+        }
+        let axes = scene.driven_axes();
+        let mut places = Vec::new();
+        for name in channels(scene) {
+            let Some(pickup) = scene.baseline.pickup(&name) else {
+                continue;
+            };
+            for &axis in axes.iter().filter(|axis| pickup.weights[**axis] == 0.0) {
+                places.push(Place::ChannelFrom(name.clone(), axis));
+            }
+        }
+        places
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, place: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+        let Place::ChannelFrom(_, axis) = place else {
+            return None;
+        };
+        let mut weights = [0.0; 3];
+        weights[*axis] = 1.0;
+        Some(of_meant(record, place, |_| weights, |_| Complex64::ONE))
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        coefficients.first().map(|fraction| vec![("fraction", *fraction)])
+    }
+}

@@ -1,0 +1,75 @@
+//! A channel that is late: y(t) = y_t(t − τ), so that y − ŷ = y(t) − y(t + τ), which is −τ·ẏ while the delay is short.
+
+use num_complex::Complex64;
+
+use super::{of_meant, one_or_all};
+use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::Scene;
+
+pub(super) struct Delay;
+
+/// Delays up to this share of the period of the highest frequency are looked for.
+const LONGEST: f64 = 0.4;
+
+impl Cause for Delay {
+    fn name(&self) -> &'static str {
+        "sensor-delay"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        one_or_all(scene, self.name())
+    }
+
+    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
+        let [[_, longest]] = self.bounds(scene, place)[..] else {
+            return Vec::new();
+        };
+        [0.01, 0.3, 1.0].map(|share| vec![share * longest]).to_vec()
+    }
+
+    fn bounds(&self, scene: &Scene<'_>, _: &Place) -> Vec<[f64; 2]> {
+        let highest = scene
+            .records
+            .iter()
+            .map(|record| record.highest_hz)
+            .fold(1e-9, f64::max);
+        vec![[1e-5 / highest, LONGEST / highest]]
+    }
+
+    fn regressors(
+        &self,
+        _: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let delay = *shape.first()?;
+        // Per second of delay, so that the coefficient is the delay.
+        Some(of_meant(
+            record,
+            place,
+            |channel| channel.pickup.weights,
+            |omega| (Complex64::ONE - Complex64::cis(omega * delay)) / delay,
+        ))
+    }
+
+    /// The regressor is exact at the delay that it was made for.
+    fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
+        coefficients
+            .first()
+            .filter(|delay| **delay > 0.0)
+            .map(|delay| vec![*delay])
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let delay = *coefficients.first()?;
+        (delay > 0.0).then(|| vec![("delay_s", delay)])
+    }
+}

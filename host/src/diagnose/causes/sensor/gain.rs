@@ -1,0 +1,48 @@
+//! A channel that reads g times the truth: y = g·y_t, so that y − ŷ = (1 − 1/g)·y.
+
+use num_complex::Complex64;
+
+use super::{of_meant, one_or_all};
+use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
+use crate::diagnose::record::Record;
+use crate::diagnose::scene::Scene;
+
+pub(super) struct Gain;
+
+/// The share 1 − 1/g beyond which nothing of the truth would be in a reading.
+const LARGEST_SHARE: f64 = 0.98;
+
+/// g of the share 1 − 1/g.
+pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
+    let share = *coefficients.first()?;
+    (share < LARGEST_SHARE).then(|| 1.0 / (1.0 - share))
+}
+
+impl Cause for Gain {
+    fn name(&self) -> &'static str {
+        "sensor-gain"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        one_or_all(scene, self.name())
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, place: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+        Some(of_meant(
+            record,
+            place,
+            |channel| channel.pickup.weights,
+            |_| Complex64::ONE,
+        ))
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        Some(vec![("gain", factor(coefficients)?)])
+    }
+}

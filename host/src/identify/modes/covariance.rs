@@ -1,0 +1,140 @@
+//! How well the parameters of a fit are known.
+//!
+//! Covariance: Gauss's, N⁻¹ M N⁻¹, where M has what is left as it is correlated: between receptances of one line, as they
+//! share a response's noise, and between neighbouring lines, as windows make it (thesis chapter 7 measures by Welch's
+//! method). Correlations are pooled over all lines.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::Receptances;
+use super::pole_residue::{PoleResidue, jacobian, normal, shared};
+use super::weights::Weights;
+
+/// Lines over which what is left is correlated: a Hann window joins two on each side.
+const LAGS: usize = 2;
+
+/// The covariance of the parameters under the constraints of [`shape::normalize`].
+pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Option<DMatrix<f64>> {
+    let jacobian = jacobian(data, fit, weights);
+    let normal = normal(&jacobian);
+    let bread = constrained_inverse(data, fit, &normal)?;
+    let left = fit.left(data, weights);
+    let same_line = &bread * meat(&jacobian, &left, 0) * &bread;
+    let all = &bread * meat(&jacobian, &left, LAGS) * &bread;
+    // Correlations from few lines may cancel more than there is.
+    let is_more = |i: usize| all[(i, i)] >= same_line[(i, i)];
+    let scale = DVector::from_fn(all.nrows(), |i, _| {
+        if is_more(i) || all[(i, i)] <= 0.0 {
+            1.0
+        } else {
+            (same_line[(i, i)] / all[(i, i)]).sqrt()
+        }
+    });
+    let scaled = DMatrix::from_fn(all.nrows(), all.ncols(), |i, j| {
+        if all[(i, i)] <= 0.0 || all[(j, j)] <= 0.0 {
+            same_line[(i, j)]
+        } else {
+            all[(i, j)] * scale[i] * scale[j]
+        }
+    });
+    Some(scaled)
+}
+
+/// ½ Σ Re(J(f)ᴴ C_l J(f + l)) over lines f and lags l to both sides, with C_l the mean of left(f) left(f + l)ᴴ over all lines.
+fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usize) -> DMatrix<f64> {
+    let size = jacobian.first().map_or(0, DMatrix::nrows);
+    let lines = left.first().map_or(0, |left| left.len());
+    let mut meat = DMatrix::<f64>::zeros(size, size);
+    for lag in 0..=lags.min(lines.saturating_sub(1)) {
+        let count = lines - lag;
+        for (k, first) in left.iter().enumerate() {
+            // Σ_k' C_l[k, k'] J_k'(f + l), then Re of J_k(f) conjugate times it.
+            let mut other = DMatrix::<Complex64>::zeros(size, count);
+            for (j, second) in left.iter().enumerate() {
+                let sum: Complex64 = (0..count)
+                    .map(|line| first[line] * second[line + lag].conj())
+                    .sum();
+                other += jacobian[j].columns(lag, count) * (sum / lines as f64);
+            }
+            let own = jacobian[k].columns(0, count);
+            let (a, b) = (own.map(|z| z.re), own.map(|z| z.im));
+            let product = &a * other.map(|z| z.re).transpose() + &b * other.map(|z| z.im).transpose();
+            // Both directions of a lag are each other's transpose.
+            let part = if lag == 0 {
+                0.5 * (&product + product.transpose())
+            } else {
+                &product + product.transpose()
+            };
+            meat += 0.5 * part;
+        }
+    }
+    meat
+}
+
+/// The upper left block of [N Gᵀ; G 0]⁻¹ with the gradients G of the constraints: scale and phase of the shapes of each
+/// mode are not in the data.
+fn constrained_inverse(data: &Receptances, fit: &PoleResidue, normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let size = normal.nrows();
+    let scale = normal
+        .diagonal()
+        .map(|entry| if entry > 0.0 { entry.sqrt().recip() } else { 1.0 });
+    let mut bordered = DMatrix::<f64>::zeros(size + 2 * fit.modes.len(), size + 2 * fit.modes.len());
+    for i in 0..size {
+        for j in 0..size {
+            bordered[(i, j)] = normal[(i, j)] * scale[i] * scale[j];
+        }
+    }
+    let gradients = constraints(data, fit, size);
+    for (c, gradient) in gradients.iter().enumerate() {
+        let scaled = gradient.component_mul(&scale);
+        let norm = scaled.norm();
+        for i in 0..size {
+            bordered[(size + c, i)] = scaled[i] / norm;
+            bordered[(i, size + c)] = scaled[i] / norm;
+        }
+    }
+    let inverse = bordered.try_inverse()?;
+    Some(DMatrix::from_fn(size, size, |i, j| {
+        inverse[(i, j)] * scale[i] * scale[j]
+    }))
+}
+
+fn constraints(data: &Receptances, fit: &PoleResidue, size: usize) -> Vec<DVector<f64>> {
+    let (width, rights) = (PoleResidue::width(data), data.responses.len());
+    let both = shared(data);
+    let mut gradients = Vec::new();
+    for (r, mode) in fit.modes.iter().enumerate() {
+        let mut norms = DVector::zeros(size);
+        let mut phase = DVector::zeros(size);
+        let right_at = |p: usize| r * width + 2 + 2 * p;
+        let left_at = |q: usize| r * width + 2 + 2 * (rights + q);
+        let mut of_norm = |at: usize, z: Complex64, sign: f64| {
+            norms[at] = sign * z.re;
+            norms[at + 1] = sign * z.im;
+        };
+        if both.is_empty() {
+            (0..rights).for_each(|p| of_norm(right_at(p), mode.right[p], 1.0));
+            (0..mode.left.len()).for_each(|q| of_norm(left_at(q), mode.left[q], -1.0));
+            // Without a shared entry the phase stays that of the largest entry of the right shape.
+            let p = (0..rights)
+                .max_by(|&a, &b| mode.right[a].norm().total_cmp(&mode.right[b].norm()))
+                .unwrap_or(0);
+            phase[right_at(p)] = -mode.right[p].im;
+            phase[right_at(p) + 1] = mode.right[p].re;
+        }
+        for &(p, q) in &both {
+            let (right, left) = (mode.right[p], mode.left[q]);
+            of_norm(right_at(p), right, 1.0);
+            of_norm(left_at(q), left, -1.0);
+            // Im(right·conj(left)) summed is 0.
+            phase[right_at(p)] = -left.im;
+            phase[right_at(p) + 1] = left.re;
+            phase[left_at(q)] = right.im;
+            phase[left_at(q) + 1] = -right.re;
+        }
+        gradients.push(norms);
+        gradients.push(phase);
+    }
+    gradients
+}

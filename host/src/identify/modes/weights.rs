@@ -1,0 +1,100 @@
+//! What each value of each receptance counts in a fit.
+//!
+//! Receptances by nearly dependent forces share large errors that cancel in other directions of the force: what is left
+//! of a first fit says how the receptances of a line are correlated, and the next weighs by that.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::Receptances;
+use super::pole_residue::PoleResidue;
+
+/// Lines for each receptance from which on the correlation between receptances is known well enough to weigh by.
+const LINES_PER_RECEPTANCE: usize = 6;
+
+/// What is added to a correlation, as a part of it: directions in which less is left than that weigh no more.
+const CORRELATION_RIDGE: f64 = 1e-5;
+
+/// A receptance of which less than this part is left weighs no more than if this much were.
+const LEAST_LEFT: f64 = 1e-6;
+
+/// How what is left counts.
+#[derive(Clone)]
+pub(super) struct Weights {
+    /// Deviation of every value of every receptance.
+    pub(super) deviation: Vec<Vec<f64>>,
+    /// Turns values over their deviations, receptance by receptance, into ones that are not correlated.
+    whitening: Option<DMatrix<Complex64>>,
+}
+
+impl Weights {
+    pub(super) fn of(deviation: &[Vec<f64>]) -> Self {
+        Self {
+            deviation: deviation.to_vec(),
+            whitening: None,
+        }
+    }
+
+    /// Sums over the receptances by the rows of the whitening matrix, which is lower triangular.
+    pub(super) fn mixed<C: nalgebra::Dim>(
+        &self,
+        plain: Vec<nalgebra::OMatrix<Complex64, nalgebra::Dyn, C>>,
+    ) -> Vec<nalgebra::OMatrix<Complex64, nalgebra::Dyn, C>>
+    where
+        nalgebra::DefaultAllocator: nalgebra::allocator::Allocator<nalgebra::Dyn, C>,
+    {
+        let Some(whitening) = &self.whitening else {
+            return plain;
+        };
+        (0..plain.len())
+            .map(|k| {
+                let mut sum = &plain[0] * whitening[(k, 0)];
+                for (j, of) in plain.iter().enumerate().take(k + 1).skip(1) {
+                    sum += of * whitening[(k, j)];
+                }
+                sum
+            })
+            .collect()
+    }
+
+    /// The weights by what is left of a fit.
+    pub(super) fn again(&mut self, data: &Receptances, fit: &PoleResidue) {
+        let mut left = Vec::with_capacity(data.values.len());
+        for k in 0..data.values.len() {
+            let values = fit.left_of(data, &self.deviation, k);
+            let least = LEAST_LEFT * root_mean_square(&data.values[k]) / mean(&self.deviation[k]);
+            // Real and imaginary part have the stated deviation each.
+            let scale = (root_mean_square(&values) / 2.0_f64.sqrt()).max(least);
+            for value in &mut self.deviation[k] {
+                *value *= scale;
+            }
+            left.push(DVector::from_vec(values) / Complex64::from(scale));
+        }
+        self.whitening = whitening(&left);
+    }
+}
+
+/// Root of the mean square of the absolute values.
+pub(super) fn root_mean_square(values: &[Complex64]) -> f64 {
+    (values.iter().map(|value| value.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// L⁻¹ of the correlation L Lᴴ of what is left, real and imaginary part having a variance of one each; `None` from too
+/// few lines.
+fn whitening(left: &[DVector<Complex64>]) -> Option<DMatrix<Complex64>> {
+    let (count, lines) = (left.len(), left.first().map_or(0, |left| left.len()));
+    if lines < LINES_PER_RECEPTANCE * count {
+        return None;
+    }
+    let mut correlation =
+        DMatrix::from_fn(count, count, |k, j| left[j].dotc(&left[k]) / (2.0 * lines as f64));
+    for k in 0..count {
+        correlation[(k, k)] += CORRELATION_RIDGE;
+    }
+    let lower = Cholesky::new(correlation)?.unpack();
+    lower.solve_lower_triangular(&DMatrix::identity(count, count))
+}
