@@ -228,11 +228,11 @@ fn limits_as_text(chart: &Chart) -> String {
             stable.join(", ")
         );
         if let Some(spread) = &line.spread {
-            let intervals = spread.limit_percentiles_ci90_mm;
-            let intervals = [intervals.low, intervals.median, intervals.high];
             text.push_str("; limit of 5, 50, 95 % of the machines:");
-            for (percentile, interval) in percentiles(spread, "beyond").into_iter().zip(intervals) {
-                let [from, to] = interval.map(|end| depth_or(end, "beyond"));
+            let both = percentiles(spread, "beyond")
+                .into_iter()
+                .zip(intervals(spread, "beyond"));
+            for (percentile, [from, to]) in both {
                 let _ = write!(text, " {percentile} ({from}–{to})");
             }
         }
@@ -244,6 +244,13 @@ fn limits_as_text(chart: &Chart) -> String {
 fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
     let percentiles = spread.limit_percentiles_mm;
     [percentiles.low, percentiles.median, percentiles.high].map(|depth_mm| depth_or(depth_mm, beyond))
+}
+
+/// Between which depths each percentile lies with 90 % confidence, as text, mm.
+fn intervals(spread: &LimitSpread, beyond: &str) -> [[String; 2]; 3] {
+    let intervals = spread.limit_percentiles_ci90_mm;
+    let intervals = [intervals.low, intervals.median, intervals.high];
+    intervals.map(|interval| interval.map(|end| depth_or(end, beyond)))
 }
 
 fn depth_or(depth_mm: Option<f64>, beyond: &str) -> String {
@@ -291,7 +298,7 @@ fn as_page(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<
             tr {
                 th { "rev/min" } th { "first limit [mm]" } th { "error [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
                 @if chart.speeds.iter().any(|line| line.spread.is_some()) {
-                    th { "limit of 5 % [mm]" } th { "of 50 %" } th { "of 95 % of the machines" }
+                    th { "limit of 5 % (90 % interval) [mm]" } th { "of 50 %" } th { "of 95 % of the machines" }
                 }
             }
             @for line in &chart.speeds { (row(line)) }
@@ -319,7 +326,9 @@ fn row(line: &SpeedLine) -> maud::Markup {
             }
             td { (stable.join(", ")) }
             @if let Some(spread) = &line.spread {
-                @for depth in percentiles(spread, "beyond") { td { (depth) } }
+                @for (depth, [from, to]) in percentiles(spread, "beyond").into_iter().zip(intervals(spread, "beyond")) {
+                    td { (depth) " (" (from) " to " (to) ")" }
+                }
             }
         }
     }
@@ -341,6 +350,10 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
     ];
     if chart.speeds.iter().any(|line| line.spread.is_some()) {
         header.extend(["limit_5 [mm]", "limit_50 [mm]", "limit_95 [mm]"]);
+        // Between which depths each lies with 90 % confidence.
+        header.extend(["limit_5_from [mm]", "limit_5_to [mm]"]);
+        header.extend(["limit_50_from [mm]", "limit_50_to [mm]"]);
+        header.extend(["limit_95_from [mm]", "limit_95_to [mm]"]);
     }
     writer.write_record(&header).map_err(Error::other)?;
     for line in &chart.speeds {
@@ -348,7 +361,10 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
         let spread: Vec<String> = line
             .spread
             .iter()
-            .flat_map(|spread| percentiles(spread, ""))
+            .flat_map(|spread| {
+                let ends = intervals(spread, "").into_iter().flatten();
+                percentiles(spread, "").into_iter().chain(ends)
+            })
             .collect();
         let spread = spread.iter().map(String::as_str);
         if line.switches.is_empty() {

@@ -8,13 +8,12 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::forced::ForcedProblem;
-use super::orbit::{Mesh, Orbit, OrbitError, PIECE_ANGLE, Scale, pass};
-use super::variation;
+use super::orbit::{Orbit, OrbitError, PeriodMap, Scale};
+use super::revolution::RevolutionPeriod;
+use super::tooth_period::ToothPeriod;
 use crate::stability::line::union;
-use crate::stability::multiplier::{Kind, chatter_hz};
-use crate::stability::period::Period;
-use crate::stability::period_map;
-use crate::stability::{Limit, SpeedLine, Switch};
+use crate::stability::multiplier::Kind;
+use crate::stability::{LEAST_ERROR, Limit, SpeedLine, Switch};
 
 /// The longest step, as a share of the last depth (or of the size of the orbit there).
 const STEP_MAX: f64 = 1.0 / 30.0;
@@ -27,6 +26,9 @@ const MOVE_MAX: f64 = 0.12;
 
 /// Multipliers below this size are not followed: they are more than two steps away from the circle.
 const FOLLOWED: f64 = 1.0 - 2.5 * MOVE_MAX;
+
+/// By how much less a mesh twice as fine errs, at the least: what changes to it times this is an estimate with room to spare.
+const ROOM: f64 = 10.0;
 
 /// The most steps of a branch: with the longest step a branch that is followed up and down needs about a hundred.
 const STEPS_MAX: usize = 4000;
@@ -49,7 +51,9 @@ pub struct BranchPoint {
 pub struct Event {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// How it crosses; a fold is where the branch turns back in depth.
+    /// An estimate of its error, mm: within it |μ| is as near to 1 as the error of the multiplier.
+    pub error_mm: f64,
+    /// How it crosses; a fold is where the branch turns back in depth. With unequal teeth with respect to the revolution.
     pub kind: Kind,
     /// True where the number outside falls along the branch.
     pub gain: bool,
@@ -90,7 +94,15 @@ pub fn follow_depth(
     depth_mm: f64,
     extent: Extent,
 ) -> Result<Branch, OrbitError> {
-    Follower::new(problem, rpm, depth_mm * 1e-3, PIECE_ANGLE).follow(extent)
+    let depth_m = depth_mm * 1e-3;
+    match &problem.uneven {
+        None => Follower::new(ToothPeriod::new(problem, rpm), rpm, depth_m).follow(extent),
+        Some(uneven) => {
+            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_m)
+                .ok_or(OrbitError::Singular { depth_mm })?;
+            Follower::new(map, rpm, depth_m).follow(extent)
+        }
+    }
 }
 
 /// The dominant multiplier of an orbit.
@@ -107,29 +119,57 @@ pub(super) fn multiplier_at(
     rpm: f64,
     depth_mm: f64,
 ) -> Result<[Dominant; 2], OrbitError> {
-    let at = |piece_angle| {
-        let follower = Follower::new(problem, rpm, depth_mm * 1e-3, piece_angle);
-        let sample = follower.up_to(depth_mm * 1e-3)?;
-        let depth_m = sample.orbit.depth_m;
-        let multiplier =
-            period_map::dominant(&sample.period, depth_m).ok_or(OrbitError::Singular { depth_mm })?;
+    match &problem.uneven {
+        None => dominant_of(ToothPeriod::new(problem, rpm), rpm, depth_mm),
+        Some(uneven) => {
+            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_mm * 1e-3)
+                .ok_or(OrbitError::Singular { depth_mm })?;
+            dominant_of(map, rpm, depth_mm)
+        }
+    }
+}
+
+/// The orbit at a depth, reached from depth 0.
+#[cfg(test)]
+pub(super) fn orbit_at(problem: &ForcedProblem, rpm: f64, depth_mm: f64) -> Result<Orbit, OrbitError> {
+    let depth_m = depth_mm * 1e-3;
+    Ok(match &problem.uneven {
+        None => Follower::new(ToothPeriod::new(problem, rpm), rpm, depth_m).up_to(depth_m)?,
+        Some(uneven) => {
+            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_m)
+                .ok_or(OrbitError::Singular { depth_mm })?;
+            Follower::new(map, rpm, depth_m).up_to(depth_m)?
+        }
+    }
+    .orbit)
+}
+
+fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominant; 2], OrbitError> {
+    let singular = OrbitError::Singular { depth_mm };
+    let finer = map.finer().ok_or(singular)?;
+    let at = |map: M| {
+        let follower = Follower::new(map, rpm, depth_mm * 1e-3);
+        let orbit = follower.up_to(depth_mm * 1e-3)?.orbit;
+        let multiplier = follower
+            .map
+            .multipliers(&orbit)
+            .and_then(|all| all.first().copied())
+            .ok_or(singular)?;
         let multiplier = Complex64::new(multiplier.re, multiplier.im.abs());
-        let linear = &problem.linear;
         Ok(Dominant {
             multiplier,
-            chatter_hz: chatter_hz(linear, rpm, &sample.period, multiplier, depth_m),
+            chatter_hz: follower.map.chatter_hz(&orbit, multiplier),
         })
     };
-    Ok([at(PIECE_ANGLE)?, at(0.5 * PIECE_ANGLE)?])
+    Ok([at(map)?, at(finer)?])
 }
 
 /// How large the state at the start of the period is at a depth, if cubic terms are left out.
-fn size_at(problem: &ForcedProblem, mesh: &Mesh, depth_m: f64) -> f64 {
-    let rest = Orbit::rest(problem, mesh);
-    let order = problem.order();
-    let linear = pass(problem, mesh, &rest.start, 0.0, &rest.states).and_then(|passage| {
+fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
+    let rest = Orbit::rest(map);
+    let linear = map.pass(&rest.start, 0.0, &rest.states).and_then(|passage| {
         let mut periodic = -passage.by_start;
-        for i in 0..order {
+        for i in 0..map.size() {
             periodic[(i, i)] += 1.0;
         }
         periodic.lu().solve(&(passage.by_depth * depth_m))
@@ -141,10 +181,9 @@ fn size_at(problem: &ForcedProblem, mesh: &Mesh, depth_m: f64) -> f64 {
         .unwrap_or(1.0)
 }
 
-struct Follower<'a> {
-    problem: &'a ForcedProblem,
+struct Follower<M> {
+    map: M,
     rpm: f64,
-    mesh: Mesh,
     scale: Scale,
 }
 
@@ -153,7 +192,6 @@ struct Follower<'a> {
 struct Sample {
     orbit: Orbit,
     tangent: DVector<f64>,
-    period: Period,
     /// Multipliers in the upper half plane or on the real axis that are near the circle or outside.
     roots: Vec<Complex64>,
     largest: f64,
@@ -169,28 +207,23 @@ impl Sample {
     }
 }
 
-impl<'a> Follower<'a> {
-    fn new(problem: &'a ForcedProblem, rpm: f64, depth_m: f64, piece_angle: f64) -> Self {
-        let mesh = Mesh::new(problem, rpm, piece_angle);
+impl<M: PeriodMap> Follower<M> {
+    fn new(map: M, rpm: f64, depth_m: f64) -> Self {
         // At depth 0 there is nothing to follow; any scale serves.
         let depth_m = if depth_m > 0.0 { depth_m } else { 1e-3 };
-        Self {
-            problem,
-            rpm,
-            scale: Scale {
-                state: size_at(problem, &mesh, depth_m),
-                depth_m,
-            },
-            mesh,
-        }
+        let scale = Scale {
+            state: size_at(&map, depth_m),
+            depth_m,
+        };
+        Self { map, rpm, scale }
     }
 
     /// The orbit at a depth, reached from depth 0.
     fn up_to(&self, depth_m: f64) -> Result<Sample, OrbitError> {
-        let order = self.problem.order();
+        let order = self.map.size();
         let mut along_depth = DVector::zeros(order + 1);
         along_depth[order] = 1.0;
-        let mut here = self.sample(&Orbit::rest(self.problem, &self.mesh), &along_depth)?;
+        let mut here = self.sample(&Orbit::rest(&self.map), &along_depth)?;
         let mut step = STEP_MAX;
         while here.orbit.depth_m < depth_m {
             let depth_mm = here.orbit.depth_m * 1e3;
@@ -220,10 +253,10 @@ impl<'a> Follower<'a> {
     }
 
     fn follow(&self, extent: Extent) -> Result<Branch, OrbitError> {
-        let order = self.problem.order();
+        let order = self.map.size();
         let mut along_depth = DVector::zeros(order + 1);
         along_depth[order] = 1.0;
-        let mut here = self.sample(&Orbit::rest(self.problem, &self.mesh), &along_depth)?;
+        let mut here = self.sample(&Orbit::rest(&self.map), &along_depth)?;
         let mut branch = Branch {
             rpm: self.rpm,
             points: vec![self.point(&here)],
@@ -263,7 +296,7 @@ impl<'a> Follower<'a> {
 
     /// The sample a step further along the branch.
     fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
-        let order = self.problem.order();
+        let order = self.map.size();
         let mut guess = from.orbit.clone();
         guess.start += from.tangent.rows(0, order) * (step * self.scale.state);
         guess.depth_m += from.tangent[order] * step * self.scale.depth_m;
@@ -271,11 +304,12 @@ impl<'a> Follower<'a> {
     }
 
     fn sample(&self, guess: &Orbit, normal: &DVector<f64>) -> Result<Sample, OrbitError> {
-        let (orbit, tangent) = Orbit::correct(self.problem, &self.mesh, guess, self.scale, normal)?;
+        let (orbit, tangent) = Orbit::correct(&self.map, guess, self.scale, normal)?;
         let depth_mm = orbit.depth_m * 1e3;
-        let singular = OrbitError::Singular { depth_mm };
-        let period = variation::about(self.problem, &self.mesh, &orbit).ok_or(singular)?;
-        let all = period_map::multipliers(&period, orbit.depth_m).ok_or(singular)?;
+        let all = self
+            .map
+            .multipliers(&orbit)
+            .ok_or(OrbitError::Singular { depth_mm })?;
         let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
         let roots = all
             .into_iter()
@@ -285,7 +319,6 @@ impl<'a> Follower<'a> {
         Ok(Sample {
             orbit,
             tangent,
-            period,
             roots,
             largest,
         })
@@ -320,28 +353,56 @@ impl<'a> Follower<'a> {
             }
         }
         let on_circle = root / root.norm();
+        let kind = Kind::of(root);
         let event = Event {
             depth_mm: sample.orbit.depth_m * 1e3,
-            kind: Kind::of(root),
+            error_mm: 1e3 * self.error_m(&sample, root).unwrap_or(self.scale.depth_m),
+            kind,
             gain: !outward,
             multiplier: on_circle,
-            chatter_hz: match Kind::of(root) {
+            chatter_hz: match kind {
                 // The orbit jumps to another of the same period.
                 Kind::Fold => None,
-                _ => chatter_hz(
-                    &self.problem.linear,
-                    self.rpm,
-                    &sample.period,
-                    on_circle,
-                    sample.orbit.depth_m,
-                ),
+                _ => self.map.chatter_hz(&sample.orbit, on_circle),
             },
         };
         Some((low.0, event))
     }
 
+    /// How far the depth of a crossing may be off, m: over as much of the branch as takes the multiplier by its error to either
+    /// side, and what a finer mesh changes of the depth itself; `None` where it cannot be told.
+    fn error_m(&self, at: &Sample, root: Complex64) -> Option<f64> {
+        let order = self.map.problem().order();
+        let finer = Follower {
+            map: self.map.finer()?,
+            rpm: self.rpm,
+            scale: self.scale,
+        };
+        // Across the branch as far as states of the structure go, which are the same on both meshes.
+        let mut normal = DVector::zeros(finer.map.size() + 1);
+        normal.rows_mut(0, order).copy_from(&at.tangent.rows(0, order));
+        normal[finer.map.size()] = at.tangent[self.map.size()];
+        let length = normal.norm();
+        let there = finer
+            .sample(&at.orbit.onto(&self.map, &finer.map), &(normal / length))
+            .ok()?;
+        let change = (nearest(&there.roots, root)? - root).norm();
+        let error = (ROOM * change).max(LEAST_ERROR);
+        let beside = self.step(at, STEP_MIN).ok()?;
+        let slope = (nearest(&beside.roots, root)?.norm() - root.norm()).abs() / STEP_MIN;
+        let reach = error / slope;
+        if reach.is_nan() || reach > STEP_MAX {
+            return None;
+        }
+        let depth_m = at.orbit.depth_m;
+        let shift_m = |step: f64| Some((self.step(at, step).ok()?.orbit.depth_m - depth_m).abs());
+        let along_m = shift_m(reach)?.max(shift_m(-reach)?);
+        // At a fold the depth does not change along the branch: there, what has been checked of orbits is the least.
+        Some(along_m.max(LEAST_ERROR * depth_m) + ROOM * (there.orbit.depth_m - depth_m).abs())
+    }
+
     fn point(&self, sample: &Sample) -> BranchPoint {
-        let c = &self.problem.linear.structure.c;
+        let c = &self.map.problem().linear.structure.c;
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
         for states in &sample.orbit.states {
@@ -432,6 +493,17 @@ impl Branch {
         stable
     }
 
+    /// Depths at which the errors of the events leave open whether some forced orbit is stable, mm: around the ends of those that
+    /// are stable.
+    fn undecided_mm(&self) -> Vec<[f64; 2]> {
+        let ends = union(self.stable_mm()).into_iter().flatten();
+        let around = ends.filter_map(|end_mm| {
+            let event = self.events.iter().find(|event| event.depth_mm == end_mm)?;
+            Some([(end_mm - event.error_mm).max(0.0), end_mm + event.error_mm])
+        });
+        union(around.collect())
+    }
+
     /// Depths at which two stable forced orbits exist, mm.
     pub fn bistable_mm(&self) -> Vec<[f64; 2]> {
         let stable = self.stable_mm();
@@ -456,7 +528,7 @@ impl Branch {
             .iter()
             .map(|event| Switch {
                 depth_mm: event.depth_mm,
-                error_mm: None,
+                error_mm: Some(event.error_mm),
                 kind: event.kind,
                 gain: event.gain,
                 chatter_hz: event.chatter_hz,
@@ -470,7 +542,7 @@ impl Branch {
         SpeedLine {
             rpm: self.rpm,
             stable_mm: union(self.stable_mm()),
-            undecided_mm: Vec::new(),
+            undecided_mm: self.undecided_mm(),
             bistable_mm: self.bistable_mm(),
             first_limit,
             switches,

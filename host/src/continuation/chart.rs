@@ -8,7 +8,16 @@ use crate::stability::{LEAST_ERROR, Method, Point, SpeedLine, StabilityError};
 /// Multipliers about the forced orbit at the feed of the case, followed from depth 0.
 impl Method for ForcedProblem {
     fn name(&self) -> &'static str {
-        "collocation about the forced orbit"
+        match self.uneven {
+            None => "collocation about the forced orbit",
+            Some(_) => "collocation about the forced orbit of the revolution",
+        }
+    }
+
+    fn blind_to(&self) -> Option<&'static str> {
+        self.uneven
+            .as_ref()
+            .map(|_| "teeth that leave the surface within the forced orbit")
     }
 
     /// About the orbit that is reached when the depth grows from 0; the error is that of a mesh twice as fine.

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::case::Case;
 use crate::simulate::{At, ChipLaw, ProcessDamping, Term};
-use crate::stability::extension::about_orbit;
-use crate::stability::{CubicTerms, Problem, StabilityError};
+use crate::stability::extension::{about_orbit, radial_m};
+use crate::stability::{CubicTerms, Pitched, Problem, StabilityError};
 use crate::structure::FirstOrder;
 
 /// ẋ = A x + B F(t, x) − N(x), u = C x: eqs 6.1 and 3.6 in first-order form.
@@ -17,12 +17,18 @@ use crate::structure::FirstOrder;
 /// M⁻¹(C₃ q̇∘³ + K₃ q∘³)/s in the lower half. On an orbit of the tooth period
 /// F = (w − z)·Σ_teeth (cutting·n_x f_t + edge), with z the axial displacement where the depth follows it, else 0.
 ///
+/// Where teeth stand at unequal angles, or run at unequal radii on a nonlinear structure, an orbit has the period of the
+/// revolution, and a chip on it is n_x f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ with the feed f_j of its own delay τ_j. It is
+/// linear through zero: a tooth that would leave the surface pulls, as in the linear problem.
+///
 /// Extensions of the case add smooth terms −B f_r(u, u̇), a chip law in place of n_x f_t, and the damping of the flank
 /// −w D(φ) u̇.
 #[derive(Clone, Debug)]
 pub struct ForcedProblem {
-    /// The linear part and the cutting process.
+    /// The linear part and the cutting process, with the mean pitch.
     pub linear: Problem,
+    /// `None` where one tooth is like the other.
+    pub(super) uneven: Option<Uneven>,
     /// The cubic terms; `None` where the structure is linear.
     pub(super) cubic: Option<Cubic>,
     /// Smooth terms of the equation of motion, and the structure in whose axes they are.
@@ -31,6 +37,34 @@ pub struct ForcedProblem {
     chip: Option<ChipLaw>,
     /// `None` where the flank does not touch.
     flank: Option<Flank>,
+}
+
+/// Teeth of which one is not like the other.
+#[derive(Clone, Debug)]
+pub(super) struct Uneven {
+    /// The linear problem over the revolution.
+    pub(super) pitched: Pitched,
+    /// By how much the chip of each tooth is thicker since the one before runs on another radius, m.
+    pub(super) runout_m: Vec<f64>,
+}
+
+impl Uneven {
+    /// `None` where one tooth is like the other.
+    fn of(case: &Case, pitched: &Pitched) -> Result<Option<Self>, StabilityError> {
+        let sin_edge = case.tool()?.edge_angle_deg.to_radians().sin();
+        let radial_m = radial_m(case)?;
+        let before = radial_m.iter().cycle().skip(1);
+        let runout_m: Vec<f64> = radial_m
+            .iter()
+            .zip(before)
+            .map(|(own, before)| (own - before) * sin_edge)
+            .collect();
+        let runs_out = runout_m.iter().any(|chip_m| *chip_m != 0.0);
+        Ok((runs_out || pitched.has_variable_pitch()).then(|| Self {
+            pitched: pitched.clone().over_revolution(),
+            runout_m,
+        }))
+    }
 }
 
 /// f_r along the machine's axes.
@@ -95,7 +129,9 @@ impl ForcedProblem {
     /// # Errors
     /// As [`Problem::new`], but for cubic terms, which are kept.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
-        let linear = Problem::new(case, CubicTerms::Kept)?;
+        let pitched = Pitched::new(case, CubicTerms::Kept)?;
+        let linear = pitched.with_mean_pitch().clone();
+        let uneven = Uneven::of(case, &pitched)?;
         let structure = case.structure()?;
         let cubic = match structure.equation() {
             Some(matrices) if structure.is_nonlinear() => {
@@ -142,7 +178,28 @@ impl ForcedProblem {
             }),
             _ => None,
         };
+        let is_linear = cubic.is_none() && about.terms.is_empty();
+        let refuse = |what| {
+            Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what,
+            })
+        };
+        if uneven.is_some() && about.law.chip.is_some() {
+            return refuse(
+                "tool.pitch_deg or runout beside extension.force-exponent: chips of unequal teeth vanish and turn round within the \
+                 forced orbit, and there a power of the chip has no slope; equal pitch without runout is needed",
+            );
+        }
+        if is_linear && pitched.has_variable_pitch() {
+            return refuse(
+                "tool.pitch_deg: on a linear structure the forced orbit of teeth at unequal pitch is not followed, it grows beyond \
+                 all bounds where a multiplier over the revolution reaches 1; equal pitch is needed beside process-damping",
+            );
+        }
         Ok(Self {
+            // On a linear structure runout moves the orbit and not what is about it.
+            uneven: uneven.filter(|_| !is_linear),
             smooth: (!about.terms.is_empty()).then(|| Smooth::new(about.terms, &machine)),
             chip: about.law.chip,
             flank,
@@ -156,20 +213,18 @@ impl ForcedProblem {
         self.cubic.is_none() && self.smooth.is_none()
     }
 
-    /// The damping of the flank per depth, N s/m², of all cutting teeth at a phase, rad, while the tool turns at a speed,
+    /// The damping of the flank per depth, N s/m², of teeth at immersion angles, rad, while the tool turns at a speed,
     /// rad/s, in feed, normal and axial direction; `None` where there is none.
     pub(super) fn damping_per_depth(
         &self,
-        teeth: usize,
-        phase: f64,
+        angles: impl Iterator<Item = f64>,
         speed_rad_per_s: f64,
     ) -> Option<Matrix3<f64>> {
         let flank = self.flank.as_ref()?;
         let size = flank.law.n_per_m / (flank.radius_m * speed_rad_per_s);
         let process = &self.linear.process;
-        let sum: Matrix3<f64> = (0..teeth)
-            .map(|tooth| {
-                let angle = process.engagement.angle(tooth, phase);
+        let sum: Matrix3<f64> = angles
+            .map(|angle| {
                 let normal = process.force.normal.at(angle);
                 let tangent = Vector3::new(-angle.cos(), angle.sin(), 0.0);
                 (normal - tangent * flank.law.friction) * normal.transpose()
@@ -240,6 +295,15 @@ impl ForcedProblem {
                     + cubic.damping[(i, j)] * state[size + j].powi(3);
             }
             rate[size + i] -= sum;
+        }
+    }
+
+    /// The depth, m, that a state leaves of a depth: less by the axial displacement where the depth follows it.
+    pub(super) fn depth_at(&self, state: &DVector<f64>, depth_m: f64) -> f64 {
+        if self.linear.process.axial_depth_modulation {
+            depth_m - (self.linear.structure.c.row(2) * state)[0]
+        } else {
+            depth_m
         }
     }
 

@@ -3,11 +3,17 @@
 //! With the delay equal to the tooth period, u = u_τ holds on an orbit of that period: the regenerative force
 //! vanishes, and the orbit is that of an ordinary differential equation under the forces of feed and edges.
 //! Its multipliers are those of the delay equation linearized about it.
+//!
+//! With unequal pitch, or with runout, the orbit has the period of the revolution, the surface cut before acts on it, and it is
+//! that of the delay equation itself.
 
 mod branch;
 mod chart;
+mod collocated;
 mod forced;
 mod orbit;
+mod revolution;
+mod tooth_period;
 mod variation;
 
 pub use branch::{Branch, BranchPoint, Event, Extent, follow_depth};

@@ -6,57 +6,41 @@
 
 use nalgebra::DMatrix;
 
-use super::forced::ForcedProblem;
-use super::orbit::{Linearized, Mesh, Orbit, Piece};
-use crate::stability::gauss::Gauss;
+use super::collocated::Linearized;
+use super::orbit::Orbit;
+use super::tooth_period::{Piece, ToothPeriod};
 use crate::stability::period::{Element, Period, Port};
 
 /// The tooth period linearized about an orbit; `None` where a piece is singular.
-pub(super) fn about(problem: &ForcedProblem, mesh: &Mesh, orbit: &Orbit) -> Option<Period> {
-    let order = problem.order();
+pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
+    let order = map.problem.order();
     let mut elements = Vec::new();
     let mut flight = DMatrix::identity(order, order);
-    for (piece, states) in mesh.pieces.iter().zip(&orbit.states) {
-        let linearized = Linearized::new(problem, &mesh.gauss, piece, states, orbit.depth_m);
+    for (piece, states) in map.pieces.iter().zip(&orbit.states) {
+        let linearized = map.linearized(piece, states, orbit.depth_m);
         if piece.teeth == 0 {
-            flight = flow(&linearized, &mesh.gauss, piece)?.0 * flight;
+            flight = flow(&linearized)?.1 * flight;
         } else {
-            elements.push(element(
-                problem,
-                &mesh.gauss,
-                piece,
-                states,
-                orbit.depth_m,
-                &linearized,
-            )?);
+            elements.push(element(map, piece, states, orbit.depth_m, &linearized)?);
         }
     }
     Some(Period { elements, flight })
 }
 
-/// The transition over a piece, and the values at its nodes, both by its start.
-fn flow(linearized: &Linearized, gauss: &Gauss, piece: &Piece) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let order = linearized.jacobians[0].nrows();
-    let nodes = gauss.nodes.len();
-    let right = DMatrix::from_fn(order * nodes, order, |row, column| {
-        if row % order == column { 1.0 } else { 0.0 }
-    });
-    let values = linearized.solve(&right)?;
-    let mut transition = linearized.gather(gauss, piece, &values);
-    for i in 0..order {
-        transition[(i, i)] += 1.0;
-    }
-    Some((transition, values))
+/// The values at the nodes of a piece and its end, both by its start.
+fn flow(linearized: &Linearized<'_>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let order = linearized.order();
+    linearized.response(&DMatrix::identity(order, order), &[])
 }
 
 fn element(
-    problem: &ForcedProblem,
-    gauss: &Gauss,
+    map: &ToothPeriod<'_>,
     piece: &Piece,
     states: &DMatrix<f64>,
     depth_m: f64,
-    linearized: &Linearized,
+    linearized: &Linearized<'_>,
 ) -> Option<Element> {
+    let (problem, gauss) = (map.problem, &map.gauss);
     let structure = &problem.linear.structure;
     let process = &problem.linear.process;
     let (order, nodes, teeth) = (problem.order(), gauss.nodes.len(), piece.teeth);
@@ -85,13 +69,13 @@ fn element(
             });
         }
     }
-    let (flow, by_start) = flow(linearized, gauss, piece)?;
+    let (by_start, flow) = flow(linearized)?;
     let right = DMatrix::from_fn(order * nodes, nodes * teeth, |row, port| {
         let (i, state) = (row / order, row % order);
         piece.duration * gauss.integrals[(i, port / teeth)] * push[(state, port)]
     });
     let by_port = linearized.solve(&right)?;
-    let mut drive = linearized.gather(gauss, piece, &by_port);
+    let mut drive = linearized.gather(&by_port);
     for port in 0..nodes * teeth {
         let mut column = drive.column_mut(port);
         column.axpy(

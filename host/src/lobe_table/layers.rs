@@ -10,7 +10,7 @@ use super::{BuildError, TableRequest};
 use crate::case::Case;
 use crate::continuation::ForcedProblem;
 use crate::stability::{
-    Collocation, CubicTerms, Limit, Method, Pitched, Problem, RevolutionCollocation, SpeedLine,
+    Collocation, CubicTerms, Limit, Method, Percentile, Pitched, Problem, RevolutionCollocation, SpeedLine,
     StabilityError, Uncertainty, chart, needs_orbit,
 };
 
@@ -122,8 +122,8 @@ impl Family {
         let limited: Vec<Result<SpeedLine, StabilityError>> = lines
             .into_par_iter()
             .map(|line| {
-                let limit_mm = uncertainty.percentile(&line, depth_mm, 0.01 * percent)?;
-                Ok(up_to(line, limit_mm, depth_mm))
+                let percentile = uncertainty.percentile(&line, depth_mm, 0.01 * percent)?;
+                Ok(up_to(line, &percentile, depth_mm))
             })
             .collect();
         limited.into_iter().collect()
@@ -131,22 +131,33 @@ impl Family {
 }
 
 /// The line with nothing stable above a limit; the kind is that of the nominal first limit.
-fn up_to(line: SpeedLine, limit_mm: Option<f64>, depth_mm: f64) -> SpeedLine {
-    let limit = limit_mm.and_then(|depth_mm| {
+fn up_to(line: SpeedLine, percentile: &Percentile, depth_mm: f64) -> SpeedLine {
+    let error_mm = percentile.error_mm(depth_mm);
+    let limit = percentile.depth_mm.and_then(|depth_mm| {
         Some(Limit {
             depth_mm,
-            error_mm: None,
+            error_mm,
             ..line.first_limit?
         })
     });
-    let stable_to = limit_mm.unwrap_or(depth_mm);
+    let stable_to = percentile.depth_mm.unwrap_or(depth_mm);
     SpeedLine {
         stable_mm: if stable_to > 0.0 {
             vec![[0.0, stable_to]]
         } else {
             Vec::new()
         },
-        undecided_mm: Vec::new(),
+        undecided_mm: percentile
+            .depth_mm
+            .zip(error_mm)
+            .map(|(limit_mm, error_mm)| {
+                [
+                    (limit_mm - error_mm).max(0.0),
+                    (limit_mm + error_mm).min(depth_mm),
+                ]
+            })
+            .into_iter()
+            .collect(),
         bistable_mm: Vec::new(),
         switches: limit
             .map(|limit| crate::stability::Switch {

@@ -241,11 +241,25 @@ pub(super) fn material(case: &Case) -> Result<Material, StabilityError> {
 
 /// The force law with these extensions.
 fn law(case: &Case, names: &[&str]) -> Result<ForceLaw, StabilityError> {
-    // The depth is no part of the law.
+    Ok(cutter(case, names)?.force)
+}
+
+/// The tool with these extensions.
+fn cutter(case: &Case, names: &[&str]) -> Result<Cutter, StabilityError> {
+    // The depth is no part of what is asked.
     let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3);
     let effects = effects(case, names)?;
     let cutter = cutter.and_then(|cutter| effects.cutter(cutter));
-    Ok(cutter.map_err(|cause| wrong(case, cause))?.force)
+    cutter.map_err(|cause| wrong(case, cause))
+}
+
+/// How far the radius of each tooth exceeds the mean, m, in the order of the teeth: runout.
+///
+/// # Errors
+/// A section is missing, or an extension that the case cannot have.
+pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
+    let teeth = cutter(case, &["runout"])?.teeth;
+    Ok(teeth.iter().map(|tooth| tooth.radial_m).collect())
 }
 
 /// What acts about a forced orbit: smooth terms, the chip law, the damping of the flank.

@@ -47,6 +47,20 @@ impl Gauss {
     }
 }
 
+impl Gauss {
+    /// The Lagrange polynomials of the nodes at a place; nodes lie in (0, 1).
+    pub(crate) fn lagrange(&self, place: f64) -> Vec<f64> {
+        let nodes = &self.nodes;
+        let weight = |i: usize| -> f64 {
+            let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
+            others
+                .map(|(_, node)| (place - node) / (nodes[i] - node))
+                .product()
+        };
+        (0..nodes.len()).map(weight).collect()
+    }
+}
+
 /// P_0 … P_{count} at x.
 fn legendre(count: usize, x: f64) -> Vec<f64> {
     let mut values = vec![1.0, x];

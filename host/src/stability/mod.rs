@@ -19,7 +19,7 @@ pub(crate) mod line;
 mod method;
 pub(crate) mod multiplier;
 mod one_period;
-mod passages;
+pub(crate) mod passages;
 pub(crate) mod period;
 pub(crate) mod period_map;
 mod pitched;
@@ -28,6 +28,7 @@ mod point;
 mod problem;
 mod revolution;
 mod revolution_map;
+pub(crate) mod revolution_mesh;
 mod root;
 pub(crate) mod sampling;
 mod sdm;
@@ -53,7 +54,7 @@ pub use problem::{CubicTerms, Problem, StabilityError};
 pub use sampling::Variable;
 pub use sdm::{Sdm, SdmOrder, SemiDiscretization};
 pub use sensitivity::{Sensitivity, Slope, Tangent};
-pub use uncertainty::{LimitSpread, Maker, Percentiles, Uncertainty};
+pub use uncertainty::{LimitSpread, Maker, Percentile, Percentiles, Uncertainty};
 pub use variable_pitch::RevolutionCollocation;
 
 #[cfg(test)]

@@ -128,7 +128,7 @@ fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f6
 
 /// The frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest; `size` gives its size at an exponent
 /// s with e^{sT} = μ.
-pub(super) fn loudest_hz(
+pub(crate) fn loudest_hz(
     problem: &Problem,
     depth_m: f64,
     period_s: f64,
@@ -232,7 +232,7 @@ fn cyclic_vector(parts: &[DMatrix<Complex64>], multiplier: Complex64) -> Option<
 }
 
 /// A vector that the matrix multiplies by about `eigenvalue`, by inverse iteration.
-pub(super) fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
+pub(crate) fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
     let order = matrix.nrows();
     // A shift a little off the eigenvalue keeps the matrix regular and separates the vector by 1e8 at each step.
     let shift = if eigenvalue.norm() > 0.0 {

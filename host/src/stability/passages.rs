@@ -8,37 +8,37 @@ use super::pitched::Pitched;
 
 /// One tooth on its way through the cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Passage {
+pub(crate) struct Passage {
     /// When it enters, s; may lie before the period.
-    pub(super) entry_s: f64,
+    pub(crate) entry_s: f64,
     /// When it leaves, s; may lie after the period.
-    pub(super) exit_s: f64,
+    pub(crate) exit_s: f64,
     /// Time since the tooth before it was at the same place, s.
-    pub(super) delay_s: f64,
+    pub(crate) delay_s: f64,
     /// How far the tool feeds in that time, m.
-    pub(super) feed_m: f64,
+    pub(crate) feed_m: f64,
     /// Number of the tooth, and of the one before it in the cut; both 0 where one tooth is like the other.
-    pub(super) tooth: usize,
+    pub(crate) tooth: usize,
     /// See `tooth`.
-    pub(super) before: usize,
+    pub(crate) before: usize,
 }
 
 /// All teeth that cut within one period, at one speed.
 ///
 /// The period is the tooth period where the teeth stand evenly, else the revolution. It starts when a tooth enters.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Passages {
+pub(crate) struct Passages {
     /// Period T, s.
-    pub(super) period_s: f64,
+    pub(crate) period_s: f64,
     /// Spindle speed, rad/s.
-    pub(super) rad_per_s: f64,
+    pub(crate) rad_per_s: f64,
     /// By entry, the latest first.
-    pub(super) list: Vec<Passage>,
+    pub(crate) list: Vec<Passage>,
 }
 
 impl Passages {
     /// The passages of a problem at a speed.
-    pub(super) fn new(pitched: &Pitched, rpm: f64) -> Self {
+    pub(crate) fn new(pitched: &Pitched, rpm: f64) -> Self {
         let rad_per_s = rpm * TAU / 60.0;
         match &pitched.pitch_rad {
             None => Self::of_tooth_period(pitched, rad_per_s),
@@ -109,7 +109,7 @@ impl Passages {
     }
 
     /// Where a tooth enters or leaves, s, ascending, with both ends of the period.
-    pub(super) fn switches_s(&self) -> Vec<f64> {
+    pub(crate) fn switches_s(&self) -> Vec<f64> {
         let ends = self
             .list
             .iter()
@@ -118,14 +118,14 @@ impl Passages {
     }
 
     /// The passages that cut at a time, s, which is not that of a switch.
-    pub(super) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &Passage> {
+    pub(crate) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &Passage> {
         self.list
             .iter()
             .filter(move |passage| passage.entry_s < time_s && time_s < passage.exit_s)
     }
 
     /// Immersion angle of a passage at a time, rad.
-    pub(super) fn angle(&self, pitched: &Pitched, passage: &Passage, time_s: f64) -> f64 {
+    pub(crate) fn angle(&self, pitched: &Pitched, passage: &Passage, time_s: f64) -> f64 {
         pitched.problem.process.engagement.start + (time_s - passage.entry_s) * self.rad_per_s
     }
 }

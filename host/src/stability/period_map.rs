@@ -54,7 +54,11 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
 /// All multipliers of the collocated map, largest first; those of the history that have no physical meaning are near
 /// zero.
 pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
-    let map = monodromy(period, depth_m)?;
+    of_matrix(monodromy(period, depth_m)?)
+}
+
+/// All eigenvalues of the matrix of a map over a period, largest first.
+pub(crate) fn of_matrix(map: DMatrix<f64>) -> Option<Vec<Complex64>> {
     let mut multipliers = eigenvalues(map)?;
     multipliers.sort_by(|p, q| q.norm_sqr().total_cmp(&p.norm_sqr()).then(q.im.total_cmp(&p.im)));
     Some(multipliers)

@@ -33,6 +33,15 @@ impl Pitched {
         &self.problem
     }
 
+    /// The same with the revolution as its period, also where the pitches are equal.
+    #[must_use]
+    pub(crate) fn over_revolution(mut self) -> Self {
+        let problem = &self.problem;
+        self.pitch_rad
+            .get_or_insert_with(|| vec![problem.process.engagement.pitch; problem.teeth]);
+        self
+    }
+
     /// True where teeth stand at unequal angles: there are then several delays.
     pub fn has_variable_pitch(&self) -> bool {
         self.pitch_rad.is_some()

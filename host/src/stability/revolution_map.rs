@@ -8,7 +8,8 @@ use num_complex::Complex64;
 use super::krylov::LinearMap;
 use super::multiplier::loudest_hz;
 use super::one_period::PeriodMap;
-use super::revolution::{Revolution, Series, Source};
+use super::revolution::Revolution;
+use super::revolution_mesh::{Series, Source};
 
 /// The map of a revolution at one depth.
 pub(super) struct RevolutionMap<'a> {
@@ -31,9 +32,9 @@ struct Trace {
 impl<'a> RevolutionMap<'a> {
     /// The map at a depth, m; `None` where the collocation equations are singular.
     pub(super) fn new(revolution: Rc<Revolution<'a>>, depth_m: f64) -> Option<Self> {
-        let factors = revolution.pieces.iter().map(|piece| {
-            let size = piece.element.kernel.nrows();
-            let implicit = DMatrix::identity(size, size) - &piece.element.kernel * depth_m;
+        let factors = revolution.elements.iter().map(|element| {
+            let size = element.kernel.nrows();
+            let implicit = DMatrix::identity(size, size) - &element.kernel * depth_m;
             let factor = implicit.lu();
             factor.is_invertible().then_some(factor)
         });
@@ -51,22 +52,24 @@ impl<'a> RevolutionMap<'a> {
         let width = columns.ncols();
         let mut trace = Trace {
             state: columns.rows(0, order).into_owned(),
-            seen: Vec::with_capacity(revolution.pieces.len()),
-            chips: Vec::with_capacity(revolution.pieces.len()),
+            seen: Vec::with_capacity(revolution.elements.len()),
+            chips: Vec::with_capacity(revolution.elements.len()),
         };
         let before = columns.transpose();
-        for (piece, factor) in revolution.pieces.iter().zip(&self.factors) {
-            let ports = piece.pasts.len();
+        let stretches = &revolution.mesh.stretches;
+        let parts = stretches.iter().zip(&revolution.elements).zip(&self.factors);
+        for ((stretch, element), factor) in parts {
+            let ports = stretch.pasts.len();
             let mut past = DMatrix::zeros(width, ports);
-            for (port, of) in piece.pasts.iter().enumerate() {
+            for (port, of) in stretch.pasts.iter().enumerate() {
                 let mut sum = past.column_mut(port);
                 for (node, weight) in of.weights.iter().enumerate() {
                     let seen = match of.source {
                         Source::Earlier(first) => before.column(first + node),
-                        Source::Own(Series { element, tooth }) => {
-                            // A delay shorter than an element would end in the element itself.
-                            let values = trace.seen.get(element)?;
-                            values.column(node * revolution.pieces[element].teeth.len() + tooth)
+                        Source::Own(Series { stretch, tooth }) => {
+                            // A delay shorter than a stretch would end in the stretch itself.
+                            let values = trace.seen.get(stretch)?;
+                            values.column(node * stretches[stretch].cutting.len() + tooth)
                         }
                     };
                     sum.axpy(*weight, &seen, 1.0);
@@ -74,14 +77,14 @@ impl<'a> RevolutionMap<'a> {
             }
             // p − w Q p = E x − w Q p_τ
             let past = past.transpose();
-            let mut seen = &piece.element.observe * &trace.state;
-            seen.gemm(-self.depth_m, &piece.element.kernel, &past, 1.0);
+            let mut seen = &element.observe * &trace.state;
+            seen.gemm(-self.depth_m, &element.kernel, &past, 1.0);
             if ports > 0 && !factor.solve_mut(&mut seen) {
                 return None;
             }
             let chips = &seen - past;
-            let mut next = &piece.element.flow * &trace.state;
-            next.gemm(self.depth_m, &piece.element.drive, &chips, 1.0);
+            let mut next = &element.flow * &trace.state;
+            next.gemm(self.depth_m, &element.drive, &chips, 1.0);
             trace.state = next;
             trace.seen.push(seen.transpose());
             trace.chips.push(chips);
@@ -92,18 +95,18 @@ impl<'a> RevolutionMap<'a> {
 
 impl LinearMap for RevolutionMap<'_> {
     fn size(&self) -> usize {
-        self.revolution.size
+        self.revolution.mesh.size
     }
 
     fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let trace = self.trace(columns)?;
         let mut image = DMatrix::zeros(self.size(), columns.ncols());
         image.rows_mut(0, trace.state.nrows()).copy_from(&trace.state);
-        for (series, first) in &self.revolution.kept {
-            let piece = &self.revolution.pieces[series.element];
-            let values = &trace.seen[series.element];
-            for node in 0..piece.gauss.nodes.len() {
-                let column = values.column(node * piece.teeth.len() + series.tooth);
+        for (series, first) in &self.revolution.mesh.kept {
+            let stretch = &self.revolution.mesh.stretches[series.stretch];
+            let values = &trace.seen[series.stretch];
+            for node in 0..stretch.gauss.nodes.len() {
+                let column = values.column(node * stretch.cutting.len() + series.tooth);
                 image.row_mut(first + node).tr_copy_from(&column);
             }
         }
@@ -122,10 +125,11 @@ impl PeriodMap for RevolutionMap<'_> {
         );
         let trace = self.trace(&parts)?;
         let problem = &self.revolution.pitched.problem;
-        loudest_hz(problem, self.depth_m, self.revolution.period_s, multiplier, |s| {
+        let period_s = self.revolution.mesh.passages.period_s;
+        loudest_hz(problem, self.depth_m, period_s, multiplier, |s| {
             let mut harmonic = Vector3::<Complex64>::zeros();
-            for (piece, chips) in self.revolution.pieces.iter().zip(&trace.chips) {
-                for (port, chip) in piece.element.ports.iter().zip(chips.row_iter()) {
+            for (element, chips) in self.revolution.elements.iter().zip(&trace.chips) {
+                for (port, chip) in element.ports.iter().zip(chips.row_iter()) {
                     let chip = Complex64::new(chip[0], chip[1]) * port.weight_s;
                     harmonic += port.force.map(Complex64::from) * (chip * (-s * port.time_s).exp());
                 }

@@ -82,6 +82,25 @@ pub struct PercentileIntervals {
     pub high: [Option<f64>; 2],
 }
 
+/// One percentile of the limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Percentile {
+    /// The depth, mm; `None` beyond the last depth.
+    pub depth_mm: Option<f64>,
+    /// Between which depths, mm, it lies with 90 % confidence; `None` beyond the last depth.
+    pub ci90_mm: [Option<f64>; 2],
+}
+
+impl Percentile {
+    /// How far it may be off, mm, with 90 % confidence: the farther end of its interval, which ends at `deepest_mm` where it
+    /// goes beyond. `None` where the percentile itself lies beyond.
+    pub fn error_mm(&self, deepest_mm: f64) -> Option<f64> {
+        let depth_mm = self.depth_mm?;
+        let [from, to] = self.ci90_mm.map(|end| end.unwrap_or(deepest_mm));
+        Some((depth_mm - from).max(to - depth_mm))
+    }
+}
+
 /// What is known of the limit at one speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitSpread {
@@ -161,8 +180,7 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// The depth, mm, below which this share of all machines has its first limit at the speed of a line; `None` where it lies
-    /// beyond `depth_mm`.
+    /// The depth below which this share of all machines has its first limit at the speed of a line.
     ///
     /// # Errors
     /// As [`spread`](Self::spread).
@@ -171,9 +189,13 @@ impl<'a> Uncertainty<'a> {
         nominal: &SpeedLine,
         depth_mm: f64,
         share: f64,
-    ) -> Result<Option<f64>, StabilityError> {
+    ) -> Result<Percentile, StabilityError> {
         let batches = self.batches(nominal, depth_mm, false, *BATCHES.start(), &[share])?;
-        Ok(batches.limits().all.quantile(share))
+        let limits = batches.limits();
+        Ok(Percentile {
+            depth_mm: limits.all.quantile(share),
+            ci90_mm: limits.interval(share),
+        })
     }
 
     /// Lines of batches of machines, at least `least`, until the percentiles of these shares have settled.

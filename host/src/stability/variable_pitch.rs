@@ -11,8 +11,9 @@ use super::method::Method;
 use super::one_period::{self, MapSpectrum, PeriodMap};
 use super::pitched::Pitched;
 use super::point::{LEAST_ERROR, Point, check_depth, check_speed};
-use super::revolution::{Fineness, Revolution};
+use super::revolution::Revolution;
 use super::revolution_map::RevolutionMap;
+use super::revolution_mesh::Fineness;
 
 /// Collocation over the revolution, for teeth at any angles.
 ///

@@ -3,8 +3,9 @@
 use rand::{RngExt, SeedableRng};
 
 use super::krylov::Dominant;
-use super::revolution::{Fineness, Revolution};
+use super::revolution::Revolution;
 use super::revolution_map::RevolutionMap;
+use super::revolution_mesh::Fineness;
 use super::tests::{case, random_case};
 use super::*;
 
@@ -20,10 +21,7 @@ fn pitched(case_name: &str, pitch_deg: &[f64]) -> Pitched {
 /// Equal pitches that are treated as if they were not.
 fn as_revolution(problem: &Problem) -> RevolutionCollocation {
     RevolutionCollocation {
-        pitched: Pitched {
-            pitch_rad: Some(vec![problem.process.engagement.pitch; problem.teeth]),
-            problem: problem.clone(),
-        },
+        pitched: Pitched::from(problem.clone()).over_revolution(),
     }
 }
 

@@ -54,6 +54,32 @@ fn the_first_loss_is_a_fold_of_the_orbit_where_it_turns_back() {
 }
 
 #[test]
+fn stated_errors_of_limits_hold_what_a_mesh_four_times_as_fine_changes() {
+    let full = problem("kuka-kr90-full-cubic");
+    for (tau, kind) in [
+        (3.13, Kind::Flip),
+        (4.0, Kind::Hopf),
+        (6.4, Kind::Hopf),
+        (1.0 / 0.163, Kind::Fold),
+    ] {
+        let first = |map: ToothPeriod<'_>| {
+            let follower = Follower::new(map, rpm(tau), 15e-3);
+            let branch = follower.follow(Extent::FirstLoss).unwrap();
+            branch.events.into_iter().find(|event| !event.gain).unwrap()
+        };
+        let map = ToothPeriod::new(&full, rpm(tau));
+        let finest = first(map.finer().unwrap().finer().unwrap());
+        let found = first(map);
+        let change_mm = (found.depth_mm - finest.depth_mm).abs();
+        println!("{tau}: {found:?}, {change_mm:.1e} mm from the finest");
+        assert_eq!(found.kind, kind, "{tau}");
+        assert!(change_mm <= found.error_mm, "{tau}: {change_mm} {found:?}");
+        // Limits are known to far more than the four digits that are asked for.
+        assert!(found.error_mm < 1e-5 * found.depth_mm, "{tau}: {found:?}");
+    }
+}
+
+#[test]
 fn cubic_terms_raise_the_pockets_of_half_immersion() {
     let (cubic, linear) = (problem("kuka-kr90-half-cubic"), problem("kuka-kr90-half"));
     for (speed, ratio) in [(526.0, 1.36), (559.0, 1.78)] {

@@ -215,7 +215,7 @@ fn a_small_disturbance_of_a_real_cut_grows_as_the_multiplier_says() {
     ] {
         let case = case(name);
         let model = steady(&case, spindle_rpm, depth_mm);
-        let found = growth_of_a_push(model, case.tool().unwrap(), expected, order);
+        let found = growth_of_a_push(model, tooth_period_s(&case, spindle_rpm), expected, order);
         // The share of other multipliers, and of what loss of contact the disturbance still causes.
         assert!(
             (found - expected).abs() < 1e-4,
@@ -224,10 +224,13 @@ fn a_small_disturbance_of_a_real_cut_grows_as_the_multiplier_says() {
     }
 }
 
-/// The multiplier of a small disturbance of a cut, `expected` about as large.
-fn growth_of_a_push(mut model: Model, tool: &crate::milling::Tool, expected: f64, order: usize) -> f64 {
+fn tooth_period_s(case: &Case, spindle_rpm: f64) -> f64 {
+    case.tool().unwrap().tooth_period_s(spindle_rpm)
+}
+
+/// The multiplier of a small disturbance of a cut over a period, `expected` about as large.
+fn growth_of_a_push(mut model: Model, period_s: f64, expected: f64, order: usize) -> f64 {
     let cutting = model.cutting.as_ref().unwrap();
-    let period_s = std::f64::consts::TAU / (cutting.spindle.speed_rad_per_s() * tool.teeth as f64);
     // Transients to 1e-10 of the feed, or as far as errors allow; a push of 1e-5 of the feed or so.
     let calm = (-23.0 / f64::ln(expected)).min(1500.0);
     // Until a thousandth of it is left.
@@ -255,6 +258,38 @@ fn growth_of_a_push(mut model: Model, tool: &crate::milling::Tool, expected: f64
         })
         .collect();
     largest_root(&disturbance[8..], order)
+}
+
+#[test]
+fn disturbances_of_unequal_teeth_with_cubic_terms_grow_as_their_multipliers_say() {
+    let runout = crate::milling::Runout {
+        offset_um: 40.0,
+        angle_deg: 30.0,
+    };
+    for (pitch_deg, runout, rpm, depth_mm) in [
+        ([165.0, 195.0], None, 550.0, 9.0),
+        ([180.0, 180.0], Some(runout), 550.0, 9.0),
+    ] {
+        let plain = case("kuka-kr90-half-cubic");
+        let mut uneven = plain.clone();
+        let tool = uneven.tool.as_mut().unwrap();
+        (tool.pitch_deg, tool.runout) = (pitch_deg.to_vec(), runout);
+        let at = |case: &Case| ForcedProblem::new(case).unwrap().point(rpm, depth_mm).unwrap();
+        let (expected, equal) = (at(&uneven).multiplier_abs, at(&plain).multiplier_abs.powi(2));
+        let cut = VirtualCut {
+            entry: Entry::None,
+            ..VirtualCut::new(rpm, depth_mm, 1.0)
+        };
+        let mut model = cut.model(&uneven).unwrap();
+        model.cutting.as_mut().unwrap().regeneration = Regeneration::LastPass;
+        let found = growth_of_a_push(model, 60.0 / rpm, expected, 4);
+        println!("{pitch_deg:?} {runout:?}: {found} {expected}, equal teeth {equal}");
+        // The share of other multipliers and of the square of the disturbance; what unequal teeth change is ten times that and
+        // more.
+        let (error, change) = ((found - expected).abs(), (equal - expected).abs());
+        assert!(error < 3e-5, "{pitch_deg:?}: {found} {expected}");
+        assert!(change > 10.0 * error, "{pitch_deg:?}: {equal} {expected}");
+    }
 }
 
 #[test]
@@ -314,7 +349,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         let order = if name == two { 4 } else { 2 };
         let found = growth_of_a_push(
             cut.model(&extended).unwrap(),
-            extended.tool().unwrap(),
+            tooth_period_s(&extended, rpm),
             expected.multiplier_abs,
             order,
         );

@@ -1,0 +1,263 @@
+//! One revolution of a tool with several delays, cut into stretches, and where every chip finds the surface before it.
+//!
+//! Tooth j at an immersion angle sees p_j = nᵀ u, and the tooth before it saw p_{j−1} at the same angle, one pitch
+//! earlier: a number of another stretch, between its nodes, in this revolution or the one before. It is interpolated by
+//! the polynomial through the nodes of that stretch, for which p must be smooth there. Displacement has a kink of some
+//! order wherever a tooth enters or leaves; the surface hands it on to the next tooth, one delay later and smoother by
+//! what the structure smooths. So stretches end at all of these times, for several generations.
+
+use super::gauss::Gauss;
+use super::passages::{Passage, Passages, distinct};
+use super::period::{DECAY_MAX, Rates};
+use super::pitched::Pitched;
+
+/// How finely a revolution is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Fineness {
+    /// The largest angle, rad, by which the fastest motion turns within a stretch.
+    pub(crate) angle: f64,
+    /// Error of interpolation within a stretch, relative to the motion at the fastest rate, that is aimed at.
+    pub(crate) tolerance: f64,
+    /// Generations of kinks at which stretches end.
+    pub(crate) generations: u32,
+}
+
+impl Fineness {
+    /// For answers.
+    pub(crate) const WORKING: Self = Self {
+        angle: 5.0,
+        tolerance: 1e-9,
+        generations: 3,
+    };
+    /// What changes from the working one to this is an estimate of the error of the former.
+    pub(crate) const FINE: Self = Self {
+        angle: 4.0,
+        tolerance: 1e-11,
+        generations: 4,
+    };
+}
+
+/// What becomes of the times at which no tooth cuts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Flight {
+    /// Each is one stretch without nodes of use: the structure's own motion is known in closed form.
+    Whole,
+    /// Cut as finely as the others.
+    Cut,
+}
+
+/// No further generation of kinks is added to so many: stretches are then short, and kinks of later generations small.
+const KINKS_MAX: usize = 300;
+
+/// The values of one tooth in a stretch, at all of its nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Series {
+    /// Number of the stretch.
+    pub(crate) stretch: usize,
+    /// Which of the teeth that cut there.
+    pub(crate) tooth: usize,
+}
+
+/// Where the values of the tooth before are found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Source {
+    /// In this revolution.
+    Own(Series),
+    /// In the revolution before: in the state, from this row on.
+    Earlier(usize),
+}
+
+/// Where the tooth before was when it cut what a port sees now.
+#[derive(Clone, Debug)]
+pub(crate) struct Past {
+    pub(crate) source: Source,
+    /// Lagrange polynomials of the nodes at that time.
+    pub(crate) weights: Vec<f64>,
+}
+
+/// A part of the revolution without a kink.
+#[derive(Clone, Debug)]
+pub(crate) struct Stretch {
+    /// When it begins, s.
+    pub(crate) start_s: f64,
+    /// How long it takes, s.
+    pub(crate) duration_s: f64,
+    pub(crate) gauss: &'static Gauss,
+    /// The teeth that cut, in the order of the ports of a node.
+    pub(crate) cutting: Vec<Passage>,
+    /// Of each port, node by node.
+    pub(crate) pasts: Vec<Past>,
+}
+
+/// One revolution at one speed.
+#[derive(Clone, Debug)]
+pub(crate) struct RevolutionMesh {
+    pub(crate) passages: Passages,
+    pub(crate) stretches: Vec<Stretch>,
+    /// What of the revolution before acts in this one, with the first row in the state.
+    pub(crate) kept: Vec<(Series, usize)>,
+    /// Number of rows of the state: those of the structure, then those of what is kept.
+    pub(crate) size: usize,
+}
+
+impl RevolutionMesh {
+    /// Cuts the revolution at a speed for depths up to `depth_m`; `None` where a tooth finds no surface before it.
+    pub(crate) fn new(
+        pitched: &Pitched,
+        rpm: f64,
+        depth_m: f64,
+        fineness: Fineness,
+        flight: Flight,
+    ) -> Option<Self> {
+        let passages = Passages::new(pitched, rpm);
+        // At the unit circle |w (1 − 1/μ)| ≤ 2 w. Coefficients turn as products of two sines: twice the angle of the tool.
+        let rate = Rates::new(&pitched.problem).at(2.0 * depth_m) + 2.0 * passages.rad_per_s;
+        let decay = pitched.problem.fastest_decay();
+        let mut stretches = Vec::new();
+        for ends in kinks(&passages, fineness.generations).windows(2) {
+            let length_s = ends[1] - ends[0];
+            let cutting: Vec<Passage> = passages.cutting_at(0.5 * (ends[0] + ends[1])).copied().collect();
+            let angle = rate * length_s;
+            let (count, nodes) = if cutting.is_empty() && flight == Flight::Whole {
+                (1.0, 1)
+            } else {
+                let count = (angle / fineness.angle)
+                    .max(decay * length_s / DECAY_MAX)
+                    .ceil()
+                    .max(1.0);
+                (count, nodes_for(angle / count, fineness.tolerance))
+            };
+            let duration_s = length_s / count;
+            // The count is small: a few stretches for each vibration in the revolution.
+            stretches.extend((0..count as usize).map(|index| Stretch {
+                start_s: ends[0] + duration_s * index as f64,
+                duration_s,
+                gauss: Gauss::shared(nodes),
+                cutting: cutting.clone(),
+                pasts: Vec::new(),
+            }));
+        }
+        let mut mesh = Self {
+            passages,
+            stretches,
+            kept: Vec::new(),
+            size: pitched.problem.structure.order(),
+        };
+        mesh.link()?;
+        Some(mesh)
+    }
+
+    /// Finds what every port sees of the past.
+    fn link(&mut self) -> Option<()> {
+        let period_s = self.passages.period_s;
+        let starts_s: Vec<f64> = self.stretches.iter().map(|stretch| stretch.start_s).collect();
+        for index in 0..self.stretches.len() {
+            let here = self.stretches[index].clone();
+            let mut pasts = Vec::with_capacity(here.gauss.nodes.len() * here.cutting.len());
+            for node in &here.gauss.nodes {
+                for passage in &here.cutting {
+                    let then_s = here.start_s + here.duration_s * node - passage.delay_s;
+                    let is_earlier = then_s < 0.0;
+                    let then_s = if is_earlier { then_s + period_s } else { then_s };
+                    let stretch = starts_s
+                        .partition_point(|&start_s| start_s <= then_s)
+                        .saturating_sub(1);
+                    let there = &self.stretches[stretch];
+                    let mut teeth = there.cutting.iter();
+                    let tooth = teeth.position(|other| other.tooth == passage.before)?;
+                    let series = Series { stretch, tooth };
+                    let weights = there.gauss.lagrange((then_s - there.start_s) / there.duration_s);
+                    let source = if is_earlier {
+                        Source::Earlier(self.keep(series))
+                    } else {
+                        Source::Own(series)
+                    };
+                    pasts.push(Past { source, weights });
+                }
+            }
+            self.stretches[index].pasts = pasts;
+        }
+        Some(())
+    }
+
+    /// The first row of a series in the state, which gets it if need be.
+    fn keep(&mut self, series: Series) -> usize {
+        if let Some((_, first)) = self.kept.iter().find(|(known, _)| *known == series) {
+            return *first;
+        }
+        let first = self.size;
+        self.kept.push((series, first));
+        self.size += self.stretches[series.stretch].gauss.nodes.len();
+        first
+    }
+}
+
+/// All times at which displacement may have a kink, s, ascending, with both ends of the period.
+fn kinks(passages: &Passages, generations: u32) -> Vec<f64> {
+    let mut all = passages.switches_s();
+    let mut youngest = all.clone();
+    for _ in 0..generations {
+        let mut next = Vec::new();
+        for &time_s in &youngest {
+            for cut in passages.cutting_at(time_s) {
+                let after = passages.list.iter().find(|after| after.before == cut.tooth);
+                if let Some(after) = after {
+                    next.push((time_s + after.delay_s) % passages.period_s);
+                }
+            }
+        }
+        let known = all.len();
+        let mut grown = all.clone();
+        grown.extend(&next);
+        let grown = distinct(grown, passages.period_s);
+        if grown.len() == known || grown.len() > KINKS_MAX {
+            break;
+        }
+        all = grown;
+        youngest = next;
+    }
+    all
+}
+
+/// The fewest Gauss nodes, from 4 to 40, through which e^{iz} over an angle z is interpolated to a tolerance:
+/// z^m/m! times the largest value of the monic Legendre polynomial on [0, 1], (m!)²/(2m)!.
+fn nodes_for(angle: f64, tolerance: f64) -> usize {
+    let mut error = 1.0;
+    for m in 1..=40_u32 {
+        let m_f = f64::from(m);
+        error *= angle / (2.0 * (2.0 * m_f - 1.0));
+        if error < tolerance && m >= 4 {
+            return m as usize;
+        }
+    }
+    40
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use num_complex::Complex64;
+
+    use super::*;
+
+    #[test]
+    fn interpolation_errs_by_no_more_than_is_aimed_at() {
+        for (angle, tolerance) in [(0.3, 1e-9), (2.0, 1e-9), (5.0, 1e-9), (4.0, 1e-11), (TAU, 1e-6)] {
+            let gauss = Gauss::shared(nodes_for(angle, tolerance));
+            let worst = (0..=200).map(|i| {
+                let place = f64::from(i) / 200.0;
+                let weights = gauss.lagrange(place);
+                let value: Complex64 = weights
+                    .iter()
+                    .zip(&gauss.nodes)
+                    .map(|(weight, node)| Complex64::cis(angle * node) * *weight)
+                    .sum();
+                (value - Complex64::cis(angle * place)).norm()
+            });
+            let worst = worst.fold(0.0, f64::max);
+            // Of the remainder both parts of e^{iz} have their share.
+            assert!(worst < 2.0_f64.sqrt() * tolerance, "{angle} {tolerance}: {worst}");
+        }
+    }
+}
