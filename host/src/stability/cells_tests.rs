@@ -50,6 +50,43 @@ fn cells_of_whole_charts_are_those_of_single_points() {
 }
 
 #[test]
+fn verdicts_of_whole_charts_are_those_of_semi_discretization() {
+    let seed = 20_261_123;
+    println!("seed {seed}");
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    for (name, slowest, fastest, depth_mm) in CHARTS {
+        let method = Collocation {
+            problem: problem(name),
+        };
+        let stepped = Sdm {
+            pitched: method.problem.clone().into(),
+            discretization: SemiDiscretization(SdmOrder::First),
+            steps: 60,
+        };
+        let (speeds, depths) = (grid(slowest, fastest, 200), grid(0.0, depth_mm, 100));
+        let (mut decided, mut large) = (0, 0);
+        for _ in 0..60 {
+            let (speed, depth) = (rng.random_range(0..200), rng.random_range(0..100));
+            // Cells are computed from all depths of a speed together.
+            let cell = method.cells(speeds[speed], &depths).unwrap()[depth];
+            let point = stepped.point(speeds[speed], depths[depth]).unwrap();
+            let place = format!("{name} {} {}", speeds[speed], depths[depth]);
+            let off = (cell.multiplier_abs - point.multiplier_abs).abs();
+            assert!(off <= cell.error + point.error, "{place}: {cell:?} {point:?}");
+            if point.verdict != Verdict::Undecided {
+                assert_eq!(cell.verdict, point.verdict, "{place}: {cell:?} {point:?}");
+                decided += 1;
+                large += usize::from(point.multiplier_abs > 2.0);
+            }
+        }
+        println!("{name}: {decided} of 60 decided, {large} of them beyond 2");
+        // Sixty steps tell most cells; at a twentieth of the diameter, and on the robot, no multiplier is beyond 2.
+        assert!(decided >= 45, "{name}: {decided}");
+        assert_eq!(large > 0, name == "insperger-2dof-ad0.5", "{name}: {large}");
+    }
+}
+
+#[test]
 fn cells_are_the_same_for_any_number_of_threads_and_any_order_of_depths() {
     let method = Collocation {
         problem: problem("kuka-kr90-acetal"),

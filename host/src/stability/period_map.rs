@@ -64,11 +64,6 @@ pub(crate) fn of_matrix(map: DMatrix<f64>) -> Option<Vec<Complex64>> {
     Some(multipliers)
 }
 
-/// The largest multiplier; of a pair the one above the real axis.
-pub(crate) fn dominant(period: &Period, depth_m: f64) -> Option<Complex64> {
-    multipliers(period, depth_m)?.first().copied()
-}
-
 /// The multipliers within `share` of the largest, largest first, to begin Newton with.
 ///
 /// Of large maps by block Arnoldi. `None` where nothing finite comes out, or where that does not settle and the map is too

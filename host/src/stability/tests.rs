@@ -417,7 +417,7 @@ fn the_dominant_multiplier_is_the_growth_rate_of_the_map() {
             growth += norm.ln();
             vector /= norm;
         }
-        let dominant = period_map::dominant(&period, depth_m).unwrap().norm();
+        let dominant = period_map::multipliers(&period, depth_m).unwrap()[0].norm();
         // The start vector and the turning of a complex pair count for a few units over 400 turns.
         assert!(
             (growth / f64::from(TURNS) - dominant.ln()).abs() < 0.02,
@@ -517,7 +517,7 @@ fn lines_of_random_machines_agree_with_multipliers_at_single_depths() {
         for _ in 0..8 {
             let depth = rng.random_range(0.0..depth_mm);
             let period = Period::new(&problem, rpm, depth * 2e-3, Resolution::WORKING);
-            let dominant = period_map::dominant(&period, depth * 1e-3).unwrap().norm();
+            let dominant = period_map::multipliers(&period, depth * 1e-3).unwrap()[0].norm();
             let stable = line
                 .stable_mm
                 .iter()
