@@ -79,6 +79,18 @@ impl Characteristic {
         }
     }
 
+    /// Number of states, n.
+    pub(super) fn order(&self) -> usize {
+        self.order
+    }
+
+    /// About how many operations an evaluation takes.
+    pub(super) fn operations(&self) -> f64 {
+        let n = self.order as f64;
+        let entries: usize = self.elements.iter().map(Vec::len).sum();
+        16.0 * entries as f64 + 32.0 * n.powi(3) * (self.elements.len() as f64 + 3.0)
+    }
+
     /// Room for evaluations.
     pub(super) fn workspace(&self) -> Workspace {
         let zero = vec![Complex64::ZERO; self.order * self.order];
@@ -102,9 +114,9 @@ impl Characteristic {
             work.slope.fill(Complex64::ZERO);
             return;
         };
-        horner(first, n, xi, &mut work.value, &mut work.slope);
+        polynomial_at(first, n, xi, &mut work.value, &mut work.slope);
         for element in rest {
-            horner(element, n, xi, &mut work.factor, &mut work.factor_slope);
+            polynomial_at(element, n, xi, &mut work.factor, &mut work.factor_slope);
             // (P T)' = P' T + P T'
             multiply(&work.factor, &work.slope, n, &mut work.product);
             multiply_add(&work.factor_slope, &work.value, n, &mut work.product);
@@ -129,12 +141,18 @@ impl Characteristic {
         work: &mut Workspace,
     ) -> Option<Logarithmic> {
         let n = self.order;
-        let inverse = multiplier.inv();
+        let inverse = inverse(multiplier);
         self.evaluate((Complex64::ONE - inverse) * depth_m, work);
+        // Squares of large multipliers would leave the range of numbers.
+        let unit = multiplier.l1_norm().max(1.0);
         for i in 0..n {
             work.value[i * n + i] -= multiplier;
         }
+        for entry in work.value.iter_mut().chain(&mut work.slope) {
+            *entry /= unit;
+        }
         let (trace, trace_slope) = traces(&mut work.value, &mut work.slope, &mut work.factor, n)?;
+        let trace = trace / unit;
         let logarithmic = Logarithmic {
             by_multiplier: trace_slope * depth_m * inverse * inverse - trace,
             by_depth: trace_slope * (Complex64::ONE - inverse),
@@ -158,7 +176,7 @@ impl Characteristic {
                 // F is zero to the last bit, or the range was left.
                 return multiplier.is_finite().then_some(multiplier);
             };
-            let step = -logarithmic.by_multiplier.inv();
+            let step = -inverse(logarithmic.by_multiplier);
             multiplier += step;
             if !multiplier.is_finite() || (multiplier - guess).norm() > reach {
                 return None;
@@ -182,7 +200,7 @@ impl Characteristic {
             return None;
         }
         let logarithmic = self.logarithmic(beside, depth_m, work)?;
-        let mut multiplier = beside - logarithmic.by_multiplier.inv();
+        let mut multiplier = beside - inverse(logarithmic.by_multiplier);
         let mut slope = -logarithmic.by_depth / logarithmic.by_multiplier;
         if guess.im == 0.0 {
             (multiplier.im, slope.im) = (0.0, 0.0);
@@ -262,6 +280,12 @@ impl Characteristic {
     }
 }
 
+/// 1/z, also where |z|² is no number.
+fn inverse(z: Complex64) -> Complex64 {
+    let size = z.re.abs().max(z.im.abs());
+    (z / size).inv() / size
+}
+
 /// The polynomial G + κ T E + κ² T Q E + … of an element in κ/scale.
 fn polynomial(element: &Element, scale: f64) -> Vec<f64> {
     let mut coefficients = by_rows(&element.flow);
@@ -292,14 +316,26 @@ fn by_rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<f64> {
 }
 
 /// Value and derivative of a matrix polynomial.
-fn horner(coefficients: &[f64], n: usize, xi: Complex64, value: &mut [Complex64], slope: &mut [Complex64]) {
+fn polynomial_at(
+    coefficients: &[f64],
+    n: usize,
+    xi: Complex64,
+    value: &mut [Complex64],
+    slope: &mut [Complex64],
+) {
     value.fill(Complex64::ZERO);
     slope.fill(Complex64::ZERO);
-    for term in coefficients.chunks_exact(n * n).rev() {
+    // By powers: of complex numbers only products with real ones are taken, for all entries at once.
+    let (mut power, mut power_slope) = (Complex64::ONE, Complex64::ZERO);
+    for (j, term) in coefficients.chunks_exact(n * n).enumerate() {
         for ((value, slope), coefficient) in value.iter_mut().zip(slope.iter_mut()).zip(term) {
-            *slope = *slope * xi + *value;
-            *value = *value * xi + coefficient;
+            value.re += coefficient * power.re;
+            value.im += coefficient * power.im;
+            slope.re += coefficient * power_slope.re;
+            slope.im += coefficient * power_slope.im;
         }
+        power_slope = power * (j + 1) as f64;
+        power *= xi;
     }
 }
 

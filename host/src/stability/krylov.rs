@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use super::hessenberg::Shifted;
 use super::multiplier::eigenvector;
 use crate::eigenvalues::eigenvalues;
 
@@ -25,8 +26,21 @@ const RESIDUAL: f64 = 1e-11;
 /// The same where Newton goes on from there.
 const ROUGH: f64 = 1e-7;
 
+/// Eigenvalues above this size are all of interest.
+const ANY: f64 = 0.25;
+
 /// So many eigenvalues of nearly one size are no candidates for the largest but a crowd near zero.
 const CROWD: usize = 24;
+
+/// The most vectors of a space: looks at it take a second or two then, and maps that need more have a crowd of eigenvalues of one
+/// size.
+const SPACE_MAX: usize = 480;
+
+/// The same where a search without the map can go on.
+const ROUGH_SPACE_MAX: usize = 240;
+
+/// The largest map of which all eigenvalues are computed; they cost about 10 n³ operations, some ten seconds.
+pub(super) const WHOLE_MAX: usize = 1200;
 
 /// What is left of a vector that depends on others, relative to it: rounding of a map of some hundred steps, and far below
 /// any residual.
@@ -53,35 +67,45 @@ pub(super) struct Dominant {
 }
 
 impl Dominant {
-    /// All eigenvalues larger than `least`. `None` where nothing finite comes out.
+    /// All eigenvalues larger than `least`. `None` where nothing finite comes out, or where the map is large and the eigenvalues do
+    /// not settle.
     pub(super) fn of(map: &impl LinearMap, least: f64) -> Option<Self> {
-        // Beyond half the size the whole matrix is cheaper.
-        let most = map.size() / 2;
-        if map.size() > WHOLE
-            && let Some(found) = arnoldi(map, most, RESIDUAL, &|values| {
-                values.retain(|value| value.norm() > least);
-            })
-        {
-            return Some(found);
-        }
-        let projected = map.apply(&DMatrix::identity(map.size(), map.size()))?;
-        Some(Self {
-            eigenvalues: larger(&projected, least)?,
-            basis: None,
-            projected,
+        Self::kept(map, &|values| values.retain(|value| value.norm() > least))
+    }
+
+    /// All eigenvalues larger than 0.25; where there is none the largest, but no more than [`CROWD`].
+    pub(super) fn any(map: &impl LinearMap) -> Option<Self> {
+        Self::kept(map, &|values| {
+            let largest = values.first().map_or(0.0, |value| value.norm());
+            if largest > ANY {
+                values.retain(|value| value.norm() > ANY);
+            } else {
+                values.retain(|value| value.norm() >= 0.5 * largest);
+                values.truncate(CROWD);
+            }
         })
     }
 
-    /// The largest eigenvalues, however small they are.
-    pub(super) fn any(map: &impl LinearMap) -> Option<Self> {
-        let mut least = 0.25;
-        loop {
-            let found = Self::of(map, least)?;
-            if !found.eigenvalues.is_empty() || least < 1e-12 {
-                return Some(found);
-            }
-            least *= 0.1;
+    fn kept(map: &impl LinearMap, keep: &dyn Fn(&mut Vec<Complex64>)) -> Option<Self> {
+        // Beyond half the size the whole matrix is cheaper.
+        let most = (map.size() / 2).min(SPACE_MAX);
+        if map.size() > WHOLE
+            && let Some(found) = arnoldi(map, most, RESIDUAL, keep)
+            && found.is_settled
+        {
+            return Some(found.dominant);
         }
+        if map.size() > WHOLE_MAX {
+            return None;
+        }
+        let projected = map.apply(&DMatrix::identity(map.size(), map.size()))?;
+        let mut eigenvalues = larger(&projected, 0.0)?;
+        keep(&mut eigenvalues);
+        Some(Self {
+            eigenvalues,
+            basis: None,
+            projected,
+        })
     }
 
     /// The eigenvector of one of the eigenvalues, of length 1.
@@ -94,36 +118,61 @@ impl Dominant {
     }
 }
 
-/// The eigenvalues within `share` of the largest, but no more than [`CROWD`], largest first, to a relative residual of about
-/// 1e-7: to begin Newton with.
+/// The eigenvalues that seem the largest, largest first, to begin Newton with.
+#[derive(Clone, Debug)]
+pub(super) struct Largest {
+    /// The eigenvalues, to a residual of about 1e-7 where they are settled.
+    pub(super) eigenvalues: Vec<Complex64>,
+    /// False where block Arnoldi did not settle.
+    pub(super) is_settled: bool,
+    /// The largest entry of the map within the space.
+    pub(super) norm: f64,
+}
+
+/// The eigenvalues within `share` of the largest, but no more than [`CROWD`].
 ///
-/// `None` where block Arnoldi does not settle in a space of half the size, or nothing finite comes out.
-pub(super) fn largest(map: &impl LinearMap, share: f64) -> Option<Vec<Complex64>> {
-    let found = arnoldi(map, map.size() / 2, ROUGH, &|values| {
+/// `None` where nothing finite comes out.
+pub(super) fn largest(map: &impl LinearMap, share: f64) -> Option<Largest> {
+    let most = (map.size() / 2).min(ROUGH_SPACE_MAX);
+    let found = arnoldi(map, most, ROUGH, &|values| {
         let largest = values.first().map_or(0.0, |value| value.norm());
         values.retain(|value| value.norm() >= share * largest);
         values.truncate(CROWD);
     })?;
-    Some(found.eigenvalues)
+    Some(Largest {
+        norm: found.dominant.projected.amax(),
+        eigenvalues: found.dominant.eigenvalues,
+        is_settled: found.is_settled,
+    })
 }
 
-/// The eigenvalues larger than `least`, or than `share` of the largest where that is less, largest first; else as [`largest`].
+/// The eigenvalues larger than `least`, or than `share` of the largest where that is less, largest first, to a relative residual of
+/// about 1e-7.
+///
+/// `None` where block Arnoldi does not settle in a space of half the size, or nothing finite comes out.
 pub(super) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Option<Vec<Complex64>> {
-    let found = arnoldi(map, map.size() / 2, ROUGH, &|values| {
+    let most = (map.size() / 2).min(SPACE_MAX);
+    let found = arnoldi(map, most, ROUGH, &|values| {
         let largest = values.first().map_or(0.0, |value| value.norm());
         values.retain(|value| value.norm() > least.min(share * largest));
     })?;
-    Some(found.eigenvalues)
+    found.is_settled.then_some(found.dominant.eigenvalues)
+}
+
+/// What block Arnoldi arrived at.
+struct Found {
+    dominant: Dominant,
+    is_settled: bool,
 }
 
 /// Block Arnoldi with full orthogonalization until those eigenvalues are settled that `keep` keeps of all of them, largest
-/// first; `None` where the space would have to grow beyond `most`.
+/// first, or until the space would have to grow beyond `most`. `None` where nothing finite comes out.
 fn arnoldi(
     map: &impl LinearMap,
     most: usize,
     residual: f64,
     keep: &dyn Fn(&mut Vec<Complex64>),
-) -> Option<Dominant> {
+) -> Option<Found> {
     let size = map.size();
     // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
     let mut room = most.min(4 * LOOK * BLOCK);
@@ -136,9 +185,6 @@ fn arnoldi(
     let (mut done, mut width) = (0, first.ncols());
     let mut look = LOOK;
     for count in 1.. {
-        if done + width > most {
-            return None;
-        }
         if done + width > room {
             // Few maps need much room, and so much of it takes longer than they do.
             room = most.min(2 * room);
@@ -161,20 +207,20 @@ fn arnoldi(
             .view_mut((end, done), (next.ncols(), width))
             .copy_from(&coupling);
         basis.columns_mut(end, next.ncols()).copy_from(&next);
-        if next.ncols() == 0 || count == look {
+        let is_full = next.ncols() == 0 || end + next.ncols() > most;
+        if is_full || count == look {
             look += LOOK.max(look / 3);
             let within = projected.view((0, 0), (end, end)).into_owned();
             let mut eigenvalues = larger(&within, 0.0)?;
             keep(&mut eigenvalues);
-            if are_settled(&within, &coupling, &eigenvalues, residual) {
-                return Some(Dominant {
+            let is_settled = are_settled(&within, &coupling, &eigenvalues, residual);
+            if is_settled || is_full {
+                let dominant = Dominant {
                     eigenvalues,
                     basis: Some(basis.columns(0, end).into_owned()),
                     projected: within,
-                });
-            }
-            if next.ncols() == 0 {
-                return None;
+                };
+                return Some(Found { dominant, is_settled });
             }
         }
         (done, width) = (end, next.ncols());
@@ -191,17 +237,19 @@ fn are_settled(
     eigenvalues: &[Complex64],
     residual: f64,
 ) -> bool {
-    let complex = projected.map(Complex64::from);
     let coupling = coupling.map(Complex64::from);
     let width = coupling.ncols();
     let mut of_interest = eigenvalues
         .iter()
         .filter(|value| value.im >= 0.0 && value.norm() > residual);
     of_interest.all(|&value| {
-        eigenvector(&complex, value).is_some_and(|vector| {
-            let last = vector.rows(vector.len() - width, width);
-            (&coupling * last).norm() < residual * value.norm().max(1.0)
-        })
+        // Each block is coupled to the next by a triangle.
+        Shifted::new(projected, BLOCK, value)
+            .right()
+            .is_some_and(|vector| {
+                let last = vector.rows(vector.len() - width, width);
+                (&coupling * last).norm() < residual * value.norm().max(1.0)
+            })
     })
 }
 

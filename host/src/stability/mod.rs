@@ -14,6 +14,7 @@ pub(crate) mod extension;
 mod fdm;
 mod frequency;
 pub(crate) mod gauss;
+mod hessenberg;
 mod krylov;
 pub(crate) mod line;
 mod method;
@@ -37,6 +38,7 @@ mod spectrum;
 mod stepped;
 mod uncertainty;
 mod variable_pitch;
+mod winding;
 
 pub use cells::{Cell, CellChart, CellLine, cell_chart};
 pub use chart::{Chart, Refinement, chart};

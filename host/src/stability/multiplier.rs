@@ -109,10 +109,18 @@ pub(crate) fn chatter_hz(
     if forces.iter().all(|(_, force)| force.norm() == 0.0) {
         return free_hz(problem, period_s, multiplier);
     }
+    // e^{−s t} at every time, and what the next exponent multiplies it by: exponentials of all would take seconds.
+    let mut factors: Vec<(Complex64, Complex64)> = Vec::new();
     loudest_hz(problem, depth_m, period_s, multiplier, |s| {
         let mut harmonic = Vector3::<Complex64>::zeros();
-        for (time_s, force) in &forces {
-            harmonic += force * (-s * *time_s).exp();
+        if factors.is_empty() {
+            let times = forces.iter().map(|(time_s, _)| *time_s);
+            factors
+                .extend(times.map(|time_s| ((-s * time_s).exp(), Complex64::cis(-TAU * time_s / period_s))));
+        }
+        for ((_, force), (factor, turn)) in forces.iter().zip(&mut factors) {
+            harmonic += force * *factor;
+            *factor *= *turn;
         }
         Some((problem.structure.transfer(s)? * harmonic).norm())
     })
@@ -127,13 +135,13 @@ fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f6
 }
 
 /// The frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest; `size` gives its size at an exponent
-/// s with e^{sT} = μ.
+/// s with e^{sT} = μ, and is asked for one after the other, each 2πi/T above the one before.
 pub(crate) fn loudest_hz(
     problem: &Problem,
     depth_m: f64,
     period_s: f64,
     multiplier: Complex64,
-    size: impl Fn(Complex64) -> Option<f64>,
+    mut size: impl FnMut(Complex64) -> Option<f64>,
 ) -> Option<f64> {
     let growth = multiplier.ln();
     // The cut makes modes stiffer; above the fastest the motion only falls, and one harmonic beyond is enough.
@@ -181,14 +189,18 @@ fn eigenfunction_forces(
     }
     parts.push(complex(&period.flight) * part);
     let starts = cyclic_vector(&parts, multiplier)?;
-    let mut forces = Vec::new();
+    let mut forces: Vec<(f64, Vector3<Complex64>)> = Vec::new();
     for (element, (part, chips, axial)) in period.elements.iter().zip(seen_from) {
         let start = &starts[part];
         let mut push = |ports: &[Port], seen: DVector<Complex64>, factor: Complex64| {
-            forces.extend(ports.iter().zip(seen.iter()).map(|(port, seen)| {
+            for (port, seen) in ports.iter().zip(seen.iter()) {
                 let force = port.force.map(Complex64::from) * (seen * factor * port.weight_s);
-                (port.time_s, force)
-            }));
+                match forces.last_mut() {
+                    // Of another tooth at the same node.
+                    Some((time_s, sum)) if *time_s == port.time_s => *sum += force,
+                    _ => forces.push((port.time_s, force)),
+                }
+            }
         };
         push(&element.ports, chips * start, kappa);
         if let (Some(ports), Some(seen)) = (&element.axial, axial) {

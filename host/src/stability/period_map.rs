@@ -11,8 +11,15 @@ use crate::eigenvalues::eigenvalues;
 /// Up to this size all eigenvalues of the map are computed from its matrix: it is as fast.
 const WHOLE: usize = 110;
 
-/// The largest map of which all eigenvalues are computed; they cost about 10 n³ operations, some ten seconds.
-const WHOLE_MAX: usize = 1200;
+/// The same where Krylov spaces do not settle: a second.
+const UNSETTLED_WHOLE_MAX: usize = 400;
+
+/// Multipliers so large have lost what was before: they are eigenvalues of Φ(w), up to one part in so many.
+const GROWN: f64 = 1e6;
+
+/// How much larger than the largest multiplier a map may be: Krylov spaces with residuals of 1e-7 are to see no more than roundings
+/// of that.
+const NORMAL: f64 = 1e7;
 
 /// The matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at a depth, m.
 ///
@@ -57,37 +64,68 @@ pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64
     of_matrix(monodromy(period, depth_m)?)
 }
 
-/// All eigenvalues of the matrix of a map over a period, largest first.
+/// All eigenvalues of the matrix of a map over a period, largest first, of pairs the upper one first.
 pub(crate) fn of_matrix(map: DMatrix<f64>) -> Option<Vec<Complex64>> {
     let mut multipliers = eigenvalues(map)?;
-    multipliers.sort_by(|p, q| q.norm_sqr().total_cmp(&p.norm_sqr()).then(q.im.total_cmp(&p.im)));
+    multipliers.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
     Some(multipliers)
 }
 
-/// The multipliers within `share` of the largest, largest first, to begin Newton with.
+/// The multipliers that seem the largest, to begin Newton with.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Candidates {
+    /// Largest first.
+    pub(super) multipliers: Vec<Complex64>,
+    /// False where larger ones may have been missed: a Krylov space did not settle, or the map is so far from normal that rounding
+    /// moves its eigenvalues.
+    pub(super) is_certain: bool,
+}
+
+/// The multipliers within `share` of the largest.
 ///
-/// Of large maps by block Arnoldi. `None` where nothing finite comes out, or where that does not settle and the map is too
-/// large for all eigenvalues.
-pub(super) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Vec<Complex64>> {
-    let size = period.order() + period.ports();
-    if size > WHOLE
-        && let Some(found) = krylov::largest(&Map::new(period, depth_m)?, share)
-    {
+/// Of large maps by block Arnoldi. `None` where nothing finite comes out.
+pub(super) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candidates> {
+    let (order, size) = (period.order(), period.order() + period.ports());
+    let of = |mut multipliers: Vec<Complex64>, norm: f64, is_settled: bool| {
+        let largest = multipliers.first().map_or(0.0, |multiplier| multiplier.norm());
+        multipliers.retain(|multiplier| multiplier.norm() >= share * largest);
+        Candidates {
+            multipliers,
+            is_certain: is_settled && norm <= NORMAL * largest.max(1.0),
+        }
+    };
+    // Φ(w) is what the map makes of a surface at rest: without a tooth before, κ is w.
+    let grown = |transition: DMatrix<f64>| {
+        let norm = transition.amax();
+        let multipliers = of_matrix(transition)?;
+        let is_large = multipliers.first().is_some_and(|first| first.norm() > GROWN);
+        Some(of(multipliers, norm, is_large)).filter(|found| found.is_certain)
+    };
+    if size > WHOLE {
+        let map = Map::new(period, depth_m)?;
+        let identity = DMatrix::identity(size, order);
+        let transition = map.apply(&identity)?.rows(0, order).into_owned();
+        if let Some(found) = grown(transition) {
+            return Some(found);
+        }
+        let found = krylov::largest(&map, share)?;
+        if found.is_settled || size > UNSETTLED_WHOLE_MAX {
+            return Some(of(found.eigenvalues, found.norm, found.is_settled));
+        }
+    }
+    let map = monodromy(period, depth_m)?;
+    if let Some(found) = grown(map.view((0, 0), (order, order)).into_owned()) {
         return Some(found);
     }
-    if size > WHOLE_MAX {
-        return None;
-    }
-    let mut all = multipliers(period, depth_m)?;
-    let least = share * all.first()?.norm();
-    all.retain(|multiplier| multiplier.norm() >= least);
-    Some(all)
+    let norm = map.amax();
+    Some(of(of_matrix(map)?, norm, true))
 }
 
 /// All multipliers larger than `least`, or than `share` of the largest where that is less, largest first; with others that are
 /// smaller where the map is small.
 ///
-/// Of large maps by block Arnoldi, to begin Newton with. `None` as for [`largest`].
+/// Of large maps by block Arnoldi, to begin Newton with. `None` where nothing finite comes out, or where that does not settle and the
+/// map is too large for all eigenvalues.
 pub(super) fn larger_than(period: &Period, depth_m: f64, least: f64, share: f64) -> Option<Vec<Complex64>> {
     let size = period.order() + period.ports();
     if size > WHOLE
@@ -95,7 +133,7 @@ pub(super) fn larger_than(period: &Period, depth_m: f64, least: f64, share: f64)
     {
         return Some(found);
     }
-    if size > WHOLE_MAX {
+    if size > krylov::WHOLE_MAX {
         return None;
     }
     multipliers(period, depth_m)

@@ -7,14 +7,15 @@ use super::characteristic::Characteristic;
 use super::multiplier::{Kind, Verdict, chatter_hz};
 use super::period::{Period, Resolution, check_length};
 use super::period_map;
+use super::winding::{self, Search};
 use super::{Problem, StabilityError};
 
 /// The least error that is ever stated, relative to max(1, |μ|): what has been checked against independent
 /// computations. Collocation itself settles at 1e-10 and below.
 pub const LEAST_ERROR: f64 = 1e-7;
 
-/// Error of a multiplier that all multipliers of the collocated map gave and Newton did not confirm, relative to
-/// max(1, |μ|). The map is cut for 1e-8; rounding in large maps is less.
+/// Error of a multiplier that the multipliers of the collocated map gave and Newton did not confirm, relative to
+/// max(1, |μ|): ten times the residual with which Krylov spaces settle.
 pub(super) const UNCONFIRMED: f64 = 1e-6;
 
 /// Multipliers within this share of the largest at a coarse resolution may be the largest at a finer one.
@@ -35,9 +36,10 @@ pub struct Point {
     pub multiplier: Complex64,
     /// Its absolute value.
     pub multiplier_abs: f64,
-    /// An estimate of the error of the multiplier, from a second, finer collocation.
+    /// An estimate of the error of the multiplier, from a second, finer collocation. Where the multipliers of nearly one size are
+    /// too many to tell which is the largest, how much larger or, below 0.27, how different the largest may be.
     pub error: f64,
-    /// What follows.
+    /// What follows; unstable also where it is certain that this multiplier lies outside and a larger one is not excluded.
     pub verdict: Verdict,
     /// How the dominant multiplier leaves, or would leave, the unit circle.
     pub kind: Kind,
@@ -83,22 +85,48 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, Stabil
     check_length(problem, rpm, depth_mm)?;
     let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
     let depth_m = depth_mm * 1e-3;
-    let (coarse, fine, period, least) = coarse_and_fine(problem, rpm, depth_m).ok_or_else(|| {
-        broke_down(
-            "the collocation equations have no finite solution, or none on which two resolutions agree",
-        )
-    })?;
-    let multiplier = Complex64::new(fine.re, fine.im.abs());
-    let error = (10.0 * (coarse - fine).norm()).max(least * multiplier.norm().max(1.0));
-    let chatter_hz = chatter_hz(problem, rpm, &period, multiplier, depth_m);
-    Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
+    let scan = Period::new(problem, rpm, 2.0 * depth_m, Resolution::SCAN);
+    let candidates = period_map::largest(&scan, depth_m, RIVAL).unwrap_or_default();
+    let of_map = || {
+        let certain = Some(&candidates).filter(|candidates| candidates.is_certain)?;
+        coarse_and_fine(problem, rpm, depth_m, &certain.multipliers)
+    };
+    let found = of_map()
+        .or_else(|| searched(problem, rpm, depth_m, &candidates.multipliers))
+        .ok_or_else(|| {
+            broke_down(
+                "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart",
+            )
+        })?;
+    let multiplier = Complex64::new(found.multiplier.re, found.multiplier.im.abs());
+    let chatter_hz = chatter_hz(problem, rpm, &found.period, multiplier, depth_m);
+    let point = Point::new(rpm, depth_mm, multiplier, found.error, chatter_hz);
+    Ok(Point {
+        verdict: found.verdict.unwrap_or(point.verdict),
+        ..point
+    })
 }
 
-/// The dominant multiplier at the working and at a finer resolution, the period at the former, and the least relative error.
-fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64) -> Option<(Complex64, Complex64, Period, f64)> {
-    let scan = Period::new(problem, rpm, 2.0 * depth_m, Resolution::SCAN);
-    let rough: Vec<Complex64> = period_map::largest(&scan, depth_m, RIVAL)?
-        .into_iter()
+/// The dominant multiplier.
+struct Solution {
+    multiplier: Complex64,
+    error: f64,
+    /// The period at the working resolution.
+    period: Period,
+    /// Where more is known than multiplier and error say.
+    verdict: Option<Verdict>,
+}
+
+/// From what changes between the working and a finer resolution; no less than `least`, relative to max(1, |μ|).
+fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
+    (10.0 * (coarse - fine).norm()).max(least * fine.norm().max(1.0))
+}
+
+/// The dominant multiplier at the working and at a finer resolution, from the multipliers of a rough map.
+fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
+    let rough: Vec<Complex64> = candidates
+        .iter()
+        .copied()
         .filter(|multiplier| multiplier.im >= 0.0)
         .collect();
     // The complex depth w (1 − 1/μ) of the smallest of them; for those near the unit circle it is about twice the depth.
@@ -109,17 +137,59 @@ fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64) -> Option<(Complex
     let period_at = |resolution| Period::new(problem, rpm, kappa_m.min(KAPPA_MAX * depth_m), resolution);
     let working = period_at(Resolution::WORKING);
     let finer = period_at(Resolution::FINE);
+    let solution = |coarse, fine, least| Solution {
+        multiplier: fine,
+        error: error(coarse, fine, least),
+        period: working.clone(),
+        verdict: None,
+    };
     if kappa_m <= KAPPA_MAX * depth_m
         && let Some(coarse) = dominant_of(&working, kappa_m, depth_m, &rough)
         && let Some(fine) = dominant_of(&finer, kappa_m, depth_m, &[coarse])
     {
-        return Some((coarse, fine, working, LEAST_ERROR));
+        return Some(solution(coarse, fine, LEAST_ERROR));
     }
-    let coarse = *period_map::largest(&working, depth_m, 1.0)?.first()?;
-    let fine = period_map::largest(&finer, depth_m, RIVAL)?
+    let largest = |period, share| {
+        let found = period_map::largest(period, depth_m, share).filter(|found| found.is_certain);
+        found.map(|found| found.multipliers)
+    };
+    let coarse = *largest(&working, 1.0)?.first()?;
+    let fine = largest(&finer, RIVAL)?
         .into_iter()
         .min_by(|p, q| (p - coarse).norm().total_cmp(&(q - coarse).norm()))?;
-    Some((coarse, fine, working, UNCONFIRMED))
+    Some(solution(coarse, fine, UNCONFIRMED))
+}
+
+/// The dominant multiplier where maps do not tell: one that is found, and a radius beyond which none is.
+fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
+    let kappa_m = (1.0 + winding::LEAST.recip()) * depth_m;
+    let working = Period::new(problem, rpm, kappa_m, Resolution::WORKING);
+    let characteristic = Characteristic::new(&working, kappa_m);
+    let beyond = Search::new(&characteristic, depth_m).largest(candidates);
+    if !beyond.radius.is_finite() {
+        return None;
+    }
+    let Some(coarse) = beyond.multiplier else {
+        // All are small, and which is the largest may remain open.
+        let within = |candidate: &&Complex64| candidate.norm() < beyond.radius;
+        return Some(Solution {
+            multiplier: *candidates.iter().find(within)?,
+            error: beyond.radius,
+            period: working,
+            verdict: None,
+        });
+    };
+    let finer = Period::new(problem, rpm, kappa_m, Resolution::FINE);
+    let fine = dominant_of(&finer, kappa_m, depth_m, &[coarse])?;
+    let own = error(coarse, fine, LEAST_ERROR);
+    Some(Solution {
+        multiplier: fine,
+        // Another may lie between this one and the radius.
+        error: own.max(beyond.radius - fine.norm()),
+        period: working,
+        // Then that one lies outside as well.
+        verdict: (fine.norm() - own > 1.0).then_some(Verdict::Unstable),
+    })
 }
 
 /// The largest of the multipliers near guesses, by Newton; `None` where one of them leads nowhere.
@@ -130,9 +200,7 @@ fn dominant_of(period: &Period, kappa_m: f64, depth_m: f64, guesses: &[Complex64
         .iter()
         .map(|&guess| characteristic.multiplier_near(guess, depth_m, 0.05 * guess.norm(), &mut work))
         .collect();
-    found?
-        .into_iter()
-        .max_by(|p, q| p.norm_sqr().total_cmp(&q.norm_sqr()))
+    found?.into_iter().max_by(|p, q| p.norm().total_cmp(&q.norm()))
 }
 
 pub(super) fn check_speed(rpm: f64) -> Result<(), StabilityError> {

@@ -1,14 +1,16 @@
 //! Random machines: verdicts against motions by Taylor series, and of some against a winding number, without eigenvalues.
 
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
-use rayon::prelude::*;
 
 use super::characteristic::Characteristic;
 use super::period::{Period, Resolution};
-use super::taylor::{self, Series};
+use super::taylor::{self, Counter, Series};
 use super::tests::random_case;
 use super::*;
 
@@ -96,6 +98,7 @@ struct Outcome {
 struct Reference {
     multiplier_abs: f64,
     error: f64,
+    verdict: Verdict,
 }
 
 impl Reference {
@@ -103,35 +106,76 @@ impl Reference {
     const COARSE: f64 = 3e-8;
     const FINE: f64 = 1e-9;
 
-    /// Fine series are for multipliers that coarse ones leave near 1.
-    fn new(problem: &Problem, rpm: f64, depth_m: f64) -> Option<Self> {
-        Self::at(problem, rpm, depth_m, Series::COARSE, Self::COARSE)
-            .filter(|coarse| (coarse.multiplier_abs - 1.0).abs() > 100.0 * coarse.error)
-            .or_else(|| Self::at(problem, rpm, depth_m, Series::FINE, Self::FINE))
+    /// Fine series are for multipliers that coarse ones leave near 1, and counting for what series do not tell or miss by more than
+    /// half of both errors.
+    fn new(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&Point>) -> Option<Self> {
+        let is_near = |reference: &Self| reference.miss(found) < 0.5;
+        let by_series = || {
+            // Where coarse series do not settle fine ones do not either.
+            let coarse = Self::at(problem, rpm, depth_m, Series::COARSE, Self::COARSE)?;
+            if (coarse.multiplier_abs - 1.0).abs() > 100.0 * coarse.error && is_near(&coarse) {
+                return Some(coarse);
+            }
+            let fine = Self::at(problem, rpm, depth_m, Series::FINE, Self::FINE)?;
+            (fine.verdict != Verdict::Undecided && is_near(&fine)).then_some(fine)
+        };
+        by_series().or_else(|| Self::by_counting(problem, rpm, depth_m, found))
     }
 
     fn at(problem: &Problem, rpm: f64, depth_m: f64, series: Series, error: f64) -> Option<Self> {
         let (multiplier_abs, unsettled) = taylor::largest_abs(problem, rpm, depth_m, series)?;
+        let error = error * multiplier_abs.max(1.0) + 10.0 * unsettled;
+        let verdict = Verdict::of(multiplier_abs, error);
         Some(Self {
             multiplier_abs,
-            error: error * multiplier_abs.max(1.0) + 10.0 * unsettled,
+            error,
+            verdict,
         })
     }
 
-    fn verdict(&self) -> Verdict {
-        Verdict::of(self.multiplier_abs, self.error)
+    /// By the numbers of multipliers beyond what was found and its error, and within: there is to be none, and one. Where nothing
+    /// was found, or these numbers do not tell a verdict, by that outside the unit circle.
+    fn by_counting(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&Point>) -> Option<Self> {
+        /// Smaller multipliers are not counted.
+        const LEAST: f64 = 0.2;
+        let counter = Counter::new(problem, rpm, depth_m, LEAST)?;
+        let (size, error) = found.map_or((0.0, 0.0), |point| (point.multiplier_abs, point.error));
+        let (inner, outer) = (size - error, size + error);
+        let beyond = |radius: f64| found.and_then(|_| counter.beyond(radius.max(LEAST)));
+        let is_none_beyond = beyond(outer).map(|count| count == 0);
+        let is_one_within = if inner > LEAST {
+            beyond(inner).map(|count| count > 0)
+        } else {
+            Some(true)
+        };
+        let verdict = match (is_none_beyond, is_one_within) {
+            (Some(true), _) if outer.max(LEAST) < 1.0 => Verdict::Stable,
+            (_, Some(true)) if inner > 1.0 => Verdict::Unstable,
+            _ if counter.beyond(1.0)? == 0 => Verdict::Stable,
+            _ => Verdict::Unstable,
+        };
+        let is_missed = is_none_beyond == Some(false) && outer > LEAST || is_one_within == Some(false);
+        Some(Self {
+            multiplier_abs: if is_missed { f64::INFINITY } else { size },
+            error,
+            verdict,
+        })
+    }
+
+    /// Distance from what was found, over the sum of both errors.
+    fn miss(&self, found: Option<&Point>) -> f64 {
+        found.map_or(0.0, |found| {
+            (found.multiplier_abs - self.multiplier_abs).abs() / (found.error + self.error)
+        })
     }
 }
-
-/// Of larger multipliers verdicts alone are compared: the digits of the reference are lost in such growth.
-const COMPARED: f64 = 1e6;
 
 /// Of so many machines one is computed with finer series too.
 const BY_FINER_SERIES: usize = 50;
 
 impl Outcome {
     fn is_wrong(&self) -> bool {
-        let reference = self.reference.map(|reference| reference.verdict());
+        let reference = self.reference.map(|reference| reference.verdict);
         let by_winding = match self.stable_by_winding {
             Some(true) => Some(Verdict::Stable),
             Some(false) => Some(Verdict::Unstable),
@@ -149,7 +193,7 @@ impl Outcome {
 
     fn is_silent(&self) -> bool {
         self.reference
-            .is_none_or(|reference| reference.verdict() == Verdict::Undecided)
+            .is_none_or(|reference| reference.verdict == Verdict::Undecided)
     }
 
     fn is_undecided(&self) -> bool {
@@ -193,33 +237,22 @@ fn random_point(seed: u64, index: usize, ports_max: usize) -> Outcome {
     let time = began.elapsed();
     let depth_m = depth_mm * 1e-3;
     let known = found.as_ref().ok();
-    let between = |a: f64, b: f64, error: f64| (a - b).abs() / error;
-    let miss = |reference: Option<Reference>| {
-        let near = reference.filter(|reference| reference.multiplier_abs < COMPARED);
-        known.zip(near).map_or(0.0, |(found, reference)| {
-            let error = found.error + reference.error;
-            between(found.multiplier_abs, reference.multiplier_abs, error)
-        })
-    };
-    let fine = || Reference::at(&problem, rpm, depth_m, Series::FINE, Reference::FINE);
     let began = Instant::now();
-    let mut reference = Reference::new(&problem, rpm, depth_m);
-    if miss(reference) > 0.5 {
-        reference = fine();
-    }
+    let reference = Reference::new(&problem, rpm, depth_m, known);
     let reference_time = began.elapsed();
-    let finer = index.is_multiple_of(BY_FINER_SERIES).then(fine).flatten();
+    let finer = index.is_multiple_of(BY_FINER_SERIES).then(|| {
+        let at = |series, error| Reference::at(&problem, rpm, depth_m, series, error);
+        at(Series::COARSE, Reference::COARSE).zip(at(Series::FINE, Reference::FINE))
+    });
     Outcome {
         verdict: known.map(|found| found.verdict),
         stable_by_winding: known
             .filter(|_| Period::new(&problem, rpm, 2.0 * depth_m, Resolution::FINE).ports() <= ports_max)
             .and_then(|found| is_stable_by_winding(&problem, rpm, depth_m, found.multiplier)),
-        error_ratio: miss(reference),
-        reference_ratio: reference
-            .zip(finer.filter(|finer| finer.multiplier_abs < COMPARED))
-            .map_or(0.0, |(reference, finer)| {
-                between(reference.multiplier_abs, finer.multiplier_abs, reference.error)
-            }),
+        error_ratio: reference.map_or(0.0, |reference| reference.miss(known)),
+        reference_ratio: finer.flatten().map_or(0.0, |(coarse, fine)| {
+            (coarse.multiplier_abs - fine.multiplier_abs).abs() / (coarse.error + fine.error)
+        }),
         reference,
         time,
         reference_time,
@@ -237,6 +270,10 @@ fn random_point(seed: u64, index: usize, ports_max: usize) -> Outcome {
 struct Counts {
     machines: usize,
     wrong: usize,
+    crashed: usize,
+    hung: usize,
+    /// With a distance from the reference beyond both stated errors.
+    beyond_error: usize,
     undecided: usize,
     refused: usize,
     stable: usize,
@@ -246,14 +283,15 @@ struct Counts {
     reference_ratio: f64,
     time: Duration,
     reference_time: Duration,
-    slowest: Duration,
-    slowest_reference: Duration,
+    slowest: (Duration, usize),
+    slowest_reference: (Duration, usize),
 }
 
 impl Counts {
-    fn add(&mut self, outcome: &Outcome) {
+    fn add(&mut self, index: usize, outcome: &Outcome) {
         self.machines += 1;
         self.wrong += usize::from(outcome.is_wrong());
+        self.beyond_error += usize::from(outcome.error_ratio > 1.0);
         self.undecided += usize::from(outcome.is_undecided());
         self.refused += usize::from(outcome.verdict.is_none());
         self.stable += usize::from(outcome.verdict == Some(Verdict::Stable));
@@ -263,12 +301,22 @@ impl Counts {
         self.reference_ratio = self.reference_ratio.max(outcome.reference_ratio);
         self.time += outcome.time;
         self.reference_time += outcome.reference_time;
-        self.slowest = self.slowest.max(outcome.time);
-        self.slowest_reference = self.slowest_reference.max(outcome.reference_time);
+        self.slowest = self.slowest.max((outcome.time, index));
+        self.slowest_reference = self.slowest_reference.max((outcome.reference_time, index));
+    }
+
+    fn crash(&mut self) {
+        self.machines += 1;
+        self.crashed += 1;
+    }
+
+    fn hang(&mut self) {
+        self.machines += 1;
+        self.hung += 1;
     }
 
     fn check(&self) {
-        assert_eq!(self.wrong, 0);
+        assert_eq!((self.wrong, self.crashed, self.hung), (0, 0, 0));
         assert!(self.error_ratio <= 1.0, "{}", self.error_ratio);
         assert!(self.reference_ratio <= 1.0, "{}", self.reference_ratio);
         // Asked for is less than 1 % each; some hundred machines may hold a few more by chance.
@@ -283,53 +331,134 @@ impl std::fmt::Display for Counts {
         let mean_ms = |time: Duration| 1e3 * time.as_secs_f64() / self.machines as f64;
         write!(
             f,
-            "{} machines: {} wrong, {} undecided ({} refused), reference silent at {}, {} also by winding number; stable \
-             {:.1} %; largest error over both stated {:.2}, of the reference {:.2}; mean {:.2} ms, slowest {:.2?}; reference \
-             {:.2} ms, {:.2?}",
+            "{} machines: {} wrong, {} crashed, {} hung, {} undecided ({} refused), reference silent at {}, {} also by winding \
+             number; stable {:.1} %; largest error over both stated {:.2} ({} above 1), of the reference {:.2}; mean {:.2} ms, \
+             slowest {:.2?} (machine {}); reference {:.2} ms, {:.2?} (machine {})",
             self.machines,
             self.wrong,
+            self.crashed,
+            self.hung,
             self.undecided,
             self.refused,
             self.silent,
             self.by_winding,
             percent(self.stable),
             self.error_ratio,
+            self.beyond_error,
             self.reference_ratio,
             mean_ms(self.time),
-            self.slowest,
+            self.slowest.0,
+            self.slowest.1,
             mean_ms(self.reference_time),
-            self.slowest_reference,
+            self.slowest_reference.0,
+            self.slowest_reference.1,
         )
     }
 }
 
-/// Machines of which counts are printed together.
-const CHUNK: usize = 1000;
+/// Machines after which counts so far are printed.
+const PROGRESS: usize = 1000;
 
-/// Runs machines, says what came of them, and panics where a verdict is wrong or an error larger than stated.
+/// A machine that takes longer, s by the clock on the wall, counts as a failure: as one that never ends.
+const LONGEST_S: usize = 60;
+
+/// What a worker says: which machine it is at, and what came of it (the words of a panic, if that is what came).
+enum Word {
+    Began(usize),
+    Ended(usize, Box<Result<Outcome, String>>),
+}
+
+/// A thread that takes machines one after the other from `next` on until `end`.
+fn worker(
+    seed: u64,
+    next: &Arc<AtomicUsize>,
+    end: usize,
+    ports_max: usize,
+    words: mpsc::Sender<(usize, Word)>,
+    number: usize,
+) {
+    let next = Arc::clone(next);
+    std::thread::spawn(move || {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= end || words.send((number, Word::Began(index))).is_err() {
+                return;
+            }
+            let outcome =
+                std::panic::catch_unwind(|| random_point(seed, index, ports_max)).map_err(|panic| {
+                    let text = panic.downcast_ref::<String>().cloned();
+                    text.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string))
+                        .unwrap_or_default()
+                });
+            if words
+                .send((number, Word::Ended(index, Box::new(outcome))))
+                .is_err()
+            {
+                return;
+            }
+        }
+    });
+}
+
+/// Runs machines, says what came of them, and panics where a verdict is wrong, an error larger than stated, or no answer came.
 ///
 /// The winding number is asked where the finest map has at most `ports_max` ports.
 fn run(seed: u64, first: usize, count: usize, ports_max: usize) {
-    let mut all = Counts::default();
-    for from in (first..first + count).step_by(CHUNK) {
-        let until = (from + CHUNK).min(first + count);
-        let outcomes: Vec<Outcome> = (from..until)
-            .into_par_iter()
-            .map(|index| {
-                let outcome = random_point(seed, index, ports_max);
-                outcome.tell();
-                outcome
-            })
-            .collect();
-        let mut counts = Counts::default();
-        for outcome in &outcomes {
-            counts.add(outcome);
-            all.add(outcome);
-        }
-        println!("seed {seed}, from {from}: {counts}");
+    let end = first + count;
+    let longest = Duration::from_secs(number("QUIETCUT_RANDOM_LONGEST_S", LONGEST_S) as u64);
+    let next = Arc::new(AtomicUsize::new(first));
+    let (sender, words) = mpsc::channel();
+    let mut workers = rayon::current_num_threads().min(count);
+    for number in 0..workers {
+        worker(seed, &next, end, ports_max, sender.clone(), number);
     }
-    println!("seed {seed}, all: {all}");
-    all.check();
+    let began = Instant::now();
+    let mut counts = Counts::default();
+    let mut at: BTreeMap<usize, (usize, Instant)> = BTreeMap::new();
+    while counts.machines < count {
+        match words.recv_timeout(Duration::from_secs(1)) {
+            Ok((number, Word::Began(index))) => {
+                at.insert(number, (index, Instant::now()));
+            }
+            Ok((number, Word::Ended(index, outcome))) => {
+                // One that was given up may end after all.
+                if at.remove(&number).is_none() {
+                    continue;
+                }
+                match *outcome {
+                    Ok(outcome) => {
+                        outcome.tell();
+                        counts.add(index, &outcome);
+                    }
+                    Err(panic) => {
+                        eprintln!("CRASH machine {index} of seed {seed}: {panic}");
+                        counts.crash();
+                    }
+                }
+                if counts.machines.is_multiple_of(PROGRESS) {
+                    println!("seed {seed}, from {first}, {:.0?}: {counts}", began.elapsed());
+                }
+            }
+            Err(_) => {}
+        }
+        let late: Vec<usize> = at
+            .iter()
+            .filter_map(|(number, (_, since))| (since.elapsed() > longest).then_some(*number))
+            .collect();
+        for number in late {
+            if let Some((index, _)) = at.remove(&number) {
+                eprintln!("HANG machine {index} of seed {seed}: no answer in {longest:.0?}");
+                counts.hang();
+                worker(seed, &next, end, ports_max, sender.clone(), workers);
+                workers += 1;
+            }
+        }
+    }
+    println!(
+        "seed {seed}, from {first}, all, {:.0?}: {counts}",
+        began.elapsed()
+    );
+    counts.check();
 }
 
 fn number(name: &str, default: usize) -> usize {
@@ -341,19 +470,20 @@ fn number(name: &str, default: usize) -> usize {
 
 #[test]
 fn verdicts_of_some_random_machines_are_right() {
-    run(20_261_121, 0, 500, 0);
+    run(20_261_121, 0, 120, 0);
     // The winding number takes much longer.
     run(20_261_122, 0, 40, 150);
 }
 
-/// All of them; counts of every thousand go to stdout, whatever is undecided or slow to stderr:
+/// All of them; counts so far go to stdout after every thousand, whatever is undecided or slow to stderr:
 ///
 /// ```text
 /// RAYON_NUM_THREADS=1 cargo test --release -p quietcut --lib -- --ignored --nocapture verdicts_of_a_hundred_thousand
 /// ```
 ///
 /// `QUIETCUT_RANDOM_CASES` sets how many, `QUIETCUT_RANDOM_FIRST` the first, `QUIETCUT_SEED` the seed, `QUIETCUT_WINDING_PORTS` up to
-/// which size the winding number is asked too.
+/// which size the winding number is asked too, `QUIETCUT_RANDOM_LONGEST_S` after which time a machine counts as hung: more where the
+/// processor is shared.
 #[test]
 #[ignore = "hours; the command stands above"]
 fn verdicts_of_a_hundred_thousand_random_machines_are_right() {

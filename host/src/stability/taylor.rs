@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use num_complex::Complex64;
 
 use super::Problem;
-use super::multiplier::eigenvector;
+use super::hessenberg::Shifted;
 use crate::eigenvalues::eigenvalues;
 
 /// How finely a period is computed.
@@ -50,8 +50,8 @@ const TURN: f64 = 0.7;
 /// Terms of coefficients below this share of the first are rounding.
 const TERM: f64 = 1e-17;
 
-/// The most vectors of a Krylov space.
-const VECTORS_MAX: usize = 500;
+/// The most vectors of a Krylov space: where more are needed counting is cheaper.
+const VECTORS_MAX: usize = 120;
 
 /// The residual of an eigenvector, and the change since the look before, with which an eigenvalue is taken, relative to the map.
 const SETTLED: f64 = 1e-10;
@@ -269,6 +269,59 @@ impl TaylorPeriod {
         after
     }
 
+    /// Φ by columns where the surface before counts as much as makes the forces `share` times those of the displacement alone, and for
+    /// each part of the period the share of the last two terms.
+    fn transition(&self, share: Complex64, tails: &mut [f64]) -> Vec<Complex64> {
+        let (n, last) = (self.order, self.series.last);
+        let mut phi = vec![Complex64::ZERO; n * n];
+        let mut x = vec![Complex64::ZERO; n * (last + 1)];
+        let mut seen = vec![[Complex64::ZERO; 3]; last];
+        for (column, out) in phi.chunks_exact_mut(n).enumerate() {
+            x[..n].fill(Complex64::ZERO);
+            x[column] = Complex64::ONE;
+            for step in &self.steps {
+                for k in 0..last {
+                    let mut force = [Complex64::ZERO; 3];
+                    if !step.force.is_empty() {
+                        for axis in 0..3 {
+                            let c = &self.c[axis * n..(axis + 1) * n];
+                            seen[k][axis] = c.iter().zip(&x[k * n..]).map(|(c, x)| x * *c).sum();
+                        }
+                        for (matrix, seen) in step.force.iter().zip(seen[..=k].iter().rev()) {
+                            for axis in 0..3 {
+                                let row = &matrix[3 * axis..];
+                                force[axis] += seen[0] * row[0] + seen[1] * row[1] + seen[2] * row[2];
+                            }
+                        }
+                        force = force.map(|force| force * share);
+                        for (vector, seen) in step.forced.iter().zip(seen[..=k].iter().rev()) {
+                            for axis in 0..3 {
+                                force[axis] -= seen[2] * vector[axis];
+                            }
+                        }
+                    }
+                    let factor = step.duration_s / (k + 1) as f64;
+                    let (known, next) = x[k * n..].split_at_mut(n);
+                    for (i, next) in next[..n].iter_mut().enumerate() {
+                        let b = &self.b[i];
+                        let pushed = force[0] * b[0] + force[1] * b[1] + force[2] * b[2];
+                        let own: Complex64 = self.a[i * n..].iter().zip(&*known).map(|(a, x)| x * *a).sum();
+                        *next = (own + pushed) * factor;
+                    }
+                }
+                let size = |k: usize| x[k * n..][..n].iter().map(|x| x.l1_norm()).fold(0.0, f64::max);
+                let largest = (0..=last).map(size).fold(f64::MIN_POSITIVE, f64::max);
+                tails[step.part] = tails[step.part].max((size(last) + size(last - 1)) / largest);
+                // The series at σ = 1.
+                for i in 0..n {
+                    x[i] = (0..=last).rev().map(|k| x[k * n + i]).sum();
+                }
+            }
+            out.copy_from_slice(&x[..n]);
+        }
+        phi
+    }
+
     /// A state that is the same at every call and has a part along everything; the surface is one of steps.
     fn start(&self) -> Vec<f64> {
         let mut state = vec![0.0; self.size];
@@ -285,22 +338,40 @@ impl TaylorPeriod {
     }
 }
 
-/// The absolute value of the largest multiplier, and what the series and rounding leave open of it; `None` where nothing finite comes
-/// out or Arnoldi's method does not settle.
-pub(super) fn largest_abs(problem: &Problem, rpm: f64, depth_m: f64, series: Series) -> Option<(f64, f64)> {
+/// The least numbers of steps for the parts of the period.
+fn least_counts(problem: &Problem, rpm: f64, series: Series) -> Vec<usize> {
     let period_s = problem.tooth_period_s(rpm);
     let rate = (0..problem.structure.order())
         .map(|column| problem.structure.a.column(column).lp_norm(1))
         .fold(0.0, f64::max);
     let pitch = TAU / problem.teeth as f64;
-    let mut counts: Vec<usize> = parts(problem)
+    parts(problem)
         .iter()
         .map(|([from, to], _)| {
             let share = (to - from) / pitch;
             let steps = (rate * period_s * share / series.angle).max((to - from) / TURN);
             steps.ceil() as usize
         })
-        .collect();
+        .collect()
+}
+
+/// More steps where the tails of the series were too large.
+fn refine(counts: &mut [usize], tails: &[f64], series: Series) {
+    for (count, tail) in counts.iter_mut().zip(tails) {
+        if !tail.is_finite() {
+            // The series grew out of all numbers.
+            *count *= 4;
+        } else if *tail >= series.tail {
+            let finer = 1.05 * (tail / series.tail).powf(1.0 / (series.last - 1) as f64);
+            *count = (*count as f64 * finer.clamp(1.1, 4.0)).ceil() as usize;
+        }
+    }
+}
+
+/// The absolute value of the largest multiplier, and what the series and rounding leave open of it; `None` where nothing finite comes
+/// out or Arnoldi's method does not settle.
+pub(super) fn largest_abs(problem: &Problem, rpm: f64, depth_m: f64, series: Series) -> Option<(f64, f64)> {
+    let mut counts = least_counts(problem, rpm, series);
     for _ in 0..12 {
         let period = TaylorPeriod::new(problem, rpm, depth_m, series, &counts);
         let mut tails = vec![0.0; counts.len()];
@@ -309,24 +380,124 @@ pub(super) fn largest_abs(problem: &Problem, rpm: f64, depth_m: f64, series: Ser
             .iter()
             .all(|&tail| tail < series.tail)
             .then(|| arnoldi(&period, &mut tails));
-        if tails.iter().any(|tail| !tail.is_finite()) {
-            // The series grew out of all numbers.
-            counts.iter_mut().for_each(|count| *count *= 4);
-            continue;
-        }
         if let Some(found) = found
             && tails.iter().all(|&tail| tail < 100.0 * series.tail)
         {
             return found;
         }
-        for (count, tail) in counts.iter_mut().zip(&tails) {
-            if *tail >= series.tail {
-                let finer = 1.05 * (tail / series.tail).powf(1.0 / (series.last - 1) as f64);
-                *count = (*count as f64 * finer.clamp(1.1, 4.0)).ceil() as usize;
-            }
-        }
+        refine(&mut counts, &tails, series);
     }
     None
+}
+
+/// Counts multipliers, without the map on surfaces: by the phase of G(z) = det(I − z Φ(w (1 − z))), whose zeros are 1/μ, along
+/// circles. Φ is that of the series with the force of the surface before in proportion to that of the tooth.
+pub(super) struct Counter {
+    period: TaylorPeriod,
+}
+
+/// The most points on half of a circle.
+const POINTS_MAX: usize = 800;
+
+/// How much the phase may turn between neighbouring points, rad.
+const PHASE: f64 = 0.6;
+
+impl Counter {
+    /// For multipliers beyond `least`; `None` where the series do not settle.
+    pub(super) fn new(problem: &Problem, rpm: f64, depth_m: f64, least: f64) -> Option<Self> {
+        let series = Series::FINE;
+        let mut counts = least_counts(problem, rpm, series);
+        for _ in 0..12 {
+            let period = TaylorPeriod::new(problem, rpm, depth_m, series, &counts);
+            let mut tails = vec![0.0; counts.len()];
+            for z in [1.0, -1.0].map(|sign| Complex64::from(sign / least)) {
+                period.transition(Complex64::ONE - z, &mut tails);
+            }
+            if tails.iter().all(|&tail| tail < series.tail) {
+                return Some(Self { period });
+            }
+            refine(&mut counts, &tails, series);
+        }
+        None
+    }
+
+    /// The phase of G at z, to whole turns; `None` where Φ is not finite.
+    fn phase(&self, z: Complex64) -> Option<f64> {
+        let n = self.period.order;
+        let mut tails = vec![0.0; self.period.steps.len()];
+        let mut g = self.period.transition(Complex64::ONE - z, &mut tails);
+        for (index, entry) in g.iter_mut().enumerate() {
+            *entry *= -z;
+            if index / n == index % n {
+                *entry += 1.0;
+            }
+        }
+        let largest = g.iter().map(|entry| entry.l1_norm()).fold(0.0, f64::max);
+        if !largest.is_finite() {
+            return None;
+        }
+        let mut matrix = DMatrix::from_vec(n, n, g) / Complex64::from(largest);
+        let mut phase = 0.0;
+        for column in 0..n {
+            let size = |row: &usize| matrix[(*row, column)].l1_norm();
+            let pivot = (column..n)
+                .max_by(|p, q| size(p).total_cmp(&size(q)))
+                .unwrap_or(column);
+            if pivot != column {
+                matrix.swap_rows(pivot, column);
+                phase += 0.5 * TAU;
+            }
+            let head = matrix[(column, column)];
+            phase += head.arg();
+            if head == Complex64::ZERO {
+                return None;
+            }
+            for row in column + 1..n {
+                let factor = matrix[(row, column)] / head;
+                for j in column + 1..n {
+                    let known = matrix[(column, j)];
+                    matrix[(row, j)] -= factor * known;
+                }
+            }
+        }
+        Some(phase)
+    }
+
+    /// How many multipliers are larger than a radius; `None` where the points allowed do not tell.
+    pub(super) fn beyond(&self, radius: f64) -> Option<usize> {
+        const FIRST: usize = 32;
+        let half = 0.5 * TAU;
+        let at = |angle: f64| self.phase(Complex64::from_polar(radius.recip(), angle));
+        let turn = |from: f64, to: f64| {
+            let turn = to - from;
+            turn - TAU * (turn / TAU).round()
+        };
+        let (mut turned, mut points) = (0.0, FIRST);
+        // Values at conjugate points are conjugate: half of the circle will do.
+        let mut last = (0.0, at(0.0)?);
+        for i in 1..=FIRST {
+            let angle = half * i as f64 / FIRST as f64;
+            // Segments that remain, the nearest last.
+            let mut ends = vec![(angle, at(angle)?)];
+            while let Some(&end) = ends.last() {
+                let middle = 0.5 * (last.0 + end.0);
+                let between = (middle, at(middle)?);
+                points += 1;
+                let turns = [turn(last.1, between.1), turn(between.1, end.1)];
+                if turns.iter().all(|turn| turn.abs() < PHASE) {
+                    turned += turns[0] + turns[1];
+                    last = end;
+                    ends.pop();
+                } else if points > POINTS_MAX {
+                    return None;
+                } else {
+                    ends.push(between);
+                }
+            }
+        }
+        let count = turned / half;
+        ((count - count.round()).abs() < 0.01 && count > -0.5).then_some(count.round() as usize)
+    }
 }
 
 /// The size of the largest eigenvalue of the map of a period; its change with the last vectors, and what the series leave out of the map.
@@ -354,7 +525,9 @@ fn arnoldi(period: &TaylorPeriod, tails: &mut [f64]) -> Option<(f64, f64)> {
                 .into_iter()
                 .max_by(|p, q| p.norm_sqr().total_cmp(&q.norm_sqr()))?;
             let size = found.norm();
-            let left_out = period.series.tail * within.norm();
+            let shifted = Shifted::new(&within, 1, found);
+            // What the series leave out changes the eigenvalue by its condition times as much.
+            let left_out = period.series.tail * within.norm() * shifted.condition()?;
             if k + 1 == period.size || left <= 1e-14 * whole {
                 return Some((size, left_out));
             }
@@ -362,7 +535,7 @@ fn arnoldi(period: &TaylorPeriod, tails: &mut [f64]) -> Option<(f64, f64)> {
             let scale = SETTLED * size.max(within.norm());
             let change = (size - before).abs();
             if change < scale {
-                let vector = eigenvector(&within.map(Complex64::from), found)?;
+                let vector = shifted.right()?;
                 if left * vector[k].norm() < scale {
                     return Some((size, change + left_out));
                 }

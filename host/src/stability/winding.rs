@@ -1,0 +1,188 @@
+//! The largest multiplier from the characteristic function alone: roots by Newton, and none missed by a winding number.
+//!
+//! Where motions grow within a period by far more than over the whole of it, the map of the period is so far from normal that
+//! rounding moves its eigenvalues, and where very many of them are of one size Krylov spaces do not settle. With z = 1/μ
+//!
+//!   G(z) = det(I − z Φ(w (1 − z)))
+//!
+//! is entire, a matter of n × n matrices, and its zeros are 1/μ of all multipliers. The mean of z G'/G over the circle of radius 1/R
+//! is the number of multipliers beyond R.
+
+use num_complex::Complex64;
+
+use super::characteristic::{Characteristic, Workspace};
+
+/// Multipliers below this size are not looked for: the depth |w (1 − 1/μ)| is five times w at most.
+pub(super) const LEAST: f64 = 0.25;
+
+/// How far beyond [`LEAST`], or beyond the largest multiplier, it is shown that there is none, in turn.
+const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
+
+/// The same while a verdict is not certain.
+const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
+
+/// How many operations all evaluations together may take: seconds.
+const OPERATIONS_MAX: f64 = 3e9;
+
+/// The most points on half of a circle.
+const POINTS_MAX: usize = 8192;
+
+/// From so many candidates Newton begins.
+const CANDIDATES_MAX: usize = 6;
+
+/// The most multipliers that are looked for one by one.
+const ROOTS_MAX: usize = 12;
+
+/// What is known of the largest multiplier.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beyond {
+    /// The largest that was found, if it is larger than [`LEAST`]; of a pair the upper one.
+    pub(super) multiplier: Option<Complex64>,
+    /// No multiplier is larger than this; infinite where that could not be shown.
+    pub(super) radius: f64,
+}
+
+/// A characteristic function with what may still be spent on it.
+pub(super) struct Search<'a> {
+    characteristic: &'a Characteristic,
+    depth_m: f64,
+    work: Workspace,
+    evaluations_left: usize,
+}
+
+impl<'a> Search<'a> {
+    /// At a depth, m; the characteristic must be one for five times that.
+    pub(super) fn new(characteristic: &'a Characteristic, depth_m: f64) -> Self {
+        Self {
+            characteristic,
+            depth_m,
+            work: characteristic.workspace(),
+            evaluations_left: (OPERATIONS_MAX / characteristic.operations()) as usize,
+        }
+    }
+
+    /// z G'/G at z; `None` on a zero, or where nothing finite comes out or nothing may be spent.
+    fn slope(&mut self, z: Complex64) -> Option<Complex64> {
+        self.evaluations_left = self.evaluations_left.checked_sub(1)?;
+        let multiplier = z.inv();
+        let found = self
+            .characteristic
+            .logarithmic(multiplier, self.depth_m, &mut self.work)?;
+        // G(z) = (−z)ⁿ F(1/z)
+        let slope = self.characteristic.order() as f64 - multiplier * found.by_multiplier;
+        slope.is_finite().then_some(slope)
+    }
+
+    /// How many multipliers are larger than a radius; `None` where one is so near to it that the points allowed do not tell.
+    pub(super) fn count_beyond(&mut self, radius: f64) -> Option<usize> {
+        use std::f64::consts::PI;
+        let at = |angle: f64| Complex64::from_polar(radius.recip(), angle);
+        // Values at conjugate points are conjugate: half of the circle will do.
+        let mut points = 8;
+        let mut sum = 0.5 * (self.slope(at(0.0))?.re + self.slope(at(PI))?.re);
+        for i in 1..points {
+            sum += self.slope(at(PI * i as f64 / points as f64))?.re;
+        }
+        let (mut last, mut before) = (f64::INFINITY, f64::INFINITY);
+        while points <= POINTS_MAX {
+            let mean = sum / points as f64;
+            let whole = mean.round();
+            // Errors fall as a power of the number of points: three rounds near the same whole number have arrived.
+            if (mean - whole).abs() < 0.02 && (last - whole).abs() < 0.1 && (before - whole).abs() < 0.4 {
+                return (whole >= 0.0).then_some(whole as usize);
+            }
+            (before, last) = (last, mean);
+            for i in 0..points {
+                sum += self.slope(at(PI * (i as f64 + 0.5) / points as f64))?.re;
+            }
+            points *= 2;
+        }
+        None
+    }
+
+    /// A multiplier beyond a radius that is none of those known, by Newton with these divided out.
+    fn another_beyond(&mut self, radius: f64, known: &[Complex64]) -> Option<Complex64> {
+        const ANGLES: usize = 6;
+        for share in [0.95, 0.7, 0.3] {
+            for i in 0..ANGLES {
+                let angle = std::f64::consts::PI * (i as f64 + 0.25) / ANGLES as f64;
+                let start = Complex64::from_polar(share / radius, angle);
+                if let Some(found) = self.newton(start, known)
+                    && found.norm() > radius
+                {
+                    return Some(found);
+                }
+            }
+        }
+        None
+    }
+
+    /// The multiplier to which Newton leads from z = `start`.
+    fn newton(&mut self, start: Complex64, known: &[Complex64]) -> Option<Complex64> {
+        let mut z = start;
+        for _ in 0..15 {
+            let mut slope = self.slope(z)?;
+            for known in known {
+                let zero = known.inv();
+                slope -= z / (z - zero);
+                if known.im != 0.0 {
+                    slope -= z / (z - zero.conj());
+                }
+            }
+            let step = -z / slope;
+            z += step;
+            // Beyond, the polynomials of the elements are not good.
+            if !z.is_finite() || z.norm() > LEAST.recip() {
+                return None;
+            }
+            if step.norm() < 1e-9 * z.norm() {
+                let multiplier = z.inv();
+                let is_real = multiplier.im.abs() < 1e-7 * multiplier.norm();
+                let im = if is_real { 0.0 } else { multiplier.im.abs() };
+                return Some(Complex64::new(multiplier.re, im));
+            }
+        }
+        None
+    }
+
+    /// The largest multiplier, and a radius beyond which there is none; `candidates` are where Newton may begin.
+    pub(super) fn largest(&mut self, candidates: &[Complex64]) -> Beyond {
+        let mut known: Vec<Complex64> = Vec::new();
+        let mut best: Option<Complex64> = None;
+        let is_large = |candidate: &&Complex64| candidate.norm() > LEAST && candidate.im >= 0.0;
+        for candidate in candidates.iter().filter(is_large).take(CANDIDATES_MAX) {
+            if let Some(found) = self.newton(candidate.inv(), &[])
+                && best.is_none_or(|best| found.norm() > best.norm())
+            {
+                best = Some(found);
+            }
+        }
+        let mut radius = f64::INFINITY;
+        for margin in MARGINS.into_iter().chain(FINE_MARGINS) {
+            // A multiplier outside is enough, and so is a radius inside.
+            let is_decided = radius < 1.0 || best.is_some_and(|best| best.norm() > 1.0);
+            if FINE_MARGINS.contains(&margin) && is_decided {
+                break;
+            }
+            loop {
+                let at = best.map_or(LEAST, |best| best.norm()) * (1.0 + margin);
+                match self.count_beyond(at) {
+                    Some(0) => radius = at,
+                    Some(_) if known.len() < ROOTS_MAX => {
+                        known.extend(best);
+                        if let Some(found) = self.another_beyond(at, &known) {
+                            best = Some(found);
+                            continue;
+                        }
+                    }
+                    _ => {}
+                }
+                break;
+            }
+        }
+        Beyond {
+            multiplier: best,
+            radius,
+        }
+    }
+}
