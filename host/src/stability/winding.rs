@@ -186,3 +186,56 @@ impl<'a> Search<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::period::{Period, Resolution};
+    use super::super::period_map;
+    use super::super::tests::problem;
+    use super::*;
+
+    /// All multipliers of the collocated map, by the QR iteration, against zeros of G.
+    #[test]
+    fn counts_and_the_largest_multiplier_are_those_of_the_whole_map() {
+        let mut numbers = std::collections::BTreeSet::new();
+        for (name, rpm) in [("insperger-2dof-ad0.5", 6000.0), ("kuka-kr90-acetal", 900.0)] {
+            for depth_mm in [0.1, 1.0, 4.0] {
+                let (problem, depth_m) = (problem(name), depth_mm * 1e-3);
+                let kappa_m = (1.0 + LEAST.recip()) * depth_m;
+                let period = Period::new(&problem, rpm, kappa_m, Resolution::WORKING);
+                let all = period_map::multipliers(&period, depth_m).unwrap();
+                let characteristic = Characteristic::new(&period, kappa_m);
+                let mut search = Search::new(&characteristic, depth_m);
+                for radius in [0.3, 0.5, 0.8, 1.1] {
+                    // Next to a multiplier the points allowed do not tell.
+                    if all
+                        .iter()
+                        .any(|multiplier| (multiplier.norm() / radius - 1.0).abs() < 0.01)
+                    {
+                        continue;
+                    }
+                    let count = all.iter().filter(|multiplier| multiplier.norm() > radius).count();
+                    assert_eq!(
+                        search.count_beyond(radius),
+                        Some(count),
+                        "{name} {depth_mm} {radius} {all:?}"
+                    );
+                    numbers.insert(count);
+                }
+                let beyond = search.largest(&[]);
+                let largest = all[0].norm();
+                // The map is good to 1e-9, the last margin 2e-3 or better.
+                match beyond.multiplier {
+                    Some(found) => assert!((found.norm() - largest).abs() < 1e-8, "{beyond:?} {largest}"),
+                    None => assert!(largest < LEAST * 1.05),
+                }
+                assert!(
+                    largest <= beyond.radius && beyond.radius < 1.003 * largest.max(LEAST),
+                    "{beyond:?} {largest}"
+                );
+            }
+        }
+        // Not always the same: none, and several.
+        assert!(numbers.contains(&0) && numbers.len() >= 3, "{numbers:?}");
+    }
+}
