@@ -1,5 +1,6 @@
 //! Which causes explain the residual, and which do so equally well.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::cause::{Cause, Parameter, Place};
@@ -36,6 +37,17 @@ pub struct Explanation {
     pub fit: Fit,
     /// Parameters that were fitted, those of the shape included.
     pub freedoms: usize,
+    /// What simulation says, where the records can be simulated: coefficients, shapes and what is left are then its own.
+    pub simulated: Option<Simulated>,
+}
+
+/// Parameters that make a simulation agree with the records.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// By choice: covariance of coefficients and, behind them, of the shape, for noise of deviation 1.
+    pub covariance: Vec<DMatrix<f64>>,
+    /// By record: states at its start; empty where it starts from rest.
+    pub starts: Vec<Vec<f64>>,
 }
 
 /// The library on a scene.
@@ -76,10 +88,7 @@ impl Library {
             candidates: Vec::new(),
         };
         for (cause, place, shape, columns) in computed {
-            let numbers = columns
-                .iter()
-                .map(|column| regression.add(scene, column))
-                .collect();
+            let numbers = columns.iter().map(|column| regression.add(column)).collect();
             let known = library
                 .candidates
                 .iter_mut()
@@ -102,7 +111,7 @@ impl Library {
     }
 
     /// Every candidate with every shape.
-    fn choices(&self) -> Vec<Choice> {
+    pub fn choices(&self) -> Vec<Choice> {
         self.candidates
             .iter()
             .enumerate()
@@ -112,7 +121,8 @@ impl Library {
             .collect()
     }
 
-    fn columns(&self, choice: Choice) -> &[usize] {
+    /// The columns of a choice.
+    pub fn columns(&self, choice: Choice) -> &[usize] {
         &self.candidates[choice.candidate].shapes[choice.shape].1
     }
 
@@ -130,22 +140,22 @@ impl Library {
             .collect();
         let fit = regression.fit(Share::Whole, &columns)?;
         let explanation = Explanation {
-            freedoms: choices
-                .iter()
-                .map(|choice| {
-                    let (shape, columns) = &self.candidates[choice.candidate].shapes[choice.shape];
-                    // What settles by itself is no freedom.
-                    let settles = self
-                        .cause(choice.candidate)
-                        .settled(shape, &vec![1.0; columns.len()])
-                        .is_some();
-                    columns.len() + if settles { 0 } else { shape.len() }
-                })
-                .sum(),
+            freedoms: choices.iter().map(|choice| self.freedoms(*choice)).sum(),
             choices: choices.to_vec(),
             fit,
+            simulated: None,
         };
         self.parameters(scene, &explanation).map(|_| explanation)
+    }
+
+    /// Parameters of a choice that are fitted; what settles by itself is none.
+    pub fn freedoms(&self, choice: Choice) -> usize {
+        let (shape, columns) = &self.candidates[choice.candidate].shapes[choice.shape];
+        let settles = self
+            .cause(choice.candidate)
+            .settled(shape, &vec![1.0; columns.len()])
+            .is_some();
+        columns.len() + if settles { 0 } else { shape.len() }
     }
 
     /// All columns of an explanation, choice after choice.
@@ -266,7 +276,7 @@ impl Library {
     }
 
     /// A case holds one extension of a name: the same cause does not act twice.
-    fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
+    pub fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
         let new = self.cause(other.candidate).names();
         some.iter().all(|choice| {
             self.cause(choice.candidate)
@@ -334,7 +344,7 @@ impl Library {
                         }
                     }
                 }
-                Some(regression.add(scene, &slope))
+                Some(regression.add(&slope))
             })
             .collect()
     }
@@ -379,10 +389,7 @@ impl Library {
             });
         }
         let columns = columns(scene, &*self.causes[known.cause], &known.place, &shape)?;
-        let numbers = columns
-            .iter()
-            .map(|column| regression.add(scene, column))
-            .collect();
+        let numbers = columns.iter().map(|column| regression.add(column)).collect();
         let shapes = &mut self.candidates[candidate].shapes;
         shapes.push((shape, numbers));
         Some(Choice {
@@ -412,11 +419,4 @@ fn columns(
         .iter()
         .all(|column| column.iter().flatten().flatten().all(|sample| sample.is_finite()));
     whole.then_some(by_coefficient)
-}
-
-/// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
-pub fn gain(regression: &Regression, explanation: &Explanation, inflation: f64) -> f64 {
-    let count = regression.count(Share::Whole).max(2) as f64;
-    let taken = (regression.residual(Share::Whole) - explanation.fit.left) / inflation;
-    taken - explanation.freedoms as f64 * count.ln()
 }

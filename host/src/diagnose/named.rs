@@ -5,9 +5,9 @@ use nalgebra::DMatrix;
 use super::answer::{Figure, NamedCause};
 use super::cause::{Part, Place};
 use super::evidence::{Explanation, Library};
-use super::judge::APART;
 use super::regression::{Regression, Share};
 use super::scene::{Scene, direction_of};
+use super::selection::APART;
 
 /// A normal deviate is within this many deviations with 90 %.
 const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
@@ -21,7 +21,10 @@ pub(super) fn named(
     inflation: f64,
     confidence: f64,
 ) -> Vec<NamedCause> {
-    let covariance = covariance(scene, library, regression, explanation);
+    let covariance = match &explanation.simulated {
+        Some(simulated) => simulated.covariance.clone(),
+        None => covariance(scene, library, regression, explanation),
+    };
     let mut all = Vec::new();
     for (place, covariance) in covariance.iter().enumerate() {
         let choice = explanation.choices[place];
@@ -66,27 +69,6 @@ pub(super) fn named(
     all
 }
 
-/// The extensions of an explanation, name by name.
-pub(super) fn extensions(
-    scene: &Scene<'_>,
-    library: &Library,
-    explanation: &Explanation,
-) -> Option<Vec<(&'static str, toml::Table)>> {
-    let parameters = library.parameters(scene, explanation)?;
-    Some(
-        explanation
-            .choices
-            .iter()
-            .zip(parameters)
-            .flat_map(|(choice, parameters)| {
-                let place = &library.candidates[choice.candidate].place;
-                library.cause(choice.candidate).parts(place, &parameters)
-            })
-            .map(|part| (part.name, part.extension))
-            .collect(),
-    )
-}
-
 /// Mass, stiffness and damping by one factor, where that is the same as the gain that was found.
 pub(super) fn by_common_factor(
     scene: &Scene<'_>,
@@ -101,11 +83,16 @@ pub(super) fn by_common_factor(
     if !["sensor-gain", "sensor-offset-from-tool-tip"].contains(&library.cause(choice.candidate).name()) {
         return Vec::new();
     }
+    // Along the measured motion, as the common factor is.
+    let along = match regression.fit(Share::Whole, &library.columns_of(best)) {
+        Some(fit) => fit.left,
+        None => best.fit.left,
+    };
     for axis in scene.driven_axes() {
         let Some((left, change)) = library.common_factor(regression, axis) else {
             continue;
         };
-        if (left - best.fit.left) / inflation > APART {
+        if (left - along) / inflation > APART {
             continue;
         }
         // The factor is as sure as the gain.

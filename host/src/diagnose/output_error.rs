@@ -1,291 +1,659 @@
-//! The extended case in closed loop: its own motion under the measured forces, and what it misses.
+//! Parameters that make the simulation agree with the records: equation error to start, output error to finish.
 //!
-//! Regression along the measured motion is biased by the noise in that motion and by what sampling hides between samples.
-//! The simulation has neither: with r(θ) = y − y_simulated(θ), θ is moved until r is orthogonal to the regressors, which then
-//! are instruments (Söderström and Stoica, System Identification, 1989, chapter 8).
+//! Regression along the measured motion is biased by the noise in that motion and by what sampling hides between samples. The
+//! simulation has neither: with r(θ) = y − y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ
+//! (Ljung, System Identification, 1999, chapter 7; Levenberg and Marquardt's steps with slopes by differences). Of a record
+//! that begins anywhere its initial state is estimated beside θ. Where the whole record is too long for the first guess, its
+//! beginning is fitted first.
 
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::evidence::{Explanation, Library};
-use super::grid::Grid;
-use super::named::extensions;
-use super::record::Record;
-use super::regression::{Fit, Regression, Share};
-use super::scene::{Domain, Scene};
-use crate::recording::{Kind, Quantity};
-use crate::simulate::{Drive, Effects, Model, Room, Settings};
+use super::closed_loop::{ClosedLoop, starts_anywhere};
+use super::decay::{Decays, dot};
+use super::evidence::{Choice, Explanation, Library, Simulated};
+use super::part::{Part, Share, Unknown, split};
+use super::regression::{Fit, Regression};
+use super::scene::Scene;
+use crate::simulate::Effects;
 
-/// Instants between two samples at which a force is interpolated without changing its band; between these by cubics.
-const FINER: usize = 8;
-/// Rounds of correction.
-const ROUNDS: usize = 3;
+/// Steps of the search at most.
+const ROUNDS: usize = 15;
+/// A step that gains less than this of χ² is the last.
+const SETTLED: f64 = 0.1;
+/// Shares of a record that are fitted first where a guess is too far away for the whole.
+const HORIZONS: [f64; 2] = [0.12, 0.35];
+/// How many times what the regression leaves a guess may leave before it is too far away.
+const FAR: f64 = 2.0;
+/// How many times the least that the regression leaves an explanation may leave to have its start sought in steps.
+const FAR_BEHIND: f64 = 4.0;
+/// χ² by which an explanation may stay behind another before it is given up.
+const HOPELESS: f64 = 300.0;
 
-/// Measured forces as a drive.
-struct Measured {
-    rate_hz: f64,
-    /// Along x, y, z; empty where none acts.
-    force_n: [Vec<f64>; 3],
+/// Least step of a difference, as a share of its parameter: rounding of the integration. Where friction holds and lets go,
+/// accelerations jump, and a jump is before or after a sample: steps must move many of them.
+const LEAST_STEP: f64 = 1e-7;
+const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
+
+/// χ² per number from which on a search with friction is looked at again, and how far from where it ended, as shares.
+const STUCK: f64 = 1.1;
+const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
+
+/// Simulations compared with records.
+pub(super) struct OutputError<'a> {
+    scene: &'a Scene<'a>,
+    closed: ClosedLoop,
+    /// Parts of each share, in the order of the records.
+    parts: Vec<Part>,
+    horizons: Vec<Vec<Part>>,
 }
 
-impl Measured {
-    fn new(record: &Record) -> Self {
-        let grid = Grid::new(record.grid.count(), record.grid.rate_hz(), 0.0, FINER);
-        Self {
-            rate_hz: FINER as f64 * record.grid.rate_hz(),
-            force_n: std::array::from_fn(|axis| {
-                let force = &record.force_n[axis];
-                if force.is_empty() {
-                    Vec::new()
-                } else {
-                    grid.fine_samples(&grid.continued_spectrum(force))
-                }
-            }),
+/// Parameters and initial states.
+#[derive(Clone, Debug)]
+struct Point {
+    /// By choice: coefficients and, behind them, the shape.
+    inner: Vec<Vec<f64>>,
+    /// By record: states at its start; empty where it starts from rest.
+    starts: Vec<Vec<f64>>,
+}
+
+/// One number of a point that may move.
+#[derive(Clone, Copy, Debug)]
+enum Slot {
+    Inner {
+        choice: usize,
+        index: usize,
+        bounds: [f64; 2],
+    },
+    Start {
+        record: usize,
+        index: usize,
+    },
+}
+
+/// What is fitted: causes, and which numbers may move, each with the step of its difference.
+struct Problem<'a> {
+    library: &'a Library,
+    choices: &'a [Choice],
+    slots: Vec<(Slot, f64)>,
+    /// Least step of a difference, as a share of its parameter.
+    least_step: f64,
+}
+
+/// Where a search ended.
+struct Found {
+    point: Point,
+    left: f64,
+    /// Jᵀ J of the slots.
+    normal: DMatrix<f64>,
+}
+
+impl Slot {
+    fn of(self, point: &mut Point) -> &mut f64 {
+        match self {
+            Self::Inner { choice, index, .. } => &mut point.inner[choice][index],
+            Self::Start { record, index } => &mut point.starts[record][index],
+        }
+    }
+
+    /// False where a record does not feel it.
+    fn is_felt_by(self, record: usize) -> bool {
+        match self {
+            Self::Inner { .. } => true,
+            Self::Start { record: own, .. } => own == record,
         }
     }
 }
 
-impl Drive for Measured {
-    fn force_n(&self, t: f64) -> [f64; 3] {
-        let place = t * self.rate_hz;
-        self.force_n.each_ref().map(|force| catmull_rom(force, place))
+impl Problem<'_> {
+    /// The effects at a point; `None` where it is not physical.
+    fn effects(&self, scene: &Scene<'_>, point: &Point) -> Option<Effects> {
+        let mut tables = Vec::new();
+        for (choice, inner) in self.choices.iter().zip(&point.inner) {
+            let known = &self.library.candidates[choice.candidate];
+            let (shape, columns) = &known.shapes[choice.shape];
+            let (coefficients, moved) = inner.split_at(columns.len());
+            debug_assert_eq!(moved.len(), shape.len());
+            let cause = self.library.cause(choice.candidate);
+            let parameters = cause.parameters(scene, &known.place, moved, coefficients)?;
+            let parts = cause.parts(&known.place, &parameters);
+            tables.extend(parts.into_iter().map(|part| (part.name, part.extension)));
+        }
+        Effects::of_extensions(tables.iter().map(|(name, table)| (*name, table))).ok()
     }
 }
 
-/// A cubic through the two samples beside `place` with the slopes of their neighbours.
-fn catmull_rom(samples: &[f64], place: f64) -> f64 {
-    let Some(last) = samples.len().checked_sub(1) else {
-        return 0.0;
-    };
-    let index = (place.max(0.0) as usize).min(last);
-    let u = (place - index as f64).clamp(0.0, 1.0);
-    let at = |offset: isize| samples[index.saturating_add_signed(offset).min(last)];
-    let (a, b, c, d) = (at(-1), at(0), at(1), at(2));
-    b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
-}
+impl<'a> OutputError<'a> {
+    /// `None` where some record cannot be simulated.
+    pub(super) fn new(scene: &'a Scene<'a>) -> Option<Self> {
+        let closed = ClosedLoop::new(scene)?;
+        // What is let go has its own start among the parameters.
+        let unknown = |record: &super::record::Record| {
+            if starts_anywhere(record) {
+                Unknown::Offsets
+            } else {
+                Unknown::StartAndOffsets
+            }
+        };
+        let horizon = |share: f64| {
+            (0..scene.records.len())
+                .map(|index| {
+                    let record = &scene.records[index];
+                    let count = (share * record.grid.count() as f64) as usize;
+                    Part::new(scene, index, 0..count.max(16), Share::Whole, unknown(record))
+                })
+                .collect()
+        };
+        Some(Self {
+            scene,
+            closed,
+            parts: split(scene, unknown),
+            horizons: HORIZONS.map(horizon).into(),
+        })
+    }
 
-/// True where a record can be simulated: driven by its forces, from rest.
-fn can(record: &Record) -> bool {
-    record.domain == Domain::Response
-        && !matches!(record.kind, Some(Kind::FreeDecay | Kind::Cutting | Kind::Idle))
-        && record.force_n.iter().any(|force| !force.is_empty())
-}
+    fn of_share(&self, share: Share) -> Vec<&Part> {
+        self.parts.iter().filter(|part| part.share == share).collect()
+    }
 
-/// What each channel of a record reads while the extended case moves under the forces of the record, from rest.
-fn simulate(scene: &Scene<'_>, record: &Record, effects: &Effects) -> Option<Vec<Vec<f64>>> {
-    let all = scene.baseline.effects.clone().and(effects);
-    let (dynamics, terms) = all.dynamics(scene.baseline.structure).ok()?;
-    let model = Model {
-        dynamics,
-        cutting: None,
-        drive: Some(Box::new(Measured::new(record))),
-        terms,
-    };
-    let count = record.grid.count();
-    let pickups: Vec<_> = record
-        .channels
-        .iter()
-        .map(|channel| effects.pickup(channel.pickup.clone()))
-        .collect();
-    let mut samples: Vec<Vec<f64>> = vec![Vec::with_capacity(count); pickups.len()];
-    let mut room = Room::new(&model);
-    let settings = Settings {
-        relative: 1e-7,
-        ..Settings::default()
-    };
-    let rate_hz = record.grid.rate_hz();
-    model
-        .run((count - 1) as f64 / rate_hz, settings, |segment| {
-            for (pickup, samples) in pickups.iter().zip(&mut samples) {
-                while samples.len() < count {
-                    let t = samples.len() as f64 / rate_hz - pickup.delay_s;
-                    if t > segment.to_s() {
-                        break;
+    /// What is left of some parts of one record, in units of the noise.
+    fn residual(&self, record: usize, parts: &[&Part], effects: &Effects, start: &[f64]) -> Option<Vec<f64>> {
+        let mine: Vec<&&Part> = parts.iter().filter(|part| part.record == record).collect();
+        let Some(length) = mine.iter().map(|part| part.range.end).max() else {
+            return Some(Vec::new());
+        };
+        let mut samples = self.closed.simulate(self.scene, record, effects, start, length)?;
+        for (channel, samples) in self.scene.records[record].channels.iter().zip(&mut samples) {
+            for (simulated, measured) in samples.iter_mut().zip(&channel.measured) {
+                *simulated = measured - *simulated;
+            }
+        }
+        Some(mine.iter().flat_map(|part| part.whiten(&samples)).collect())
+    }
+
+    fn residuals(&self, problem: &Problem<'_>, parts: &[&Part], point: &Point) -> Option<Vec<Vec<f64>>> {
+        let effects = problem.effects(self.scene, point)?;
+        (0..self.scene.records.len())
+            .into_par_iter()
+            .map(|record| self.residual(record, parts, &effects, &point.starts[record]))
+            .collect()
+    }
+
+    /// Jᵀ J and Jᵀ r, J = ∂y_simulated/∂slot by differences; steps become such that each moves χ² by about one.
+    fn normal(
+        &self,
+        problem: &mut Problem<'_>,
+        parts: &[&Part],
+        point: &Point,
+        left: &[Vec<f64>],
+    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let size = problem.slots.len();
+        let columns: Vec<(usize, usize, Vec<f64>)> = {
+            let problem = &*problem;
+            let effects: Vec<Option<(Effects, Point, f64)>> = problem
+                .slots
+                .iter()
+                .map(|(slot, step)| {
+                    // Where a step leaves what is physical, the other way is taken.
+                    [*step, -step].into_iter().find_map(|step| {
+                        let mut moved = point.clone();
+                        *slot.of(&mut moved) += step;
+                        let effects = problem.effects(self.scene, &moved)?;
+                        Some((effects, moved, step))
+                    })
+                })
+                .collect();
+            let tasks: Vec<(usize, usize)> = (0..left.len())
+                .flat_map(|record| (0..size).map(move |slot| (record, slot)))
+                .filter(|(record, slot)| problem.slots[*slot].0.is_felt_by(*record))
+                .collect();
+            tasks
+                .into_par_iter()
+                .map(|(record, slot)| {
+                    let (effects, moved, step) = effects[slot].as_ref()?;
+                    let mut column = self.residual(record, parts, effects, &moved.starts[record])?;
+                    for (column, left) in column.iter_mut().zip(&left[record]) {
+                        *column = (left - *column) / step;
                     }
-                    if t < 0.0 {
-                        samples.push(0.0);
-                        continue;
-                    }
-                    let motion = segment.motion(t, &mut room);
-                    samples.push(pickup.read(match pickup.quantity {
-                        Quantity::Velocity => motion.velocity_m_per_s,
-                        Quantity::Acceleration => motion.acceleration_m_per_s2.unwrap_or([0.0; 3]),
-                        _ => motion.displacement_m,
-                    }));
+                    Some((record, slot, column))
+                })
+                .collect::<Option<_>>()?
+        };
+        let mut normal = DMatrix::<f64>::zeros(size, size);
+        let mut gradient = DVector::<f64>::zeros(size);
+        for (index, (record, slot, column)) in columns.iter().enumerate() {
+            gradient[*slot] += dot(column, &left[*record]);
+            for (_, other, second) in columns[..=index]
+                .iter()
+                .rev()
+                .take_while(|other| other.0 == *record)
+            {
+                let product = dot(column, second);
+                normal[(*slot, *other)] += product;
+                if slot != other {
+                    normal[(*other, *slot)] += product;
                 }
             }
-        })
-        .ok()?;
-    for samples in &mut samples {
-        let last = samples.last().copied().unwrap_or(0.0);
-        samples.resize(count, last);
-    }
-    Some(samples)
-}
-
-/// The explanation after correction by simulation, where that leaves less; else as it is.
-pub(super) fn corrected(
-    scene: &Scene<'_>,
-    library: &mut Library,
-    regression: &mut Regression,
-    explanation: &Explanation,
-) -> Explanation {
-    if !scene.records.iter().all(can) {
-        return explanation.clone();
-    }
-    let mut best: Option<Explanation> = None;
-    let mut tried = explanation.clone();
-    for _ in 0..ROUNDS {
-        let Some(left) = left_in_closed_loop(scene, library, &tried) else {
-            break;
-        };
-        let target = regression.add(scene, &left);
-        let energy = regression.energy(target);
-        let better = best.as_ref().is_none_or(|best| energy < best.fit.left - 1.0);
-        if better {
-            let mut kept = tried.clone();
-            kept.fit.left = energy;
-            best = Some(kept);
-        } else {
-            break;
         }
-        let Some(next) = step(scene, library, regression, &tried, target) else {
-            break;
+        for (index, (slot, step)) in problem.slots.iter_mut().enumerate() {
+            let value = slot.of(&mut point.clone()).abs();
+            let least = match slot {
+                Slot::Inner { .. } => problem.least_step,
+                Slot::Start { .. } => LEAST_STEP,
+            };
+            let natural = normal[(index, index)].sqrt().recip();
+            let most = match slot {
+                Slot::Inner {
+                    bounds: [low, high], ..
+                } if high.is_finite() => 0.05 * if *low > 0.0 { value } else { *high - *low },
+                _ => f64::INFINITY,
+            };
+            if natural.is_finite() {
+                *step = natural
+                    .clamp(1e-3 * *step, 1e3 * *step)
+                    .min(most)
+                    .max(least * value);
+            }
+        }
+        Some((normal, gradient))
+    }
+
+    /// Levenberg and Marquardt's search from `start`; `None` where the start cannot be simulated. It ends early where it stays
+    /// behind `rival`, a χ² that another explanation has reached.
+    fn search(
+        &self,
+        problem: &mut Problem<'_>,
+        parts: &[&Part],
+        start: Point,
+        rounds: usize,
+        rival: f64,
+    ) -> Option<Found> {
+        let mut point = start;
+        let mut residuals = self.residuals(problem, parts, &point)?;
+        let mut left = energy(&residuals);
+        let mut normal = DMatrix::zeros(0, 0);
+        if problem.slots.is_empty() {
+            return Some(Found { point, left, normal });
+        }
+        let mut trust = 1e-4;
+        for round in 0..rounds {
+            let mut gradient;
+            (normal, gradient) = self.normal(problem, parts, &point, &residuals)?;
+            at_bounds(problem, &point, &mut normal, &mut gradient);
+            let before = left;
+            // To first order most of it is of another shape.
+            let promised = left - predicted(&normal, &gradient);
+            if round >= 1 && promised - rival > HOPELESS && promised > 0.5 * left {
+                break;
+            }
+            let mut accepted = false;
+            for _ in 0..6 {
+                if let Some(next) = stepped(problem, &point, &normal, &gradient, trust)
+                    && let Some(after) = self.residuals(problem, parts, &next)
+                    && energy(&after) < left
+                {
+                    (point, left, residuals) = (next, energy(&after), after);
+                    trust = (0.1 * trust).max(1e-9);
+                    accepted = true;
+                    break;
+                }
+                trust = 10.0 * trust.max(1e-4);
+            }
+            let behind = |left: f64| left - rival - HOPELESS;
+            let hopeless = round >= 1 && behind(left) > 0.0 && behind(left) > 0.6 * behind(before);
+            if !accepted || before - left < SETTLED || hopeless {
+                break;
+            }
+        }
+        Some(Found { point, left, normal })
+    }
+
+    /// The explanation with the parameters that simulation finds, from those of the regression on; `None` where it cannot be
+    /// simulated. It is given up where it stays behind `rival`, a χ² that a simulation has reached; its start is sought in
+    /// steps only where the regression leaves not much more than `best_left`, the least that it leaves.
+    pub(super) fn fit(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        explanation: &Explanation,
+        (rival, best_left): (f64, f64),
+    ) -> Option<Explanation> {
+        let whole = self.of_share(Share::Whole);
+        let (mut problem, start) = self.problem(library, explanation)?;
+        let guess = self
+            .residuals(&problem, &whole, &start)
+            .map_or(f64::INFINITY, |left| energy(&left));
+        let mut start = start;
+        let by_regression = explanation.fit.left + regression.count(Share::Whole) as f64;
+        if guess > FAR * by_regression
+            && explanation.fit.left < FAR_BEHIND * best_left.max(regression.count(Share::Whole) as f64)
+        {
+            for parts in &self.horizons {
+                let parts: Vec<&Part> = parts.iter().collect();
+                if let Some(found) = self.search(&mut problem, &parts, start.clone(), 6, f64::INFINITY) {
+                    start = found.point;
+                }
+            }
+        }
+        let mut found = self.search(&mut problem, &whole, start, ROUNDS, rival)?;
+        if problem.least_step > LEAST_STEP && found.left > STUCK * regression.count(Share::Whole) as f64 {
+            found = self.beside(&mut problem, &whole, found, rival);
+        }
+        let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
+        let covariance = by_choice(&slots, &found);
+        self.accept(library, regression, explanation, found, covariance)
+    }
+
+    /// The search once more from the best of what lies near where it ended: whether friction lets go at all is a cliff.
+    fn beside(&self, problem: &mut Problem<'_>, parts: &[&Part], ended: Found, rival: f64) -> Found {
+        let mut best: Option<(f64, Point)> = None;
+        for (slot, _) in &problem.slots {
+            if !matches!(slot, Slot::Inner { .. }) {
+                continue;
+            }
+            for share in BESIDE.into_iter().flat_map(|share| [share, -share]) {
+                let mut moved = ended.point.clone();
+                *slot.of(&mut moved) *= 1.0 + share;
+                let least = best.as_ref().map_or(ended.left, |best| best.0);
+                if let Some(left) = self.residuals(problem, parts, &moved).map(|left| energy(&left))
+                    && left < least - SETTLED
+                {
+                    best = Some((left, moved));
+                }
+            }
+        }
+        let again = best.and_then(|(_, point)| self.search(problem, parts, point, ROUNDS, rival));
+        again.filter(|again| again.left < ended.left).unwrap_or(ended)
+    }
+
+    fn accept(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        explanation: &Explanation,
+        found: Found,
+        covariance: Vec<DMatrix<f64>>,
+    ) -> Option<Explanation> {
+        let mut next = explanation.clone();
+        let mut coefficients = Vec::new();
+        for (place, inner) in found.point.inner.iter().enumerate() {
+            let choice = next.choices[place];
+            let count = library.candidates[choice.candidate].shapes[choice.shape].1.len();
+            coefficients.extend_from_slice(&inner[..count]);
+            let shape = library
+                .cause(choice.candidate)
+                .settled(&inner[count..], &inner[..count])
+                .unwrap_or_else(|| inner[count..].to_vec());
+            next.choices[place] = library.add_shape(self.scene, regression, choice.candidate, shape)?;
+        }
+        next.fit.coefficients = coefficients;
+        next.fit.left = found.left;
+        next.simulated = Some(Simulated {
+            covariance,
+            starts: found.point.starts,
+        });
+        Some(next)
+    }
+
+    /// What may move, from what the regression says.
+    fn problem<'b>(
+        &self,
+        library: &'b Library,
+        explanation: &'b Explanation,
+    ) -> Option<(Problem<'b>, Point)> {
+        let mut slots = Vec::new();
+        let mut inner = Vec::new();
+        for (place, choice) in explanation.choices.iter().enumerate() {
+            let known = &library.candidates[choice.candidate];
+            let cause = library.cause(choice.candidate);
+            let coefficients = library.coefficients(explanation, place);
+            let shape = &known.shapes[choice.shape].0;
+            for (index, coefficient) in coefficients.iter().enumerate() {
+                let slot = Slot::Inner {
+                    choice: place,
+                    index,
+                    bounds: [f64::NEG_INFINITY, f64::INFINITY],
+                };
+                slots.push((slot, 1e-3 * coefficient.abs().max(f64::MIN_POSITIVE)));
+            }
+            if cause.settled(shape, &coefficients).is_none() {
+                let bounds = cause.bounds(self.scene, &known.place);
+                for (index, [low, high]) in bounds.into_iter().enumerate() {
+                    let slot = Slot::Inner {
+                        choice: place,
+                        index: coefficients.len() + index,
+                        bounds: [low, high],
+                    };
+                    let size = if low > 0.0 { shape[index] } else { high - low };
+                    slots.push((slot, 1e-3 * size));
+                }
+            }
+            inner.push(coefficients.iter().chain(shape).copied().collect());
+        }
+        let mut problem = Problem {
+            library,
+            choices: &explanation.choices,
+            slots,
+            least_step: LEAST_STEP,
         };
-        tried = next;
-    }
-    // Bias gone is worth a little more noise fitted; a simulation that went elsewhere is not.
-    match best {
-        Some(best) if best.fit.left < 1.02 * explanation.fit.left + 10.0 => best,
-        _ => explanation.clone(),
-    }
-}
-
-/// What the baseline alone leaves in closed loop, in units of the noise; `None` where it cannot be simulated.
-pub(super) fn left_by_baseline(
-    scene: &Scene<'_>,
-    library: &Library,
-    regression: &mut Regression,
-) -> Option<f64> {
-    if !scene.records.iter().all(can) {
-        return None;
-    }
-    let nothing = Explanation {
-        choices: Vec::new(),
-        fit: Fit {
-            coefficients: Vec::new(),
-            covariance: nalgebra::DMatrix::zeros(0, 0),
-            left: 0.0,
-        },
-        freedoms: 0,
-    };
-    let left = left_in_closed_loop(scene, library, &nothing)?;
-    let column = regression.add(scene, &left);
-    Some(regression.energy(column))
-}
-
-/// Measured less simulated, by record and channel.
-fn left_in_closed_loop(
-    scene: &Scene<'_>,
-    library: &Library,
-    explanation: &Explanation,
-) -> Option<Vec<Vec<Vec<f64>>>> {
-    let mut effects = Effects::default();
-    for (name, table) in extensions(scene, library, explanation)? {
-        effects = effects.and(&Effects::of_extension(name, &table).ok()?);
-    }
-    scene
-        .records
-        .par_iter()
-        .map(|record| {
-            let simulated = simulate(scene, record, &effects)?;
-            let left = record
-                .channels
+        let mut point = Point {
+            inner,
+            starts: vec![Vec::new(); self.scene.records.len()],
+        };
+        let effects = problem.effects(self.scene, &point)?;
+        if self.closed.holds(self.scene, &effects)? {
+            problem.least_step = LEAST_STEP_OF_FRICTION;
+        }
+        for (record, start) in point.starts.iter_mut().enumerate() {
+            if !starts_anywhere(&self.scene.records[record]) {
+                continue;
+            }
+            let state = self.state_at_start(library, explanation, record);
+            let (states, sizes) = self.closed.begin(self.scene, record, &effects, &state)?;
+            let amplitude = states
                 .iter()
-                .zip(simulated)
-                .map(|(channel, simulated)| {
+                .zip(&sizes)
+                .map(|(state, size)| (state / size).abs())
+                .fold(0.0, f64::max);
+            for (index, size) in sizes.iter().enumerate() {
+                problem
+                    .slots
+                    .push((Slot::Start { record, index }, 1e-3 * amplitude * size));
+            }
+            *start = states;
+        }
+        Some((problem, point))
+    }
+
+    /// The state of the baseline at the start of a record, once what the explanation adds is taken off.
+    fn state_at_start(&self, library: &Library, explanation: &Explanation, index: usize) -> Vec<f64> {
+        let record = &self.scene.records[index];
+        let explained = library.explained(self.scene, record, explanation);
+        let mut decays: Decays = record.decays.clone();
+        let sizes: Vec<f64> = record.channels.iter().map(|channel| channel.deviation).collect();
+        let left: Vec<Vec<f64>> = record
+            .channels
+            .iter()
+            .enumerate()
+            .map(|(index, channel)| {
+                let forced = record.decays.without(index, &channel.predicted);
+                channel
+                    .measured
+                    .iter()
+                    .zip(forced)
+                    .zip(&explained[index])
+                    .map(|((measured, forced), explained)| measured - forced - explained)
+                    .collect()
+            })
+            .collect();
+        decays.fit(&left, &sizes);
+        decays.start
+    }
+
+    /// What is left of the held-out parts if the parameters come from the fitted ones alone.
+    pub(super) fn left_held_out(&self, library: &Library, explanation: &Explanation) -> Option<f64> {
+        let simulated = explanation.simulated.as_ref()?;
+        let (mut problem, mut point) = self.problem(library, explanation)?;
+        point.starts.clone_from(&simulated.starts);
+        let fitted = self.of_share(Share::Fitted);
+        // States of records that are held out stay where they are: the fitted parts do not feel them.
+        let found = self.search(&mut problem, &fitted, point, 4, f64::INFINITY)?;
+        let held_out = self.of_share(Share::HeldOut);
+        let only_here = |slot: &Slot| match slot {
+            Slot::Start { record, .. } => !fitted.iter().any(|part| part.record == *record),
+            Slot::Inner { .. } => false,
+        };
+        problem.slots.retain(|(slot, _)| only_here(slot));
+        let found = self.search(&mut problem, &held_out, found.point, 4, f64::INFINITY)?;
+        Some(found.left)
+    }
+
+    /// Measured less simulated, by record and channel, of an explanation that is simulated.
+    pub(super) fn left_of(&self, library: &Library, explanation: &Explanation) -> Option<Vec<Vec<Vec<f64>>>> {
+        let simulated = explanation.simulated.as_ref()?;
+        let (problem, point) = self.problem(library, explanation)?;
+        let effects = problem.effects(self.scene, &point)?;
+        self.scene
+            .records
+            .par_iter()
+            .enumerate()
+            .map(|(index, record)| {
+                let count = record.grid.count();
+                let start = &simulated.starts[index];
+                let samples = self.closed.simulate(self.scene, index, &effects, start, count)?;
+                let left = record.channels.iter().zip(samples).map(|(channel, samples)| {
                     channel
                         .measured
                         .iter()
-                        .zip(simulated)
+                        .zip(samples)
                         .map(|(measured, simulated)| measured - simulated)
                         .collect()
-                })
-                .collect();
-            Some(left)
-        })
-        .collect()
+                });
+                Some(left.collect())
+            })
+            .collect()
+    }
+
+    /// What the case alone leaves in closed loop, in units of the noise.
+    pub(super) fn left_by_baseline(&self, library: &Library) -> Option<f64> {
+        let nothing = Explanation {
+            choices: Vec::new(),
+            fit: Fit {
+                coefficients: Vec::new(),
+                covariance: DMatrix::zeros(0, 0),
+                left: 0.0,
+            },
+            freedoms: 0,
+            simulated: None,
+        };
+        let (mut problem, point) = self.problem(library, &nothing)?;
+        let whole = self.of_share(Share::Whole);
+        let found = self.search(&mut problem, &whole, point, 6, f64::INFINITY)?;
+        Some(found.left)
+    }
 }
 
-/// Coefficients and shapes moved by what the regressors see in the column `target`.
-fn step(
-    scene: &Scene<'_>,
-    library: &mut Library,
-    regression: &mut Regression,
-    explanation: &Explanation,
-    target: usize,
-) -> Option<Explanation> {
-    let mut columns = library.columns_of(explanation);
-    let own = columns.len();
-    let mut moving: Vec<(usize, usize)> = Vec::new();
-    for place in 0..explanation.choices.len() {
-        let choice = explanation.choices[place];
-        let coefficients = library.coefficients(explanation, place);
-        let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
-        if shape.is_empty()
-            || library
-                .cause(choice.candidate)
-                .settled(shape, &coefficients)
-                .is_some()
+fn energy(residuals: &[Vec<f64>]) -> f64 {
+    residuals.iter().map(|residual| dot(residual, residual)).sum()
+}
+
+/// (Jᵀ J + trust·diag) step = Jᵀ r, taken within the bounds; `None` where that has no solution.
+fn stepped(
+    problem: &Problem<'_>,
+    point: &Point,
+    normal: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    trust: f64,
+) -> Option<Point> {
+    let step = scaled(normal, 1e-12 + trust)?.solve(&gradient.component_mul(&roots(normal)));
+    let step = step.component_mul(&roots(normal));
+    let mut next = point.clone();
+    for ((slot, _), step) in problem.slots.iter().zip(step.iter()) {
+        let value = slot.of(&mut next);
+        *value += step;
+        if let Slot::Inner {
+            bounds: [low, high], ..
+        } = slot
         {
-            continue;
+            *value = value.clamp(*low, *high);
         }
-        let slopes = library.slopes(scene, regression, choice, &coefficients)?;
-        moving.extend((0..slopes.len()).map(|parameter| (place, parameter)));
-        columns.extend(slopes);
     }
-    let change = regression.fit_column(Share::Whole, &columns, target)?;
-    let mut next = explanation.clone();
-    for (place, choice) in explanation.choices.iter().enumerate() {
-        let mine: Vec<(usize, f64)> = moving
-            .iter()
-            .enumerate()
-            .filter(|(_, (other, _))| *other == place)
-            .map(|(index, (_, parameter))| (*parameter, change[own + index]))
-            .collect();
-        if mine.is_empty() {
-            continue;
-        }
-        let bounds = library
-            .cause(choice.candidate)
-            .bounds(scene, &library.candidates[choice.candidate].place);
-        let mut shape = library.candidates[choice.candidate].shapes[choice.shape]
-            .0
-            .clone();
-        for (parameter, step) in mine {
-            let [low, high] = bounds[parameter];
-            shape[parameter] = (shape[parameter] + step).clamp(low, high);
-        }
-        next.choices[place] = library.add_shape(scene, regression, choice.candidate, shape)?;
-    }
-    for (coefficient, change) in next.fit.coefficients.iter_mut().zip(&change) {
-        *coefficient += change;
-    }
-    library.parameters(scene, &next).map(|_| next)
+    Some(next)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// What a whole step takes of χ², to first order.
+fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
+    let right = gradient.component_mul(&roots(normal));
+    scaled(normal, 1e-9).map_or(0.0, |factor| right.dot(&factor.solve(&right)))
+}
 
-    #[test]
-    fn cubics_go_through_their_samples_and_are_exact_for_lines() {
-        let samples = [0.0, 1.0, 2.0, 3.0, 4.0];
-        for place in [0.0, 0.7, 1.5, 2.0, 2.9, 4.0] {
-            if (1.0..=3.0).contains(&place) {
-                assert!((catmull_rom(&samples, place) - place).abs() < 1e-12);
+/// What stands at a bound and is pushed beyond it stays there.
+fn at_bounds(problem: &Problem<'_>, point: &Point, normal: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
+    for (index, (slot, _)) in problem.slots.iter().enumerate() {
+        let Slot::Inner {
+            bounds: [low, high], ..
+        } = slot
+        else {
+            continue;
+        };
+        let value = *slot.of(&mut point.clone());
+        if (value <= *low && gradient[index] < 0.0) || (value >= *high && gradient[index] > 0.0) {
+            gradient[index] = 0.0;
+            normal.row_mut(index).fill(0.0);
+            normal.column_mut(index).fill(0.0);
+        }
+    }
+}
+
+/// One over the roots of the diagonal; zero where nothing is felt.
+fn roots(normal: &DMatrix<f64>) -> DVector<f64> {
+    normal.diagonal().map(|entry| {
+        if entry > 0.0 && entry.is_finite() {
+            entry.sqrt().recip()
+        } else {
+            0.0
+        }
+    })
+}
+
+/// The matrix with a diagonal of one and `ridge` on it, factored.
+fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
+    let roots = roots(normal);
+    let mut scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
+        normal[(i, j)] * roots[i] * roots[j]
+    });
+    for i in 0..scaled.nrows() {
+        scaled[(i, i)] = 1.0 + ridge;
+    }
+    scaled.cholesky()
+}
+
+/// Covariance for noise of deviation 1 of the numbers of each choice, initial states being unknown; zero for what did not move.
+fn by_choice(slots: &[Slot], found: &Found) -> Vec<DMatrix<f64>> {
+    let roots = roots(&found.normal);
+    let inverse = scaled(&found.normal, 1e-12).map(|factor| factor.inverse());
+    let mut all: Vec<DMatrix<f64>> = found
+        .point
+        .inner
+        .iter()
+        .map(|inner| DMatrix::zeros(inner.len(), inner.len()))
+        .collect();
+    let Some(inverse) = inverse else { return all };
+    for (i, first) in slots.iter().enumerate() {
+        for (j, second) in slots.iter().enumerate() {
+            if let (
+                Slot::Inner { choice, index, .. },
+                Slot::Inner {
+                    choice: other,
+                    index: second,
+                    ..
+                },
+            ) = (first, second)
+                && choice == other
+            {
+                all[*choice][(*index, *second)] = inverse[(i, j)] * roots[i] * roots[j];
             }
         }
-        assert_eq!(catmull_rom(&[], 1.0), 0.0);
-        assert_eq!(catmull_rom(&samples, 9.0), 4.0);
     }
+    all
 }

@@ -1,41 +1,15 @@
 //! Least squares of all regressors at once, in units of the noise, with free decays taken out.
 //!
-//! Every record is looked at as a whole, and cut into blocks that are fitted and blocks that are held out. In each of these residual and regressors are
-//! transformed, cut to the band, divided by the noise of their channel, and freed of what decays of the initial state and
-//! constant offsets of the sensors could explain. Their products (Gram matrices) then give the fit of any set of regressors.
+//! Every record is looked at as a whole, and cut into blocks that are fitted and blocks that are held out. In each of
+//! these parts ([`super::part`]) residual and regressors are whitened. Their products (Gram matrices) then give the fit of any set of regressors.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::decay::dot;
-use super::grid::Stretch;
-use super::record::Record;
-use super::scene::{Domain, Scene};
-use crate::recording::Kind;
-
-/// A part of a record.
-#[derive(Clone, Debug)]
-struct Part {
-    record: usize,
-    range: std::ops::Range<usize>,
-    share: Share,
-    bins: usize,
-    /// By channel: one over the deviation of each transformed number.
-    weights: Vec<Vec<f64>>,
-    /// Orthonormal: what decays and offsets can be.
-    nuisance: Vec<Vec<f64>>,
-}
-
-/// Which parts count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Share {
-    /// Those that are fitted.
-    Fitted,
-    /// Those that are held out.
-    HeldOut,
-    /// Each record as a whole.
-    Whole,
-}
+pub use super::part::Share;
+use super::part::{Part, Unknown, split};
+use super::scene::Scene;
 
 /// Products of columns.
 #[derive(Clone, Debug, Default)]
@@ -62,7 +36,6 @@ pub struct Fit {
 /// All columns of a scene.
 pub struct Regression {
     parts: Vec<Part>,
-    stretches: Vec<Stretch>,
     /// By column, by part.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
@@ -73,25 +46,17 @@ pub struct Regression {
 impl Regression {
     /// The residuals of a scene.
     pub fn new(scene: &Scene<'_>) -> Self {
-        let mut parts = split(scene);
-        let stretches: Vec<Stretch> = parts.iter().map(|part| Stretch::new(part.range.len())).collect();
-        for (part, stretch) in parts.iter_mut().zip(&stretches) {
-            part.weights = weights(&scene.records[part.record], part);
-            part.nuisance = nuisance(&scene.records[part.record], part, stretch);
-        }
+        let parts = split(scene, |_| Unknown::StartAndOffsets);
         let residuals: Vec<Vec<f64>> = parts
             .iter()
-            .zip(&stretches)
-            .map(|(part, stretch)| {
-                let record = &scene.records[part.record];
-                let residual: Vec<Vec<f64>> =
-                    record.channels.iter().map(|channel| channel.residual()).collect();
-                whiten(record, part, stretch, &residual)
+            .map(|part| {
+                let channels = &scene.records[part.record].channels;
+                let residual: Vec<Vec<f64>> = channels.iter().map(|channel| channel.residual()).collect();
+                part.whiten(&residual)
             })
             .collect();
         let mut regression = Self {
             parts,
-            stretches,
             columns: Vec::new(),
             residuals,
             products: std::array::from_fn(|_| Products::default()),
@@ -99,18 +64,17 @@ impl Regression {
         for (part, residual) in regression.parts.iter().zip(&regression.residuals) {
             let products = &mut regression.products[part.share as usize];
             products.residual += dot(residual, residual);
-            products.count += residual.len() - part.nuisance.len();
+            products.count += residual.len() - part.taken();
         }
         regression
     }
 
     /// Adds a regressor, given as samples by record and channel; its number.
-    pub fn add(&mut self, scene: &Scene<'_>, samples: &[Vec<Vec<f64>>]) -> usize {
+    pub fn add(&mut self, samples: &[Vec<Vec<f64>>]) -> usize {
         let column: Vec<Vec<f64>> = self
             .parts
             .par_iter()
-            .zip(&self.stretches)
-            .map(|(part, stretch)| whiten(&scene.records[part.record], part, stretch, &samples[part.record]))
+            .map(|part| part.whiten(&samples[part.record]))
             .collect();
         let number = self.columns.len();
         self.columns.push(column);
@@ -176,17 +140,17 @@ impl Regression {
         self.solve(share, columns, 1e-13)
     }
 
-    /// Σ column² in units of the noise.
-    pub fn energy(&self, column: usize) -> f64 {
-        self.products(Share::Whole).gram[column][column]
-    }
-
-    /// Coefficients of `columns` that fit the column `target`.
-    pub fn fit_column(&self, share: Share, columns: &[usize], target: usize) -> Option<Vec<f64>> {
+    /// Coefficients of `columns` that fit the column `target`, and how much of its energy they take.
+    pub fn fit_column(&self, share: Share, columns: &[usize], target: usize) -> Option<(Vec<f64>, f64)> {
         let products = self.products(share);
         let right = |column: usize| products.entry(column, target);
-        self.normal(share, columns, 1e-13, right)
-            .map(|(solution, _)| solution)
+        let (solution, _) = self.normal(share, columns, 1e-13, right)?;
+        let taken = solution
+            .iter()
+            .zip(columns)
+            .map(|(solution, column)| solution * right(*column))
+            .sum();
+        Some((solution, taken))
     }
 
     /// What is left if all columns may explain, numerically dependent ones softened.
@@ -263,156 +227,4 @@ impl Products {
     fn entry(&self, i: usize, j: usize) -> f64 {
         self.gram[i.max(j)][i.min(j)]
     }
-}
-
-/// Each record as a whole, and in four blocks of a third, a sixth, a third and a sixth of which the short ones are held out:
-/// they hold other times, and of a sweep other frequencies, than what is fitted. Of several free decays the last is held out
-/// whole: the end of a decay tells nothing.
-fn split(scene: &Scene<'_>) -> Vec<Part> {
-    let several = scene.records.len() > 1;
-    let last = scene.records.len().saturating_sub(1);
-    scene
-        .records
-        .iter()
-        .enumerate()
-        .flat_map(|(index, record)| {
-            let count = record.grid.count();
-            let mut ranges = vec![(0..count, Share::Whole)];
-            if several && record.kind == Some(Kind::FreeDecay) {
-                let share = if index == last {
-                    Share::HeldOut
-                } else {
-                    Share::Fitted
-                };
-                ranges.push((0..count, share));
-            } else {
-                ranges.extend([
-                    (0..count / 3, Share::Fitted),
-                    (count / 3..count / 2, Share::HeldOut),
-                    (count / 2..5 * count / 6, Share::Fitted),
-                    (5 * count / 6..count, Share::HeldOut),
-                ]);
-            }
-            ranges.into_iter().map(move |(range, share)| Part {
-                record: index,
-                bins: bins_of(record, range.len()),
-                range,
-                share,
-                weights: Vec::new(),
-                nuisance: Vec::new(),
-            })
-        })
-        .collect()
-}
-
-fn bins_of(record: &Record, length: usize) -> usize {
-    let share = record.band_hz / record.grid.rate_hz();
-    ((share * length as f64) as usize + 1).min(length / 2 + 1)
-}
-
-/// Transformed, cut to the band, in units of the noise, and without what nuisances explain.
-fn whiten(record: &Record, part: &Part, stretch: &Stretch, samples: &[Vec<f64>]) -> Vec<f64> {
-    let mut column = raw(record, part, stretch, samples);
-    for nuisance in &part.nuisance {
-        let along = dot(&column, nuisance);
-        for (value, nuisance) in column.iter_mut().zip(nuisance) {
-            *value -= along * nuisance;
-        }
-    }
-    column
-}
-
-fn raw(record: &Record, part: &Part, stretch: &Stretch, samples: &[Vec<f64>]) -> Vec<f64> {
-    let mut column = Vec::with_capacity(2 * part.bins * samples.len());
-    for (samples, weights) in samples.iter().zip(&part.weights) {
-        let from = column.len();
-        stretch.parts(&samples[part.range.clone()], part.bins, &mut column);
-        for (value, weight) in column[from..].iter_mut().zip(weights) {
-            *value *= weight;
-        }
-    }
-    debug_assert_eq!(samples.len(), record.channels.len());
-    column
-}
-
-/// One over the deviation of each transformed number, by channel: of the sensor, and of what the channel reads of the response
-/// to the noise of the force sensors and to what sampling hides of the forces, both taken as the floor of their spectra.
-fn weights(record: &Record, part: &Part) -> Vec<Vec<f64>> {
-    let length = part.range.len();
-    let step = record.grid.omega(1);
-    record
-        .channels
-        .iter()
-        .map(|channel| {
-            (0..part.bins)
-                .flat_map(|bin| {
-                    let omega = std::f64::consts::TAU * record.grid.rate_hz() * bin as f64 / length as f64;
-                    let near = ((omega / step).round() as usize).min(record.transfer.len() - 1);
-                    let mut variance = channel.deviation * channel.deviation;
-                    if record.domain == Domain::Response {
-                        for (from, force_deviation) in record.force_deviation_n.iter().enumerate() {
-                            let response: num_complex::Complex64 = (0..3)
-                                .map(|axis| {
-                                    record.transfer[near][(axis, from)] * channel.pickup.weights[axis]
-                                })
-                                .sum();
-                            variance += (response * channel.factor(omega)).norm_sqr()
-                                * force_deviation
-                                * force_deviation;
-                        }
-                    }
-                    let parts = if bin == 0 || 2 * bin == length { 1 } else { 2 };
-                    std::iter::repeat_n(1.0 / variance.sqrt(), parts)
-                })
-                .collect()
-        })
-        .collect()
-}
-
-/// An orthonormal basis of decays and offsets in a part; where forces are compared there is neither.
-fn nuisance(record: &Record, part: &Part, stretch: &Stretch) -> Vec<Vec<f64>> {
-    if record.domain == Domain::Force {
-        return Vec::new();
-    }
-    let count = record.grid.count();
-    let channels = record.channels.len();
-    let mut raws = Vec::new();
-    for state in 0..record.decays.count() {
-        // The decay of a part begins with the part.
-        let shifted: Vec<Vec<f64>> = (0..channels)
-            .map(|channel| {
-                let column = record.decays.column(channel, state);
-                let mut samples = vec![0.0; count];
-                samples[part.range.clone()].copy_from_slice(&column[..part.range.len()]);
-                samples
-            })
-            .collect();
-        raws.push(raw(record, part, stretch, &shifted));
-    }
-    for constant in 0..channels {
-        let samples: Vec<Vec<f64>> = (0..channels)
-            .map(|channel| vec![f64::from(u8::from(channel == constant)); count])
-            .collect();
-        raws.push(raw(record, part, stretch, &samples));
-    }
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    for mut column in raws {
-        let size = dot(&column, &column).sqrt();
-        // Twice is enough: what is left after the first pass is rounding.
-        for _ in 0..2 {
-            for known in &basis {
-                let along = dot(&column, known);
-                column
-                    .iter_mut()
-                    .zip(known)
-                    .for_each(|(value, known)| *value -= along * known);
-            }
-        }
-        let left = dot(&column, &column).sqrt();
-        if left > 1e-7 * size && left > 0.0 {
-            column.iter_mut().for_each(|value| *value /= left);
-            basis.push(column);
-        }
-    }
-    basis
 }

@@ -232,6 +232,20 @@ impl Effects {
         Self::build(vec![extension(name, table)?])
     }
 
+    /// The effects of several tables `[extension.NAME]`, some of which may belong together.
+    ///
+    /// # Errors
+    /// As [`Self::of_case`].
+    pub fn of_extensions<'a>(
+        tables: impl IntoIterator<Item = (&'a str, &'a toml::Table)>,
+    ) -> Result<Self, EffectError> {
+        tables
+            .into_iter()
+            .map(|(name, table)| extension(name, table))
+            .collect::<Result<_, _>>()
+            .and_then(Self::build)
+    }
+
     fn build(mut all: Vec<Parameters>) -> Result<Self, EffectError> {
         coulomb_friction::take_play(&mut all)?;
         all.into_iter()

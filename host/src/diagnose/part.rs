@@ -1,0 +1,227 @@
+//! Parts of records as they are compared: transformed, cut to the band, in units of the noise, and freed of what decays of
+//! the initial state and constant offsets of the sensors could explain.
+
+use std::ops::Range;
+
+use super::decay::dot;
+use super::grid::Stretch;
+use super::record::Record;
+use super::scene::{Domain, Scene};
+use crate::recording::Kind;
+
+/// A part of a record.
+pub(super) struct Part {
+    /// Its record, by its place in the scene.
+    pub(super) record: usize,
+    pub(super) range: Range<usize>,
+    pub(super) share: Share,
+    bins: usize,
+    stretch: Stretch,
+    /// By channel: one over the deviation of each transformed number.
+    weights: Vec<Vec<f64>>,
+    /// Orthonormal: what decays and offsets can be.
+    nuisance: Vec<Vec<f64>>,
+}
+
+/// What a part may owe to what nobody knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unknown {
+    /// The state at its start, as free decays of the baseline, and the offsets of sensors.
+    StartAndOffsets,
+    /// Offsets of sensors alone.
+    Offsets,
+}
+
+/// Which parts count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Share {
+    /// Those that are fitted.
+    Fitted,
+    /// Those that are held out.
+    HeldOut,
+    /// Each record as a whole.
+    Whole,
+}
+
+/// Each record as a whole, and in four blocks of a third, a sixth, a third and a sixth of which the short ones are held out:
+/// they hold other times, and of a sweep other frequencies, than what is fitted. Of several free decays the last is held out
+/// whole: the end of a decay tells nothing.
+pub(super) fn split(scene: &Scene<'_>, unknown: impl Fn(&Record) -> Unknown) -> Vec<Part> {
+    let several = scene.records.len() > 1;
+    let last = scene.records.len().saturating_sub(1);
+    scene
+        .records
+        .iter()
+        .enumerate()
+        .flat_map(|(index, record)| {
+            let count = record.grid.count();
+            let mut ranges = vec![(0..count, Share::Whole)];
+            if several && record.kind == Some(Kind::FreeDecay) {
+                let share = if index == last {
+                    Share::HeldOut
+                } else {
+                    Share::Fitted
+                };
+                ranges.push((0..count, share));
+            } else {
+                ranges.extend([
+                    (0..count / 3, Share::Fitted),
+                    (count / 3..count / 2, Share::HeldOut),
+                    (count / 2..5 * count / 6, Share::Fitted),
+                    (5 * count / 6..count, Share::HeldOut),
+                ]);
+            }
+            let unknown = unknown(record);
+            ranges
+                .into_iter()
+                .map(move |(range, share)| Part::new(scene, index, range, share, unknown))
+        })
+        .collect()
+}
+
+impl Part {
+    /// A part of the record at `index`.
+    pub(super) fn new(
+        scene: &Scene<'_>,
+        index: usize,
+        range: Range<usize>,
+        share: Share,
+        unknown: Unknown,
+    ) -> Self {
+        let record = &scene.records[index];
+        let mut part = Self {
+            record: index,
+            bins: bins_of(record, range.len()),
+            stretch: Stretch::new(range.len()),
+            range,
+            share,
+            weights: Vec::new(),
+            nuisance: Vec::new(),
+        };
+        part.weights = weights(record, &part);
+        part.nuisance = nuisance(record, &part, unknown);
+        part
+    }
+
+    /// Transformed, cut to the band, in units of the noise, and without what nuisances explain; `samples` are those of the
+    /// whole record, channel by channel.
+    pub(super) fn whiten(&self, samples: &[Vec<f64>]) -> Vec<f64> {
+        let mut column = raw(self, samples);
+        for nuisance in &self.nuisance {
+            let along = dot(&column, nuisance);
+            for (value, nuisance) in column.iter_mut().zip(nuisance) {
+                *value -= along * nuisance;
+            }
+        }
+        column
+    }
+
+    /// Numbers that nuisances take.
+    pub(super) fn taken(&self) -> usize {
+        self.nuisance.len()
+    }
+}
+
+fn bins_of(record: &Record, length: usize) -> usize {
+    let share = record.band_hz / record.grid.rate_hz();
+    ((share * length as f64) as usize + 1).min(length / 2 + 1)
+}
+
+fn raw(part: &Part, samples: &[Vec<f64>]) -> Vec<f64> {
+    let mut column = Vec::with_capacity(2 * part.bins * samples.len());
+    for (samples, weights) in samples.iter().zip(&part.weights) {
+        let from = column.len();
+        part.stretch
+            .parts(&samples[part.range.clone()], part.bins, &mut column);
+        for (value, weight) in column[from..].iter_mut().zip(weights) {
+            *value *= weight;
+        }
+    }
+    column
+}
+
+/// One over the deviation of each transformed number, by channel: of the sensor, and of what the channel reads of the response
+/// to the noise of the force sensors and to what sampling hides of the forces, both taken as the floor of their spectra.
+fn weights(record: &Record, part: &Part) -> Vec<Vec<f64>> {
+    let length = part.range.len();
+    let step = record.grid.omega(1);
+    record
+        .channels
+        .iter()
+        .map(|channel| {
+            (0..part.bins)
+                .flat_map(|bin| {
+                    let omega = std::f64::consts::TAU * record.grid.rate_hz() * bin as f64 / length as f64;
+                    let near = ((omega / step).round() as usize).min(record.transfer.len() - 1);
+                    let mut variance = channel.deviation * channel.deviation;
+                    if record.domain == Domain::Response {
+                        for (from, force_deviation) in record.force_deviation_n.iter().enumerate() {
+                            let response: num_complex::Complex64 = (0..3)
+                                .map(|axis| {
+                                    record.transfer[near][(axis, from)] * channel.pickup.weights[axis]
+                                })
+                                .sum();
+                            variance += (response * channel.factor(omega)).norm_sqr()
+                                * force_deviation
+                                * force_deviation;
+                        }
+                    }
+                    let parts = if bin == 0 || 2 * bin == length { 1 } else { 2 };
+                    std::iter::repeat_n(1.0 / variance.sqrt(), parts)
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// An orthonormal basis of decays and offsets in a part; where forces are compared there is neither.
+fn nuisance(record: &Record, part: &Part, unknown: Unknown) -> Vec<Vec<f64>> {
+    if record.domain == Domain::Force {
+        return Vec::new();
+    }
+    let count = record.grid.count();
+    let channels = record.channels.len();
+    let mut raws = Vec::new();
+    let states = match unknown {
+        Unknown::StartAndOffsets => record.decays.count(),
+        Unknown::Offsets => 0,
+    };
+    for state in 0..states {
+        // The decay of a part begins with the part.
+        let shifted: Vec<Vec<f64>> = (0..channels)
+            .map(|channel| {
+                let column = record.decays.column(channel, state);
+                let mut samples = vec![0.0; count];
+                samples[part.range.clone()].copy_from_slice(&column[..part.range.len()]);
+                samples
+            })
+            .collect();
+        raws.push(raw(part, &shifted));
+    }
+    for constant in 0..channels {
+        let samples: Vec<Vec<f64>> = (0..channels)
+            .map(|channel| vec![f64::from(u8::from(channel == constant)); count])
+            .collect();
+        raws.push(raw(part, &samples));
+    }
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut column in raws {
+        let size = dot(&column, &column).sqrt();
+        // Twice is enough: what is left after the first pass is rounding.
+        for _ in 0..2 {
+            for known in &basis {
+                let along = dot(&column, known);
+                column
+                    .iter_mut()
+                    .zip(known)
+                    .for_each(|(value, known)| *value -= along * known);
+            }
+        }
+        let left = dot(&column, &column).sqrt();
+        if left > 1e-7 * size && left > 0.0 {
+            column.iter_mut().for_each(|value| *value /= left);
+            basis.push(column);
+        }
+    }
+    basis
+}

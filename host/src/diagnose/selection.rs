@@ -1,0 +1,350 @@
+//! Which explanation is selected: causes are added while that gains more than it costs.
+
+use super::evidence::{Explanation, Library};
+use super::output_error::OutputError;
+use super::refine::refine;
+use super::regression::{Regression, Share};
+use super::scene::Scene;
+use super::stepwise::{distinct, extended, without};
+
+/// What a cause must gain to be believed (twice the logarithm of the likelihood, less the price of its parameters).
+const BELIEVED: f64 = 20.0;
+/// Two explanations whose gains differ by less are not told apart.
+pub(super) const APART: f64 = 16.0;
+/// Share of the residual that a right explanation may leave for reasons of sampling alone.
+const SAMPLING: f64 = 2e-3;
+/// The same where the explanation is simulated.
+const SAMPLING_SIMULATED: f64 = 2e-4;
+/// Share of the residual's energy by which interpolation between samples may mislead the comparison of explanations.
+const NUMERICS: f64 = 1e-4;
+/// What may be left beyond the noise, as a share of the noise: that of the estimate of the noise and of chance.
+pub(super) const WITHIN_NOISE: f64 = 0.15;
+/// Most causes that act together.
+const CAUSES: usize = 3;
+/// Explanations of the regression that are simulated, by the number of their causes.
+const SIMULATED: [usize; CAUSES] = [9, 5, 3];
+/// χ² per number below which an explanation explains nearly all, and how many times that another may leave along the measured
+/// motion and still be simulated.
+const NEARLY: f64 = 1.5;
+const FAR_OFF: f64 = 6.0;
+/// Explanations that are simulated because of what a simulation with one cause less left: of the best, of the second.
+const EXTENDED: [usize; 2] = [6, 3];
+
+/// What was selected: the best explanation, and those that are as good with as many causes.
+pub(super) struct Selection {
+    pub(super) best: Option<Explanation>,
+    pub(super) others: Vec<Explanation>,
+    /// By how much the best is ahead of the next that is another.
+    pub(super) ahead: f64,
+    /// By how much it is ahead of what fewer causes reach.
+    pub(super) gained: f64,
+}
+
+/// What explanations are weighed by.
+pub(super) struct Scale<'a> {
+    pub(super) scene: &'a Scene<'a>,
+    /// Simulations, where all records can be simulated.
+    pub(super) output_error: Option<OutputError<'a>>,
+    /// How much what the whole library leaves, and what interpolation may leave, is above the noise: along the measured motion.
+    inflation: f64,
+    /// What the case alone leaves, in units of the noise.
+    pub(super) reference: f64,
+}
+
+impl<'a> Scale<'a> {
+    pub(super) fn new(scene: &'a Scene<'a>, library: &Library, regression: &Regression) -> Self {
+        let output_error = OutputError::new(scene);
+        // Along the measured motion terms of the baseline carry the noise of that motion: in closed loop they do not.
+        let closed = output_error
+            .as_ref()
+            .filter(|_| !scene.baseline.terms.is_empty())
+            .and_then(|output_error| output_error.left_by_baseline(library));
+        Self {
+            scene,
+            output_error,
+            inflation: inflation(regression),
+            reference: closed.unwrap_or_else(|| regression.residual(Share::Whole)),
+        }
+    }
+
+    /// How much the noise is above what it is taken for, by what `best` leaves of it.
+    pub(super) fn inflation(&self, regression: &Regression, best: Option<&Explanation>) -> f64 {
+        match best {
+            Some(best) if best.simulated.is_some() => {
+                let free = regression
+                    .count(Share::Whole)
+                    .saturating_sub(best.freedoms)
+                    .max(1) as f64;
+                (best.fit.left / free).max(0.5)
+            }
+            _ => self.inflation,
+        }
+    }
+
+    /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
+    fn gain(&self, regression: &Regression, explanation: &Explanation, inflation: f64) -> f64 {
+        let count = regression.count(Share::Whole).max(2) as f64;
+        // Like is compared with like.
+        let reference = match explanation.simulated {
+            Some(_) => self.reference,
+            None => regression.residual(Share::Whole),
+        };
+        (reference - explanation.fit.left) / inflation - explanation.freedoms as f64 * count.ln()
+    }
+
+    fn sort(&self, regression: &Regression, found: &mut [Explanation], inflation: f64) {
+        found.sort_by(|a, b| {
+            self.gain(regression, b, inflation)
+                .total_cmp(&self.gain(regression, a, inflation))
+        });
+    }
+
+    /// What is left beyond the noise, as a share of the noise and as a share of what was there beyond the noise.
+    pub(super) fn excess(&self, regression: &Regression, best: Option<&Explanation>) -> (f64, f64) {
+        let noise = regression.count(Share::Whole) as f64;
+        let left = best.map_or(self.reference, |best| best.fit.left);
+        let reference = self.reference.max(regression.residual(Share::Whole));
+        let beyond = (left - noise).max(0.0);
+        let there = (reference - noise).max(1e-9 * noise);
+        (beyond / noise, beyond / there)
+    }
+
+    /// True where what is left is noise, or so little of what there was that sampling alone may leave it.
+    fn is_enough(&self, regression: &Regression, best: Option<&Explanation>) -> bool {
+        let (of_noise, of_excess) = self.excess(regression, best);
+        let count = regression.count(Share::Whole) as f64;
+        let simulated = best.is_some_and(|best| best.simulated.is_some());
+        let (inflation, sampling) = if simulated {
+            (1.0, SAMPLING_SIMULATED)
+        } else {
+            (self.inflation, SAMPLING)
+        };
+        of_noise / inflation < (4.0 * (2.0 / count).sqrt()).min(WITHIN_NOISE)
+            || (best.is_some() && of_excess < sampling)
+    }
+
+    /// What is left of the held-out parts if the parameters come from the fitted ones alone.
+    pub(super) fn left_held_out(
+        &self,
+        library: &Library,
+        regression: &Regression,
+        explanation: &Explanation,
+    ) -> f64 {
+        self.output_error
+            .as_ref()
+            .and_then(|output_error| output_error.left_held_out(library, explanation))
+            .unwrap_or_else(|| library.left_held_out(regression, explanation))
+    }
+
+    /// The first of `found` as simulation has them, where it can; else all as they are. `fewer` are the best with one cause
+    /// less.
+    fn simulated(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        found: Vec<Explanation>,
+        fewer: &[Explanation],
+        most: usize,
+    ) -> Vec<Explanation> {
+        let Some(output_error) = &self.output_error else {
+            return found;
+        };
+        let mut tried = Vec::new();
+        for (base, most) in fewer.iter().zip(EXTENDED) {
+            if let Some(left) = output_error.left_of(library, base) {
+                tried.extend(
+                    extended(self.scene, library, regression, base, &left)
+                        .into_iter()
+                        .take(most),
+                );
+            }
+        }
+        tried.extend(found.iter().take(most).cloned());
+        let mut rival = f64::INFINITY;
+        let mut simulated = Vec::new();
+        let tried = distinct(tried);
+        let noise = regression.count(Share::Whole) as f64;
+        let best_left = tried
+            .iter()
+            .map(|explanation| explanation.fit.left)
+            .fold(f64::INFINITY, f64::min);
+        for explanation in tried {
+            // Where one explains nearly all, what is far from that along the measured motion need not be simulated.
+            if rival < NEARLY * noise && explanation.fit.left > FAR_OFF * rival.max(noise) {
+                continue;
+            }
+            // What cannot be simulated stays as the regression has it.
+            let fitted = output_error
+                .fit(library, regression, &explanation, (rival, best_left))
+                .unwrap_or(explanation);
+            if fitted.simulated.is_some() {
+                rival = fitted.fit.left.min(rival);
+            }
+            simulated.push(fitted);
+        }
+        if simulated.is_empty() { found } else { simulated }
+    }
+
+    /// The explanation without causes that others have made needless.
+    fn pruned(&self, library: &mut Library, regression: &mut Regression, best: Explanation) -> Explanation {
+        let Some(output_error) = self.output_error.as_ref().filter(|_| best.simulated.is_some()) else {
+            return best;
+        };
+        let mut kept = best;
+        while kept.choices.len() > 1 {
+            let inflation = self.inflation(regression, Some(&kept));
+            let reached = self.gain(regression, &kept, inflation);
+            let needless = (0..kept.choices.len()).find_map(|place| {
+                let fewer = without(library, &kept, place);
+                output_error
+                    .fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))
+                    .filter(|fewer| self.gain(regression, fewer, inflation) > reached - BELIEVED)
+            });
+            match needless {
+                Some(fewer) => kept = fewer,
+                None => break,
+            }
+        }
+        kept
+    }
+}
+
+/// How much what the whole library leaves, and what interpolation may leave, is above the noise.
+fn inflation(regression: &Regression) -> f64 {
+    let whole = regression.count(Share::Whole) as f64;
+    let free = (whole - regression.columns() as f64).max(1.0);
+    let sampling = NUMERICS * (regression.residual(Share::Whole) / whole - 1.0).max(0.0);
+    (regression.left_by_all() / free + sampling).max(1.0)
+}
+
+/// Selects by one cause, pairs and triples; more causes only where fewer leave something.
+pub(super) fn select(scale: &Scale<'_>, library: &mut Library, regression: &mut Regression) -> Selection {
+    let mut selection = Selection {
+        best: None,
+        others: Vec::new(),
+        ahead: f64::INFINITY,
+        gained: 0.0,
+    };
+    let scene = scale.scene;
+    let mut pairs = Vec::new();
+    let mut fewer: Vec<Explanation> = Vec::new();
+    for (index, most) in SIMULATED.into_iter().enumerate() {
+        let size = index + 1;
+        // Less than half of what the sensors' noise is at least: nothing is there to be explained.
+        let silent = regression.residual(Share::Whole) < 0.5 * regression.count(Share::Whole) as f64;
+        if silent || (size > 1 && scale.is_enough(regression, selection.best.as_ref())) {
+            break;
+        }
+        let mut found = match size {
+            1 => library.singles(scene, regression),
+            2 => library.pairs(scene, regression),
+            _ => library.triples(scene, regression, &pairs),
+        };
+        // Simulations of several causes begin at the shapes that were found of each alone.
+        if size == 1 || scale.output_error.is_none() {
+            refine(scene, library, regression, &mut found);
+        }
+        scale.sort(regression, &mut found, scale.inflation);
+        if size == 2 {
+            pairs.clone_from(&found);
+        }
+        let mut found = scale.simulated(library, regression, found, &fewer, most);
+        found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
+        let inflation = scale.inflation(regression, found.first());
+        scale.sort(regression, &mut found, inflation);
+        tell(scale, library, regression, &found, inflation);
+        let Some(best) = found.first() else { break };
+        let best = simplest(scale, regression, &found, best);
+        let best = &scale.pruned(library, regression, best);
+        let earlier = std::mem::replace(&mut fewer, found.clone());
+        let gained = scale.gain(regression, best, inflation);
+        let reached = selection
+            .best
+            .as_ref()
+            .map_or(0.0, |best| scale.gain(regression, best, inflation));
+        let held_out = scale.left_held_out(library, regression, best);
+        // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
+        let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
+        if gained < reached + BELIEVED || held_out > regression.residual(Share::HeldOut) + chance {
+            continue;
+        }
+        let who = names(library, best);
+        let rivals: Vec<&Explanation> = found
+            .iter()
+            .chain(&earlier)
+            .filter(|other| other.freedoms <= best.freedoms && names(library, other) != who)
+            .collect();
+        let behind = |other: &Explanation| gained - scale.gain(regression, other, inflation);
+        selection.gained = gained - reached;
+        selection.ahead = rivals
+            .iter()
+            .map(|other| behind(other))
+            .fold(f64::INFINITY, f64::min);
+        selection.others = rivals
+            .iter()
+            .filter(|other| behind(other) < APART)
+            .map(|other| (*other).clone())
+            .collect();
+        selection.best = Some(best.clone());
+    }
+    selection
+}
+
+fn tell(
+    scale: &Scale<'_>,
+    library: &Library,
+    regression: &Regression,
+    found: &[Explanation],
+    inflation: f64,
+) {
+    for explanation in found.iter().take(6) {
+        let names: Vec<String> = explanation
+            .choices
+            .iter()
+            .map(|choice| {
+                let known = &library.candidates[choice.candidate];
+                let shape = &known.shapes[choice.shape].0;
+                format!(
+                    "{} {} {shape:?}",
+                    library.cause(choice.candidate).name(),
+                    known.place
+                )
+            })
+            .collect();
+        tracing::debug!(
+            gain = scale.gain(regression, explanation, inflation),
+            left = explanation.fit.left / regression.count(Share::Whole) as f64,
+            simulated = explanation.simulated.is_some(),
+            "{}",
+            names.join(" + ")
+        );
+    }
+}
+
+/// `best`, or along the measured motion one with fewer parameters that leaves as little: more parameters may mend what
+/// sampling hides. In closed loop nothing is hidden.
+fn simplest(
+    scale: &Scale<'_>,
+    regression: &Regression,
+    found: &[Explanation],
+    best: &Explanation,
+) -> Explanation {
+    let inflation = scale.inflation;
+    let as_good = |other: &&Explanation| {
+        other.simulated.is_none()
+            && other.freedoms < best.freedoms
+            && scale.excess(regression, Some(other)).1 < SAMPLING
+            && scale.gain(regression, other, inflation) > scale.gain(regression, best, inflation) - APART
+    };
+    found.iter().find(as_good).unwrap_or(best).clone()
+}
+
+pub(super) fn names(library: &Library, explanation: &Explanation) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = explanation
+        .choices
+        .iter()
+        .flat_map(|choice| library.cause(choice.candidate).names())
+        .collect();
+    names.sort_unstable();
+    names
+}
