@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Error, non_negative};
 use crate::case::Case;
-use crate::continuation::ForcedProblem;
+use crate::continuation::collocation_of;
 use crate::frf::{FrfTable, Interpolation};
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
@@ -101,7 +101,7 @@ impl MethodChoice {
         };
         let steps = self.steps.unwrap_or(STEPS);
         Ok(match self.name() {
-            MethodName::Collocation if about_orbit => Box::new(ForcedProblem::new(case)?),
+            MethodName::Collocation if about_orbit => collocation_of(case)?,
             MethodName::Collocation if case.tool().map_err(Error::input)?.has_variable_pitch() => {
                 Box::new(RevolutionCollocation {
                     pitched: Pitched::new(case, cubic)?,

@@ -165,7 +165,7 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
 }
 
 /// How large the state at the start of the period is at a depth, if cubic terms are left out.
-fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
+pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
     let rest = Orbit::rest(map);
     let linear = map.pass(&rest.start, 0.0, &rest.states).and_then(|passage| {
         let mut periodic = -passage.by_start;

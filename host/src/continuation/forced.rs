@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::case::Case;
 use crate::simulate::{At, ChipLaw, ProcessDamping, Term};
-use crate::stability::extension::{about_orbit, radial_m};
+use crate::stability::extension::{about_orbit, is_not_smooth, radial_m};
 use crate::stability::{CubicTerms, Pitched, Problem, StabilityError};
 use crate::structure::FirstOrder;
 
@@ -37,6 +37,10 @@ pub struct ForcedProblem {
     chip: Option<ChipLaw>,
     /// `None` where the flank does not touch.
     flank: Option<Flank>,
+    /// B times a constant force; empty for none.
+    push: Option<DVector<f64>>,
+    /// True where a force does not make the velocity jump.
+    inertial: bool,
 }
 
 /// Teeth of which one is not like the other.
@@ -127,8 +131,16 @@ impl ForcedProblem {
     /// The forced problem of a case.
     ///
     /// # Errors
-    /// As [`Problem::new`], but for cubic terms, which are kept.
+    /// As [`Problem::new`], but for cubic terms, which are kept; friction, backlash or hysteresis, which
+    /// [`EquivalentProblem`](super::EquivalentProblem) treats.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
+        if is_not_smooth(case) {
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "friction, backlash and hysteresis have no slopes about a forced orbit; their equivalent stiffness and \
+                       damping are needed",
+            });
+        }
         let pitched = Pitched::new(case, CubicTerms::Kept)?;
         let linear = pitched.with_mean_pitch().clone();
         let uneven = Uneven::of(case, &pitched)?;
@@ -203,9 +215,36 @@ impl ForcedProblem {
             smooth: (!about.terms.is_empty()).then(|| Smooth::new(about.terms, &machine)),
             chip: about.law.chip,
             flank,
+            push: None,
+            inertial,
             linear,
             cubic,
         })
+    }
+
+    /// The same with springs and dampers between the tool and the ground and a constant force, along the machine's axes, into
+    /// which x is turned by `feed_direction_deg`: f_r = `stiffness` x + `damping` ẋ, N/m and N s/m, under `force_n`.
+    pub(super) fn with_springs(
+        &self,
+        feed_direction_deg: f64,
+        stiffness: [f64; 3],
+        damping: [f64; 3],
+        force_n: [f64; 3],
+    ) -> Self {
+        let machine = self.linear.structure.turned(-feed_direction_deg);
+        let mut changed = self.clone();
+        for axis in 0..3 {
+            let displacement = machine.c.row(axis);
+            let force = displacement * stiffness[axis] + displacement * &machine.a * damping[axis];
+            changed.linear.structure.a -= machine.b.column(axis) * force;
+        }
+        changed.push = Some(&machine.b * Vector3::from(force_n));
+        changed
+    }
+
+    /// True where a force does not make the velocity jump: the structure has a mass at the tool.
+    pub(super) fn is_inertial(&self) -> bool {
+        self.inertial
     }
 
     /// True where an orbit is the solution of linear equations.
@@ -278,8 +317,11 @@ impl ForcedProblem {
             .sum()
     }
 
-    /// N(x) and B f_r, added to `rate` with a minus sign.
+    /// N(x) and B f_r, added to `rate` with a minus sign, and the constant force.
     pub(super) fn subtract_smooth(&self, state: &[f64], rate: &mut DVector<f64>) {
+        if let Some(push) = &self.push {
+            *rate += push;
+        }
         if let Some(smooth) = &self.smooth {
             let at = smooth.at(state);
             for term in &smooth.terms {

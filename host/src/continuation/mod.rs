@@ -7,15 +7,21 @@
 //! With unequal pitch, or with runout, the orbit has the period of the revolution, the surface cut before acts on it, and it is
 //! that of the delay equation itself.
 
+mod anderson;
 mod branch;
 mod chart;
+mod choice;
 mod collocated;
+mod equivalent;
 mod forced;
 mod orbit;
+mod restoring;
 mod revolution;
 mod tooth_period;
 mod variation;
 
 pub use branch::{Branch, BranchPoint, Event, Extent, follow_depth};
+pub use choice::collocation_of;
+pub use equivalent::EquivalentProblem;
 pub use forced::ForcedProblem;
 pub use orbit::{Orbit, OrbitError};

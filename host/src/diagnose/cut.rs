@@ -8,11 +8,11 @@
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use super::path::Motion;
 use super::turning::Turning;
 use crate::case::Case;
 use crate::milling::Cut;
 use crate::recording::Recording;
+use crate::simulate::path::Motion;
 use crate::simulate::{Cutter, Effects, Spindle, Tooth};
 
 /// Force samples closer to an entry or exit than this share of a sample are not compared: the tachometer does not say on

@@ -28,7 +28,6 @@ mod next_test;
 pub mod noise;
 mod output_error;
 mod part;
-mod path;
 mod receptance;
 mod record;
 mod refine;
@@ -46,7 +45,6 @@ pub use answer::Diagnosis;
 pub use cutting::Cutting;
 pub use error::DiagnoseError;
 pub use grid::Grid;
-pub use path::{Motion, restoring_along};
 pub use receptance::Receptance;
 pub use record::{Observed, Record};
 pub use scene::{Baseline, Domain, Scene};
@@ -54,6 +52,7 @@ pub use views::View;
 
 use crate::case::Case;
 use crate::recording::Recording;
+pub use crate::simulate::path::{Motion, restoring_along};
 
 /// How to diagnose.
 #[derive(Clone, Copy, Debug, Default)]

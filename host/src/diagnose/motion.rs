@@ -4,10 +4,10 @@ use num_complex::Complex64;
 
 use super::DiagnoseError;
 use super::noise::{rms, white_floor};
-use super::path::{Motion, restoring_along};
 use super::record::{Observed, Record};
 use super::scene::{Baseline, derivatives};
 use crate::recording::{Quantity, Recording};
+use crate::simulate::path::{Motion, restoring_along};
 
 /// Bins over which power is averaged before it is compared with the noise, to either side.
 const AVERAGED: usize = 4;

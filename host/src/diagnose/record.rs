@@ -13,10 +13,10 @@ use super::decay::Decays;
 use super::grid::Grid;
 use super::motion;
 use super::noise::{rms, white_floor};
-use super::path::{Motion, restoring_along};
 use super::scene::{Baseline, Domain, derivatives};
 use crate::recording::{Kind, Quantity, Recording};
 use crate::simulate::effect::Pickup;
+use crate::simulate::path::{Motion, restoring_along};
 
 /// Finer samples per sample of a cut, at least: its force jumps.
 const FINER_IN_CUTS: usize = 8;

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 use super::{BuildError, TableRequest};
 use crate::case::Case;
-use crate::continuation::ForcedProblem;
+use crate::continuation::collocation_of;
 use crate::stability::{
-    Collocation, CubicTerms, Limit, Method, Percentile, Pitched, Problem, RevolutionCollocation, SpeedLine,
-    StabilityError, Uncertainty, chart, needs_orbit,
+    CubicTerms, Limit, Method, Percentile, Pitched, Problem, SpeedLine, StabilityError, Uncertainty, chart,
+    needs_orbit,
 };
 
 /// Feed per tooth, mm, up to which a layer holds whose limits do not depend on the feed.
@@ -56,7 +56,7 @@ impl Family {
         let pitched = Pitched::new(&case, CubicTerms::Kept)?;
         let linear = pitched.with_mean_pitch().clone();
         Ok(Self {
-            method: method(&case)?,
+            method: collocation_of(&case)?,
             validity: Validity {
                 feed_from: Millimeters(feed_from),
                 feed_to: Millimeters(feed_to),
@@ -115,7 +115,7 @@ impl Family {
         let Some(percent) = self.percentile else {
             return Ok(lines);
         };
-        let maker = |case: &Case| method(case).ok();
+        let maker = |case: &Case| collocation_of(case).ok();
         let Some(uncertainty) = Uncertainty::new(&self.case, &maker, SEED) else {
             return Ok(lines);
         };
@@ -172,20 +172,6 @@ fn up_to(line: SpeedLine, percentile: &Percentile, depth_mm: f64) -> SpeedLine {
         first_limit: limit,
         ..line
     }
-}
-
-fn method(case: &Case) -> Result<Box<dyn Method>, StabilityError> {
-    Ok(if needs_orbit(case) {
-        Box::new(ForcedProblem::new(case)?)
-    } else if has_variable_pitch(case) {
-        Box::new(RevolutionCollocation {
-            pitched: Pitched::new(case, CubicTerms::Refuse)?,
-        })
-    } else {
-        Box::new(Collocation {
-            problem: Problem::new(case, CubicTerms::Refuse)?,
-        })
-    })
 }
 
 fn has_variable_pitch(case: &Case) -> bool {

@@ -15,6 +15,7 @@ mod error;
 mod force_law;
 mod integrator;
 mod passage;
+pub mod path;
 mod pores;
 mod record;
 pub mod rig;

@@ -32,6 +32,9 @@ const OF_LINEAR_PROCESS: [&str; 4] = [
 /// Extensions of the process that act through the depth or about the forced chip.
 const ABOUT_FORCED_CHIP: [&str; 2] = ["process-damping", "force-exponent"];
 
+/// Terms that are not smooth: they act by an equivalent stiffness and damping at the amplitude of the forced orbit.
+pub(crate) const NOT_SMOOTH: [&str; 3] = ["coulomb-friction", "backlash", "hysteresis"];
+
 /// How much of the extensions a method treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Treated {
@@ -54,6 +57,14 @@ pub fn needs_orbit(case: &Case) -> bool {
             .extensions
             .keys()
             .any(|name| SMOOTH.contains(&name.as_str()) || ABOUT_FORCED_CHIP.contains(&name.as_str()))
+        || is_not_smooth(case)
+}
+
+/// True where a case has friction, backlash or hysteresis.
+pub(crate) fn is_not_smooth(case: &Case) -> bool {
+    case.extensions
+        .keys()
+        .any(|name| NOT_SMOOTH.contains(&name.as_str()))
 }
 
 /// Refuses what a method cannot treat, with the reason.
@@ -70,6 +81,7 @@ pub(super) fn refuse_others(case: &Case, treated: Treated) -> Result<(), Stabili
     }
     if treated == Treated::AboutOrbit {
         names.extend(ABOUT_FORCED_CHIP);
+        names.extend(NOT_SMOOTH);
     }
     names.extend(EXTENSIONS_OF_SENSORS);
     match case
@@ -105,9 +117,8 @@ fn reason(name: &str) -> &'static str {
              the table the limits are those of the mean speed"
         }
         _ => {
-            "it is not smooth: what it does depends on the amplitude of the motion, and no multipliers exist where it \
-             switches; `simulate` runs it, or put its equivalent stiffness and damping at the amplitude of the cut into \
-             [extension.stiffness] and [extension.damping]"
+            "it is not smooth: what it does depends on the amplitude of the forced motion, which this method does not follow; \
+             --method collocation takes its equivalent stiffness and damping there, and `simulate` runs it as it is"
         }
     }
 }
@@ -279,6 +290,23 @@ pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
         terms,
         law: law(case, &ABOUT_FORCED_CHIP)?,
     })
+}
+
+/// The terms of a case that are not smooth, on the structure as the other extensions leave it.
+///
+/// # Errors
+/// An extension that the case cannot have.
+pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn Term>>, StabilityError> {
+    let structure = case.structure()?;
+    let names: Vec<&str> = OF_LINEAR_STRUCTURE.into_iter().chain(NOT_SMOOTH).collect();
+    match effects(case, &names)?.dynamics(structure) {
+        Ok((_, terms)) => Ok(terms),
+        Err(SimulateError::Structure(cause)) => Err(StabilityError::Structure {
+            path: case.path.clone(),
+            cause,
+        }),
+        Err(other) => Err(wrong(case, other)),
+    }
 }
 
 /// See [`about_orbit`].

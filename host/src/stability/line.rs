@@ -353,7 +353,7 @@ impl<S: Spectrum> Scan<S> {
 impl SpeedLine {
     /// The line that switches, by depth, make of depths from 0 to `depth_mm`, where `outside` multipliers are outside
     /// at depth 0.
-    pub(super) fn of_switches(rpm: f64, depth_mm: f64, mut outside: i32, switches: Vec<Switch>) -> Self {
+    pub(crate) fn of_switches(rpm: f64, depth_mm: f64, mut outside: i32, switches: Vec<Switch>) -> Self {
         let mut stable_from = (outside == 0).then_some(0.0);
         let mut stable_mm = Vec::new();
         let mut undecided_mm = Vec::new();

@@ -25,7 +25,7 @@ pub(crate) mod period;
 pub(crate) mod period_map;
 mod pitched;
 mod plane;
-mod point;
+pub(crate) mod point;
 mod problem;
 mod revolution;
 mod revolution_map;

@@ -203,7 +203,7 @@ fn dominant_of(period: &Period, kappa_m: f64, depth_m: f64, guesses: &[Complex64
     found?.into_iter().max_by(|p, q| p.norm().total_cmp(&q.norm()))
 }
 
-pub(super) fn check_speed(rpm: f64) -> Result<(), StabilityError> {
+pub(crate) fn check_speed(rpm: f64) -> Result<(), StabilityError> {
     if rpm.is_finite() && rpm > 0.0 {
         Ok(())
     } else {
@@ -215,7 +215,7 @@ pub(super) fn check_speed(rpm: f64) -> Result<(), StabilityError> {
     }
 }
 
-pub(super) fn check_depth(depth_mm: f64) -> Result<(), StabilityError> {
+pub(crate) fn check_depth(depth_mm: f64) -> Result<(), StabilityError> {
     if depth_mm.is_finite() && depth_mm >= 0.0 {
         Ok(())
     } else {

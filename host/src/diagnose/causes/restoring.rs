@@ -11,10 +11,10 @@ mod quadratic_stiffness;
 mod softening_hardening;
 
 use crate::diagnose::cause::{Cause, Parameter, Part, Place, Regressor};
-use crate::diagnose::path::restoring_along;
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::{Scene, terms_of};
 use crate::simulate::Effects;
+use crate::simulate::path::restoring_along;
 
 pub(super) fn all() -> Vec<Box<dyn Cause>> {
     [

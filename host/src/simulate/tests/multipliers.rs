@@ -402,3 +402,41 @@ fn small_motions_of_tools_with_variable_pitch_grow_as_collocation_over_the_revol
         );
     }
 }
+
+#[test]
+fn disturbances_beside_what_is_not_smooth_grow_within_the_stated_error_of_the_equivalent_multiplier() {
+    // Friction below the force of the orbit, so that nothing sticks; a gap below its amplitude; a soft yield.
+    let friction = "[extension.coulomb-friction]\nfc_n = 0.3\ndirection = \"x\"\n";
+    let play = "[extension.backlash]\ngap_mm = 0.004\nstiffness_fraction = 0.3\ndirection = \"x\"\n";
+    let loops =
+        "[extension.hysteresis]\nhysteretic_stiffness_n_per_m = 2e5\nyield_m = 4e-6\ndirection = \"x\"\n";
+    let name = "insperger-1dof-ad0.5";
+    let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap();
+    for extension in [friction, play, loops] {
+        let extended = Case::parse(path.as_ref(), &format!("{text}\n{extension}")).unwrap();
+        let rpm = 6200.0;
+        let method = crate::continuation::collocation_of(&extended).unwrap();
+        let plain = Problem::new(&Case::parse(path.as_ref(), &text).unwrap(), CubicTerms::Refuse).unwrap();
+        for depth_mm in [0.2, 0.4] {
+            let expected = method.point(rpm, depth_mm).unwrap();
+            let without = crate::stability::point(&plain, rpm, depth_mm)
+                .unwrap()
+                .multiplier_abs;
+            let cut = VirtualCut {
+                entry: Entry::None,
+                ..VirtualCut::new(rpm, depth_mm, 1.0)
+            };
+            let found = growth_of_a_push(
+                cut.model(&extended).unwrap(),
+                extended.tool().unwrap(),
+                expected.multiplier_abs.min(0.97),
+                2,
+            );
+            println!(
+                "{extension} {depth_mm}: {found} {} ± {} plain {without}",
+                expected.multiplier_abs, expected.error
+            );
+        }
+    }
+}

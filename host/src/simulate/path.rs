@@ -1,6 +1,6 @@
 //! What a term of the equation of motion does along a motion that is known.
 
-use crate::simulate::{At, Branch, Term};
+use super::{At, Branch, Term};
 
 /// Displacement and velocity of the tool in the machine's axes, finely sampled; an axis without motion is empty.
 #[derive(Clone, Debug, Default)]
@@ -42,7 +42,8 @@ impl Motion {
 
     /// Root mean square of the displacement along an axis, m.
     pub fn size_m(&self, axis: usize) -> f64 {
-        super::noise::rms(&self.x[axis])
+        let squares: f64 = self.x[axis].iter().map(|x| x * x).sum();
+        (squares / self.x[axis].len().max(1) as f64).sqrt()
     }
 
     /// Largest displacement along an axis, m.
@@ -56,24 +57,25 @@ impl Motion {
 /// Branches follow the motion as they do in a simulation. A term that can hold an axis and has no
 /// state of its own (dry friction) is blended between its branches where the speed cannot be told from rest.
 pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
-    let count = motion.len();
-    let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; count]);
-    let mut put = |sample: usize, value: [f64; 3]| {
-        for (signal, value) in force.iter_mut().zip(value) {
-            signal[sample] = value;
-        }
-    };
     if let Some(axis) = term.holds().filter(|_| term.states() == 0) {
-        for sample in 0..count {
-            put(
-                sample,
-                blended(term, axis, &motion.at(sample), motion.rest_m_per_s[axis]),
-            );
+        let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; motion.len()]);
+        for sample in 0..motion.len() {
+            let value = blended(term, axis, &motion.at(sample), motion.rest_m_per_s[axis]);
+            for (signal, value) in force.iter_mut().zip(value) {
+                signal[sample] = value;
+            }
         }
         return force;
     }
     let mut own = vec![0.0; term.states()];
     term.begin(&motion.at(0), &mut own);
+    restoring_from(term, motion, &mut own)
+}
+
+/// The same for a term that cannot hold an axis by itself, from its own states at the first sample to those at the last.
+pub fn restoring_from(term: &dyn Term, motion: &Motion, own: &mut [f64]) -> [Vec<f64>; 3] {
+    let count = motion.len();
+    let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; count]);
     let mut branch = None;
     let mut before: Option<At> = None;
     for sample in 0..count {
@@ -81,10 +83,12 @@ pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
         if let (Some(before), Some(branch)) = (before, branch)
             && !own.is_empty()
         {
-            step(term, branch, (&before, &at), motion.step_s, &mut own);
+            step(term, branch, (&before, &at), motion.step_s, own);
         }
-        let now = settled(term, branch, &at, &own);
-        put(sample, term.restoring_n(now, &at, &own));
+        let now = settled(term, branch, &at, own);
+        for (signal, value) in force.iter_mut().zip(term.restoring_n(now, &at, own)) {
+            signal[sample] = value;
+        }
         (branch, before) = (Some(now), Some(at));
     }
     force

@@ -1,0 +1,75 @@
+//! Anderson's acceleration of a fixed-point iteration z → G(z).
+//!
+//! The next z is Σ α_i G(z_i) over the last few rounds, with Σ α_i = 1 and ‖Σ α_i (G(z_i) − z_i)‖ least. D. G. Anderson, J. ACM 12
+//! (1965) 547; H. F. Walker and P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715.
+
+use std::collections::VecDeque;
+
+use nalgebra::{DMatrix, DVector};
+
+/// What is left out of the singular values of the last residuals, as a share of the largest.
+const RANK: f64 = 1e-10;
+
+/// The last rounds.
+pub(super) struct Anderson {
+    depth: usize,
+    /// (G(z) − z, G(z)) of the last rounds.
+    rounds: VecDeque<(DVector<f64>, DVector<f64>)>,
+}
+
+impl Anderson {
+    /// Remembers `depth` rounds.
+    pub(super) fn new(depth: usize) -> Self {
+        Self {
+            depth,
+            rounds: VecDeque::with_capacity(depth + 1),
+        }
+    }
+
+    /// The next z, after G(`at`) = `to`.
+    pub(super) fn next(&mut self, at: &DVector<f64>, to: &DVector<f64>) -> DVector<f64> {
+        let residual = to - at;
+        self.rounds.push_back((residual.clone(), to.clone()));
+        if self.rounds.len() > self.depth + 1 {
+            self.rounds.pop_front();
+        }
+        let before = self.rounds.len() - 1;
+        // Half of the first step: some of the maps turn around their fixed point.
+        if before == 0 {
+            return at + &residual * 0.5;
+        }
+        let differences = DMatrix::from_fn(residual.len(), before, |row, column| {
+            residual[row] - self.rounds[column].0[row]
+        });
+        let decomposed = differences.svd(true, true);
+        let least = RANK * decomposed.singular_values.max();
+        let Ok(shares) = decomposed.solve(&residual, least) else {
+            return at + &residual * 0.5;
+        };
+        let mut next = to.clone();
+        for (share, (_, earlier)) in shares.iter().zip(&self.rounds) {
+            next -= (to - earlier) * *share;
+        }
+        next
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_linear_map_that_diverges_by_itself_is_solved() {
+        // z → A z + b with an eigenvalue of −1.5.
+        let a = DMatrix::from_row_slice(3, 3, &[-1.5, 0.2, 0.0, 0.1, 0.4, 0.3, 0.0, 0.0, 0.9]);
+        let b = DVector::from_vec(vec![1.0, -2.0, 0.5]);
+        let exact = (DMatrix::identity(3, 3) - &a).lu().solve(&b).unwrap();
+        let mut mixing = Anderson::new(5);
+        let mut z = DVector::zeros(3);
+        for _ in 0..8 {
+            let to = &a * &z + &b;
+            z = mixing.next(&z, &to);
+        }
+        assert!((z - exact).amax() < 1e-9);
+    }
+}
