@@ -132,33 +132,70 @@ impl Calls {
     /// # Errors
     /// Those of [`Method::lines`].
     pub fn new<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Self, StabilityError> {
-        let mut speeds_rpm: Vec<f64> = cuts.iter().map(|cut| cut.rpm).collect();
-        speeds_rpm.sort_by(f64::total_cmp);
-        speeds_rpm.dedup();
-        let deepest_mm = cuts.iter().map(|cut| cut.depth_mm).fold(0.0, f64::max);
-        let lines = method.lines(&speeds_rpm, deepest_mm, SAMPLES)?;
-        let mut calls = Self {
-            cuts: cuts.len(),
-            ..Self::default()
-        };
-        for cut in cuts {
+        Ok(Self::of(&calls(method, cuts)?))
+    }
+
+    /// The sum of what was said of each cut.
+    pub fn of(calls: &[Call]) -> Self {
+        let count = |call: Call| calls.iter().filter(|other| **other == call).count();
+        let (missed_chatter, false_alarms) = (count(Call::MissedChatter), count(Call::FalseAlarm));
+        Self {
+            cuts: calls.len(),
+            wrong: missed_chatter + false_alarms,
+            missed_chatter,
+            false_alarms,
+            undecided: count(Call::Undecided),
+        }
+    }
+}
+
+/// What a method says of one cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Call {
+    /// What came of it.
+    Right,
+    /// Stable, and it chattered.
+    MissedChatter,
+    /// Unstable, and it was stable.
+    FalseAlarm,
+    /// It could not be told, or two stable orbits exist at its depth.
+    Undecided,
+}
+
+impl Call {
+    /// True where what came of the cut is the opposite.
+    pub fn is_wrong(self) -> bool {
+        matches!(self, Self::MissedChatter | Self::FalseAlarm)
+    }
+}
+
+/// What the limits by a method say of cuts, in their order, each at its own speed.
+///
+/// # Errors
+/// Those of [`Method::lines`].
+pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Vec<Call>, StabilityError> {
+    let mut speeds_rpm: Vec<f64> = cuts.iter().map(|cut| cut.rpm).collect();
+    speeds_rpm.sort_by(f64::total_cmp);
+    speeds_rpm.dedup();
+    let deepest_mm = cuts.iter().map(|cut| cut.depth_mm).fold(0.0, f64::max);
+    let lines = method.lines(&speeds_rpm, deepest_mm, SAMPLES)?;
+    Ok(cuts
+        .iter()
+        .map(|cut| {
             let line = lines.iter().find(|line| line.rpm == cut.rpm);
             let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {
                 let mut intervals = line.into_iter().flat_map(of);
                 intervals.any(|&[from, to]| from <= cut.depth_mm && cut.depth_mm <= to)
             };
-            let is_stable = within(|line| &line.stable_mm);
-            match (cut.outcome, is_stable) {
-                _ if within(|line| &line.bistable_mm) => calls.undecided += 1,
-                (Outcome::Marginal, _) => calls.undecided += 1,
-                (Outcome::Chatter, true) => calls.missed_chatter += 1,
-                (Outcome::Stable, false) => calls.false_alarms += 1,
-                (Outcome::Stable, true) | (Outcome::Chatter, false) => {}
+            match (cut.outcome, within(|line| &line.stable_mm)) {
+                _ if within(|line| &line.bistable_mm) => Call::Undecided,
+                (Outcome::Marginal, _) => Call::Undecided,
+                (Outcome::Chatter, true) => Call::MissedChatter,
+                (Outcome::Stable, false) => Call::FalseAlarm,
+                (Outcome::Stable, true) | (Outcome::Chatter, false) => Call::Right,
             }
-        }
-        calls.wrong = calls.missed_chatter + calls.false_alarms;
-        Ok(calls)
-    }
+        })
+        .collect())
 }
 
 #[cfg(test)]

@@ -1,13 +1,19 @@
 //! `quietcut diagnose`: what the simulation gets wrong, and why.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::{Error, Output};
 use crate::case::Case;
 use crate::diagnose::answer::Outcome;
-use crate::diagnose::{DiagnoseError, Diagnosis, Options, diagnose};
+use crate::diagnose::lobes::lobes;
+use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched};
 use crate::recording::Recording;
 use crate::report::diagnosis::diagnosis_page;
+use crate::report::lobes_change::sentences;
+use crate::test_cuts::{self, TestCut};
 
 /// What the simulation gets wrong about recordings, why, what to add, and how much better that is.
 #[derive(Debug, clap::Args)]
@@ -24,6 +30,10 @@ pub struct Args {
     /// Folder for what is written: extended.toml, diagnosis.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Cuts that were tried, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal): how the case
+    /// and the extended case call them.
+    #[arg(long, value_name = "FILE")]
+    cuts: Option<PathBuf>,
     /// Seed of whatever is drawn.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -34,32 +44,95 @@ pub struct Args {
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case)?;
+    let cuts = match &args.cuts {
+        Some(path) => test_cuts::read(path)?,
+        None => Vec::new(),
+    };
     let recordings = args
         .recordings
         .iter()
         .map(Recording::read)
         .collect::<Result<Vec<_>, _>>()?;
-    let diagnosis = diagnose(&case, &recordings, &Options { seed: args.seed })?;
+    let bar = progress_bar();
+    let options = Options { seed: args.seed };
+    let mut diagnosis = diagnose_watched(&case, &recordings, &options, &|stage| {
+        bar.set_message(words(stage));
+        bar.inc(1);
+    })?;
+    let extended = diagnosis.extended_case(&crate::file::read_text(&args.case)?);
+    if let Some(extended) = &extended {
+        bar.set_message("limits before and after");
+        bar.inc(1);
+        compare_limits(&case, extended, &recordings, &cuts, &mut diagnosis);
+    } else if !cuts.is_empty() {
+        let why = "--cuts: without an extension there are no limits before and after; lobes --cuts says how the case calls them";
+        diagnosis.warnings.push(why.into());
+    }
+    bar.finish_and_clear();
     for warning in &diagnosis.warnings {
         tracing::warn!("{warning}");
     }
     if let Some(folder) = &args.out {
-        write(folder, &args.case, &case.name, &diagnosis)?;
+        write(folder, &case.name, &diagnosis, extended.as_deref())?;
     }
     args.output.answer(&diagnosis, text(&diagnosis))
 }
 
-fn write(folder: &Path, case: &Path, name: &str, diagnosis: &Diagnosis) -> Result<(), Error> {
+/// Adds what the extension changes of the limits; says why where that is not known.
+fn compare_limits(
+    case: &Case,
+    extended: &str,
+    recordings: &[Recording],
+    cuts: &[TestCut],
+    diagnosis: &mut Diagnosis,
+) {
+    let lobes = Case::parse(&case.path, extended)
+        .map_err(|error| error.to_string())
+        .and_then(|extended| lobes(case, &extended, recordings, cuts).map_err(|error| error.to_string()));
+    match lobes {
+        Ok(lobes) => diagnosis.lobes = Some(lobes),
+        Err(error) => diagnosis
+            .warnings
+            .push(format!("limits before and after are not known: {error}")),
+    }
+}
+
+/// Stages of a diagnosis, with that of the limits.
+const STAGES: u64 = 7;
+
+fn progress_bar() -> ProgressBar {
+    let target = if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr()
+    } else {
+        ProgressDrawTarget::hidden()
+    };
+    let bar = ProgressBar::with_draw_target(Some(STAGES), target);
+    match ProgressStyle::with_template("{bar:24} {msg} {elapsed}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+fn words(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Records => "recordings beside the case",
+        Stage::Library => "what each cause would look like",
+        Stage::Causes(1) => "one cause",
+        Stage::Causes(2) => "two causes",
+        Stage::Causes(_) => "three causes",
+        Stage::Answer => "what it means",
+    }
+}
+
+fn write(folder: &Path, name: &str, diagnosis: &Diagnosis, extended: Option<&str>) -> Result<(), Error> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::input(format!("--out {}: {error}", folder.display())))?;
-    let believed = crate::file::read_text(case)?;
-    let extended = diagnosis.extended_case(&believed);
-    if let Some(extended) = &extended {
+    if let Some(extended) = extended {
         crate::file::write(&folder.join("extended.toml"), extended.as_bytes())?;
     }
     let json = serde_json::to_string_pretty(diagnosis).map_err(Error::other)?;
     crate::file::write(&folder.join("diagnosis.json"), json.as_bytes())?;
-    let page = diagnosis_page(name, diagnosis, extended.as_deref()).map_err(Error::other)?;
+    let page = diagnosis_page(name, diagnosis, extended).map_err(Error::other)?;
     Ok(crate::file::write(&folder.join("report.html"), page.as_bytes())?)
 }
 
@@ -101,6 +174,18 @@ fn text(diagnosis: &Diagnosis) -> String {
             100.0 * extended.nrmse_heldout,
             100.0 * gain.residual_energy_removed
         ));
+    }
+    if diagnosis.unexplained.fraction > 0.0 {
+        lines.push(format!(
+            "{:.2} % of what the case misses is not explained: {}",
+            100.0 * diagnosis.unexplained.fraction,
+            diagnosis.unexplained.place
+        ));
+    }
+    lines.extend(diagnosis.unexplained.guess.clone());
+    lines.extend(diagnosis.lobes.iter().flat_map(sentences));
+    if let Some(test) = &diagnosis.next_test {
+        lines.push(format!("next test: {}: {}", test.kind, test.why));
     }
     lines.join("\n")
 }

@@ -79,6 +79,7 @@ fn mark(trial: &Trial, label: &str, advised: Option<&Trial>) -> Mark {
         },
         label: label.into(),
         advice: advised.map(|trial| (trial.rpm, trial.depth_mm)),
+        wrong: false,
     }
 }
 

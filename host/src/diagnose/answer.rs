@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::lobes::Lobes;
 use super::views::View;
 
 /// What was found.
@@ -108,6 +109,9 @@ pub struct Diagnosis {
     pub gain: Option<Gain>,
     /// What is left.
     pub unexplained: Unexplained,
+    /// What it changes of the limits; `None` where nothing was found, or limits cannot be computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lobes: Option<Lobes>,
     /// What would tell more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_test: Option<NextTest>,

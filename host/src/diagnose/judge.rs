@@ -7,7 +7,7 @@ use super::regression::{Regression, Share};
 use super::scene::{Domain, Scene};
 use super::selection::{APART, Scale, Selection, WITHIN_NOISE, names, select};
 use super::views::views;
-use super::{Options, next_test};
+use super::{Options, Stage, next_test};
 
 /// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
 /// where the noise is known by its floor, and of forces, where derivatives of the motion bring noise that is not white.
@@ -19,11 +19,13 @@ const LEFT_OF_FORCE: f64 = 0.15;
 const REJECTED: f64 = 0.03;
 const DOUBT: f64 = 0.8;
 
-pub(super) fn judge(scene: &Scene<'_>, _options: &Options) -> Diagnosis {
+pub(super) fn judge(scene: &Scene<'_>, _options: &Options, watch: &dyn Fn(Stage)) -> Diagnosis {
+    watch(Stage::Library);
     let mut regression = Regression::new(scene);
     let mut library = Library::new(scene, &mut regression);
     let scale = Scale::new(scene, &library, &regression);
-    let selection = select(&scale, &mut library, &mut regression);
+    let selection = select(&scale, &mut library, &mut regression, watch);
+    watch(Stage::Answer);
     answer(&scale, &library, &mut regression, &selection)
 }
 
@@ -53,6 +55,7 @@ fn answer(
             place: "none above noise".into(),
             guess: None,
         },
+        lobes: None,
         next_test: None,
         warnings: Vec::new(),
         acting: 0,
@@ -78,6 +81,7 @@ fn answer(
     else {
         if of_noise > WITHIN_NOISE {
             diagnosis.outcome = Outcome::Unexplained;
+            diagnosis.unexplained.guess = super::guess::guess(scene, regression);
         }
         return diagnosis;
     };

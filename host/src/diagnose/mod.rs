@@ -20,8 +20,11 @@ mod error;
 pub mod evidence;
 mod extension;
 mod grid;
+mod guess;
 mod judge;
 mod leftover;
+pub mod lobes;
+mod missing_force;
 mod motion;
 mod named;
 mod next_test;
@@ -45,10 +48,11 @@ pub use answer::Diagnosis;
 pub use cutting::Cutting;
 pub use error::DiagnoseError;
 pub use grid::Grid;
+pub use missing_force::{AtAmplitude, MissingForce};
 pub use receptance::Receptance;
 pub use record::{Observed, Record};
 pub use scene::{Baseline, Domain, Scene};
-pub use views::View;
+pub use views::{TurningView, View};
 
 use crate::case::Case;
 use crate::recording::Recording;
@@ -61,6 +65,19 @@ pub struct Options {
     pub seed: u64,
 }
 
+/// How far a diagnosis is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Recordings are set against what the case predicts.
+    Records,
+    /// What each cause would look like in them.
+    Library,
+    /// So many causes at a time are tried.
+    Causes(usize),
+    /// What was found is put into figures.
+    Answer,
+}
+
 /// What the case gets wrong about the recordings, and why.
 ///
 /// # Errors
@@ -70,6 +87,20 @@ pub fn diagnose(
     recordings: &[Recording],
     options: &Options,
 ) -> Result<Diagnosis, DiagnoseError> {
+    diagnose_watched(case, recordings, options, &|_| ())
+}
+
+/// The same, with word of each stage as it begins.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_watched(
+    case: &Case,
+    recordings: &[Recording],
+    options: &Options,
+    watch: &dyn Fn(Stage),
+) -> Result<Diagnosis, DiagnoseError> {
+    watch(Stage::Records);
     let scene = Scene::new(case, recordings)?;
-    Ok(judge::judge(&scene, options))
+    Ok(judge::judge(&scene, options, watch))
 }

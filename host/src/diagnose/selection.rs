@@ -1,5 +1,6 @@
 //! Which explanation is selected: causes are added while that gains more than it costs.
 
+use super::Stage;
 use super::evidence::{Explanation, Library};
 use super::output_error::OutputError;
 use super::refine::refine;
@@ -218,7 +219,12 @@ fn inflation(regression: &Regression) -> f64 {
 }
 
 /// Selects by one cause, pairs and triples; more causes only where fewer leave something.
-pub(super) fn select(scale: &Scale<'_>, library: &mut Library, regression: &mut Regression) -> Selection {
+pub(super) fn select(
+    scale: &Scale<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    watch: &dyn Fn(Stage),
+) -> Selection {
     let mut selection = Selection {
         best: None,
         others: Vec::new(),
@@ -235,6 +241,7 @@ pub(super) fn select(scale: &Scale<'_>, library: &mut Library, regression: &mut 
         if silent || (size > 1 && scale.is_enough(regression, selection.best.as_ref())) {
             break;
         }
+        watch(Stage::Causes(size));
         let mut found = match size {
             1 => library.singles(scene, regression),
             2 => library.pairs(scene, regression),

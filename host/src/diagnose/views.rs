@@ -1,10 +1,15 @@
 //! The residual as people look at it.
 
+use std::f64::consts::TAU;
+
 use num_complex::Complex64;
 
+use super::cut::RecordedCut;
 use super::evidence::{Explanation, Library};
 use super::grid::Grid;
+use super::missing_force::MissingForce;
 use super::noise::rms;
+use super::record::Record;
 use super::scene::Scene;
 
 /// One channel of one record: what was measured, what the case misses of it, and what the extended case misses.
@@ -18,6 +23,8 @@ pub struct View {
     pub unit: &'static str,
     /// Samples per second.
     pub rate_hz: f64,
+    /// Highest frequency at which it is compared, Hz.
+    pub highest_hz: f64,
     /// Deviation of its noise.
     pub deviation: f64,
     /// What was measured.
@@ -26,8 +33,23 @@ pub struct View {
     pub residual: Vec<f64>,
     /// The same with what was found; empty where nothing was.
     pub left: Vec<f64>,
-    /// Displacement along the axis of the channel at the samples, m; empty where it is not known.
-    pub displacement: Vec<f64>,
+    /// The force that the residual tells of; `None` where there is no motion that it could act on.
+    pub missing: Option<MissingForce>,
+    /// What a cut has besides; `None` for other tests.
+    pub turning: Option<TurningView>,
+}
+
+/// How the spindle turns under a channel of a cut.
+#[derive(Clone, Debug)]
+pub struct TurningView {
+    /// Mean speed, rev/min.
+    pub rpm: f64,
+    /// Number of teeth.
+    pub teeth: usize,
+    /// What was measured as each tooth passes the immersion angle 0, with the number of the pass.
+    pub measured: Vec<(u32, f64)>,
+    /// The same of the residual.
+    pub residual: Vec<(u32, f64)>,
 }
 
 impl View {
@@ -45,7 +67,7 @@ impl View {
             .map(|(index, chunk)| {
                 let middle = index * per + chunk.len() / 2;
                 let power: f64 = chunk.iter().map(|bin| bin.norm_sqr()).sum::<f64>() / chunk.len() as f64;
-                (grid.omega(middle) / std::f64::consts::TAU, scale * power.sqrt())
+                (grid.omega(middle) / TAU, scale * power.sqrt())
             })
             .collect()
     }
@@ -70,25 +92,61 @@ pub(super) fn views(scene: &Scene<'_>, library: &Library, best: Option<&Explanat
                     .map(|(a, b)| a - b)
                     .collect()
             });
-            let axis = (0..3)
-                .find(|axis| channel.pickup.weights[*axis] != 0.0)
-                .unwrap_or(0);
+            let turning = record.cut.as_ref().map(|cutting| {
+                let passes = passes(record, &cutting.cut);
+                let at = |samples: &[f64]| strobe(&passes, samples);
+                TurningView {
+                    rpm: cutting.cut.turning.rpm(),
+                    teeth: cutting.cut.cutter.teeth.len(),
+                    measured: at(&channel.measured),
+                    residual: at(&residual),
+                }
+            });
             all.push(View {
                 record: record.path.display().to_string(),
                 channel: channel.pickup.name.clone(),
                 unit: channel.pickup.quantity.unit(),
                 rate_hz: record.grid.rate_hz(),
+                highest_hz: record.band_hz,
                 deviation: channel.deviation,
                 measured: channel.measured.clone(),
+                missing: MissingForce::of(&scene.baseline, record, channel, &residual),
+                turning,
                 residual,
                 left,
-                displacement: record.motion.x[axis]
-                    .iter()
-                    .copied()
-                    .step_by(record.grid.finer())
-                    .collect(),
             });
         }
     }
     all
+}
+
+/// Where teeth pass, in samples, with the numbers of the passes.
+fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
+    let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
+    let rate_hz = record.grid.rate_hz();
+    let turned = |sample: usize| cut.turning.angle_rad(sample as f64 / rate_hz) / pitch;
+    let first = turned(0).ceil();
+    let mut next = first;
+    let mut found = Vec::new();
+    for sample in 1..record.grid.count() {
+        let (from, to) = (turned(sample - 1), turned(sample));
+        while next <= to && to > from {
+            let share = ((next - from) / (to - from)).clamp(0.0, 1.0);
+            found.push(((next - first) as u32, (sample - 1) as f64 + share));
+            next += 1.0;
+        }
+    }
+    found
+}
+
+/// Samples at these places, in straight lines between neighbours.
+fn strobe(passes: &[(u32, f64)], samples: &[f64]) -> Vec<(u32, f64)> {
+    passes
+        .iter()
+        .filter_map(|(pass, place)| {
+            let (index, share) = (place.floor() as usize, place.fract());
+            let (from, to) = (samples.get(index)?, samples.get(index + 1)?);
+            Some((*pass, from + share * (to - from)))
+        })
+        .collect()
 }

@@ -1,34 +1,7 @@
 //! Which speeds and depths a table covers.
 
-use std::f64::consts::TAU;
-
 use super::layers::Family;
-use crate::case::Case;
-use crate::stability::{Refinement, StabilityError, chart};
-use crate::structure::FirstOrder;
-
-/// The machine's limits, else 1/2 to 5 teeth per vibration of the most flexible mode of the first layer.
-pub(super) fn default_speeds(first: &Case, families: &[Family]) -> (f64, f64) {
-    if let Some(limits) = first.limits {
-        // A spindle at rest cuts nothing; a hundredth of the fastest speed stands for a slowest speed of 0.
-        return (limits.rpm_min.max(0.01 * limits.rpm_max), limits.rpm_max);
-    }
-    let rpm = families.first().map_or(1.0, |family| {
-        most_flexible_hz(&family.linear.structure) * 60.0 / family.teeth as f64
-    });
-    (0.5 * rpm, 5.0 * rpm)
-}
-
-/// The frequency, Hz, of the pole at which the receptance is largest.
-fn most_flexible_hz(structure: &FirstOrder) -> f64 {
-    let size = |omega: f64| structure.receptance(omega).map_or(f64::INFINITY, |h| h.norm());
-    structure
-        .poles()
-        .iter()
-        .map(|pole| pole.norm())
-        .max_by(|a, b| size(*a).total_cmp(&size(*b)))
-        .map_or(1.0, |omega| omega / TAU)
-}
+use crate::stability::{Refinement, StabilityError, chart, spaced};
 
 /// Four times the lowest limit, found by doubling: deep enough for every pocket that is worth while.
 pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> Result<f64, StabilityError> {
@@ -51,17 +24,6 @@ pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> 
         depth_mm *= 2.0;
     }
     Ok(DEEPEST_MM)
-}
-
-/// Speeds from first to last with equal ratios: lobes get narrower towards low speeds.
-pub(super) fn spaced(from_rpm: f64, to_rpm: f64, count: usize) -> Vec<f64> {
-    let last = count.saturating_sub(1).max(1) as f64;
-    (0..count)
-        .map(|index| {
-            let share = index as f64 / last;
-            from_rpm.powf(1.0 - share) * to_rpm.powf(share)
-        })
-        .collect()
 }
 
 /// The speeds that any of the layers needs, ascending.

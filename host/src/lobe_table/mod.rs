@@ -14,7 +14,7 @@ use quietcut_core::units::{Degrees, Millimeters, Rpm};
 use quietcut_core::working_point::Limits;
 
 use crate::case::Case;
-use crate::stability::{Refinement, StabilityError};
+use crate::stability::{Refinement, StabilityError, default_speeds, spaced};
 use accuracy::Checks;
 use derivatives::Derivatives;
 use entries::Entry;
@@ -100,12 +100,16 @@ pub enum BuildError {
 pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, BuildError> {
     let first = cases.first().ok_or(BuildError::NoCase)?;
     let asked = layers::families(cases, request)?;
-    let (from_rpm, to_rpm) = request.rpm.unwrap_or_else(|| grid::default_speeds(first, &asked));
+    let (from_rpm, to_rpm) = match (request.rpm, asked.first()) {
+        (Some(rpm), _) => rpm,
+        (None, Some(family)) => default_speeds(first, &family.linear.structure, family.teeth),
+        (None, None) => return Err(BuildError::NoCase),
+    };
     let depth_mm = match request.depth_mm {
         Some(depth_mm) => depth_mm,
         None => grid::default_depth(&asked, from_rpm, to_rpm)?,
     };
-    let probes = grid::spaced(from_rpm, to_rpm, layers::PROBES);
+    let probes = spaced(from_rpm, to_rpm, layers::PROBES);
     let families = layers::refined(cases, request, &probes, depth_mm, TOLERANCE * depth_mm)?;
     let modes = if request.derivatives {
         derivatives::mode_count(&families)?
@@ -119,7 +123,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
         least_step: 2e-4,
         most_speeds: (BYTES / bytes_of_speed).max(SPEEDS),
     };
-    let coarse = grid::spaced(from_rpm, to_rpm, request.speeds.unwrap_or(SPEEDS).max(2));
+    let coarse = spaced(from_rpm, to_rpm, request.speeds.unwrap_or(SPEEDS).max(2));
     let speeds = grid::speeds_of_all(&families, &coarse, depth_mm, refinement)?;
     let mut lines = Vec::with_capacity(families.len());
     for family in &families {

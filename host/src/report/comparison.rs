@@ -5,7 +5,9 @@ use std::ops::Range;
 use plotters::prelude::{Circle, LineSeries, PathElement, RGBColor};
 use plotters::style::Color;
 
-use super::picture::{BLUE, CHATTER, INK, Labels, ORANGE, PictureError, QUIET, axes, draw, legend, span};
+use super::picture::{
+    BLUE, CHATTER, INK, Labels, ORANGE, PictureError, QUIET, VIOLET, axes, draw, legend, span,
+};
 
 /// One line, or one cloud of points.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +33,8 @@ pub enum Look {
     Level,
     /// Points of what the model misses.
     Cloud,
+    /// Points of something else of the same kind.
+    OtherCloud,
 }
 
 impl Look {
@@ -41,6 +45,7 @@ impl Look {
             Self::Left => QUIET,
             Self::Level => ORANGE,
             Self::Cloud => BLUE,
+            Self::OtherCloud => VIOLET,
         }
     }
 }
@@ -69,7 +74,7 @@ pub fn comparison(
         let mut chart = axes(canvas, &Labels { title, x, y }, low..high, y_range.clone())?;
         for line in lines.iter().filter(|line| !line.points.is_empty()) {
             let color = line.look.color();
-            let drawn = if line.look == Look::Cloud {
+            let drawn = if matches!(line.look, Look::Cloud | Look::OtherCloud) {
                 let dots = line
                     .points
                     .iter()

@@ -3,9 +3,9 @@
 use maud::{Markup, html};
 
 use super::PictureError;
-use super::comparison::{Line, Look, comparison};
-use super::page::{figure, page};
-use super::time_signal::thinned;
+use super::lobes_change::section;
+use super::page::page;
+use super::residual_pictures::{file_name, pictures};
 use crate::diagnose::answer::{Figure, NamedCause, Outcome};
 use crate::diagnose::{Diagnosis, View};
 
@@ -26,10 +26,13 @@ pub fn diagnosis_page(
         p { (verdict(case_name, diagnosis)) }
         h2 { "What was believed, and what was seen" }
         (seen(diagnosis))
-        (pictures(diagnosis)?)
         @if !diagnosis.causes.is_empty() {
             h2 { @if diagnosis.outcome == Outcome::Confounded { "What explains it, and cannot be told apart" } @else { "Why" } }
             @for cause in &diagnosis.causes { (cause_table(cause)) }
+        }
+        @if let Some(lobes) = &diagnosis.lobes {
+            h2 { "What it changes" }
+            (section(lobes)?)
         }
         @if let Some(test) = &diagnosis.next_test {
             h2 { "The next test" }
@@ -40,6 +43,9 @@ pub fn diagnosis_page(
             (format!("{:.2} % of the energy that the case misses is neither explained nor noise. ", 100.0 * diagnosis.unexplained.fraction))
             @if diagnosis.unexplained.fraction > 0.0 { (diagnosis.unexplained.place) "." }
         }
+        @if let Some(guess) = &diagnosis.unexplained.guess { p { (guess) "." } }
+        h2 { "The residual, channel by channel" }
+        (all_pictures(diagnosis)?)
         @if let Some(extended) = extended {
             h2 { "The extended case" }
             pre { (extended) }
@@ -95,7 +101,7 @@ fn seen(diagnosis: &Diagnosis) -> Markup {
             @for view in &diagnosis.views {
                 @let [measured, residual, left] = view.sizes();
                 tr {
-                    td { (view.record) }
+                    td { (file_name(&view.record)) }
                     td { (view.channel) }
                     td { (format!("{measured:.3e} {}", view.unit)) }
                     td { (percent(residual / measured.max(f64::MIN_POSITIVE))) }
@@ -107,86 +113,16 @@ fn seen(diagnosis: &Diagnosis) -> Markup {
     }
 }
 
-fn pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
+/// Pictures of the channels that miss most.
+fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
     let mut views: Vec<&View> = diagnosis.views.iter().collect();
     let loudness = |view: &View| view.sizes()[1] / view.deviation.max(f64::MIN_POSITIVE);
     views.sort_by(|a, b| loudness(b).total_cmp(&loudness(a)));
     let mut all = Vec::new();
     for view in views.into_iter().take(PICTURED) {
-        let what = format!("{} of {}", view.channel, view.record);
-        all.push(html! {
-            (figure(&over_time(view, &what)?, &format!("{what} over time: what was measured, what the case misses, and what the extended case misses.")))
-            div.pair {
-                (figure(&over_frequency(view)?, "Over frequency, as powers of ten of the amplitude per line."))
-                (figure(&over_displacement(view)?, "What the case misses over the displacement: a spring that is not linear bends it, friction and play open it."))
-            }
-        });
+        all.push(pictures(view, !view.left.is_empty())?);
     }
     Ok(html! { @for picture in all { (picture) } })
-}
-
-fn over_time(view: &View, what: &str) -> Result<String, PictureError> {
-    let t_s: Vec<f64> = (0..view.measured.len())
-        .map(|n| n as f64 / view.rate_hz)
-        .collect();
-    let line = |name: &str, look, samples: &[f64]| Line {
-        name: name.into(),
-        points: thinned(&t_s, samples),
-        look,
-    };
-    let mut lines = vec![
-        line("measured", Look::Measured, &view.measured),
-        line("missed by the case", Look::Missed, &view.residual),
-    ];
-    if !view.left.is_empty() {
-        lines.push(line("missed with the extension", Look::Left, &view.left));
-    }
-    let unit = format!("{} [{}]", view.channel, view.unit);
-    comparison((960, 300), [what, "time [s]", &unit], &lines, None)
-}
-
-fn over_frequency(view: &View) -> Result<String, PictureError> {
-    let line = |name: &str, look, samples: &[f64]| Line {
-        name: name.into(),
-        points: view
-            .spectrum(samples, 500)
-            .into_iter()
-            .filter(|(_, amplitude)| *amplitude > 0.0)
-            .map(|(hertz, amplitude)| (hertz, amplitude.log10()))
-            .collect(),
-        look,
-    };
-    let mut lines = vec![
-        line("measured", Look::Measured, &view.measured),
-        line("missed by the case", Look::Missed, &view.residual),
-    ];
-    if !view.left.is_empty() {
-        lines.push(line("missed with the extension", Look::Left, &view.left));
-    }
-    let unit = format!("log10 of {} [{}]", view.channel, view.unit);
-    comparison((470, 330), ["", "frequency [Hz]", &unit], &lines, None)
-}
-
-fn over_displacement(view: &View) -> Result<String, PictureError> {
-    let every = view.residual.len().div_ceil(3000).max(1);
-    let cloud = |samples: &[f64]| -> Vec<(f64, f64)> {
-        view.displacement
-            .iter()
-            .zip(samples)
-            .step_by(every)
-            .map(|(x, y)| (1e3 * x, *y))
-            .collect()
-    };
-    let mut lines = vec![Line {
-        name: "missed by the case".into(),
-        points: cloud(&view.residual),
-        look: Look::Cloud,
-    }];
-    if lines[0].points.len() < 2 {
-        lines[0].points = vec![(0.0, 0.0), (1.0, 0.0)];
-    }
-    let unit = format!("{} [{}]", view.channel, view.unit);
-    comparison((470, 330), ["", "displacement [mm]", &unit], &lines, None)
 }
 
 fn cause_table(cause: &NamedCause) -> Markup {

@@ -347,6 +347,7 @@ mod tests {
             kind: MarkKind::Chatter,
             label: "first cut".into(),
             advice: Some((1150.0, 2.0)),
+            wrong: false,
         };
         let svg = lobe_chart("robot", &columns, 4.0, &[mark]).unwrap();
         for said in [

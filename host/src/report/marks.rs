@@ -4,7 +4,7 @@ use plotters::prelude::{Circle, Cross, PathElement, Polygon, Rectangle, Text, WH
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
 
-use super::picture::{Axes, CHATTER, Canvas, INK, PictureError, QUIET, text};
+use super::picture::{Axes, CHATTER, Canvas, INK, ORANGE, PictureError, QUIET, text};
 use crate::test_cuts::{Outcome, TestCut};
 
 /// What a marked point is.
@@ -31,6 +31,8 @@ pub struct Mark {
     pub label: String,
     /// Spindle speed and depth that were advised here: an arrow goes there.
     pub advice: Option<(f64, f64)>,
+    /// True where the chart says the opposite: it gets a ring.
+    pub wrong: bool,
 }
 
 impl From<&TestCut> for Mark {
@@ -45,6 +47,7 @@ impl From<&TestCut> for Mark {
             },
             label: String::new(),
             advice: None,
+            wrong: false,
         }
     }
 }
@@ -90,6 +93,9 @@ pub(super) fn draw_marks(
                 canvas.draw(&Rectangle::new(corners, WHITE.filled()))?;
                 canvas.draw(&Rectangle::new(corners, color.stroke_width(2)))?;
             }
+        }
+        if mark.wrong {
+            canvas.draw(&Circle::new(at, RADIUS + 5, ORANGE.stroke_width(3)))?;
         }
         if !mark.label.is_empty() {
             draw_label(canvas, at, &mark.label, color, &mut taken)?;

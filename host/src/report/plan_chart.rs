@@ -40,6 +40,7 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
                 kind: MarkKind::Quiet,
                 label: format!("test {}: {} cuts", index + 1, step.cuts_or_tests),
                 advice: None,
+                wrong: false,
             }),
             _ => None,
         });

@@ -1,0 +1,130 @@
+//! What an extension changes of the limits, in words and charts.
+
+use maud::{Markup, html};
+
+use super::PictureError;
+use super::lobe_chart::{Column, lobe_chart};
+use super::marks::Mark;
+use super::page::figure;
+use crate::diagnose::lobes::{Change, Lobes};
+
+/// The change in sentences.
+pub fn sentences(lobes: &Lobes) -> Vec<String> {
+    let mut all = vec![format!(
+        "at {:.1} rev/min the limit was {} and is {} with the extension",
+        lobes.at.at_rpm,
+        limit(
+            lobes.at.limit_before_mm,
+            lobes.at.kind_before,
+            lobes.at.chatter_before_hz,
+            lobes
+        ),
+        limit(
+            lobes.at.limit_after_mm,
+            lobes.at.kind_after,
+            lobes.at.chatter_after_hz,
+            lobes
+        ),
+    )];
+    if let (Some(first), Some(last)) = (lobes.speeds.first(), lobes.speeds.last()) {
+        let percent: Vec<f64> = lobes
+            .speeds
+            .iter()
+            .map(|change| 100.0 * change.relative(lobes.searched_mm).exp_m1())
+            .collect();
+        let lowest = percent.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = percent.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        all.push(format!(
+            "from {:.0} to {:.0} rev/min limits change by {lowest:+.1} to {highest:+.1} %",
+            first.at_rpm, last.at_rpm
+        ));
+    }
+    if let Some(calls) = lobes.calls {
+        all.push(format!(
+            "of {} cuts that were tried the case calls {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
+            calls.before.cuts,
+            calls.before.wrong,
+            calls.before.missed_chatter,
+            calls.before.false_alarms,
+            calls.after.wrong,
+            calls.after.missed_chatter,
+            calls.after.false_alarms,
+        ));
+    }
+    if let Some(after_s) = lobes.after_s {
+        all.push(format!(
+            "drift and wear as they are after {after_s:.0} s, the end of the longest recording"
+        ));
+    }
+    all
+}
+
+fn limit(
+    depth_mm: Option<f64>,
+    kind: Option<crate::stability::Kind>,
+    chatter_hz: Option<f64>,
+    lobes: &Lobes,
+) -> String {
+    let Some(depth_mm) = depth_mm else {
+        return format!("beyond {:.3} mm", lobes.searched_mm);
+    };
+    let kind = kind.map_or("", crate::stability::Kind::name);
+    match chatter_hz {
+        Some(hertz) => format!("{depth_mm:.3} mm ({kind}, {hertz:.2} Hz)"),
+        None => format!("{depth_mm:.3} mm ({kind})"),
+    }
+}
+
+/// Both charts, with the cuts that were tried; those that a chart calls wrong are ringed.
+///
+/// # Errors
+/// A picture that cannot be drawn.
+pub(super) fn section(lobes: &Lobes) -> Result<Markup, PictureError> {
+    let mut charts = Vec::new();
+    for (which, title) in ["Lobes of the case", "Lobes of the extended case"]
+        .into_iter()
+        .enumerate()
+    {
+        let columns: Vec<Column> = lobes.lines[which].iter().map(Column::from).collect();
+        let marks: Vec<Mark> = lobes
+            .cuts
+            .iter()
+            .map(|(cut, calls)| Mark {
+                wrong: calls[which].is_wrong(),
+                ..Mark::from(cut)
+            })
+            .collect();
+        charts.push(lobe_chart(title, &columns, lobes.searched_mm, &marks)?);
+    }
+    let by = format!(
+        "By {}. Circles: cuts that were stable; crosses: that chattered; squares: of which it cannot be told; an orange ring: the chart calls it wrong.",
+        lobes.method_after
+    );
+    Ok(html! {
+        ul { @for sentence in sentences(lobes) { li { (sentence) "." } } }
+        (figure(&charts[0], "What was believed."))
+        (figure(&charts[1], &by))
+        details {
+            summary { "Limits, speed by speed" }
+            table {
+                tr { th { "rev/min" } th { "limit before [mm]" } th { "chatter [Hz]" } th { "limit after [mm]" } th { "chatter [Hz]" } }
+                @for change in &lobes.speeds { (row(change)) }
+            }
+        }
+    })
+}
+
+fn row(change: &Change) -> Markup {
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or_else(|| "–".into(), |value| format!("{value:.digits$}"))
+    };
+    html! {
+        tr {
+            td { (format!("{:.1}", change.at_rpm)) }
+            td { (number(change.limit_before_mm, 3)) }
+            td { (number(change.chatter_before_hz, 2)) }
+            td { (number(change.limit_after_mm, 3)) }
+            td { (number(change.chatter_after_hz, 2)) }
+        }
+    }
+}
