@@ -16,8 +16,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use super::modes::IdentifiedMode;
+use super::modes::shape::{normalize, rank_one};
 use super::observed_cut::ObservedCut;
+use super::steady_fit::NINETY_PERCENT;
 use crate::stability::{Problem, StabilityError, point};
+use crate::structure::{Direction, FirstOrder, Mode};
 
 /// What was thought possible before: factors up and down from the first guess.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,6 +65,11 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// Standard deviation of the logarithm, if it were normal.
+    pub fn deviation(&self) -> f64 {
+        (self.ci90[1] / self.ci90[0]).ln() / (2.0 * NINETY_PERCENT)
+    }
+
     /// True where the cuts have left more than half of what was possible before, on a logarithmic scale: they cannot tell.
     pub fn is_vague(&self) -> bool {
         let width = |[low, high]: [f64; 2]| (high / low).ln();
@@ -77,6 +86,8 @@ pub struct InverseMode {
     pub damping_ratio: Spread,
     /// Stiffness of the mode in its softest direction, N/m: force over displacement at rest, of this mode alone.
     pub stiffness_n_per_m: Spread,
+    /// That of the first guess, N/m.
+    pub start_stiffness_n_per_m: f64,
 }
 
 /// Why nothing can be said.
@@ -115,7 +126,8 @@ struct Family<'a> {
     start: &'a Problem,
     /// Pole and projector of each mode.
     modes: Vec<(Complex64, DMatrix<Complex64>)>,
-    cuts: &'a [ObservedCut],
+    /// Those with a chatter frequency first: they tell the most.
+    cuts: Vec<ObservedCut>,
     errors: Errors,
     /// Logarithms of the factors of [`Before`], three for each mode.
     half_widths: Vec<f64>,
@@ -147,11 +159,13 @@ pub fn modes(
         return Err(InverseError::NoModes);
     }
     let of_mode = [before.frequency.ln(), before.damping.ln(), before.stiffness.ln()];
+    let mut ordered = cuts.to_vec();
+    ordered.sort_by_key(|cut| cut.chatter_hz.is_none());
     let family = Family {
         start,
         half_widths: modes.iter().flat_map(|_| of_mode).collect(),
         modes,
-        cuts,
+        cuts: ordered,
         errors,
     };
     // A first look says whether stability can be computed at all.
@@ -161,6 +175,56 @@ pub fn modes(
     let particles = family.draw(seed);
     family.check(&particles)?;
     Ok(family.told(&particles))
+}
+
+/// The modes of `start`, in the machine's directions, with the medians that the cuts have left: for a case.
+///
+/// Shapes are those of the first guess. Left shapes carry the residue, which is about ω/2ik, and its deviation. Deviations are
+/// those of the logarithms; that the cuts tie the parameters to each other is lost.
+/// Modes of one pole, as those of a round tool, become several of one frequency.
+pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direction>, Vec<IdentifiedMode>) {
+    let axes: Vec<usize> = (0..3)
+        .filter(|&axis| start.c.row(axis).amax() > 0.0 && start.b.column(axis).amax() > 0.0)
+        .collect();
+    let names = [Direction::X, Direction::Y, Direction::Z];
+    let shared: Vec<(usize, usize)> = (0..axes.len()).map(|place| (place, place)).collect();
+    let mut modes = Vec::new();
+    for (part, told) in start.modal_parts().iter().zip(found) {
+        let at_start = (part.omega() / TAU, told.start_stiffness_n_per_m);
+        let scale = told.frequency_hz.value / at_start.0 / (told.stiffness_n_per_m.value / at_start.1);
+        let share = told
+            .frequency_hz
+            .deviation()
+            .hypot(told.stiffness_n_per_m.deviation());
+        let whole = part.residue(start) * Complex64::from(scale);
+        let mut rest = DMatrix::from_fn(axes.len(), axes.len(), |i, j| whole[(axes[i], axes[j])]);
+        let all = rest.norm();
+        while let Some((mut right, mut left, _)) = rank_one(&rest) {
+            let taken = DMatrix::from_fn(axes.len(), axes.len(), |i, j| right[i] * left[j]);
+            // What is left of a residue that was taken whole is rounding.
+            if taken.norm() <= 1e-9 * all {
+                break;
+            }
+            rest -= taken;
+            normalize(&mut right, &mut left, &shared);
+            modes.push(IdentifiedMode {
+                frequency_std_hz: told.frequency_hz.value * told.frequency_hz.deviation(),
+                damping_ratio_std: told.damping_ratio.value * told.damping_ratio.deviation(),
+                left_std: left
+                    .iter()
+                    .map(|z| [z.re, z.im].map(|x| share * x.abs()))
+                    .collect(),
+                right_std: vec![[0.0; 2]; right.len()],
+                mode: Mode {
+                    frequency_hz: told.frequency_hz.value,
+                    damping_ratio: told.damping_ratio.value,
+                    left,
+                    right,
+                },
+            });
+        }
+    }
+    (axes.into_iter().map(|axis| names[axis]).collect(), modes)
 }
 
 impl Family<'_> {
@@ -184,11 +248,16 @@ impl Family<'_> {
     }
 
     /// Logarithm of the likelihood, and how many cuts are told wrongly.
-    fn likelihood(&self, theta: &[f64]) -> (f64, usize) {
+    ///
+    /// No cut adds to the sum: once it has fallen to `least` it cannot rise above it again, and −∞ is the answer.
+    fn likelihood(&self, theta: &[f64], least: f64) -> (f64, usize) {
         let problem = self.problem(theta);
         let mut sum = 0.0;
         let mut wrong = 0;
-        for cut in self.cuts {
+        for cut in &self.cuts {
+            if sum <= least {
+                return (f64::NEG_INFINITY, self.cuts.len());
+            }
             let step = 1.0 + self.errors.depth;
             let Ok(high) = point(&problem, cut.rpm, cut.depth_mm * step) else {
                 return (f64::NEG_INFINITY, self.cuts.len());
@@ -238,7 +307,7 @@ impl Family<'_> {
             .collect();
         let mut sums: Vec<f64> = particles
             .par_iter()
-            .map(|theta| self.likelihood(theta).0)
+            .map(|theta| self.likelihood(theta, f64::NEG_INFINITY).0)
             .collect();
         let mut share = 0.0;
         let mut stage = 0;
@@ -291,8 +360,9 @@ impl Family<'_> {
             if !self.is_possible(&tried) {
                 continue;
             }
-            let (found, _) = self.likelihood(&tried);
-            if luck.ln() < share * (found - sum) {
+            let least = sum + luck.ln() / share;
+            let (found, _) = self.likelihood(&tried, least);
+            if found > least {
                 (theta, sum) = (tried, found);
             }
         }
@@ -302,7 +372,7 @@ impl Family<'_> {
     fn check(&self, particles: &[Vec<f64>]) -> Result<(), InverseError> {
         let wrong = particles
             .par_iter()
-            .map(|theta| self.likelihood(theta).1)
+            .map(|theta| self.likelihood(theta, f64::NEG_INFINITY).1)
             .min()
             .unwrap_or(0);
         // One in twenty may be wrong for reasons of its own.
@@ -339,6 +409,7 @@ impl Family<'_> {
                     frequency_hz: spread(0, pole.norm() / TAU),
                     damping_ratio: spread(1, -pole.re / pole.norm()),
                     stiffness_n_per_m: spread(2, stiffness),
+                    start_stiffness_n_per_m: stiffness,
                 }
             })
             .collect()

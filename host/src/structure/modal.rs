@@ -1,6 +1,6 @@
 //! The modes of a structure in first-order form, and how a pole moves while shapes stay.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
 
 use super::FirstOrder;
@@ -41,6 +41,13 @@ impl ModalPart {
     pub fn by_damping_ratio(&self) -> DMatrix<f64> {
         let (omega, zeta) = (self.omega(), self.damping_ratio());
         self.moved(Complex64::new(-omega, -omega * zeta / (1.0 - zeta * zeta).sqrt()))
+    }
+
+    /// Residue C P B of the receptance of its structure at the pole, m/N/s, rows displacement, columns force.
+    pub fn residue(&self, structure: &FirstOrder) -> Matrix3<Complex64> {
+        let complex = |entry: f64| Complex64::new(entry, 0.0);
+        let residue = structure.c.map(complex) * &self.projector * structure.b.map(complex);
+        Matrix3::from_fn(|i, j| residue[(i, j)])
     }
 
     /// The change of A while the pole moves by δλ: 2 Re(δλ P).

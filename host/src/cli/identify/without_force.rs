@@ -4,8 +4,8 @@ use super::answer::{Answer, Figure, OfMode};
 use super::{Args, Error};
 use crate::case::Case;
 use crate::identify::ambient::Ambient;
-use crate::identify::inverse_stability::{Before, Errors, InverseMode, Spread, modes};
-use crate::identify::{observed_cut, subspace};
+use crate::identify::inverse_stability::{Before, Errors, InverseMode, Spread, identified_modes, modes};
+use crate::identify::{case_file, observed_cut, subspace};
 use crate::recording::{Kind, Recording};
 use crate::stability::{CubicTerms, Problem};
 
@@ -92,7 +92,8 @@ pub(super) fn inverse_stability(args: &Args) -> Result<Answer, Error> {
             "--method inverse-stability needs --start CASE.toml: tool, material and cut, and a first guess of the structure",
         ));
     };
-    let problem = Problem::new(&Case::read(start)?, CubicTerms::Refuse)?;
+    let case = Case::read(start)?;
+    let problem = Problem::new(&case, CubicTerms::Refuse)?;
     let errors = Errors {
         depth: 0.01 * args.depth_error_percent,
         frequency: 0.01 * args.chatter_error_percent,
@@ -108,9 +109,21 @@ pub(super) fn inverse_stability(args: &Args) -> Result<Answer, Error> {
         before.damping
     )];
     lines.extend(said(&of_modes));
+    let machine = case
+        .structure()?
+        .first_order()
+        .map_err(|error| Error::input(format!("{}: {error}", start.display())))?;
+    let (directions, identified) = identified_modes(&machine, &found);
+    let name = args
+        .out
+        .as_deref()
+        .and_then(std::path::Path::file_stem)
+        .unwrap_or_default()
+        .to_string_lossy();
     Ok(Answer {
         modes: Some(of_modes),
         said: lines,
+        table: Some(case_file::modal(&name, &directions, &identified)),
         ..Answer::of("inverse-stability", Vec::new(), Vec::new())
     })
 }

@@ -10,7 +10,7 @@ mod covariance;
 mod denominator;
 mod pole_residue;
 mod receptances;
-mod shape;
+pub(super) mod shape;
 pub mod stabilization;
 mod weights;
 

@@ -9,7 +9,9 @@ pub(super) fn pair(residue: Complex64, s: Complex64, pole: Complex64) -> Complex
 }
 
 /// The nearest right·leftᵀ to a matrix of residues (responses by forces), and how much of the matrix it leaves, as a part.
-pub(super) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>, Vec<Complex64>, f64)> {
+pub(in crate::identify) fn rank_one(
+    residues: &DMatrix<Complex64>,
+) -> Option<(Vec<Complex64>, Vec<Complex64>, f64)> {
     let all = residues.norm();
     let svd = residues.clone().try_svd(true, true, f64::EPSILON, 0)?;
     let (u, v) = (svd.u?, svd.v_t?);
@@ -30,7 +32,11 @@ pub(super) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>,
 /// Scales right by c and left by 1/c, so that both have one norm over the `shared` entries (index in right, in left) and
 /// are as near to each other as can be: those of a reciprocal structure become equal. Without a shared entry the norms
 /// of the whole shapes become one. The largest entry of the right shape has a positive real part.
-pub(super) fn normalize(right: &mut [Complex64], left: &mut [Complex64], shared: &[(usize, usize)]) {
+pub(in crate::identify) fn normalize(
+    right: &mut [Complex64],
+    left: &mut [Complex64],
+    shared: &[(usize, usize)],
+) {
     let norm = |shape: &[Complex64]| shape.iter().map(|entry| entry.norm_sqr()).sum::<f64>().sqrt();
     let pick = |shape: &[Complex64], of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<Complex64> {
         shared.iter().map(|both| shape[of(both)]).collect()
