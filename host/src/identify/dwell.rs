@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::recording::{Quantity, Recording};
+use crate::recording::{Channel, Quantity, Recording};
 use crate::structure::Direction;
 
 /// A stretch of samples in which one frequency is held.
@@ -60,11 +60,11 @@ impl Line {
     }
 }
 
-/// A channel of force or motion by its name.
-fn channel(name: &str, quantity: Quantity) -> Option<Direction> {
-    let direction = match quantity {
-        Quantity::Displacement => name,
-        Quantity::Force | Quantity::Velocity | Quantity::Acceleration => name.get(1..)?,
+/// The direction of a channel of force or motion, by its name.
+pub(super) fn direction_of(channel: &Channel) -> Option<Direction> {
+    let direction = match channel.quantity {
+        Quantity::Displacement => channel.name.as_str(),
+        Quantity::Force | Quantity::Velocity | Quantity::Acceleration => channel.name.get(1..)?,
         _ => return None,
     };
     direction.parse().ok()
@@ -198,7 +198,7 @@ impl Dwell {
         let channels: Vec<_> = recording
             .channels
             .iter()
-            .filter_map(|c| Some((c, channel(&c.name, c.quantity)?)))
+            .filter_map(|c| Some((c, direction_of(c)?)))
             .filter(|(c, _)| c.quantity == Quantity::Force || c.samples.iter().any(|x| *x != 0.0))
             .collect();
         let mut omega = TAU * stretch.frequency_hz;
