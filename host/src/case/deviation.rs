@@ -41,6 +41,10 @@ pub enum Parameter {
     JointStiffness(usize),
     /// Damping of a joint.
     JointDamping(usize),
+    /// Stiffness of a joint on the cube of its angle.
+    JointCubicStiffness(usize),
+    /// Damping of a joint on the cube of its angular velocity.
+    JointCubicDamping(usize),
     /// Mass of the link behind a joint.
     LinkMass(usize),
     /// Edge angle of the tool.
@@ -79,6 +83,7 @@ impl Parameter {
             let part = if imaginary { "imaginary" } else { "real" };
             format!("structure.mode[{}].{side}[{}] {part}", mode + 1, index + 1)
         };
+        let of_joint = |joint: usize, key: &str| format!("structure.joint[{}].{key}", joint + 1);
         match self {
             Self::Mass(i, j) => entry("mass", i, j),
             Self::Damping(i, j) => entry("damping", i, j),
@@ -89,9 +94,11 @@ impl Parameter {
             Self::DampingRatio(mode) => format!("structure.mode[{}].damping_ratio", mode + 1),
             Self::Left(mode, index, imaginary) => shape(mode, "left", index, imaginary),
             Self::Right(mode, index, imaginary) => shape(mode, "right", index, imaginary),
-            Self::JointStiffness(joint) => format!("structure.joint[{}].stiffness_nm_per_rad", joint + 1),
-            Self::JointDamping(joint) => format!("structure.joint[{}].damping_nms_per_rad", joint + 1),
-            Self::LinkMass(joint) => format!("structure.joint[{}].mass_kg", joint + 1),
+            Self::JointStiffness(joint) => of_joint(joint, "stiffness_nm_per_rad"),
+            Self::JointDamping(joint) => of_joint(joint, "damping_nms_per_rad"),
+            Self::JointCubicStiffness(joint) => of_joint(joint, "cubic_stiffness_nm_per_rad3"),
+            Self::JointCubicDamping(joint) => of_joint(joint, "cubic_damping_nms3_per_rad3"),
+            Self::LinkMass(joint) => of_joint(joint, "mass_kg"),
             Self::EdgeAngle => "tool.edge_angle_deg".into(),
             Self::RunoutOffset => "tool.runout_um".into(),
             Self::RunoutAngle => "tool.runout_angle_deg".into(),
@@ -154,12 +161,14 @@ impl Parameter {
                 Form::Modes(modes) => self.of_mode(modes.get_mut(mode)?),
                 Form::Matrices(_) | Form::Joints(_) => None,
             },
-            Self::JointStiffness(joint) | Self::JointDamping(joint) | Self::LinkMass(joint) => {
-                match &mut case.structure.as_mut()?.form {
-                    Form::Joints(robot) => self.of_joint(robot.joints.get_mut(joint)?),
-                    Form::Matrices(_) | Form::Modes(_) => None,
-                }
-            }
+            Self::JointStiffness(joint)
+            | Self::JointDamping(joint)
+            | Self::JointCubicStiffness(joint)
+            | Self::JointCubicDamping(joint)
+            | Self::LinkMass(joint) => match &mut case.structure.as_mut()?.form {
+                Form::Joints(robot) => self.of_joint(robot.joints.get_mut(joint)?),
+                Form::Matrices(_) | Form::Modes(_) => None,
+            },
             Self::EdgeAngle => Some(&mut case.tool.as_mut()?.edge_angle_deg),
             Self::RunoutOffset => Some(&mut case.tool.as_mut()?.runout.as_mut()?.offset_um),
             Self::RunoutAngle => Some(&mut case.tool.as_mut()?.runout.as_mut()?.angle_deg),
@@ -191,6 +200,8 @@ impl Parameter {
         match self {
             Self::JointStiffness(_) => Some(&mut joint.stiffness_nm_per_rad),
             Self::JointDamping(_) => Some(&mut joint.damping_nms_per_rad),
+            Self::JointCubicStiffness(_) => Some(&mut joint.cubic_stiffness_nm_per_rad3),
+            Self::JointCubicDamping(_) => Some(&mut joint.cubic_damping_nms3_per_rad3),
             Self::LinkMass(_) => Some(&mut joint.mass_kg),
             _ => None,
         }

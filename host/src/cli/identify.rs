@@ -35,7 +35,7 @@ pub struct Args {
     /// The case to write.
     #[arg(long, value_name = "CASE.toml")]
     out: Option<PathBuf>,
-    /// Nonlinear terms of harmonic-balance.
+    /// Nonlinear terms of harmonic-balance, and of joints.
     #[arg(
         long,
         value_name = "TERM,…",
@@ -98,7 +98,7 @@ pub struct Args {
     /// From when to when the tool is in full cut, in s, for force-coefficients; without it where the force says so.
     #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, value_parser = finite)]
     cut_s: Vec<f64>,
-    /// The case whose tool, material, cut and limits go into the case that is written.
+    /// The case whose tool, material, cut and limits go into the case that is written; without it those of --start.
     #[arg(long, value_name = "CASE", requires = "out")]
     case: Option<PathBuf>,
     #[command(flatten)]
@@ -122,7 +122,8 @@ enum Method {
     Ncma,
     /// Whether the structure is linear, and if not of what kind it is.
     Linearity,
-    /// Stiffness and damping of a robot's joints, from blows or a shaker at several postures.
+    /// Stiffness and damping of a robot's joints, from blows or a shaker at several postures; with --terms from step-sine tests at
+    /// several forces.
     Joints,
     /// Natural frequencies and damping ratios from motion alone: idle running, or whatever shakes the machine.
     OutputOnly,
@@ -147,7 +148,11 @@ enum SurfaceTerm {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let other = args.case.as_deref().map(sections).transpose()?;
+    let others = match args.method {
+        Method::Joints | Method::InverseStability => args.case.as_deref().or(args.start.as_deref()),
+        _ => args.case.as_deref(),
+    };
+    let other = others.map(sections).transpose()?;
     let recordings = match args.method {
         Method::InverseStability | Method::Modes => Vec::new(),
         _ => args

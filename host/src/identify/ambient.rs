@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::steady_fit::scaled_solve;
+use super::least_squares::scaled_solve;
 use crate::recording::{Quantity, Recording, SpindleAngle};
 
 /// Motion that is driven by something that nobody measured.

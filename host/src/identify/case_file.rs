@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, Vector3};
 use num_complex::Complex64;
 use toml::{Table, Value};
 
-use super::modes::ModalModel;
+use super::joints::JointParameter;
+use super::modes::{IdentifiedMode, ModalModel};
 use crate::milling::Runout;
-use crate::structure::{Direction, Joint, Robot};
+use crate::structure::{Direction, Joint, Mode, Robot};
 
 /// One identified parameter with its interval.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,26 +63,45 @@ pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileE
     if directions.is_empty() {
         return Err(CaseFileError::NoDirection);
     }
-    let pairs = |all: &[Direction], shape: &[[f64; 2]]| -> Value {
-        let entry = |direction: &Direction| {
-            let index = all.iter().position(|known| known == direction)?;
-            Some(Value::Array(
-                shape[index].iter().map(|part| Value::Float(*part)).collect(),
-            ))
-        };
-        Value::Array(directions.iter().filter_map(entry).collect())
+    let picked = |all: &[Direction], index: usize| all.iter().position(|known| *known == directions[index]);
+    let modes: Vec<IdentifiedMode> = model
+        .modes
+        .iter()
+        .map(|found| {
+            let places = |all| (0..directions.len()).filter_map(move |index| picked(all, index));
+            let (left, right) = (places(&model.forces), places(&model.responses));
+            IdentifiedMode {
+                mode: Mode {
+                    left: left.clone().map(|place| found.mode.left[place]).collect(),
+                    right: right.clone().map(|place| found.mode.right[place]).collect(),
+                    ..found.mode
+                },
+                left_std: left.map(|place| found.left_std[place]).collect(),
+                right_std: right.map(|place| found.right_std[place]).collect(),
+                ..*found
+            }
+        })
+        .collect();
+    Ok(toml::to_string(&modal(name, &directions, &modes)).unwrap_or_default())
+}
+
+/// A case with complex modes whose shapes have an entry for each of `directions`.
+pub fn modal(name: &str, directions: &[Direction], modes: &[IdentifiedMode]) -> Table {
+    let pairs = |shape: &[[f64; 2]]| -> Value {
+        let entry = |parts: &[f64; 2]| Value::Array(parts.map(Value::Float).into());
+        Value::Array(shape.iter().map(entry).collect())
     };
     let parts = |shape: &[Complex64]| -> Vec<[f64; 2]> { shape.iter().map(|z| [z.re, z.im]).collect() };
-    let modes = model.modes.iter().map(|found| {
+    let modes = modes.iter().map(|found| {
         let mut mode = Table::new();
         mode.insert("frequency_hz".into(), found.mode.frequency_hz.into());
         mode.insert("frequency_hz_std".into(), found.frequency_std_hz.into());
         mode.insert("damping_ratio".into(), found.mode.damping_ratio.into());
         mode.insert("damping_ratio_std".into(), found.damping_ratio_std.into());
-        mode.insert("left".into(), pairs(&model.forces, &parts(&found.mode.left)));
-        mode.insert("left_std".into(), pairs(&model.forces, &found.left_std));
-        mode.insert("right".into(), pairs(&model.responses, &parts(&found.mode.right)));
-        mode.insert("right_std".into(), pairs(&model.responses, &found.right_std));
+        mode.insert("left".into(), pairs(&parts(&found.mode.left)));
+        mode.insert("left_std".into(), pairs(&found.left_std));
+        mode.insert("right".into(), pairs(&parts(&found.mode.right)));
+        mode.insert("right_std".into(), pairs(&found.right_std));
         Value::Table(mode)
     });
     let mut structure = Table::new();
@@ -92,13 +112,13 @@ pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileE
     let mut case = Table::new();
     case.insert("name".into(), name.into());
     case.insert("structure".into(), Value::Table(structure));
-    Ok(toml::to_string(&case).unwrap_or_default())
+    case
 }
 
-/// A case of a robot at its posture; `deviations` are those of stiffness, damping and mass of each joint, where they are known.
-pub fn robot(name: &str, robot: &Robot, deviations: &[[Option<f64>; 3]]) -> Table {
+/// A case of a robot at its posture; `deviations` are those of what was identified.
+pub fn robot(name: &str, robot: &Robot, deviations: &[(JointParameter, f64)]) -> Table {
     let place = |place: &Vector3<f64>| numbers(place.iter().copied());
-    let joint = |(joint, deviations): (&Joint, &[Option<f64>; 3])| {
+    let joint = |joint: &Joint| {
         let mut table = Table::new();
         let i = &joint.inertia_kg_m2;
         table.insert("axis".into(), place(&joint.axis));
@@ -109,27 +129,23 @@ pub fn robot(name: &str, robot: &Robot, deviations: &[[Option<f64>; 3]]) -> Tabl
             numbers([i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]].into_iter()),
         );
         for (key, value) in [
+            ("stiffness_nm_per_rad", joint.stiffness_nm_per_rad),
+            ("damping_nms_per_rad", joint.damping_nms_per_rad),
+            ("mass_kg", joint.mass_kg),
             ("rotor_kg_m2", joint.rotor_kg_m2),
             ("cubic_stiffness_nm_per_rad3", joint.cubic_stiffness_nm_per_rad3),
             ("cubic_damping_nms3_per_rad3", joint.cubic_damping_nms3_per_rad3),
         ] {
             table.insert(key.into(), value.into());
         }
-        for ((key, value), deviation) in [
-            ("stiffness_nm_per_rad", joint.stiffness_nm_per_rad),
-            ("damping_nms_per_rad", joint.damping_nms_per_rad),
-            ("mass_kg", joint.mass_kg),
-        ]
-        .into_iter()
-        .zip(deviations)
-        {
-            table.insert(key.into(), value.into());
-            if let Some(deviation) = deviation {
-                table.insert(format!("{key}_std"), (*deviation).into());
-            }
-        }
-        Value::Table(table)
+        table
     };
+    let mut joints: Vec<Table> = robot.joints.iter().map(joint).collect();
+    for (parameter, deviation) in deviations {
+        if let Some(table) = joints.get_mut(parameter.joint(robot.joints.len())) {
+            table.insert(format!("{}_std", parameter.key()), (*deviation).into());
+        }
+    }
     let mut structure = Table::new();
     structure.insert("kind".into(), "joints".into());
     structure.insert(
@@ -137,7 +153,7 @@ pub fn robot(name: &str, robot: &Robot, deviations: &[[Option<f64>; 3]]) -> Tabl
         Value::Array(["x", "y", "z"].map(Value::from).into()),
     );
     structure.insert("tool_m".into(), place(&robot.tool_m));
-    let joints = robot.joints.iter().zip(deviations).map(joint).collect();
+    let joints = joints.into_iter().map(Value::Table).collect();
     structure.insert("joint".into(), Value::Array(joints));
     let mut posture = Table::new();
     let angles = robot.angles_rad.iter().map(|angle| angle.to_degrees());
@@ -319,7 +335,15 @@ mod tests {
     fn a_robot_that_is_written_is_read_again() {
         let mut before = crate::structure::tests::robot();
         before.joints[2].cubic_stiffness_nm_per_rad3 = -1e12;
-        let deviations = [[Some(1.0), Some(2.0), None]; 6];
+        let of: [fn(usize) -> JointParameter; 3] = [
+            JointParameter::Stiffness,
+            JointParameter::Damping,
+            JointParameter::CubicStiffness,
+        ];
+        let deviations: Vec<(JointParameter, f64)> = of
+            .iter()
+            .flat_map(|of| (0..6).map(move |joint| (of(joint), 1.0 + joint as f64)))
+            .collect();
         let text = toml::to_string(&robot("found", &before, &deviations)).unwrap();
         let case = Case::parse(std::path::Path::new("found.toml"), &text).unwrap();
         let Form::Joints(after) = &case.structure.as_ref().unwrap().form else {
@@ -327,7 +351,7 @@ mod tests {
         };
         assert_eq!(after.joints, before.joints);
         assert_eq!(after.tool_m, before.tool_m);
-        assert_eq!(case.deviations.len(), 12);
+        assert_eq!(case.deviations.len(), 18);
         // Degrees are rounded once.
         for (a, b) in after.angles_rad.iter().zip(&before.angles_rad) {
             assert!((a - b).abs() < 1e-14);

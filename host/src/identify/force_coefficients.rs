@@ -14,7 +14,8 @@ use rayon::prelude::*;
 
 use super::chip::{Chip, chips};
 use super::cutting_test::CuttingTest;
-use super::steady_fit::{NINETY_PERCENT, scaled_inverse, scaled_least_squares, scaled_solve};
+use super::least_squares::{scaled_inverse, scaled_least_squares, scaled_solve};
+use super::steady_fit::NINETY_PERCENT;
 use super::student::ninety_percent;
 use crate::milling::{Material, Runout, Tool, ToothForce, TurningVector};
 

@@ -5,7 +5,8 @@ use num_complex::Complex64;
 
 use super::dwell::Dwell;
 use super::law::{Extra, Law, Role};
-use super::steady_fit::{derivative, scaled_inverse, scaled_least_squares};
+use super::least_squares::{scaled_inverse, scaled_least_squares};
+use super::steady_fit::derivative;
 
 /// H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) at one frequency, m/N, m/N³, m/N⁵.
 #[derive(Clone, Copy, Debug, PartialEq)]

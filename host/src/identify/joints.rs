@@ -3,7 +3,8 @@
 //! Geometry and inertia of the links are known (drawings, CAD), but for the mass of the last one if asked: tool and payload. At
 //! each posture H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (eqs 3.14, 3.15 without the inverse of J). What is fitted are the
 //! logarithms of the parameters; weights are the errors of the measured receptances. A first guess of the stiffnesses comes
-//! from the lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in compliance.
+//! from the lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in compliance. Cubic terms, which need several levels of force:
+//! [`cubic_joints`](super::cubic_joints).
 
 use std::f64::consts::TAU;
 
@@ -11,7 +12,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::steady_fit::{NINETY_PERCENT, scaled_inverse, scaled_least_squares, scaled_solve};
+use super::least_squares::{FitError, scaled_inverse, scaled_least_squares, scaled_solve};
+use super::steady_fit::NINETY_PERCENT;
 use super::student::ninety_percent;
 use crate::frf::FrfTable;
 use crate::structure::Robot;
@@ -34,6 +36,10 @@ pub enum JointParameter {
     Stiffness(usize),
     /// Damping of a joint, from 0.
     Damping(usize),
+    /// Cubic stiffness of a joint, from 0.
+    CubicStiffness(usize),
+    /// Cubic damping of a joint, from 0.
+    CubicDamping(usize),
     /// Mass of the last link.
     Payload,
 }
@@ -74,6 +80,9 @@ pub enum JointFitError {
         "the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}: geometry or inertia of the links may be wrong"
     )]
     NotConverged(f64),
+    /// Steady tones do not give the cubic terms.
+    #[error(transparent)]
+    Tones(#[from] FitError),
 }
 
 /// Receptances are never known better than this share of them: noise of the force in H1, sensors, windows, sample rates. No
@@ -89,6 +98,8 @@ impl JointParameter {
         match self {
             Self::Stiffness(_) => "stiffness_nm_per_rad",
             Self::Damping(_) => "damping_nms_per_rad",
+            Self::CubicStiffness(_) => "cubic_stiffness_nm_per_rad3",
+            Self::CubicDamping(_) => "cubic_damping_nms3_per_rad3",
             Self::Payload => "mass_kg",
         }
     }
@@ -96,16 +107,27 @@ impl JointParameter {
     /// The joint, from 0, that it belongs to in a robot of so many.
     pub fn joint(self, joints: usize) -> usize {
         match self {
-            Self::Stiffness(joint) | Self::Damping(joint) => joint,
+            Self::Stiffness(joint)
+            | Self::Damping(joint)
+            | Self::CubicStiffness(joint)
+            | Self::CubicDamping(joint) => joint,
             Self::Payload => joints.saturating_sub(1),
         }
+    }
+
+    /// True for terms that do not act at vanishing force; they may be negative.
+    pub fn is_cubic(self) -> bool {
+        matches!(self, Self::CubicStiffness(_) | Self::CubicDamping(_))
     }
 
     /// The name for people, with the joint counted from 1.
     pub fn name(self) -> String {
         match self {
-            Self::Stiffness(joint) | Self::Damping(joint) => format!("joint {} {}", joint + 1, self.key()),
             Self::Payload => format!("payload {}", self.key()),
+            Self::Stiffness(joint)
+            | Self::Damping(joint)
+            | Self::CubicStiffness(joint)
+            | Self::CubicDamping(joint) => format!("joint {} {}", joint + 1, self.key()),
         }
     }
 
@@ -113,6 +135,8 @@ impl JointParameter {
         Some(match self {
             Self::Stiffness(joint) => &mut robot.joints.get_mut(joint)?.stiffness_nm_per_rad,
             Self::Damping(joint) => &mut robot.joints.get_mut(joint)?.damping_nms_per_rad,
+            Self::CubicStiffness(joint) => &mut robot.joints.get_mut(joint)?.cubic_stiffness_nm_per_rad3,
+            Self::CubicDamping(joint) => &mut robot.joints.get_mut(joint)?.cubic_damping_nms3_per_rad3,
             Self::Payload => &mut robot.joints.last_mut()?.mass_kg,
         })
     }
@@ -120,6 +144,13 @@ impl JointParameter {
     /// Its value.
     pub fn value(self, robot: &Robot) -> f64 {
         self.slot(&mut robot.clone()).map_or(f64::NAN, |value| *value)
+    }
+
+    /// Gives it another value.
+    pub(super) fn set(self, robot: &mut Robot, value: f64) {
+        if let Some(slot) = self.slot(robot) {
+            *slot = value;
+        }
     }
 }
 
@@ -392,6 +423,8 @@ impl Model {
         match parameter {
             JointParameter::Stiffness(joint) => of_joint(joint, Complex64::from(-value)),
             JointParameter::Damping(joint) => of_joint(joint, Complex64::new(0.0, -self.omega * value)),
+            // No part in receptances at vanishing force.
+            JointParameter::CubicStiffness(_) | JointParameter::CubicDamping(_) => Matrix3::zeros(),
             JointParameter::Payload => {
                 let moved = payload.map(Complex64::from) * &self.angles;
                 let product = moved.tr_mul(&moved) * Complex64::from(self.omega * self.omega * value);

@@ -207,7 +207,7 @@ impl<'a> Base<'a> {
         if features.is_empty() {
             return right.norm_squared();
         }
-        match super::steady_fit::scaled_least_squares(&matrix, &right) {
+        match super::least_squares::scaled_least_squares(&matrix, &right) {
             Some(solution) => (&right - matrix * solution).norm_squared(),
             None => right.norm_squared(),
         }

@@ -3,11 +3,12 @@
 //! Steady tests: [`dwell`] finds where a frequency is held and what moves there, [`steady_fit`] fits a [`law`] to it by
 //! [`harmonic_balance`]; [`hfrf`] and [`ncma`] are the thesis's own ways, [`linearity`] judges. Any record:
 //! [`restoring_force`]; whole periods of a multisine: [`periodic_fit`]. Cutting tests: [`force_coefficients`].
-//! A robot at several postures: [`joints`]. Without any force: [`subspace`], and from chatter [`inverse_stability`].
+//! A robot at several postures: [`joints`], with cubic terms [`cubic_joints`]. Without any force: [`subspace`], and from chatter [`inverse_stability`].
 
 pub mod ambient;
 pub mod case_file;
 pub mod chip;
+pub mod cubic_joints;
 pub mod cutting_test;
 pub mod describing;
 pub mod dwell;
@@ -18,6 +19,7 @@ pub mod homogeneity;
 pub mod inverse_stability;
 pub mod joints;
 pub mod law;
+mod least_squares;
 pub mod linearity;
 pub mod modes;
 pub mod ncma;
@@ -32,6 +34,7 @@ pub mod steady_fit;
 pub mod student;
 pub mod subspace;
 pub mod sweep;
+mod whitening;
 
 #[cfg(test)]
 mod tests;

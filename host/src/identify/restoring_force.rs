@@ -9,8 +9,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::least_squares::{scaled_inverse, scaled_least_squares};
 use super::spectrum::{Spectral, band_of, loudest_hz};
-use super::steady_fit::{NINETY_PERCENT, scaled_inverse, scaled_least_squares};
+use super::steady_fit::NINETY_PERCENT;
 use crate::recording::Quantity;
 
 /// A term of the law along one direction.

@@ -5,11 +5,14 @@
 //! exact derivatives. Intervals are those of the normal distribution; where the law does not reach the noise they come
 //! from the scatter of the dwells themselves (sandwich).
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::dwell::{Dwell, Line};
 use super::harmonic_balance::{Grid, Problem, Solution};
 use super::law::Law;
+pub use super::least_squares::FitError;
+use super::least_squares::{Normal, Spread, minimum, scaled_least_squares};
+use super::whitening::Seen;
 use crate::recording::Quantity;
 use crate::structure::Direction;
 
@@ -28,46 +31,8 @@ pub struct Fit {
     pub robust: bool,
 }
 
-/// Why no law can be fitted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitError {
-    /// Too few data for the parameters.
-    #[error(
-        "{found} dwells with motion in every direction are too few for {parameters} parameters; at least {needed} are needed"
-    )]
-    TooFew {
-        /// Dwells that can be used.
-        found: usize,
-        /// Parameters.
-        parameters: usize,
-        /// Dwells needed.
-        needed: usize,
-    },
-    /// Data that do not determine the parameters.
-    #[error(
-        "the data do not determine all parameters; more force levels, or frequencies on both sides of the resonance, are needed"
-    )]
-    Undetermined,
-    /// The law has no periodic motion near the measured one.
-    #[error(
-        "the law has no periodic motion near the measured one at {failed} of {all} dwells; another law is needed, or steadier data"
-    )]
-    NoMotion {
-        /// Dwells without.
-        failed: usize,
-        /// All dwells.
-        all: usize,
-    },
-    /// No minimum was found.
-    #[error("the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}")]
-    NotConverged(f64),
-}
-
 /// 90 % of a normal distribution lie within this many deviations.
 pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_2;
-
-/// Above this misfit the law does not explain the data, and the sandwich is taken.
-const MISFIT: f64 = 1.3;
 
 /// Data of a fit: dwells and the directions that are the degrees of freedom of the law.
 #[derive(Clone, Copy)]
@@ -89,18 +54,20 @@ impl Data<'_> {
             .position(|direction| *direction == line.direction)
     }
 
-    /// Fourier coefficients of the force on every degree of freedom; its mean is left out, load cells do not have it.
-    fn force(&self, dwell: &Dwell) -> DVector<f64> {
-        let width = self.grid.width();
-        let mut force = DVector::zeros(self.law.dofs * width);
-        for line in &dwell.forces {
-            if let Some(dof) = self.degree_of(line) {
-                force
-                    .rows_mut(dof * width + 1, width - 1)
-                    .copy_from(&line.coefficients.rows(1, width - 1));
-            }
+    /// Every degree of freedom is the displacement in its direction.
+    fn unit(&self) -> DMatrix<f64> {
+        DMatrix::identity(self.law.dofs, self.law.dofs)
+    }
+
+    fn seen<'b>(&'b self, shape: &'b DMatrix<f64>) -> Seen<'b> {
+        Seen {
+            directions: self.directions,
+            shape,
         }
-        force
+    }
+
+    fn force(&self, dwell: &Dwell) -> DVector<f64> {
+        self.seen(&self.unit()).force(dwell, self.grid.width())
     }
 
     /// The measured displacement of every degree of freedom; `None` where one is not measured.
@@ -158,67 +125,9 @@ impl Data<'_> {
 
     /// Residual of a dwell over its noise, and its derivative by θ.
     fn whitened(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let start = self.displacement(dwell)?;
-        let solution = self.solve(dwell, theta, &start)?;
-        let width = self.grid.width();
-        let lines: Vec<(&Line, usize)> = dwell
-            .motions
-            .iter()
-            .filter_map(|line| Some((line, self.degree_of(line)?)))
-            .collect();
-        let used = width - 1;
-        let (by_theta, by_force, by_omega) = solution.sensitivities(0..self.law.dofs * width)?;
-        let mut residual = DVector::zeros(lines.len() * used);
-        let mut slope = DMatrix::zeros(lines.len() * used, theta.len());
-        let mut force_slope = DMatrix::zeros(lines.len() * used, by_force.ncols());
-        let mut omega_slope = DVector::zeros(lines.len() * used);
-        let noise = dwell.gram_inverse.view((1, 1), (used, used));
-        let mut covariance = DMatrix::zeros(lines.len() * used, lines.len() * used);
-        for (index, (line, dof)) in lines.iter().enumerate() {
-            let order = derivative(line.quantity);
-            let rows = dof * width..(dof + 1) * width;
-            let to = |motion: DVector<f64>| apply(&motion, order, dwell.omega).rows(1, used).into_owned();
-            let motion = solution.x.rows(rows.start, width).into_owned();
-            residual
-                .rows_mut(index * used, used)
-                .copy_from(&(line.coefficients.rows(1, used) - to(motion.clone())));
-            for column in 0..theta.len() {
-                let derived = to(by_theta
-                    .view((rows.start, column), (width, 1))
-                    .column(0)
-                    .into_owned());
-                slope
-                    .view_mut((index * used, column), (used, 1))
-                    .copy_from(&derived);
-            }
-            for column in 0..by_force.ncols() {
-                let derived = to(by_force
-                    .view((rows.start, column), (width, 1))
-                    .column(0)
-                    .into_owned());
-                force_slope
-                    .view_mut((index * used, column), (used, 1))
-                    .copy_from(&derived);
-            }
-            let own = to(motion) * (f64::from(order) / dwell.omega);
-            omega_slope
-                .rows_mut(index * used, used)
-                .copy_from(&(to(by_omega.rows(rows.start, width).into_owned()) + own));
-            covariance
-                .view_mut((index * used, index * used), (used, used))
-                .copy_from(&(noise * line.variance));
-        }
-        for line in &dwell.forces {
-            if let Some(dof) = self.degree_of(line) {
-                let part = force_slope.columns(dof * width + 1, used);
-                covariance += part * (noise * line.variance) * part.transpose();
-            }
-        }
-        covariance += &omega_slope * omega_slope.transpose() * dwell.omega_variance;
-        let root = Cholesky::new(covariance)?.unpack();
-        root.solve_lower_triangular_mut(&mut residual).then_some(())?;
-        root.solve_lower_triangular_mut(&mut slope).then_some(())?;
-        Some((residual, slope))
+        let solution = self.solve(dwell, theta, &self.displacement(dwell)?)?;
+        self.seen(&self.unit())
+            .whitened(dwell, &solution, self.grid.width())
     }
 
     fn solve(&self, dwell: &Dwell, theta: &DVector<f64>, start: &DVector<f64>) -> Option<Solution> {
@@ -258,92 +167,23 @@ impl Data<'_> {
         if all > 0.0 { (left / all).sqrt() } else { 0.0 }
     }
 
-    fn normal(&self, theta: &DVector<f64>) -> Normal {
-        let size = theta.len();
-        let mut normal = Normal {
-            matrix: DMatrix::zeros(size, size),
-            gradient: DVector::zeros(size),
-            scatter: DMatrix::zeros(size, size),
-            sum: 0.0,
-            rows: 0,
-            failed: 0,
-        };
-        for dwell in self.dwells {
-            let Some((residual, slope)) = self.whitened(dwell, theta) else {
-                normal.failed += 1;
-                continue;
-            };
-            let gradient = slope.tr_mul(&residual);
-            normal.matrix += slope.tr_mul(&slope);
-            normal.scatter += &gradient * gradient.transpose();
-            normal.gradient += gradient;
-            normal.sum += residual.norm_squared();
-            normal.rows += residual.len();
-        }
-        normal
-    }
-
     /// The fit from a first guess.
     ///
     /// # Errors
     /// See [`FitError`].
     pub fn fit(&self, start: DVector<f64>) -> Result<Fit, FitError> {
-        let mut theta = start;
-        let mut normal = self.normal(&theta);
-        let mut damping = 0.0;
-        for _ in 0..60 {
-            // A dwell or two without a motion near the measured one may be found once the parameters are better.
-            if normal.failed * 2 > self.dwells.len() {
-                return Err(FitError::NoMotion {
-                    failed: normal.failed,
-                    all: self.dwells.len(),
-                });
+        let (theta, normal) = minimum(start, 0.0, |theta| {
+            let mut normal = Normal::new(theta.len());
+            for dwell in self.dwells {
+                normal.add(self.whitened(dwell, theta));
             }
-            let mut matrix = normal.matrix.clone();
-            for i in 0..theta.len() {
-                matrix[(i, i)] *= 1.0 + damping;
-            }
-            let step = scaled_solve(&matrix, &normal.gradient).ok_or(FitError::Undetermined)?;
-            let next = &theta + &step;
-            let tried = self.normal(&next);
-            // The step in units of the interval that the parameters will get. Weights move with the parameters, so that
-            // the sum itself need not fall at the very end.
-            let length = step.dot(&(&normal.matrix * &step)).sqrt();
-            if length < 1e-3 && tried.failed == normal.failed {
-                return self.finish(next, tried);
-            }
-            let better = tried.failed < normal.failed
-                || (tried.failed == normal.failed && tried.sum <= normal.sum * (1.0 + 1e-6));
-            if better {
-                (theta, normal) = (next, tried);
-                damping = if damping < 1e-6 { 0.0 } else { 0.1 * damping };
-            } else {
-                damping = (10.0 * damping).max(1e-3);
-                if damping > 1e8 {
-                    break;
-                }
-            }
-        }
-        let free = normal.rows.saturating_sub(theta.len()).max(1) as f64;
-        Err(FitError::NotConverged(normal.sum / free))
-    }
-
-    fn finish(&self, theta: DVector<f64>, normal: Normal) -> Result<Fit, FitError> {
-        if normal.failed > 0 {
-            return Err(FitError::NoMotion {
-                failed: normal.failed,
-                all: self.dwells.len(),
-            });
-        }
-        let inverse = scaled_inverse(&normal.matrix).ok_or(FitError::Undetermined)?;
-        let free = normal.rows.saturating_sub(theta.len()).max(1) as f64;
-        let misfit = normal.sum / free;
-        let robust = misfit > MISFIT;
-        let covariance = if robust {
-            &inverse * normal.scatter * &inverse
-        } else {
-            inverse
-        };
+            normal
+        })?;
+        let Spread {
+            covariance,
+            misfit,
+            robust,
+        } = normal.spread()?;
         Ok(Fit {
             relative_error: self.relative_error(&theta),
             theta,
@@ -352,15 +192,6 @@ impl Data<'_> {
             robust,
         })
     }
-}
-
-struct Normal {
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
-    scatter: DMatrix<f64>,
-    sum: f64,
-    rows: usize,
-    failed: usize,
 }
 
 impl Fit {
@@ -379,20 +210,6 @@ pub(super) fn derivative(quantity: Quantity) -> u8 {
     }
 }
 
-/// Coefficients of the derivative.
-fn apply(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
-    let mut derived = x.clone();
-    for _ in 0..order {
-        derived[0] = 0.0;
-        for h in 1..=x.len() / 2 {
-            let (c, s) = (derived[2 * h - 1], derived[2 * h]);
-            let factor = h as f64 * omega;
-            (derived[2 * h - 1], derived[2 * h]) = (factor * s, -factor * c);
-        }
-    }
-    derived
-}
-
 /// Coefficients of the integral.
 pub(super) fn undo(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
     let mut integral = x.clone();
@@ -405,52 +222,4 @@ pub(super) fn undo(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
         }
     }
     integral
-}
-
-/// Least squares with columns brought to length 1: parameters differ by many powers of ten.
-pub(super) fn scaled_least_squares(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let lengths = DVector::from_iterator(matrix.ncols(), matrix.column_iter().map(|column| column.norm()));
-    if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
-        return None;
-    }
-    let mut scaled = matrix.clone();
-    for (mut column, length) in scaled.column_iter_mut().zip(lengths.iter()) {
-        column /= *length;
-    }
-    let svd = scaled.svd(true, true);
-    let largest = svd.singular_values.max();
-    // Below the rounding of the data nothing is determined.
-    if svd.singular_values.min() < 1e-12 * largest {
-        return None;
-    }
-    let solution = svd.solve(right, 0.0).ok()?;
-    Some(solution.component_div(&lengths))
-}
-
-fn scaled(matrix: &DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
-    let lengths = matrix.diagonal().map(f64::sqrt);
-    if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
-        return None;
-    }
-    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        matrix[(i, j)] / (lengths[i] * lengths[j])
-    });
-    Some((Cholesky::new(scaled)?, lengths))
-}
-
-pub(super) fn scaled_solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (cholesky, lengths) = scaled(matrix)?;
-    Some(
-        cholesky
-            .solve(&right.component_div(&lengths))
-            .component_div(&lengths),
-    )
-}
-
-pub(super) fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let (cholesky, lengths) = scaled(matrix)?;
-    let inverse = cholesky.inverse();
-    Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        inverse[(i, j)] / (lengths[i] * lengths[j])
-    }))
 }

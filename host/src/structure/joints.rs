@@ -2,7 +2,8 @@
 //!
 //! With the joint angles' deviations q from the posture, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ F and u = J q: the tool-space
 //! matrices of thesis eq. 3.14, J⁻ᵀ · J⁻¹, where J has an inverse, and still right where it has none (a straight wrist) and for
-//! any number of joints. Gravity, and the change of M and J within a vibration, are left out.
+//! any number of joints. Left out are the change of M and J within a vibration, and gravity: q and its cubes count from where the robot
+//! hangs, which is a milliradian or so from the commanded angles. On the robot of the cases that moves peaks by 0.3 % (a test).
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Rotation3, Unit, Vector3};
 

@@ -126,6 +126,16 @@ impl Check<'_> {
             &key("damping_nms_per_rad"),
             Parameter::JointDamping(index),
         )?;
+        self.deviation(
+            &file.cubic_stiffness_nm_per_rad3_std,
+            &key("cubic_stiffness_nm_per_rad3"),
+            Parameter::JointCubicStiffness(index),
+        )?;
+        self.deviation(
+            &file.cubic_damping_nms3_per_rad3_std,
+            &key("cubic_damping_nms3_per_rad3"),
+            Parameter::JointCubicDamping(index),
+        )?;
         self.deviation(&file.mass_kg_std, &key("mass_kg"), Parameter::LinkMass(index))?;
         Ok(joint)
     }

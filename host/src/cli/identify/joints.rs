@@ -2,22 +2,72 @@
 
 use std::collections::BTreeMap;
 
+use clap::ValueEnum;
+
 use super::answer::{Answer, Figure, OfJoint};
+use super::methods::settling;
 use super::{Args, Error};
 use crate::case::Case;
 use crate::frf::{MeasurementSettings, measure};
 use crate::identify::case_file;
-use crate::identify::joints::{JointFit, PostureFrf, fit};
+use crate::identify::cubic_joints::{self, PostureDwells};
+use crate::identify::dwell::Dwell;
+use crate::identify::joints::{self, JointParameter, PostureFrf};
+use crate::identify::law::Extra;
+use crate::identify::steady::{Settling, steady};
 use crate::identify::steady_fit::NINETY_PERCENT;
-use crate::recording::Recording;
-use crate::structure::{Form, Robot};
+use crate::recording::{Kind, Recording};
+use crate::structure::{Direction, Form, Robot, Structure};
 
 /// Postures whose angles are closer than this, degrees, are one.
 const SAME_DEG: f64 = 1e-3;
 
+/// Forces further apart than this factor are levels; a shaker keeps its own within a few percent.
+const LEVELS: f64 = 1.2;
+
+/// Recordings at one posture.
+struct AtPosture {
+    joints_deg: Vec<f64>,
+    recordings: Vec<Recording>,
+}
+
+impl AtPosture {
+    fn angles_rad(&self) -> Vec<f64> {
+        self.joints_deg.iter().map(|angle| angle.to_radians()).collect()
+    }
+}
+
+/// What was identified of a robot.
+struct Found {
+    robot: Robot,
+    estimates: Vec<(JointParameter, Figure, f64)>,
+    misfit: f64,
+    relative_error: f64,
+    said: Vec<String>,
+    warnings: Vec<String>,
+}
+
 pub(super) fn joints(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
     let start = start(args)?;
-    let mut postures: Vec<(Vec<f64>, Vec<Recording>)> = Vec::new();
+    let postures = postures(recordings)?;
+    let all_steps = recordings
+        .iter()
+        .all(|recording| recording.sidecar.kind == Some(Kind::StepSine));
+    let tones = if all_steps {
+        dwells(args, &postures, settling(args))
+    } else {
+        Vec::new()
+    };
+    let found = if tones.iter().any(|(posture, _)| has_levels(&posture.dwells)) {
+        by_tones(args, &start, &postures, tones)?
+    } else {
+        by_receptances(args, &start, &postures)?
+    };
+    Ok(answer(args, &found, postures.len()))
+}
+
+fn postures(recordings: &[Recording]) -> Result<Vec<AtPosture>, Error> {
+    let mut postures: Vec<AtPosture> = Vec::new();
     for recording in recordings {
         let Some(posture) = &recording.sidecar.posture else {
             return Err(Error::input(format!(
@@ -29,42 +79,159 @@ pub(super) fn joints(args: &Args, recordings: &[Recording]) -> Result<Answer, Er
             let mut pairs = known.iter().zip(&posture.joints_deg);
             known.len() == posture.joints_deg.len() && pairs.all(|(a, b)| (a - b).abs() < SAME_DEG)
         };
-        match postures.iter_mut().find(|(known, _)| is_same(known)) {
-            Some((_, members)) => members.push(recording.clone()),
-            None => postures.push((posture.joints_deg.clone(), vec![recording.clone()])),
+        match postures.iter_mut().find(|known| is_same(&known.joints_deg)) {
+            Some(known) => known.recordings.push(recording.clone()),
+            None => postures.push(AtPosture {
+                joints_deg: posture.joints_deg.clone(),
+                recordings: vec![recording.clone()],
+            }),
         }
     }
+    Ok(postures)
+}
+
+/// Steady tones of every posture, and what was wrong with the rest.
+fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(PostureDwells, Vec<String>)> {
+    postures
+        .iter()
+        .map(|posture| {
+            let taken = steady(&posture.recordings, usize::from(args.harmonics), settling);
+            let dwells = PostureDwells {
+                angles_rad: posture.angles_rad(),
+                dwells: taken.dwells,
+            };
+            (dwells, taken.warnings)
+        })
+        .collect()
+}
+
+/// True where the force of one direction has more than one level.
+fn has_levels(dwells: &[Dwell]) -> bool {
+    let forces: Vec<(Direction, f64)> = dwells
+        .iter()
+        .filter_map(|dwell| dwell.force())
+        .map(|line| (line.direction, line.amplitude(1)))
+        .collect();
+    forces.iter().any(|(direction, force)| {
+        let mut others = forces.iter().filter(|(other, _)| other == direction);
+        others.any(|(_, other)| *other > LEVELS * force)
+    })
+}
+
+/// Stiffness, damping and cubic terms from tones at several levels.
+fn by_tones(
+    args: &Args,
+    start: &Robot,
+    postures: &[AtPosture],
+    tones: Vec<(PostureDwells, Vec<String>)>,
+) -> Result<Found, Error> {
+    if let Some(other) = args
+        .terms
+        .iter()
+        .find(|term| !matches!(term, Extra::CubicStiffness | Extra::CubicDamping))
+    {
+        let name = other.to_possible_value();
+        return Err(Error::input(format!(
+            "--terms {}: joints have cubic-stiffness and cubic-damping",
+            name.as_ref().map_or("", |name| name.get_name())
+        )));
+    }
+    let fitted = |tones: Vec<(PostureDwells, Vec<String>)>| {
+        let (dwells, warnings): (Vec<PostureDwells>, Vec<Vec<String>>) = tones.into_iter().unzip();
+        let harmonics = usize::from(args.harmonics);
+        cubic_joints::fit(start, &dwells, &args.terms, args.payload, harmonics)
+            .map(|fit| (fit, warnings.concat()))
+            .map_err(|error| Error::input(error.to_string()))
+    };
+    let (mut fit, mut warnings) = fitted(tones)?;
+    if args.settle_s.is_none() {
+        let decay = slowest_decay(&fit.robot, postures)?;
+        (fit, warnings) = fitted(dwells(args, postures, Settling::Decay(decay)))?;
+    }
+    if fit.robust {
+        warnings.push(format!(
+            "what is left is {:.1} times the noise: geometry or inertia of the links may be wrong, links bend, or joints have other terms; the intervals are those of the scatter between tones",
+            fit.misfit.sqrt()
+        ));
+    }
+    let estimates = fit.parameters.iter().enumerate().map(|(index, parameter)| {
+        let deviation = fit.covariance[(index, index)].max(0.0).sqrt();
+        let figure = Figure::new(parameter.value(&fit.robot), deviation);
+        (*parameter, figure, deviation)
+    });
+    Ok(Found {
+        estimates: estimates.collect(),
+        misfit: fit.misfit,
+        relative_error: fit.relative_error,
+        said: vec!["steady tones at several forces, by harmonic balance".into()],
+        warnings,
+        robot: fit.robot,
+    })
+}
+
+/// The slowest decay of the robot at the postures, 1/s.
+fn slowest_decay(robot: &Robot, postures: &[AtPosture]) -> Result<f64, Error> {
+    let mut slowest = f64::INFINITY;
+    for posture in postures {
+        let structure = Structure {
+            directions: vec![Direction::X, Direction::Y, Direction::Z],
+            form: Form::Joints(Box::new(robot.at(&posture.angles_rad()))),
+        };
+        let first_order = structure
+            .first_order()
+            .map_err(|error| Error::input(error.to_string()))?;
+        slowest = first_order
+            .poles()
+            .iter()
+            .map(|pole| -pole.re)
+            .fold(slowest, f64::min);
+    }
+    Ok(slowest.max(1e-3))
+}
+
+/// Stiffness and damping from receptances.
+fn by_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<Found, Error> {
     let settings = MeasurementSettings {
-        band_hz: match args.band_hz[..] {
-            [] => None,
-            [low, high] if low < high => Some((low, high)),
-            _ => {
-                return Err(Error::input(
-                    "--band-hz: two frequencies are needed, the lower first, as in 2,60",
-                ));
-            }
-        },
+        band_hz: super::band(args)?.map(|[low, high]| (low, high)),
         ..MeasurementSettings::default()
     };
     let mut warnings = Vec::new();
     let mut measured = Vec::new();
-    for (joints_deg, members) in &postures {
-        let found = measure(members, &settings)?;
+    for posture in postures {
+        let found = measure(&posture.recordings, &settings)?;
         warnings.extend(found.warnings);
         measured.push(PostureFrf {
-            angles_rad: joints_deg.iter().map(|angle| angle.to_radians()).collect(),
+            angles_rad: posture.angles_rad(),
             table: found.table,
             deviation: found.deviation,
         });
     }
-    let fit = fit(&start, &measured, args.payload).map_err(|error| Error::input(error.to_string()))?;
+    let fit = joints::fit(start, &measured, args.payload).map_err(|error| Error::input(error.to_string()))?;
     if fit.misfit > 4.0 {
         warnings.push(format!(
             "what is left is {:.1} times the error of the receptances: geometry or inertia of the links may be wrong, or links bend; the intervals are those of the scatter between receptances",
             fit.misfit.sqrt()
         ));
     }
-    answer(args, &fit, postures.len(), warnings)
+    let estimates = fit.parameters.iter().enumerate().map(|(index, parameter)| {
+        let value = parameter.value(&fit.robot);
+        let share = fit.covariance[(index, index)].max(0.0).sqrt();
+        // Of the logarithm: the interval is not that of a difference.
+        let factor = (NINETY_PERCENT * share).exp();
+        let figure = Figure {
+            value,
+            ci90: [value / factor, value * factor],
+        };
+        (*parameter, figure, share * value)
+    });
+    Ok(Found {
+        estimates: estimates.collect(),
+        misfit: fit.misfit,
+        relative_error: fit.relative_error,
+        said: vec!["receptances, without cubic terms: those need step-sine tests at several forces".into()],
+        warnings,
+        robot: fit.robot,
+    })
 }
 
 fn start(args: &Args) -> Result<Robot, Error> {
@@ -83,57 +250,49 @@ fn start(args: &Args) -> Result<Robot, Error> {
     }
 }
 
-fn answer(args: &Args, fit: &JointFit, postures: usize, warnings: Vec<String>) -> Result<Answer, Error> {
-    let count = fit.robot.joints.len();
+fn answer(args: &Args, found: &Found, postures: usize) -> Answer {
+    let count = found.robot.joints.len();
     let mut of_joints: Vec<OfJoint> = (1..=count)
         .map(|joint| OfJoint {
             joint,
             parameters: BTreeMap::new(),
         })
         .collect();
-    let mut deviations = vec![[None; 3]; count];
     let mut said = vec![format!(
-        "{postures} postures; what is left is {:.2} times the error of the receptances",
-        fit.misfit.sqrt()
+        "{postures} postures; what is left is {:.2} times the error",
+        found.misfit.sqrt()
     )];
-    for (index, parameter) in fit.parameters.iter().enumerate() {
-        let value = parameter.value(&fit.robot);
-        let share = fit.covariance[(index, index)].max(0.0).sqrt();
-        // Of the logarithm: the interval is not that of a difference.
-        let factor = (NINETY_PERCENT * share).exp();
-        let figure = Figure {
-            value,
-            ci90: [value / factor, value * factor],
-        };
+    said.extend(found.said.iter().cloned());
+    for (parameter, figure, _) in &found.estimates {
         let joint = parameter.joint(count);
-        of_joints[joint].parameters.insert(parameter.key(), figure);
-        let place = ["stiffness_nm_per_rad", "damping_nms_per_rad", "mass_kg"]
-            .iter()
-            .position(|key| *key == parameter.key());
-        if let Some(place) = place {
-            deviations[joint][place] = Some(share * value);
-        }
+        of_joints[joint].parameters.insert(parameter.key(), *figure);
         said.push(format!(
-            "joint {} {} = {value:.5e}, 90 % interval {:.5e} to {:.5e}",
+            "joint {} {} = {:.5e}, 90 % interval {:.5e} to {:.5e}",
             joint + 1,
             parameter.key(),
+            figure.value,
             figure.ci90[0],
             figure.ci90[1]
         ));
     }
+    let deviations: Vec<(JointParameter, f64)> = found
+        .estimates
+        .iter()
+        .map(|(parameter, _, deviation)| (*parameter, *deviation))
+        .collect();
     let name = args
         .out
         .as_deref()
         .and_then(std::path::Path::file_stem)
         .unwrap_or_default()
         .to_string_lossy();
-    Ok(Answer {
-        fit_error: Some(fit.relative_error),
-        misfit: Some(fit.misfit),
-        warnings,
+    Answer {
+        fit_error: Some(found.relative_error),
+        misfit: Some(found.misfit),
+        warnings: found.warnings.clone(),
         said,
         joints: Some(of_joints),
-        table: Some(case_file::robot(&name, &fit.robot, &deviations)),
+        table: Some(case_file::robot(&name, &found.robot, &deviations)),
         ..Answer::of("joints", Vec::new(), Vec::new())
-    })
+    }
 }

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,12 +20,12 @@ use crate::identify::steady_fit::NINETY_PERCENT;
 use crate::recording::{Quantity, Recording};
 use crate::simulate::rig::{Noise, Rig, Signal};
 use crate::stability::{CubicTerms, Problem, line};
-use crate::structure::{Direction, Form, Matrices, Robot, Structure, tests::robot};
+use crate::structure::{Direction, FirstOrder, Form, Matrices, Robot, Structure, tests::robot};
 
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
-/// The robot in the six directions of the tool, by thesis eq. 3.14.
-fn tool_space(robot: &Robot) -> Structure {
+/// J, 6 × 6: displacement and turn of the tool per joint angle.
+pub(super) fn whole_jacobian(robot: &Robot) -> DMatrix<f64> {
     let moved = robot.jacobian();
     // What three more points of the tool do beyond the tool centre point.
     let point = |offset: Vector3<f64>| {
@@ -55,7 +55,13 @@ fn tool_space(robot: &Robot) -> Structure {
             .sum();
         j.view_mut((3, joint), (3, 1)).copy_from(&(0.5 * spin));
     }
-    let inverse = j.try_inverse().unwrap();
+    j
+}
+
+/// The robot in the six directions of the tool, by thesis eq. 3.14, without cubic terms; `more` is added to the stiffness of the
+/// joints.
+fn tool_space_with(robot: &Robot, more: &DMatrix<f64>) -> Structure {
+    let inverse = whole_jacobian(robot).try_inverse().unwrap();
     let own = robot.matrices();
     let turned = |matrix: &DMatrix<f64>| {
         let there = inverse.transpose() * matrix * &inverse;
@@ -66,15 +72,56 @@ fn tool_space(robot: &Robot) -> Structure {
         form: Form::Matrices(Matrices {
             mass: turned(&own.mass),
             damping: turned(&own.damping),
-            stiffness: turned(&own.stiffness),
+            stiffness: turned(&(&own.stiffness + more)),
             cubic_damping: None,
             cubic_stiffness: None,
         }),
     }
 }
 
+pub(super) fn tool_space(robot: &Robot) -> Structure {
+    tool_space_with(robot, &DMatrix::zeros(6, 6))
+}
+
+/// Torque of gravity on the joints, N m, with z up.
+fn gravity(robot: &Robot) -> DVector<f64> {
+    let mut torque = DVector::zeros(robot.joints.len());
+    for link in 0..robot.joints.len() {
+        let mut below = robot.clone();
+        below.joints.truncate(link + 1);
+        below.angles_rad.truncate(link + 1);
+        let lift = below.payload_jacobian();
+        for joint in 0..=link {
+            torque[joint] -= 9.806_65 * robot.joints[link].mass_kg * lift[(2, joint)];
+        }
+    }
+    torque
+}
+
+/// The robot where it hangs: links sag by the torque of gravity over the stiffness of the joints, which their encoders on the
+/// motor's side do not see, and lifting the links is work, too.
+fn sagged(robot: &Robot) -> Structure {
+    let at = |angles: &DVector<f64>| robot.at(angles.as_slice());
+    let commanded = DVector::from_column_slice(&robot.angles_rad);
+    let stiffness = robot.matrices().stiffness;
+    let mut angles = commanded.clone();
+    for _ in 0..20 {
+        angles = &commanded + stiffness.clone().lu().solve(&gravity(&at(&angles))).unwrap();
+    }
+    let step = 1e-4;
+    let slope = DMatrix::from_fn(6, 6, |i, j| {
+        let torque = |by: f64| {
+            let mut moved = angles.clone();
+            moved[j] += by;
+            gravity(&at(&moved))[i]
+        };
+        -(torque(step) - torque(-step)) / (2.0 * step)
+    });
+    tool_space_with(&at(&angles), &slope)
+}
+
 /// A posture in which a robot mills: the arm bent, the wrist not straight.
-fn posture(random: &mut ChaCha8Rng) -> Vec<f64> {
+pub(super) fn posture(random: &mut ChaCha8Rng) -> Vec<f64> {
     [
         (-40.0, 40.0),
         (-95.0, -45.0),
@@ -88,8 +135,7 @@ fn posture(random: &mut ChaCha8Rng) -> Vec<f64> {
 }
 
 /// Hammer blows in x, y and z with sensors of 1 % noise, and the receptances that follow.
-fn hammered(robot: &Robot, seed: u64) -> PostureFrf {
-    let structure = tool_space(robot);
+fn hammered(structure: &Structure, angles_rad: &[f64], seed: u64) -> PostureFrf {
     let recordings: Vec<Recording> = AXES
         .iter()
         .enumerate()
@@ -99,7 +145,7 @@ fn hammered(robot: &Robot, seed: u64) -> PostureFrf {
                 measured: vec![Quantity::Displacement],
                 ..Rig::new(*direction, signal, 2048.0)
             };
-            let (mut recording, _) = rig.record(&structure, Path::new("blows.csv")).unwrap();
+            let (mut recording, _) = rig.record(structure, Path::new("blows.csv")).unwrap();
             let noise = Noise {
                 relative: 0.01,
                 ..Noise::default()
@@ -114,21 +160,21 @@ fn hammered(robot: &Robot, seed: u64) -> PostureFrf {
     };
     let measured = measure(&recordings, &settings).unwrap();
     PostureFrf {
-        angles_rad: robot.angles_rad.clone(),
+        angles_rad: angles_rad.to_vec(),
         table: measured.table,
         deviation: measured.deviation,
     }
 }
 
 /// The fit of six postures that a seed draws, from a first guess that is wrong by up to a third; and the random source.
-fn trained(seed: u64, payload: bool) -> (JointFit, ChaCha8Rng) {
+fn trained(seed: u64, payload: bool, machine: fn(&Robot) -> Structure) -> (JointFit, ChaCha8Rng) {
     let truth = robot();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let postures: Vec<Vec<f64>> = (0..6).map(|_| posture(&mut random)).collect();
     let measured: Vec<PostureFrf> = postures
         .par_iter()
         .enumerate()
-        .map(|(index, angles)| hammered(&truth.at(angles), 100 * seed + index as u64))
+        .map(|(index, angles)| hammered(&machine(&truth.at(angles)), angles, 100 * seed + index as u64))
         .collect();
     let mut guess = truth;
     for joint in &mut guess.joints {
@@ -150,10 +196,30 @@ fn peak(of: impl Fn(f64) -> Complex64) -> (f64, f64) {
         .unwrap()
 }
 
+/// Peaks of direct receptances at ten unseen postures: the largest error of the predicted ones, and how many of the 30 lie
+/// within their stated 90 % intervals.
+fn unseen(fit: &JointFit, random: &mut ChaCha8Rng, machine: fn(&Robot) -> Structure) -> (f64, usize) {
+    let (mut largest, mut held) = (0.0_f64, 0);
+    for _ in 0..10 {
+        let angles = posture(random);
+        let truth = machine(&robot().at(&angles)).first_order().unwrap();
+        for axis in 0..3 {
+            let (frequency, height) = peak(|f| truth.receptance(TAU * f).unwrap()[(axis, axis)]);
+            let predicted = |f: f64| fit.receptance(&angles, f).unwrap();
+            let (_, found) = peak(|f| predicted(f).0[(axis, axis)]);
+            largest = largest.max((found / height - 1.0).abs());
+            let (h, deviation) = predicted(frequency);
+            let off = (h[(axis, axis)].norm() - height).abs();
+            held += usize::from(off <= NINETY_PERCENT * deviation[(axis, axis)]);
+        }
+    }
+    (largest, held)
+}
+
 #[test]
 fn peaks_at_unseen_postures_are_within_three_percent() {
     for (seed, payload) in [(1, false), (2, true)] {
-        let (fit, mut random) = trained(seed, payload);
+        let (fit, mut random) = trained(seed, payload, tool_space);
         println!(
             "seed {seed}: misfit {:.2}, left {:.2e}",
             fit.misfit, fit.relative_error
@@ -166,28 +232,76 @@ fn peaks_at_unseen_postures_are_within_three_percent() {
                 parameter.name()
             );
         }
-        let (mut largest, mut held, mut all) = (0.0_f64, 0, 0);
-        for _ in 0..10 {
-            let angles = posture(&mut random);
-            let truth = tool_space(&robot().at(&angles)).first_order().unwrap();
-            for axis in 0..3 {
-                let (frequency, height) = peak(|f| truth.receptance(TAU * f).unwrap()[(axis, axis)]);
-                let predicted = |f: f64| fit.receptance(&angles, f).unwrap();
-                let (_, found) = peak(|f| predicted(f).0[(axis, axis)]);
-                largest = largest.max((found / height - 1.0).abs());
-                let (h, deviation) = predicted(frequency);
-                let off = (h[(axis, axis)].norm() - height).abs();
-                held += usize::from(off <= NINETY_PERCENT * deviation[(axis, axis)]);
-                all += 1;
-            }
-        }
+        let (largest, held) = unseen(&fit, &mut random, tool_space);
         println!(
-            "seed {seed}: peaks at ten unseen postures within {:.2} %; {held} of {all} within the stated interval",
+            "seed {seed}: peaks at ten unseen postures within {:.2} %; {held} of 30 within the stated interval",
             100.0 * largest
         );
         assert!(largest < 0.03, "{largest}");
         // Three peaks of one posture move together: 24 of 30 is two deviations of ten draws below nine tenths.
-        assert!(held >= 24, "{held} of {all}");
+        assert!(held >= 24, "{held}");
+    }
+}
+
+/// Gravity is left out of what is fitted: joints sag by a milliradian or so, and links that are lifted store energy.
+#[test]
+fn peaks_at_unseen_postures_of_a_robot_that_sags_are_within_three_percent() {
+    let (fit, mut random) = trained(3, false, sagged);
+    let (largest, held) = unseen(&fit, &mut random, sagged);
+    let mut moved = 0.0_f64;
+    for _ in 0..10 {
+        let robot = robot().at(&posture(&mut random));
+        let [with, without] =
+            [sagged(&robot), tool_space(&robot)].map(|machine| machine.first_order().unwrap());
+        for axis in 0..3 {
+            let height =
+                |machine: &FirstOrder| peak(|f| machine.receptance(TAU * f).unwrap()[(axis, axis)]).1;
+            moved = moved.max((height(&with) / height(&without) - 1.0).abs());
+        }
+    }
+    println!(
+        "seed 3: gravity moves peaks by up to {:.2} %; with it left out they are predicted within {:.2} %, {held} of 30 within the stated interval",
+        100.0 * moved,
+        100.0 * largest
+    );
+    assert!(largest < 0.03, "{largest}");
+}
+
+/// How often the intervals of peaks at unseen postures, and those of the joints, hold the truth.
+#[test]
+#[ignore = "a campaign: QUIETCUT_SEEDS seeds, twenty without it"]
+fn coverage_of_joints() {
+    let seeds: u64 = std::env::var("QUIETCUT_SEEDS")
+        .ok()
+        .and_then(|seeds| seeds.parse().ok())
+        .unwrap_or(20);
+    let machines: [(&str, fn(&Robot) -> Structure); 2] = [("without", tool_space), ("with", sagged)];
+    for (name, machine) in machines {
+        let (mut largest, mut held, mut joints) = (0.0_f64, 0, 0);
+        for seed in 0..seeds {
+            let (fit, mut random) = trained(seed, false, machine);
+            let (off, of_peaks) = unseen(&fit, &mut random, machine);
+            largest = largest.max(off);
+            held += of_peaks;
+            joints += (0..fit.parameters.len())
+                .filter(|index| {
+                    let off = (fit.parameters[*index].value(&fit.robot)
+                        / fit.parameters[*index].value(&robot()))
+                    .ln();
+                    off.abs() <= NINETY_PERCENT * fit.covariance[(*index, *index)].sqrt()
+                })
+                .count();
+        }
+        println!(
+            "seeds 0 to {}, {name} gravity: peaks at unseen postures within {:.2} %, {:.1} % of {} held, joints {:.1} % of {}",
+            seeds - 1,
+            100.0 * largest,
+            100.0 * held as f64 / (30 * seeds) as f64,
+            30 * seeds,
+            100.0 * joints as f64 / (12 * seeds) as f64,
+            12 * seeds
+        );
+        assert!(largest < 0.03, "{largest}");
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod ambient;
 mod coupling;
+mod cubic_joints;
 mod cutting;
 mod inverse_stability;
 mod joints;

@@ -1,0 +1,229 @@
+//! Weighed least squares of steady motions, whose weights move with the parameters.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Why no law can be fitted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// Too few data for the parameters.
+    #[error(
+        "{found} dwells with motion in every direction are too few for {parameters} parameters; at least {needed} are needed"
+    )]
+    TooFew {
+        /// Dwells that can be used.
+        found: usize,
+        /// Parameters.
+        parameters: usize,
+        /// Dwells needed.
+        needed: usize,
+    },
+    /// Data that do not determine the parameters.
+    #[error(
+        "the data do not determine all parameters; more force levels, or frequencies on both sides of the resonance, are needed"
+    )]
+    Undetermined,
+    /// The law has no periodic motion near the measured one.
+    #[error(
+        "the law has no periodic motion near the measured one at {failed} of {all} dwells; another law is needed, or steadier data"
+    )]
+    NoMotion {
+        /// Dwells without.
+        failed: usize,
+        /// All dwells.
+        all: usize,
+    },
+    /// No minimum was found.
+    #[error("the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}")]
+    NotConverged(f64),
+}
+
+/// Above this misfit the law does not explain the data, and the sandwich is taken.
+const MISFIT: f64 = 1.3;
+
+/// Sums over the dwells: residual r over its noise, its derivative S by the parameters.
+pub(super) struct Normal {
+    /// Σ SᵀS.
+    matrix: DMatrix<f64>,
+    /// Σ Sᵀr.
+    gradient: DVector<f64>,
+    /// Σ Sᵀr rᵀS.
+    scatter: DMatrix<f64>,
+    /// Σ rᵀr.
+    sum: f64,
+    rows: usize,
+    /// Dwells at which the law has no motion near the measured one.
+    failed: usize,
+    dwells: usize,
+}
+
+/// How well the parameters are known.
+pub(super) struct Spread {
+    /// Covariance of the parameters.
+    pub(super) covariance: DMatrix<f64>,
+    /// Sum of squares over degrees of freedom, in units of the noise.
+    pub(super) misfit: f64,
+    /// True where the covariance is the sandwich.
+    pub(super) robust: bool,
+}
+
+impl Normal {
+    /// Of so many parameters, without any dwell.
+    pub(super) fn new(size: usize) -> Self {
+        Self {
+            matrix: DMatrix::zeros(size, size),
+            gradient: DVector::zeros(size),
+            scatter: DMatrix::zeros(size, size),
+            sum: 0.0,
+            rows: 0,
+            failed: 0,
+            dwells: 0,
+        }
+    }
+
+    /// Adds measured − predicted of a dwell over its noise with the derivative of the predicted; `None` where there is no motion.
+    pub(super) fn add(&mut self, dwell: Option<(DVector<f64>, DMatrix<f64>)>) {
+        self.dwells += 1;
+        let Some((residual, slope)) = dwell else {
+            self.failed += 1;
+            return;
+        };
+        let gradient = slope.tr_mul(&residual);
+        self.matrix += slope.tr_mul(&slope);
+        self.scatter += &gradient * gradient.transpose();
+        self.gradient += gradient;
+        self.sum += residual.norm_squared();
+        self.rows += residual.len();
+    }
+
+    fn failure(&self) -> FitError {
+        FitError::NoMotion {
+            failed: self.failed,
+            all: self.dwells,
+        }
+    }
+
+    fn misfit(&self) -> f64 {
+        self.sum / self.rows.saturating_sub(self.gradient.len()).max(1) as f64
+    }
+
+    /// # Errors
+    /// A dwell has no motion, or the data do not determine the parameters.
+    pub(super) fn spread(&self) -> Result<Spread, FitError> {
+        if self.failed > 0 {
+            return Err(self.failure());
+        }
+        let inverse = scaled_inverse(&self.matrix).ok_or(FitError::Undetermined)?;
+        let misfit = self.misfit();
+        let robust = misfit > MISFIT;
+        let covariance = if robust {
+            &inverse * &self.scatter * &inverse
+        } else {
+            inverse
+        };
+        Ok(Spread {
+            covariance,
+            misfit,
+            robust,
+        })
+    }
+}
+
+/// The parameters of the least sum, by Levenberg and Marquardt, from a start whose steps are damped by a share of the diagonal:
+/// 0 where it is near.
+///
+/// # Errors
+/// See [`FitError`].
+pub(super) fn minimum(
+    start: DVector<f64>,
+    mut damping: f64,
+    of: impl Fn(&DVector<f64>) -> Normal,
+) -> Result<(DVector<f64>, Normal), FitError> {
+    let mut theta = start;
+    let mut normal = of(&theta);
+    for _ in 0..60 {
+        // A dwell or two without a motion near the measured one may be found once the parameters are better.
+        if normal.failed * 2 > normal.dwells {
+            return Err(normal.failure());
+        }
+        let mut matrix = normal.matrix.clone();
+        for i in 0..theta.len() {
+            matrix[(i, i)] *= 1.0 + damping;
+        }
+        let Some(step) = scaled_solve(&matrix, &normal.gradient) else {
+            // Far from the minimum parameters may look alike that are not.
+            if damping >= 1.0 {
+                return Err(FitError::Undetermined);
+            }
+            damping = (10.0 * damping).max(1e-3);
+            continue;
+        };
+        let next = &theta + &step;
+        let tried = of(&next);
+        // The step in units of the interval that the parameters will get. Weights move with the parameters, so that
+        // the sum itself need not fall at the very end.
+        let length = step.dot(&(&normal.matrix * &step)).sqrt();
+        if length < 1e-3 && tried.failed == normal.failed {
+            return Ok((next, tried));
+        }
+        let better = tried.failed < normal.failed
+            || (tried.failed == normal.failed && tried.sum <= normal.sum * (1.0 + 1e-6));
+        if better {
+            (theta, normal) = (next, tried);
+            damping = if damping < 1e-6 { 0.0 } else { 0.1 * damping };
+        } else {
+            damping = (10.0 * damping).max(1e-3);
+            if damping > 1e8 {
+                break;
+            }
+        }
+    }
+    Err(FitError::NotConverged(normal.misfit()))
+}
+
+/// Least squares with columns brought to length 1: parameters differ by many powers of ten.
+pub(super) fn scaled_least_squares(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let lengths = DVector::from_iterator(matrix.ncols(), matrix.column_iter().map(|column| column.norm()));
+    if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
+        return None;
+    }
+    let mut scaled = matrix.clone();
+    for (mut column, length) in scaled.column_iter_mut().zip(lengths.iter()) {
+        column /= *length;
+    }
+    let svd = scaled.svd(true, true);
+    let largest = svd.singular_values.max();
+    // Below the rounding of the data nothing is determined.
+    if svd.singular_values.min() < 1e-12 * largest {
+        return None;
+    }
+    let solution = svd.solve(right, 0.0).ok()?;
+    Some(solution.component_div(&lengths))
+}
+
+fn scaled(matrix: &DMatrix<f64>) -> Option<(Cholesky<f64, nalgebra::Dyn>, DVector<f64>)> {
+    let lengths = matrix.diagonal().map(f64::sqrt);
+    if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        matrix[(i, j)] / (lengths[i] * lengths[j])
+    });
+    Some((Cholesky::new(scaled)?, lengths))
+}
+
+pub(super) fn scaled_solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let (cholesky, lengths) = scaled(matrix)?;
+    Some(
+        cholesky
+            .solve(&right.component_div(&lengths))
+            .component_div(&lengths),
+    )
+}
+
+pub(super) fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (cholesky, lengths) = scaled(matrix)?;
+    let inverse = cholesky.inverse();
+    Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        inverse[(i, j)] / (lengths[i] * lengths[j])
+    }))
+}
