@@ -136,7 +136,7 @@ fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
     let pores_hz = cut.pores.map_or(0.0, |pores| {
         std::f64::consts::PI * diameter_m * turns_hz / pores.size_m
     });
-    (3.0 * pores_hz).max(200.0 * teeth_hz)
+    (3.0 * pores_hz).max(1000.0 * teeth_hz)
 }
 
 /// The case with the immersion that was asked for.

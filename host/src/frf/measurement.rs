@@ -30,7 +30,7 @@ pub enum Excitation {
 
 impl Excitation {
     /// What a test is driven by.
-    fn of(sidecar: &Sidecar) -> Self {
+    pub(super) fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {
             Some(Kind::Cutting) if glides => Self::Sweep,

@@ -9,7 +9,7 @@ use super::Error;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::homogeneity::Region;
 use crate::identify::linearity::Verdict;
-use crate::identify::modes::{ModalModel, Rejected};
+use crate::identify::modes::{ChannelNoise, ModalModel, Rejected};
 use crate::identify::ncma::Map;
 use crate::identify::reciprocity::Reciprocity;
 use crate::identify::steady_fit::NINETY_PERCENT;
@@ -29,6 +29,9 @@ pub(super) struct Answer {
     /// Median coherence of each response.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) coherence: BTreeMap<&'static str, f64>,
+    /// Noise of the channels, where modes were fitted to the records themselves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) noise: Vec<ChannelNoise>,
     /// Parameters by the directions that they belong to.
     pub(super) models: Vec<Model>,
     /// Root mean square of what is left over that of the data.

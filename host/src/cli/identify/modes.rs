@@ -7,8 +7,8 @@ use maud::html;
 
 use super::answer::{Answer, ComplexMode, Figure, Parts};
 use super::{Args, Error, positive};
-use crate::frf::{Estimator, FrfTable, MeasurementSettings, measure};
-use crate::identify::modes::{self, IdentifiedMode, ModalModel, Receptances};
+use crate::frf::{Estimator, FrfTable, MeasurementSettings, RecordSpectra, measure, record_spectra};
+use crate::identify::modes::{self, ChannelNoise, IdentifiedMode, ModalModel, Receptances};
 use crate::recording::Recording;
 use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
@@ -50,7 +50,11 @@ pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
         highest_order: usize::from(options.order),
         modes: options.modes.map(usize::from),
     };
-    let model = modes::identify(&data, &wanted).map_err(refused)?;
+    let mut model = modes::identify(&data, &wanted).map_err(refused)?;
+    let mut noise = Vec::new();
+    if let Some(records) = &source.records {
+        (model, noise) = modes::refine_by_records(&model, records).map_err(refused)?;
+    }
     if let Some(path) = &options.stabilization {
         draw(path, &data, &model)?;
     }
@@ -65,7 +69,8 @@ pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
         fit_error: Some(model.fit_error),
         misfit: model.misfit,
         warnings,
-        said: said(&model),
+        said: said(&model, &noise),
+        noise,
         modal: Some(model),
         ..Answer::default()
     })
@@ -76,6 +81,8 @@ struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
     warnings: Vec<String>,
+    /// The records themselves, where they go on from start to end.
+    records: Option<Vec<RecordSpectra>>,
 }
 
 fn source(args: &Args) -> Result<Source, Error> {
@@ -86,6 +93,7 @@ fn source(args: &Args) -> Result<Source, Error> {
             table: FrfTable::read(path)?,
             deviation: None,
             warnings: Vec::new(),
+            records: None,
         });
     }
     let read = args.recordings.iter().map(Recording::read);
@@ -105,6 +113,7 @@ fn source(args: &Args) -> Result<Source, Error> {
         table: measurement.table,
         deviation: Some(measurement.deviation),
         warnings: measurement.warnings,
+        records: record_spectra(&recordings, &settings)?,
     })
 }
 
@@ -185,7 +194,7 @@ fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
     })
 }
 
-fn said(model: &ModalModel) -> Vec<String> {
+fn said(model: &ModalModel, noise: &[ChannelNoise]) -> Vec<String> {
     let mut lines = Vec::new();
     for found in &model.modes {
         let frequency = Figure::new(found.mode.frequency_hz, found.frequency_std_hz);
@@ -222,6 +231,12 @@ fn said(model: &ModalModel) -> Vec<String> {
                 entries.join(", ")
             ));
         }
+    }
+    for channel in noise {
+        lines.push(format!(
+            "noise of {} in {}: {:.3} % of its root mean square",
+            channel.channel, channel.recording, channel.percent
+        ));
     }
     for pole in &model.rejected {
         lines.push(format!(

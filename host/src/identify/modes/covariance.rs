@@ -18,7 +18,7 @@ const LAGS: usize = 2;
 pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Option<DMatrix<f64>> {
     let jacobian = jacobian(data, fit, weights);
     let normal = normal(&jacobian);
-    let bread = constrained_inverse(data, fit, &normal)?;
+    let bread = constrained_inverse(fit, &shared(data), &normal)?;
     let left = fit.left(data, weights);
     let same_line = &bread * meat(&jacobian, &left, 0) * &bread;
     let all = &bread * meat(&jacobian, &left, LAGS) * &bread;
@@ -74,7 +74,11 @@ fn meat(jacobian: &[DMatrix<Complex64>], left: &[DVector<Complex64>], lags: usiz
 
 /// The upper left block of [N Gᵀ; G 0]⁻¹ with the gradients G of the constraints: scale and phase of the shapes of each
 /// mode are not in the data.
-fn constrained_inverse(data: &Receptances, fit: &PoleResidue, normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub(super) fn constrained_inverse(
+    fit: &PoleResidue,
+    shared: &[(usize, usize)],
+    normal: &DMatrix<f64>,
+) -> Option<DMatrix<f64>> {
     let size = normal.nrows();
     let scale = normal
         .diagonal()
@@ -85,7 +89,7 @@ fn constrained_inverse(data: &Receptances, fit: &PoleResidue, normal: &DMatrix<f
             bordered[(i, j)] = normal[(i, j)] * scale[i] * scale[j];
         }
     }
-    let gradients = constraints(data, fit, size);
+    let gradients = constraints(fit, shared, size);
     for (c, gradient) in gradients.iter().enumerate() {
         let scaled = gradient.component_mul(&scale);
         let norm = scaled.norm();
@@ -100,11 +104,10 @@ fn constrained_inverse(data: &Receptances, fit: &PoleResidue, normal: &DMatrix<f
     }))
 }
 
-fn constraints(data: &Receptances, fit: &PoleResidue, size: usize) -> Vec<DVector<f64>> {
-    let (width, rights) = (PoleResidue::width(data), data.responses.len());
-    let both = shared(data);
+fn constraints(fit: &PoleResidue, both: &[(usize, usize)], size: usize) -> Vec<DVector<f64>> {
     let mut gradients = Vec::new();
     for (r, mode) in fit.modes.iter().enumerate() {
+        let (width, rights) = (mode.width(), mode.right.len());
         let mut norms = DVector::zeros(size);
         let mut phase = DVector::zeros(size);
         let right_at = |p: usize| r * width + 2 + 2 * p;
@@ -123,7 +126,7 @@ fn constraints(data: &Receptances, fit: &PoleResidue, size: usize) -> Vec<DVecto
             phase[right_at(p)] = -mode.right[p].im;
             phase[right_at(p) + 1] = mode.right[p].re;
         }
-        for &(p, q) in &both {
+        for &(p, q) in both {
             let (right, left) = (mode.right[p], mode.left[q]);
             of_norm(right_at(p), right, 1.0);
             of_norm(left_at(q), left, -1.0);

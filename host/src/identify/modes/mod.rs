@@ -10,6 +10,7 @@ mod covariance;
 mod denominator;
 mod pole_residue;
 mod receptances;
+mod record_fit;
 pub(super) mod shape;
 pub mod stabilization;
 mod weights;
@@ -18,6 +19,7 @@ mod weights;
 mod tests;
 
 pub use receptances::Receptances;
+pub use record_fit::{ChannelNoise, refine_by_records};
 pub use stabilization::{Candidate, Stabilization};
 
 use num_complex::Complex64;
@@ -226,7 +228,7 @@ fn model(
         rejected,
         warnings: Vec::new(),
     };
-    model.warnings = warnings(data, &model);
+    model.warnings = warnings(data.spacing_hz(), &model);
     model
 }
 
@@ -236,7 +238,8 @@ const GOOD_FIT: f64 = 0.1;
 /// Fewest lines within the width of a resonance, 2ζf, for its damping to be measured rather than extrapolated.
 const LINES_PER_WIDTH: f64 = 3.0;
 
-fn warnings(data: &Receptances, model: &ModalModel) -> Vec<String> {
+/// What a model from lines so far apart does not know well.
+fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     let mut warnings = Vec::new();
     if model.fit_error > GOOD_FIT {
         warnings.push(format!(
@@ -247,7 +250,7 @@ fn warnings(data: &Receptances, model: &ModalModel) -> Vec<String> {
     for mode in &model.modes {
         let (hertz, damping) = (mode.mode.frequency_hz, mode.mode.damping_ratio);
         let width_hz = 2.0 * damping * hertz;
-        let lines = width_hz / data.spacing_hz();
+        let lines = width_hz / spacing_hz;
         if lines < LINES_PER_WIDTH {
             warnings.push(format!(
                 "{lines:.1} lines within the width of the mode at {hertz:.3} Hz ({width_hz:.3} Hz); a finer resolution is needed for its damping"

@@ -22,6 +22,13 @@ pub(super) struct Shaped {
     pub(super) left: Vec<Complex64>,
 }
 
+impl Shaped {
+    /// How many numbers it is: its pole, right and left shape.
+    pub(super) fn width(&self) -> usize {
+        2 + 2 * (self.right.len() + self.left.len())
+    }
+}
+
 /// The parameters of a fit.
 #[derive(Clone, Debug)]
 pub(super) struct PoleResidue {
@@ -34,7 +41,7 @@ pub(super) struct PoleResidue {
 pub(super) struct Refined {
     pub(super) fit: PoleResidue,
     /// Covariance of the parameters in the order of [`PoleResidue::parameters`].
-    covariance: DMatrix<f64>,
+    pub(super) covariance: DMatrix<f64>,
     pub(super) relative_error: f64,
     pub(super) misfit: f64,
 }
@@ -109,11 +116,6 @@ impl PoleResidue {
         self.of_modes(place, s) + above + below / (s * s)
     }
 
-    /// Numbers of a mode: its pole, right and left shape.
-    pub(super) fn width(data: &Receptances) -> usize {
-        2 + 2 * (data.responses.len() + data.forces.len())
-    }
-
     /// Each mode: Re λ, Im λ, right shape (real and imaginary parts in turn), left shape; then U and L of each receptance.
     pub(super) fn parameters(&self) -> DVector<f64> {
         let modes = self.modes.iter().flat_map(|mode| {
@@ -124,7 +126,8 @@ impl PoleResidue {
         DVector::from_vec(all)
     }
 
-    fn moved(&self, step: &DVector<f64>) -> Self {
+    /// The fit a step further, in the order of [`Self::parameters`].
+    pub(super) fn moved(&self, step: &[f64]) -> Self {
         let mut moved = self.clone();
         let mut values = step.iter();
         let mut next = || values.next().copied().unwrap_or(0.0);
@@ -170,7 +173,8 @@ impl PoleResidue {
     fn derivatives(&self, data: &Receptances, k: usize, s: Complex64, deviation: f64, row: &mut [Complex64]) {
         row.fill(Complex64::ZERO);
         let (p, q) = data.places[k];
-        let (width, rights) = (Self::width(data), data.responses.len());
+        let rights = data.responses.len();
+        let width = self.modes.first().map_or(0, Shaped::width);
         for (r, mode) in self.modes.iter().enumerate() {
             let (a, b) = ((s - mode.pole).inv(), (s - mode.pole.conj()).inv());
             let mut put = |at: usize, factor: Complex64, a: Complex64, b: Complex64| {
@@ -270,7 +274,7 @@ fn least_squares(data: &Receptances, weights: &Weights, mut fit: PoleResidue) ->
         let before = squares;
         while damping < DAMPING_MAX {
             if let Some(step) = step(&normal, &gradient, damping) {
-                let next = fit.moved(&step);
+                let next = fit.moved(step.as_slice());
                 let then = next.squares(data, weights);
                 if then <= squares {
                     (fit, squares) = (next, then);
@@ -288,7 +292,7 @@ fn least_squares(data: &Receptances, weights: &Weights, mut fit: PoleResidue) ->
 }
 
 /// (N + μ diag N) step = gradient, in units in which the diagonal of N is one.
-fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+pub(super) fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
     let scale = normal
         .diagonal()
         .map(|entry| if entry > 0.0 { entry.sqrt().recip() } else { 0.0 });
