@@ -136,7 +136,12 @@ impl Finding {
                             continue;
                         };
                         covered[1] += 1;
-                        if (low..=high).contains(&truth) {
+                        // Angles come around.
+                        let turn = if *key == "angle_deg" { 360.0 } else { 0.0 };
+                        if [-turn, 0.0, turn]
+                            .iter()
+                            .any(|turn| (low..=high).contains(&&(truth + turn)))
+                        {
                             covered[0] += 1;
                         } else {
                             missed.push(format!(

@@ -102,10 +102,7 @@ impl Cause {
                 ("exponent", 1.0 - 0.4 * s[0]),
                 ("reference_chip_mm", s[1] * job.feed_mm),
             ],
-            Kind::Runout => vec![
-                ("runout_um", 0.2e3 * s[0] * job.feed_mm),
-                ("angle_deg", s[1].to_degrees()),
-            ],
+            Kind::Runout => runout(0.2e3 * s[0] * job.feed_mm, s[1], job.teeth),
             // A damping of half that of the machine, were one tooth always in the cut.
             Kind::ProcessDamping => {
                 vec![(
@@ -119,4 +116,15 @@ impl Cause {
             _ => return None,
         })
     }
+}
+
+/// Offset and direction. Two teeth stand on one line: only what lies along it moves them, and is all that can be said.
+fn runout(offset_um: f64, angle: f64, teeth: usize) -> Vec<(&'static str, f64)> {
+    let (offset_um, angle) = if teeth == 2 {
+        let along = offset_um * angle.cos();
+        (along.abs(), if along < 0.0 { std::f64::consts::PI } else { 0.0 })
+    } else {
+        (offset_um, angle)
+    };
+    vec![("runout_um", offset_um), ("angle_deg", angle.to_degrees())]
 }

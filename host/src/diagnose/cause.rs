@@ -135,14 +135,14 @@ impl Regressor {
             (!force.is_empty() && force.iter().any(|x| *x != 0.0))
                 .then(|| record.grid.spectrum_of_fine(force))
         });
-        for (channel, column) in record.channels.iter().zip(&mut columns) {
+        for (index, (channel, column)) in record.channels.iter().zip(&mut columns).enumerate() {
             // The force of a cut is what it is: a spring moves the tool.
             if record.domain == super::Domain::Response && channel.pickup.quantity == Quantity::Force {
                 continue;
             }
             let added: Vec<f64> = match record.domain {
                 super::Domain::Response => {
-                    let response = record.read_response(&spectra, channel);
+                    let response = record.read_response(&spectra, index);
                     response.into_iter().map(|x| -x).collect()
                 }
                 super::Domain::Force => {
@@ -245,6 +245,11 @@ pub trait Cause: Send + Sync {
             parameters: parameters.to_vec(),
             extension: self.extension(place, parameters),
         }]
+    }
+
+    /// Standard deviations of parameters that are known otherwise than by the fit, by key.
+    fn known_deviations(&self, _scene: &Scene<'_>) -> Vec<Parameter> {
+        Vec::new()
     }
 
     /// Parameters that are said beside those of the extension, as the same thing in other words.

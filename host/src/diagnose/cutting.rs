@@ -4,11 +4,16 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::DiagnoseError;
+use super::chips::Chips;
 use super::cut::{CutForce, RecordedCut};
 use super::motion;
+use super::noise::rms;
+use super::path::Motion;
 use super::record::{Observed, Record};
-use super::scene::Baseline;
+use super::scene::{Baseline, Scene};
+use super::turning::Turning;
 use crate::recording::{Quantity, Recording};
+use crate::simulate::Cutter;
 
 /// Rounds in which force and motion settle: the motion comes from the force, the chip from the motion.
 const ROUNDS: usize = 4;
@@ -17,8 +22,13 @@ const ROUNDS: usize = 4;
 pub struct Cutting {
     /// The cut.
     pub cut: RecordedCut,
+    /// Its chips along the motion.
+    chips: Chips,
     /// Its force along the motion, as the baseline has it.
     pub force: CutForce,
+    finer: usize,
+    /// True where forces are measured.
+    with_force: bool,
     /// True at samples beside an entry or exit, whose forces are not compared.
     beside: Vec<bool>,
 }
@@ -30,11 +40,39 @@ impl Cutting {
         let beside = (0..grid.count())
             .map(|sample| cut.is_beside(sample as f64 / grid.rate_hz()))
             .collect();
+        let with_force = record
+            .channels
+            .iter()
+            .any(|channel| channel.pickup.quantity == Quantity::Force);
+        let chips = cut.chips(&cut.turning, &record.motion, grid.finer(), with_force);
         Ok(Self {
-            force: cut.force(&cut.believed(), &record.motion, grid.finer()),
+            force: chips.force(&cut.cutter, &cut.turning, &record.motion),
+            chips,
+            finer: grid.finer(),
+            with_force,
             cut,
             beside,
         })
+    }
+
+    /// Goes along another motion.
+    fn follow(&mut self, motion: &Motion) {
+        self.chips = self
+            .cut
+            .chips(&self.cut.turning, motion, self.finer, self.with_force);
+        self.force = self.force_of(&self.cut.cutter, motion);
+    }
+
+    /// The force of another tool along the motion that the chips are of.
+    pub fn force_of(&self, cutter: &Cutter, motion: &Motion) -> CutForce {
+        self.chips.force(cutter, &self.cut.turning, motion)
+    }
+
+    /// The force of the believed tool where it turns or moves otherwise.
+    pub fn force_along(&self, turning: &Turning, motion: &Motion) -> CutForce {
+        self.cut
+            .chips(turning, motion, self.finer, self.with_force)
+            .force(&self.cut.cutter, turning, motion)
     }
 }
 
@@ -45,7 +83,8 @@ impl Record {
         let spectra = self.cut_spectra(force);
         self.channels
             .par_iter()
-            .map(|channel| {
+            .enumerate()
+            .map(|(index, channel)| {
                 if channel.pickup.quantity == Quantity::Force {
                     return (0..self.grid.count())
                         .map(|sample| {
@@ -55,7 +94,7 @@ impl Record {
                         })
                         .collect();
                 }
-                self.read_response(&spectra, channel)
+                self.read_response(&spectra, index)
             })
             .collect()
     }
@@ -64,6 +103,9 @@ impl Record {
     fn cut_spectra(&self, force: &CutForce) -> [Option<Vec<Complex64>>; 3] {
         let step_s = 1.0 / (self.grid.rate_hz() * self.grid.finer() as f64);
         std::array::from_fn(|axis| {
+            if !self.responds(axis) {
+                return None;
+            }
             let mut spectrum = self.grid.spectrum_of_fine(&force.mean_n[axis]);
             for (bin, value) in spectrum.iter_mut().enumerate().skip(1) {
                 let half = 0.5 * self.grid.omega(bin) * step_s;
@@ -82,9 +124,9 @@ impl Record {
         self.prepare_decays(baseline);
         let mut cutting = Cutting::new(baseline, self, recording)?;
         for round in 0..ROUNDS {
-            cutting.force = cutting
-                .cut
-                .force(&cutting.cut.believed(), &self.motion, self.grid.finer());
+            if round > 0 {
+                cutting.follow(&self.motion);
+            }
             let mut force = self.cut_spectra(&cutting.force);
             self.force_n = std::array::from_fn(|axis| match &force[axis] {
                 Some(spectrum) if baseline.axes.contains(&axis) => {
@@ -96,9 +138,9 @@ impl Record {
             if round > 0 && !baseline.terms.is_empty() {
                 let mut terms = [None, None, None];
                 self.add_terms(baseline, &mut terms);
-                for (channel, predicted) in self.channels.iter().zip(&mut predicted) {
-                    if channel.pickup.quantity != Quantity::Force {
-                        let added = self.read_response(&terms, channel);
+                for (index, predicted) in predicted.iter_mut().enumerate() {
+                    if self.channels[index].pickup.quantity != Quantity::Force {
+                        let added = self.read_response(&terms, index);
                         predicted
                             .iter_mut()
                             .zip(added)
@@ -112,9 +154,8 @@ impl Record {
             motion::learn(self, baseline, &force);
         }
         // What the causes add is measured from the force along the motion as it is known now.
-        cutting.force = cutting
-            .cut
-            .force(&cutting.cut.believed(), &self.motion, self.grid.finer());
+        cutting.follow(&self.motion);
+        self.compared_from = cutting.cut.first_turn();
         self.cut = Some(cutting);
         Ok(())
     }
@@ -131,4 +172,20 @@ fn skip_beside(beside: &[bool], channels: &[Observed], predicted: &mut [Vec<f64>
             }
         }
     }
+}
+
+/// Noise over signal from which on the noise of the motion is felt in what is found along it.
+const NOISY: f64 = 0.003;
+
+/// True where all records are cuts, and the motion of one has noise that is felt.
+pub(super) fn is_noisy(scene: &Scene<'_>) -> bool {
+    let motions = scene
+        .records
+        .iter()
+        .flat_map(|record| &record.channels)
+        .filter(|channel| channel.pickup.quantity != Quantity::Force);
+    scene.records.iter().all(|record| record.cut.is_some())
+        && motions
+            .into_iter()
+            .any(|channel| channel.deviation > NOISY * rms(&channel.measured))
 }

@@ -3,8 +3,22 @@
 use std::fmt::Write as _;
 
 use super::answer::{Diagnosis, Outcome};
+use crate::case::Case;
 
 impl Diagnosis {
+    /// The extended case; `None` where nothing was found.
+    pub fn extended(&self, case: &Case) -> Option<Case> {
+        let found = &self.causes[..self.acting];
+        (!found.is_empty()).then(|| {
+            let mut extended = case.clone();
+            let tables = found
+                .iter()
+                .map(|cause| (cause.name.to_owned(), cause.extension.clone()));
+            extended.extensions.extend(tables);
+            extended
+        })
+    }
+
     /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each cause that acts, and
     /// standard deviations of its parameters as comments. `None` where nothing was found.
     ///

@@ -132,11 +132,21 @@ impl Grid {
         bins
     }
 
-    /// The samples of the record of a spectrum of finer samples: what a sensor without a filter reads, aliases included.
+    /// The samples of the record of a spectrum of finer samples: what a sensor without a filter reads. Every `finer`-th sample
+    /// has the spectrum folded at the bins of the samples, aliases included.
     pub fn samples_of_fine(&self, spectrum: &[Complex64]) -> Vec<f64> {
-        let mut bins = spectrum.to_vec();
-        let fine = back(&*self.fine_inverse, &mut bins, self.length);
-        fine.into_iter().step_by(self.finer).take(self.count).collect()
+        let whole = self.finer * self.length;
+        let at = |bin: usize| {
+            if 2 * bin <= whole {
+                spectrum[bin]
+            } else {
+                spectrum[whole - bin].conj()
+            }
+        };
+        let folded: Vec<Complex64> = (0..self.bins())
+            .map(|bin| (0..self.finer).map(|turn| at(bin + turn * self.length)).sum())
+            .collect();
+        self.samples(&folded)
     }
 }
 

@@ -9,6 +9,7 @@ pub mod answer;
 pub mod cause;
 mod causes;
 mod checks;
+pub mod chips;
 mod closed_loop;
 mod cubic;
 pub mod cut;
@@ -102,5 +103,18 @@ pub fn diagnose_watched(
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
     let scene = Scene::new(case, recordings)?;
-    Ok(judge::judge(&scene, options, watch))
+    let diagnosis = judge::judge(&scene, options, watch);
+    // A second look at a cut, along the motion that the first one explains.
+    let again = cutting::is_noisy(&scene)
+        .then(|| diagnosis.extended(case))
+        .flatten()
+        .and_then(|extended| {
+            watch(Stage::Records);
+            let better = Scene::new(&extended, recordings).ok()?;
+            let scene = Scene::along(case, recordings, &better).ok()?;
+            Some(judge::judge(&scene, options, watch))
+        });
+    Ok(again
+        .filter(|again| !again.causes.is_empty())
+        .unwrap_or(diagnosis))
 }

@@ -79,8 +79,9 @@ fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
     let of_axis: Vec<(&Observed, Vec<Complex64>)> = record
         .channels
         .iter()
-        .filter(|channel| channel.pickup.quantity != Quantity::Force && main_axis(channel) == Some(axis))
-        .map(|channel| (channel, grid.continued_spectrum(&channel.residual())))
+        .enumerate()
+        .filter(|(_, channel)| channel.pickup.quantity != Quantity::Force && main_axis(channel) == Some(axis))
+        .map(|(index, channel)| (channel, grid.continued_spectrum(&record.to_correct(index))))
         .collect();
     let mut spectrum = vec![Complex64::ZERO; bins];
     let mut precision = vec![0.0; bins];
@@ -114,7 +115,10 @@ fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
             }
         })
         .collect();
-    let weights = heard(&power);
+    let weights = match record.clean {
+        Some(_) => vec![1.0; bins],
+        None => heard(&power),
+    };
     let mut speed_noise = 0.0;
     for bin in 0..bins {
         if weights[bin] > 0.0 && precision[bin] > 0.0 {
@@ -147,7 +151,7 @@ fn heard(power: &[f64]) -> Vec<f64> {
 }
 
 /// The axis that a channel reads most.
-fn main_axis(channel: &Observed) -> Option<usize> {
+pub(super) fn main_axis(channel: &Observed) -> Option<usize> {
     (0..3)
         .filter(|axis| channel.pickup.weights[*axis] != 0.0)
         .max_by(|a, b| {

@@ -54,13 +54,21 @@ pub(super) fn named(
         let (Some(parts), Some(center)) = (parts(&inner), values(&inner)) else {
             continue;
         };
+        let known = cause.known_deviations(scene);
         let mut deviations = deviations(&values, &inner, &center, covariance, inflation).into_iter();
         for part in parts {
             all.push(NamedCause {
                 parameters: part
                     .parameters
                     .iter()
-                    .map(|(key, value)| (*key, figure(*value, deviations.next().unwrap_or(0.0))))
+                    .map(|(key, value)| {
+                        let fitted = deviations.next().unwrap_or(0.0);
+                        let known = known.iter().find(|(known, _)| known == key);
+                        (
+                            *key,
+                            figure(*value, known.map_or(fitted, |(_, deviation)| *deviation)),
+                        )
+                    })
                     .collect(),
                 ..empty(part.name, &candidate.place, confidence, part.extension)
             });

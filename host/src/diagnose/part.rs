@@ -54,21 +54,22 @@ pub(super) fn split(scene: &Scene<'_>, unknown: impl Fn(&Record) -> Unknown) -> 
         .iter()
         .enumerate()
         .flat_map(|(index, record)| {
-            let count = record.grid.count();
-            let mut ranges = vec![(0..count, Share::Whole)];
+            let (from, end) = (record.compared_from, record.grid.count());
+            let count = end - from;
+            let mut ranges = vec![(from..end, Share::Whole)];
             if several && record.kind == Some(Kind::FreeDecay) {
                 let share = if index == last {
                     Share::HeldOut
                 } else {
                     Share::Fitted
                 };
-                ranges.push((0..count, share));
+                ranges.push((from..end, share));
             } else {
                 ranges.extend([
-                    (0..count / 3, Share::Fitted),
-                    (count / 3..count / 2, Share::HeldOut),
-                    (count / 2..5 * count / 6, Share::Fitted),
-                    (5 * count / 6..count, Share::HeldOut),
+                    (from..from + count / 3, Share::Fitted),
+                    (from + count / 3..from + count / 2, Share::HeldOut),
+                    (from + count / 2..from + 5 * count / 6, Share::Fitted),
+                    (from + 5 * count / 6..end, Share::HeldOut),
                 ]);
             }
             let unknown = unknown(record);

@@ -12,7 +12,7 @@ use super::cutting::Cutting;
 use super::decay::Decays;
 use super::grid::Grid;
 use super::motion;
-use super::noise::{rms, white_floor};
+use super::noise::{floor_between_lines, rms, white_floor};
 use super::scene::{Baseline, Domain, derivatives};
 use crate::recording::{Kind, Quantity, Recording};
 use crate::simulate::effect::Pickup;
@@ -32,6 +32,15 @@ pub struct Observed {
     pub predicted: Vec<f64>,
     /// Standard deviation of its white noise.
     pub deviation: f64,
+}
+
+/// What the channels of a record read without their noise, as a better model has it.
+#[derive(Clone, Debug)]
+pub struct Clean {
+    /// By channel.
+    readings: Vec<Vec<f64>>,
+    /// The noise of each.
+    deviations: Vec<f64>,
 }
 
 /// One recording with its prediction.
@@ -66,10 +75,17 @@ pub struct Record {
     /// H(iω) of the baseline at the bins of the finer samples, m/N; in the domain of force the dynamic stiffness at the bins
     /// of the samples, N/m.
     pub transfer: Vec<Matrix3<Complex64>>,
+    /// By channel of motion and axis of force: what the channel reads per newton at the bins of the finer samples; empty where
+    /// it hears nothing of that axis.
+    responses: Vec<[Vec<Complex64>; 3]>,
+    /// The first sample that is compared: those before it are only the past of what follows.
+    pub compared_from: usize,
     /// Free decays of the baseline, as the channels read them.
     pub decays: Decays,
     /// The cut, where it is the record of one.
     pub cut: Option<Cutting>,
+    /// What the motion is learned from, where that is known better than from what was measured.
+    pub clean: Option<Clean>,
 }
 
 impl Observed {
@@ -94,7 +110,12 @@ impl Record {
     ///
     /// # Errors
     /// A record that tells nothing: too short, clipped, without a channel that is needed, of a kind that is not judged.
-    pub fn new(baseline: &Baseline<'_>, index: usize, recording: &Recording) -> Result<Self, DiagnoseError> {
+    pub fn new(
+        baseline: &Baseline<'_>,
+        index: usize,
+        recording: &Recording,
+        clean: Option<Clean>,
+    ) -> Result<Self, DiagnoseError> {
         let domain = checks::domain(baseline, recording)?;
         let is_cut = recording.sidecar.kind == Some(Kind::Cutting);
         // What drives a cut is its model; forces that were measured are compared with it.
@@ -111,7 +132,10 @@ impl Record {
         let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
             .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
             .next_power_of_two();
-        let grid = Grid::new(recording.len(), rate_hz, 8.0 * baseline.slowest_decay_s(), finer);
+        // What comes around from the end of a cut is a free decay at its beginning, which is taken off.
+        let decays = if is_cut { 2.0 } else { 8.0 };
+        let room_s = decays * baseline.slowest_decay_s();
+        let grid = Grid::new(recording.len(), rate_hz, room_s, finer);
         let transfer = match domain {
             Domain::Response => response(baseline, &grid),
             Domain::Force => dynamic_stiffness(baseline, &grid),
@@ -136,11 +160,15 @@ impl Record {
                 (6.0 * highest_hz).min(0.5 * rate_hz)
             },
             transfer,
+            responses: Vec::new(),
+            compared_from: 0,
             decays: Decays::default(),
             cut: None,
+            clean,
         };
         match domain {
             Domain::Response => {
+                record.responses = record.channel_responses(&baseline.axes);
                 if is_cut {
                     record.compare_cut(baseline, recording)?;
                 } else {
@@ -166,24 +194,14 @@ impl Record {
 
     /// Samples that a channel reads of the response to forces in the machine's axes, given as spectra of the samples or of
     /// finer ones.
-    pub fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: &Observed) -> Vec<f64> {
+    pub fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: usize) -> Vec<f64> {
         let count = force.iter().flatten().map(Vec::len).max().unwrap_or(0);
-        let spectrum: Vec<Complex64> = (0..count)
-            .map(|bin| {
-                let mut sum = Complex64::ZERO;
-                for (axis, force) in force.iter().enumerate() {
-                    if let Some(force) = force.as_ref().filter(|force| bin < force.len()) {
-                        for (weight, row) in channel.pickup.weights.iter().zip(self.transfer[bin].row_iter())
-                        {
-                            if *weight != 0.0 {
-                                sum += row[axis] * force[bin] * *weight;
-                            }
-                        }
-                    }
-                }
-                sum * self.factor(channel, bin)
-            })
-            .collect();
+        let mut spectrum = vec![Complex64::ZERO; count];
+        for (force, response) in force.iter().zip(&self.responses[channel]) {
+            for ((sum, force), response) in spectrum.iter_mut().zip(force.iter().flatten()).zip(response) {
+                *sum += force * response;
+            }
+        }
         if count == 0 {
             vec![0.0; self.grid.count()]
         } else if count > self.grid.bins() {
@@ -191,6 +209,37 @@ impl Record {
         } else {
             self.grid.samples(&spectrum)
         }
+    }
+
+    /// True where some channel hears a force along `axis`.
+    pub(super) fn responds(&self, axis: usize) -> bool {
+        self.responses.iter().any(|response| !response[axis].is_empty())
+    }
+
+    fn channel_responses(&self, axes: &[usize]) -> Vec<[Vec<Complex64>; 3]> {
+        self.channels
+            .iter()
+            .map(|channel| {
+                std::array::from_fn(|axis| {
+                    if channel.pickup.quantity == Quantity::Force || !axes.contains(&axis) {
+                        return Vec::new();
+                    }
+                    (0..self.transfer.len())
+                        .into_par_iter()
+                        .map(|bin| {
+                            let read: Complex64 = channel
+                                .pickup
+                                .weights
+                                .iter()
+                                .enumerate()
+                                .map(|(row, weight)| self.transfer[bin][(row, axis)] * *weight)
+                                .sum();
+                            read * self.factor(channel, bin)
+                        })
+                        .collect()
+                })
+            })
+            .collect()
     }
 
     /// [`Observed::factor`] at a bin; zero at the last one of the finer samples, where it would not be real.
@@ -245,9 +294,8 @@ impl Record {
 
     /// Response to `force` and the free decay that fits best, in every channel; the noise of what is left.
     fn predict(&mut self, force: &[Option<Vec<Complex64>>; 3]) {
-        let predicted: Vec<Vec<f64>> = self
-            .channels
-            .par_iter()
+        let predicted: Vec<Vec<f64>> = (0..self.channels.len())
+            .into_par_iter()
             .map(|channel| self.read_response(force, channel))
             .collect();
         self.accept(predicted);
@@ -272,7 +320,36 @@ impl Record {
         self.decays.fit(&residuals, &sizes);
         for (index, channel) in self.channels.iter_mut().enumerate() {
             self.decays.add_to(index, &mut channel.predicted);
-            channel.deviation = white_floor(&channel.residual(), rms(&channel.measured));
+            let (residual, size) = (channel.residual(), rms(&channel.measured));
+            channel.deviation = match &self.clean {
+                Some(clean) => clean.deviations[index],
+                None if self.kind == Some(Kind::Cutting) => floor_between_lines(&residual, size),
+                None => white_floor(&residual, size),
+            };
+        }
+    }
+
+    /// What the channels read without their noise, if the baseline is right.
+    pub fn predicted(&self) -> Clean {
+        Clean {
+            readings: self
+                .channels
+                .iter()
+                .map(|channel| channel.predicted.clone())
+                .collect(),
+            deviations: self.channels.iter().map(|channel| channel.deviation).collect(),
+        }
+    }
+
+    /// What the motion corrects in a channel: what was measured, or known to be so without noise, less what is predicted.
+    pub(super) fn to_correct(&self, channel: usize) -> Vec<f64> {
+        let observed = &self.channels[channel];
+        match &self.clean {
+            Some(clean) => {
+                let pairs = clean.readings[channel].iter().zip(&observed.predicted);
+                pairs.map(|(clean, predicted)| clean - predicted).collect()
+            }
+            None => observed.residual(),
         }
     }
 }

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use super::DiagnoseError;
 use super::cubic::cubic_term;
 use super::receptance::Receptance;
-use super::record::Record;
+use super::record::{Clean, Record};
 use crate::case::Case;
 use crate::recording::Recording;
 use crate::simulate::effect::Pickup;
@@ -135,6 +135,30 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// A case that cannot be simulated, or a record that tells nothing.
     pub fn new(case: &'a Case, recordings: &[Recording]) -> Result<Self, DiagnoseError> {
+        Self::with(case, recordings, |_| None)
+    }
+
+    /// The same with the motion as `better`, a scene of the same recordings with a case that explains them, says that it is read.
+    ///
+    /// Along a measured motion every term carries the noise of that motion, which is also in the residual: the coefficient of a
+    /// term is then off by about the square of noise over signal, which is more than its deviation once
+    /// (noise over signal)·√(number of samples) is above one. Along the motion of a model that explains the records it is not.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn along(
+        case: &'a Case,
+        recordings: &[Recording],
+        better: &Scene<'_>,
+    ) -> Result<Self, DiagnoseError> {
+        Self::with(case, recordings, |index| Some(better.records[index].predicted()))
+    }
+
+    fn with(
+        case: &'a Case,
+        recordings: &[Recording],
+        clean: impl Fn(usize) -> Option<Clean>,
+    ) -> Result<Self, DiagnoseError> {
         if recordings.is_empty() {
             return Err(DiagnoseError::NoRecording);
         }
@@ -142,7 +166,7 @@ impl<'a> Scene<'a> {
         let records = recordings
             .iter()
             .enumerate()
-            .map(|(index, recording)| Record::new(&baseline, index, recording))
+            .map(|(index, recording)| Record::new(&baseline, index, recording, clean(index)))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self { baseline, records })
     }

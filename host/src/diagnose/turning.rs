@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::diagnose::DiagnoseError;
 use crate::recording::Recording;
 use crate::simulate::{Fluctuation, Spindle};
@@ -173,11 +175,20 @@ const STEP: f64 = 0.2;
 /// A swing must explain so much more of the edges per parameter than is left per edge.
 const BEYOND_CHANCE: f64 = 20.0;
 
+/// A swing of the speed, as tachometers tell it.
+#[derive(Clone, Copy, Debug)]
+pub struct Swing {
+    /// The swing.
+    pub fluctuation: Fluctuation,
+    /// Standard deviations of δ, f_m in Hz and ψ in rad: from what is left of the times of the edges.
+    pub deviation: [f64; 3],
+}
+
 /// The swing of the speed that comes nearest to the edges of all records; `None` where none stands out.
 ///
 /// Edge k comes at t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + a constant: linear in all but the frequency,
 /// with T₀ and the constant those of each record.
-pub fn swing(turnings: &[&Turning]) -> Option<Fluctuation> {
+pub fn swing(turnings: &[&Turning]) -> Option<Swing> {
     let longest_s = turnings
         .iter()
         .filter_map(|turning| Some(turning.edges_s.last()? - turning.edges_s.first()?))
@@ -212,11 +223,50 @@ pub fn swing(turnings: &[&Turning]) -> Option<Fluctuation> {
     let found = nearest(turnings, frequency_hz);
     let gained = (found.without - found.left) / 3.0;
     let delta = found.along.hypot(found.across);
-    (gained > BEYOND_CHANCE * found.left / free && delta < 0.9).then(|| Fluctuation {
-        delta,
-        frequency_hz,
-        phase_rad: found.across.atan2(found.along),
+    let is_found = gained > BEYOND_CHANCE * found.left / free && delta < 0.9;
+    is_found.then(|| Swing {
+        fluctuation: Fluctuation {
+            delta,
+            frequency_hz,
+            phase_rad: found.across.atan2(found.along),
+        },
+        deviation: deviation(turnings, frequency_hz, &found, found.left / free),
     })
+}
+
+/// Standard deviations of δ, f_m and ψ for edges whose times have the given variance, s².
+fn deviation(turnings: &[&Turning], frequency_hz: f64, found: &Nearest, variance: f64) -> [f64; 3] {
+    let step_hz = 1e-4 * frequency_hz;
+    let times = |along: f64, across: f64, frequency_hz: f64| -> Vec<f64> {
+        let omega = TAU * frequency_hz;
+        let of = |t: f64| along * (1.0 - (omega * t).cos()) / omega + across * (omega * t).sin() / omega;
+        turnings
+            .iter()
+            .flat_map(|turning| without_line(&turning.edges_s, of))
+            .collect()
+    };
+    let (along, across) = (found.along, found.across);
+    let columns = [
+        times(1.0, 0.0, frequency_hz),
+        times(0.0, 1.0, frequency_hz),
+        times(along, across, frequency_hz + step_hz)
+            .iter()
+            .zip(times(along, across, frequency_hz - step_hz))
+            .map(|(above, below)| (above - below) / (2.0 * step_hz))
+            .collect(),
+    ];
+    let products = Matrix3::from_fn(|i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
+    let Some(covariance) = products
+        .try_inverse()
+        .map(|inverse: Matrix3<f64>| inverse * variance)
+    else {
+        return [f64::INFINITY; 3];
+    };
+    let delta = along.hypot(across);
+    let of_delta = Vector3::new(along / delta, across / delta, 0.0);
+    let of_phase = Vector3::new(-across, along, 0.0) / (delta * delta);
+    [of_delta, Vector3::z(), of_phase]
+        .map(|gradient| (gradient.transpose() * covariance * gradient)[0].max(0.0).sqrt())
 }
 
 /// The fit of a swing of a given frequency.
@@ -317,7 +367,10 @@ mod tests {
             turning(edges(900.0, 0.4, Some(truth))),
             turning(edges(1233.0, 2.0, Some(truth))),
         ];
-        let found = swing(&swings.each_ref()).unwrap();
+        let Swing {
+            fluctuation: found,
+            deviation,
+        } = swing(&swings.each_ref()).unwrap();
         // Two microseconds against a swing of δ/ω = 1.1 ms over 24 edges.
         assert!((found.delta / truth.delta - 1.0).abs() < 3e-3, "{found:?}");
         assert!(
@@ -325,6 +378,16 @@ mod tests {
             "{found:?}"
         );
         assert!((found.phase_rad - truth.phase_rad).abs() < 1e-2, "{found:?}");
+        let errors = [
+            found.delta - truth.delta,
+            found.frequency_hz - truth.frequency_hz,
+            found.phase_rad - truth.phase_rad,
+        ];
+        for (error, deviation) in errors.iter().zip(deviation) {
+            // What the fixed disorder makes of them is of the size that is told.
+            assert!(error.abs() < 4.0 * deviation, "{errors:?} {deviation:?}");
+            assert!(deviation < 1e-2, "{deviation:?}");
+        }
         let spindle = Spindle::new(900.0).fluctuating(truth);
         let known = swings[0].with(truth);
         for i in 0..100 {

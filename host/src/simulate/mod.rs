@@ -28,7 +28,7 @@ mod virtual_cut;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use cutter::{Cutter, Tooth};
+pub use cutter::{Cutter, Immersion, Tooth};
 pub use dynamics::Dynamics;
 pub use effect::{Effect, EffectError, Effects};
 pub use error::SimulateError;

@@ -40,6 +40,16 @@ impl Motion {
         }
     }
 
+    /// Moves the motion along an axis so far towards its past.
+    pub fn advance(&mut self, axis: usize, seconds: f64) {
+        let place = seconds / self.step_s;
+        for signal in [&mut self.x[axis], &mut self.v[axis]] {
+            *signal = (0..signal.len())
+                .map(|sample| between(signal, sample as f64 + place))
+                .collect();
+        }
+    }
+
     /// Root mean square of the displacement along an axis, m.
     pub fn size_m(&self, axis: usize) -> f64 {
         let squares: f64 = self.x[axis].iter().map(|x| x * x).sum();
@@ -50,6 +60,23 @@ impl Motion {
     pub fn largest_m(&self, axis: usize) -> f64 {
         self.x[axis].iter().fold(0.0, |most, x| x.abs().max(most))
     }
+}
+
+/// A signal between its samples, by a cubic through four of them; `place` counts samples.
+pub(super) fn between(samples: &[f64], place: f64) -> f64 {
+    let Some(last) = samples.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let index = (place.max(0.0) as usize).min(last);
+    let u = place - index as f64;
+    let of = |index: usize| samples[index.min(last)];
+    let (a, b, c, d) = (
+        of(index.saturating_sub(1)),
+        of(index),
+        of(index + 1),
+        of(index + 2),
+    );
+    b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
 }
 
 /// f_r of a term along `motion`, N, in the machine's axes.

@@ -16,7 +16,8 @@ mod speed_fluctuation;
 mod wear;
 
 use crate::diagnose::cause::{Cause, Place, Regressor};
-use crate::diagnose::cut::Variation;
+use crate::diagnose::cut::CutForce;
+use crate::diagnose::cutting::Cutting;
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::Scene;
 use crate::simulate::Cutter;
@@ -59,33 +60,28 @@ fn has_axial(scene: &Scene<'_>) -> bool {
     scene.baseline.axes.contains(&2)
 }
 
-/// What a cut adds per unit when it changes from `before` to `after`, `over` units apart; nothing in a record without a cut.
-fn added(
-    record: &Record,
-    before: impl Fn(&mut Variation),
-    after: impl Fn(&mut Variation),
-    over: f64,
-) -> Regressor {
+/// What a cut adds per unit when its tool changes from `before` to `after`, `over` units apart; nothing in a record without a
+/// cut.
+fn added(record: &Record, before: impl Fn(&mut Cutter), after: impl Fn(&mut Cutter), over: f64) -> Regressor {
     let Some(cut) = &record.cut else {
         return Regressor::default();
     };
-    let force = |change: &dyn Fn(&mut Variation)| {
-        let mut variation = cut.cut.believed();
-        change(&mut variation);
-        cut.cut.force(&variation, &record.motion, record.grid.finer())
-    };
-    Regressor::of_cut(force(&after).difference(&force(&before), over))
+    let (before, after) = (with(record, cut, before), with(record, cut, after));
+    Regressor::of_cut(after.difference(&before, over))
 }
 
-/// What a cut adds per unit when it changes from the one that is believed.
-fn changed(record: &Record, after: impl Fn(&mut Variation), over: f64) -> Regressor {
+/// What a cut adds per unit when its tool changes from the one that is believed.
+fn changed(record: &Record, after: impl Fn(&mut Cutter), over: f64) -> Regressor {
     let Some(cut) = &record.cut else {
         return Regressor::default();
     };
-    let mut variation = cut.cut.believed();
-    after(&mut variation);
-    let force = cut.cut.force(&variation, &record.motion, record.grid.finer());
-    Regressor::of_cut(force.difference(&cut.force, over))
+    Regressor::of_cut(with(record, cut, after).difference(&cut.force, over))
+}
+
+fn with(record: &Record, cut: &Cutting, change: impl Fn(&mut Cutter)) -> CutForce {
+    let mut cutter = cut.cut.cutter.clone();
+    change(&mut cutter);
+    cut.force_of(&cutter, &record.motion)
 }
 
 /// A step that stands for a size that may vanish.

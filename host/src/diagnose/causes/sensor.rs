@@ -8,6 +8,8 @@ mod offset;
 use num_complex::Complex64;
 
 use crate::diagnose::cause::{Cause, Place, Regressor};
+use crate::diagnose::motion::main_axis;
+use crate::diagnose::path::Motion;
 use crate::diagnose::record::{Observed, Record};
 use crate::diagnose::scene::{Domain, Scene};
 use crate::recording::Quantity;
@@ -101,4 +103,51 @@ fn of_meant(
         }
     };
     vec![Regressor::of_channels(record.channels.iter().map(of).collect())]
+}
+
+/// The same regressor in a cut, where the chip was taken along a motion that the sensor tells wrongly: what the force is less
+/// along the motion that `truth` makes of it, which is `over` units away.
+///
+/// With y = S x the reading of the motion x and F the force along a motion, y − H F(y) = (y − x) − H (F(y) − F(x)). Several sensors
+/// of one axis are taken to have an even share in what is known of its motion.
+fn in_cut(
+    record: &Record,
+    place: &Place,
+    mut regressors: Vec<Regressor>,
+    over: f64,
+    truth: impl Fn(&mut Motion, usize),
+) -> Vec<Regressor> {
+    let (Some(cut), Some(regressor)) = (&record.cut, regressors.first_mut()) else {
+        return regressors;
+    };
+    let of_motion = |channel: &&Observed| channel.pickup.quantity != Quantity::Force;
+    let mut moved = record.motion.clone();
+    for axis in 0..3 {
+        let readers = record
+            .channels
+            .iter()
+            .filter(of_motion)
+            .filter(|channel| main_axis(channel) == Some(axis));
+        let (mut all, mut wrong) = (0, 0);
+        for channel in readers {
+            all += 1;
+            wrong += usize::from(meant(place, channel));
+        }
+        if wrong == 0 || record.motion.x[axis].is_empty() {
+            continue;
+        }
+        truth(&mut moved, axis);
+        let share = wrong as f64 / all as f64;
+        for (moved, known) in [
+            (&mut moved.x[axis], &record.motion.x[axis]),
+            (&mut moved.v[axis], &record.motion.v[axis]),
+        ] {
+            for (moved, known) in moved.iter_mut().zip(known) {
+                *moved = known + share * (*moved - known);
+            }
+        }
+    }
+    let force = cut.force_along(&cut.cut.turning, &moved);
+    regressor.cut = Some(force.difference(&cut.force, over));
+    regressors
 }

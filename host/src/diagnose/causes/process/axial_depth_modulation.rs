@@ -26,7 +26,7 @@ impl Cause for OfDepth {
     fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
         Some(vec![changed(
             record,
-            |variation| variation.cutter.axial_depth_modulation = true,
+            |cutter| cutter.axial_depth_modulation = true,
             1.0,
         )])
     }

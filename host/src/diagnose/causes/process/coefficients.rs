@@ -35,10 +35,10 @@ impl Cause for Coefficients {
         let with_more = |index: usize| {
             changed(
                 record,
-                |variation| {
-                    let mut material = variation.cutter.force.material();
+                |cutter| {
+                    let mut material = cutter.force.material();
                     *(self.of)(&mut material)[index] += step;
-                    variation.cutter.force = variation.cutter.force.with_material(material);
+                    cutter.force = cutter.force.with_material(material);
                 },
                 step,
             )

@@ -75,8 +75,8 @@ impl Cause for CommonFactor {
     fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
         Some(vec![changed(
             record,
-            |variation| {
-                let force = &mut variation.cutter.force;
+            |cutter| {
+                let force = &mut cutter.force;
                 *force = force.with_material(scaled(force.material(), 2.0));
             },
             1.0,

@@ -48,15 +48,11 @@ impl Cause for ForceExponent {
         };
         let q_step = step(q, LEAST);
         Some(vec![
-            changed(
-                record,
-                |variation| variation.cutter.force.chip = Some(law(0.0)),
-                less,
-            ),
+            changed(record, |cutter| cutter.force.chip = Some(law(0.0)), less),
             added(
                 record,
-                |variation| variation.cutter.force.chip = Some(law(0.0)),
-                |variation| variation.cutter.force.chip = Some(law(q_step)),
+                |cutter| cutter.force.chip = Some(law(0.0)),
+                |cutter| cutter.force.chip = Some(law(q_step)),
                 q_step,
             ),
         ])

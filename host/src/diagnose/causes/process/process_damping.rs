@@ -29,7 +29,7 @@ impl Cause for OfFlank {
         };
         Some(vec![changed(
             record,
-            |variation| variation.cutter.force.process_damping = Some(unit),
+            |cutter| cutter.force.process_damping = Some(unit),
             1.0,
         )])
     }

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use super::{added, changed, cutter, everywhere, step};
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
-use crate::diagnose::cut::Variation;
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::Scene;
 use crate::milling::Runout;
+use crate::simulate::Cutter;
 
 pub(super) struct OfTool;
 
@@ -20,9 +20,9 @@ fn teeth(scene: &Scene<'_>) -> usize {
     cutter(scene).map_or(0, |cutter| cutter.teeth.len())
 }
 
-fn offset(along_um: f64, across_um: f64) -> impl Fn(&mut Variation) {
-    move |variation| {
-        variation.cutter.set_runout(Runout {
+fn offset(along_um: f64, across_um: f64) -> impl Fn(&mut Cutter) {
+    move |cutter| {
+        cutter.set_runout(Runout {
             offset_um: along_um.hypot(across_um),
             angle_deg: across_um.atan2(along_um).to_degrees(),
         });
@@ -104,7 +104,7 @@ impl Cause for OfTool {
         );
         Some(vec![
             ("runout_um", along.hypot(across)),
-            ("angle_deg", across.atan2(along).to_degrees()),
+            ("angle_deg", across.atan2(along).to_degrees().rem_euclid(360.0)),
         ])
     }
 }

@@ -1,19 +1,30 @@
 //! The spindle does not turn steadily: Ω = Ω₀(1 + δ·sin(2πf_m t + ψ)).
 //!
 //! The tachometer says how: the swing that comes nearest to its edges is looked for up to half a swing per turn. The force
-//! with that swing less the one at steady speed then has the coefficient 1.
+//! with that swing less the one at steady speed then has the coefficient 1: that it is near 1 is what the record confirms; how
+//! large the swing is, the tachometer knows better.
 
-use super::{changed, everywhere};
+use super::everywhere;
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::Scene;
-use crate::diagnose::turning::{Turning, swing};
+use crate::diagnose::turning::{Swing, Turning, swing};
 use crate::simulate::Fluctuation;
 
 pub(super) struct OfSpindle;
 
 /// How far from 1 the coefficient may be.
 const ROUNDING: f64 = 0.5;
+
+/// The swing that the tachometers of all cuts tell.
+fn of_tachometer(scene: &Scene<'_>) -> Option<Swing> {
+    let turnings: Vec<&Turning> = scene
+        .records
+        .iter()
+        .filter_map(|record| Some(&record.cut.as_ref()?.cut.turning))
+        .collect();
+    swing(&turnings)
+}
 
 impl Cause for OfSpindle {
     fn name(&self) -> &'static str {
@@ -25,13 +36,15 @@ impl Cause for OfSpindle {
     }
 
     fn shapes(&self, scene: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
-        let turnings: Vec<&Turning> = scene
-            .records
-            .iter()
-            .filter_map(|record| Some(&record.cut.as_ref()?.cut.turning))
-            .collect();
-        let found = swing(&turnings).map(|found| vec![found.frequency_hz, found.delta, found.phase_rad]);
-        found.into_iter().collect()
+        let shape = |found: Swing| {
+            let Fluctuation {
+                delta,
+                frequency_hz,
+                phase_rad,
+            } = found.fluctuation;
+            vec![frequency_hz, delta, phase_rad]
+        };
+        of_tachometer(scene).map(shape).into_iter().collect()
     }
 
     fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, shape: &[f64]) -> Option<Vec<Regressor>> {
@@ -43,11 +56,12 @@ impl Cause for OfSpindle {
             frequency_hz,
             phase_rad,
         };
-        Some(vec![changed(
-            record,
-            |variation| variation.turning = variation.turning.with(fluctuation),
-            1.0,
-        )])
+        let Some(cut) = &record.cut else {
+            return Some(vec![Regressor::default()]);
+        };
+        let turning = cut.cut.turning.with(fluctuation);
+        let force = cut.force_along(&turning, &record.motion);
+        Some(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
     }
 
     /// The shape is the tachometer's, not one that the fit chose.
@@ -68,10 +82,25 @@ impl Cause for OfSpindle {
         let share = *coefficients.first()?;
         ((share - 1.0).abs() < ROUNDING).then(|| {
             vec![
-                ("delta", share * delta),
+                ("delta", delta),
                 ("frequency_hz", frequency_hz),
                 ("phase_deg", phase_rad.to_degrees()),
             ]
         })
+    }
+
+    fn known_deviations(&self, scene: &Scene<'_>) -> Vec<Parameter> {
+        let Some(Swing {
+            deviation: [delta, frequency_hz, phase_rad],
+            ..
+        }) = of_tachometer(scene)
+        else {
+            return Vec::new();
+        };
+        vec![
+            ("delta", delta),
+            ("frequency_hz", frequency_hz),
+            ("phase_deg", phase_rad.to_degrees()),
+        ]
     }
 }

@@ -19,7 +19,7 @@ impl Cause for OfEdge {
     fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
         Some(vec![changed(
             record,
-            |variation| variation.cutter.force.wear_per_s += 1.0,
+            |cutter| cutter.force.wear_per_s += 1.0,
             1.0,
         )])
     }

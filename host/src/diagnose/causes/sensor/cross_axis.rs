@@ -2,12 +2,15 @@
 
 use num_complex::Complex64;
 
-use super::{channels, of_meant};
+use super::{channels, in_cut, of_meant};
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::Scene;
 
 pub(super) struct CrossAxis;
+
+/// The fraction for which the chip of a cut is taken.
+const SMALL_FRACTION: f64 = 0.05;
 
 impl Cause for CrossAxis {
     fn name(&self) -> &'static str {
@@ -37,7 +40,19 @@ impl Cause for CrossAxis {
         };
         let mut weights = [0.0; 3];
         weights[*axis] = 1.0;
-        Some(of_meant(record, place, |_| weights, |_| Complex64::ONE))
+        let read = of_meant(record, place, |_| weights, |_| Complex64::ONE);
+        let other = record.motion.clone();
+        // x = y − p·(the other direction).
+        Some(in_cut(record, place, read, SMALL_FRACTION, |motion, to| {
+            for (to, from) in [
+                (&mut motion.x[to], &other.x[*axis]),
+                (&mut motion.v[to], &other.v[*axis]),
+            ] {
+                to.iter_mut()
+                    .zip(from)
+                    .for_each(|(to, from)| *to -= SMALL_FRACTION * from);
+            }
+        }))
     }
 
     fn parameters(

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::{of_meant, one_or_all};
+use super::{in_cut, of_meant, one_or_all};
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::Scene;
@@ -46,12 +46,16 @@ impl Cause for Delay {
     ) -> Option<Vec<Regressor>> {
         let delay = *shape.first()?;
         // Per second of delay, so that the coefficient is the delay.
-        Some(of_meant(
+        let read = of_meant(
             record,
             place,
             |channel| channel.pickup.weights,
             |omega| (Complex64::ONE - Complex64::cis(omega * delay)) / delay,
-        ))
+        );
+        // x(t) = y(t + τ).
+        Some(in_cut(record, place, read, delay, |motion, axis| {
+            motion.advance(axis, delay);
+        }))
     }
 
     /// The regressor is exact at the delay that it was made for.

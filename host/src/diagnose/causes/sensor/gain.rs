@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::{of_meant, one_or_all};
+use super::{in_cut, of_meant, one_or_all};
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::Scene;
@@ -11,6 +11,9 @@ pub(super) struct Gain;
 
 /// The share 1 − 1/g beyond which nothing of the truth would be in a reading.
 const LARGEST_SHARE: f64 = 0.98;
+
+/// The share for which the chip of a cut is taken.
+const SMALL_SHARE: f64 = 0.05;
 
 /// g of the share 1 − 1/g.
 pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
@@ -28,12 +31,17 @@ impl Cause for Gain {
     }
 
     fn regressors(&self, _: &Scene<'_>, record: &Record, place: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
-        Some(of_meant(
+        let read = of_meant(
             record,
             place,
             |channel| channel.pickup.weights,
             |_| Complex64::ONE,
-        ))
+        );
+        // x = (1 − share)·y.
+        Some(in_cut(record, place, read, SMALL_SHARE, |motion, axis| {
+            let signals = motion.x[axis].iter_mut().chain(&mut motion.v[axis]);
+            signals.for_each(|value| *value *= 1.0 - SMALL_SHARE);
+        }))
     }
 
     fn parameters(
