@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 use super::cut::CutForce;
-use super::path::{Motion, between};
+use crate::simulate::path::{Motion, between};
 use super::turning::Turning;
 use crate::simulate::{Cutter, Immersion, Tooth};
 

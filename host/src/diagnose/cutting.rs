@@ -8,7 +8,7 @@ use super::chips::Chips;
 use super::cut::{CutForce, RecordedCut};
 use super::motion;
 use super::noise::rms;
-use super::path::Motion;
+use crate::simulate::path::Motion;
 use super::record::{Observed, Record};
 use super::scene::{Baseline, Scene};
 use super::turning::Turning;
@@ -100,7 +100,7 @@ impl Record {
     }
 
     /// Spectra of a cutting force at the bins of the finer grid; the mean over a finer sample is set right.
-    fn cut_spectra(&self, force: &CutForce) -> [Option<Vec<Complex64>>; 3] {
+    pub fn cut_spectra(&self, force: &CutForce) -> [Option<Vec<Complex64>>; 3] {
         let step_s = 1.0 / (self.grid.rate_hz() * self.grid.finer() as f64);
         std::array::from_fn(|axis| {
             if !self.responds(axis) {

@@ -6,7 +6,7 @@ use super::DiagnoseError;
 use super::noise::{rms, white_floor};
 use super::record::{Observed, Record};
 use super::scene::{Baseline, derivatives};
-use crate::recording::{Quantity, Recording};
+use crate::recording::{Kind, Quantity, Recording};
 use crate::simulate::path::{Motion, restoring_along};
 
 /// Bins over which power is averaged before it is compared with the noise, to either side.
@@ -30,6 +30,7 @@ pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Optio
     };
     let mut displacement: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());
     let decay = fine_decay(record, baseline, rate);
+    let mut corrections: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());
     for &axis in &baseline.axes {
         let correction = correction(record, axis, baseline.lowest_hz().unwrap_or(0.0));
         let x: Vec<Complex64> = (0..bins)
@@ -61,9 +62,41 @@ pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Optio
         motion.rest_m_per_s[axis] = correction.speed_noise + 0.003 * rms(&motion.v[axis]);
         let coarse: Vec<f64> = motion.x[axis].iter().copied().step_by(grid.finer()).collect();
         displacement[axis] = grid.continued_spectrum(&coarse);
+        corrections[axis] = correction.spectrum;
+    }
+    if record.kind == Some(Kind::Cutting) {
+        record.readings = (0..record.channels.len())
+            .map(|channel| reading(record, channel, &corrections))
+            .collect();
     }
     record.motion = motion;
     record.displacement = displacement;
+}
+
+/// What a channel reads: as predicted, with what corrects the motion.
+fn reading(record: &Record, channel: usize, corrections: &[Vec<Complex64>; 3]) -> Vec<f64> {
+    let grid = &record.grid;
+    let observed = &record.channels[channel];
+    if observed.pickup.quantity == Quantity::Force {
+        return observed.predicted.clone();
+    }
+    let spectrum: Vec<Complex64> = (0..grid.bins())
+        .map(|bin| {
+            let corrected: Complex64 = corrections
+                .iter()
+                .zip(observed.pickup.weights)
+                .filter_map(|(correction, weight)| Some(correction.get(bin)? * weight))
+                .sum();
+            corrected * observed.factor(grid.omega(bin))
+        })
+        .collect();
+    let corrected = grid.samples(&spectrum);
+    observed
+        .predicted
+        .iter()
+        .zip(corrected)
+        .map(|(predicted, corrected)| predicted + corrected)
+        .collect()
 }
 
 struct Correction {

@@ -126,8 +126,9 @@ mod tests {
             .collect();
         let size = rms(&residual);
         let floor = floor_between_lines(&residual, size);
-        // The lines and what leaks from them beside Hann's window are a tenth of all bins: they move the median by 6 % of power.
-        assert!((floor - 1.0).abs() < 0.08, "{floor}");
+        // A line and what leaks from it through Hann's window stands above the noise in six bins: in 12 % of all. The median is
+        // then at most the quantile 0.5/0.88 of the noise, 17 % more in amplitude; 5 % is three deviations of chance.
+        assert!((0.95..1.22).contains(&floor), "{floor}");
         assert!(white_floor(&residual, size) > 1.5);
     }
 

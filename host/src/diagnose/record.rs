@@ -68,6 +68,8 @@ pub struct Record {
     /// Its displacement at the samples of the record as spectra, continued smoothly before and after: what that adds are free
     /// decays.
     pub displacement: [Vec<Complex64>; 3],
+    /// By channel, of a cut: what it reads of the motion as far as it is known, with what sampling folds into it.
+    pub readings: Vec<Vec<f64>>,
     /// Below this lies all but a two-hundredth of the motion's power, Hz.
     pub highest_hz: f64,
     /// Highest frequency at which the record is compared, Hz.
@@ -152,6 +154,7 @@ impl Record {
             force_n,
             motion: Motion::default(),
             displacement: std::array::from_fn(|_| Vec::new()),
+            readings: Vec::new(),
             highest_hz,
             // Forces of a cut reach to the end of the band.
             band_hz: if is_cut {

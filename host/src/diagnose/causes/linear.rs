@@ -14,6 +14,7 @@ use crate::diagnose::receptance::Receptance;
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::{Domain, Scene};
 use crate::diagnose::stiffness;
+use crate::recording::Quantity;
 use crate::simulate::Effects;
 use crate::structure::Form;
 
@@ -118,10 +119,16 @@ impl Cause for Linear {
         let ((below_effect, below), (above_effect, above)) = (below?, above?);
         let baseline = &scene.baseline;
         let grid = &record.grid;
+        let folded = of_folded_forces(record);
+        let bins = if folded.is_some() {
+            grid.fine_bins()
+        } else {
+            grid.bins()
+        };
         let difference: Vec<Matrix3<Complex64>> = match record.domain {
             Domain::Response => {
                 let (below, above) = (Receptance::new(&below), Receptance::new(&above));
-                (0..grid.bins())
+                (0..bins)
                     .into_par_iter()
                     .map(|bin| {
                         let omega = grid.omega(bin);
@@ -146,17 +153,28 @@ impl Cause for Linear {
             }
         };
         let into = match record.domain {
-            Domain::Response => effective_force(scene, record),
+            Domain::Response => {
+                let mut force = effective_force(scene, record);
+                for (force, beyond) in force.iter_mut().zip(folded.into_iter().flatten()) {
+                    let known = force.len();
+                    force.extend(beyond.into_iter().flatten().skip(known));
+                    force.resize(bins, Complex64::ZERO);
+                }
+                force
+            }
             Domain::Force => record.displacement.clone(),
         };
         let observed = record
             .channels
             .iter()
             .map(|channel| {
-                let spectrum: Vec<Complex64> = (0..grid.bins())
+                let spectrum: Vec<Complex64> = (0..bins)
                     .map(|bin| {
                         let mut sum = Complex64::ZERO;
                         for (axis, weight) in channel.pickup.weights.iter().enumerate() {
+                            if *weight == 0.0 {
+                                continue;
+                            }
                             for &from in &baseline.axes {
                                 sum += difference[bin][(axis, from)] * into[from][bin] * *weight;
                             }
@@ -167,7 +185,11 @@ impl Cause for Linear {
                         }
                     })
                     .collect();
-                grid.samples(&spectrum)
+                if bins > grid.bins() {
+                    grid.samples_of_fine(&spectrum)
+                } else {
+                    grid.samples(&spectrum)
+                }
             })
             .collect();
         Some(vec![Regressor::of_channels(observed)])
@@ -206,6 +228,17 @@ impl Cause for Linear {
             Which::Damping => vec![("damping_ratio", mode.damping_ratio * (1.0 + relative))],
         }
     }
+}
+
+/// The forces of a cut whose acceleration is measured, at the bins of the finer samples: above half the sample rate the structure
+/// is a mass, and its acceleration is folded into the band.
+fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
+    let cut = record.cut.as_ref()?;
+    record
+        .channels
+        .iter()
+        .any(|channel| channel.pickup.quantity == Quantity::Acceleration)
+        .then(|| record.cut_spectra(&cut.force))
 }
 
 /// F_eff, N, over the axes of the baseline.

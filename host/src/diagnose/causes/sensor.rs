@@ -9,7 +9,7 @@ use num_complex::Complex64;
 
 use crate::diagnose::cause::{Cause, Place, Regressor};
 use crate::diagnose::motion::main_axis;
-use crate::diagnose::path::Motion;
+use crate::simulate::path::Motion;
 use crate::diagnose::record::{Observed, Record};
 use crate::diagnose::scene::{Domain, Scene};
 use crate::recording::Quantity;
@@ -67,25 +67,48 @@ fn meant(place: &Place, channel: &Observed) -> bool {
 }
 
 /// What the channel reads of the motion as it is known, with the spectrum turned by `change` of ω.
+///
+/// The acceleration of a cut jumps where teeth enter and leave, so that much of a reading is folded into the band by sampling:
+/// where a channel of the same kind reads an axis of a cut, its reading is taken and not the motion between the samples.
 fn read(
     record: &Record,
     channel: &Observed,
     weights: [f64; 3],
     change: impl Fn(f64) -> Complex64,
 ) -> Vec<f64> {
-    let spectrum: Vec<Complex64> = (0..record.grid.bins())
-        .map(|bin| {
-            let sum: Complex64 = record
-                .displacement
-                .iter()
-                .zip(weights)
-                .filter(|(displacement, _)| !displacement.is_empty())
-                .map(|(displacement, weight)| displacement[bin] * weight)
-                .sum();
-            sum * record.factor(channel, bin) * change(record.grid.omega(bin))
-        })
-        .collect();
-    record.grid.samples(&spectrum)
+    let grid = &record.grid;
+    let mut sum = vec![Complex64::ZERO; grid.bins()];
+    for (axis, weight) in weights.into_iter().enumerate() {
+        if weight == 0.0 || record.displacement[axis].is_empty() {
+            continue;
+        }
+        let alike = record
+            .readings
+            .iter()
+            .zip(&record.channels)
+            .filter(|(_, other)| other.pickup.quantity == channel.pickup.quantity)
+            .filter(|(_, other)| other.pickup.delay_s == channel.pickup.delay_s)
+            .find_map(|(reading, other)| {
+                let only = (0..3).all(|from| (from == axis) == (other.pickup.weights[from] != 0.0));
+                only.then(|| (reading, weight / other.pickup.weights[axis]))
+            });
+        match alike {
+            Some((reading, weight)) => {
+                for (sum, bin) in sum.iter_mut().zip(grid.continued_spectrum(reading)) {
+                    *sum += bin * weight;
+                }
+            }
+            None => {
+                for (bin, (sum, displacement)) in sum.iter_mut().zip(&record.displacement[axis]).enumerate() {
+                    *sum += displacement * weight * record.factor(channel, bin);
+                }
+            }
+        }
+    }
+    for (bin, value) in sum.iter_mut().enumerate() {
+        *value *= change(grid.omega(bin));
+    }
+    grid.samples(&sum)
 }
 
 /// What the channels that are meant read with the spectrum turned by `change` of ω.
