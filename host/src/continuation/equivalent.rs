@@ -18,15 +18,15 @@ use num_complex::Complex64;
 use super::anderson::Anderson;
 use super::branch::size_at;
 use super::forced::ForcedProblem;
-use super::orbit::{Mesh, Orbit, PIECE_ANGLE, Scale};
+use super::orbit::{Orbit, PeriodMap, Scale};
 use super::restoring::{Samples, Spring, equivalent, incremental};
-use super::variation;
+use super::tooth_period::ToothPeriod;
 use crate::case::Case;
 use crate::simulate::Term;
 use crate::stability::extension::{NOT_SMOOTH, not_smooth};
-use crate::stability::multiplier::{Kind, chatter_hz};
+use crate::stability::multiplier::Kind;
 use crate::stability::point::{check_depth, check_speed};
-use crate::stability::{LEAST_ERROR, Method, Point, SpeedLine, StabilityError, Switch, period_map};
+use crate::stability::{LEAST_ERROR, Method, Point, SpeedLine, StabilityError, Switch};
 
 /// Steps in depth, at least, at which multipliers are counted.
 const SAMPLES: usize = 32;
@@ -117,6 +117,12 @@ impl EquivalentProblem {
                        hysteresis have no motion of their own; use mass, damping and stiffness matrices",
             });
         }
+        if smooth.uneven.is_some() {
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "friction, backlash and hysteresis go with teeth that are all alike only: leave out runout, and unequal pitch",
+            });
+        }
         let feed_direction_deg = case.cut()?.feed_direction_deg;
         let machine = smooth.linear.structure.turned(-feed_direction_deg);
         let order = machine.order();
@@ -162,16 +168,16 @@ struct Follower<'a> {
     problem: &'a EquivalentProblem,
     rpm: f64,
     period_s: f64,
-    mesh: Mesh,
+    map: ToothPeriod<'a>,
 }
 
 impl<'a> Follower<'a> {
-    fn new(problem: &'a EquivalentProblem, rpm: f64, piece_angle: f64) -> Self {
+    fn new(problem: &'a EquivalentProblem, rpm: f64) -> Self {
         Self {
             problem,
             rpm,
             period_s: problem.smooth.linear.tooth_period_s(rpm),
-            mesh: Mesh::new(&problem.smooth, rpm, piece_angle),
+            map: ToothPeriod::new(&problem.smooth, rpm),
         }
     }
 
@@ -185,14 +191,14 @@ impl<'a> Follower<'a> {
 
     fn samples(&self, orbit: &Orbit) -> Samples {
         let seen = [&self.problem.displacement, &self.problem.velocity];
-        Samples::new(&self.mesh, orbit, self.period_s, seen)
+        Samples::new(&self.map.spans(), orbit, self.period_s, seen)
     }
 
     /// Rest, with no springs.
     fn rest(&self) -> Settled {
         Settled {
             springs: [Spring::default(); 3],
-            orbit: Orbit::rest(&self.problem.smooth, &self.mesh),
+            orbit: Orbit::rest(&self.map),
         }
     }
 
@@ -209,9 +215,6 @@ impl<'a> Follower<'a> {
             let found = equivalent(&all.terms, &samples, all.most_damping);
             let units = units.get_or_insert_with(|| Units::new(all, &samples, self.period_s));
             let (at, to) = (units.vector(&now.springs), units.vector(&found));
-            if std::env::var("DBG").is_ok() {
-                eprintln!("{depth_m} {:e} {:?}", (&to - &at).amax(), now.springs[1]);
-            }
             if (&to - &at).amax() <= SETTLED * at.amax().max(1.0) {
                 return Ok(now);
             }
@@ -226,6 +229,7 @@ impl<'a> Follower<'a> {
     /// The orbit with these springs at the depth of a guess.
     fn orbit(&self, springs: &[Spring; 3], guess: &Orbit) -> Result<Orbit, StabilityError> {
         let problem = self.problem.with(springs);
+        let map = self.map.of(&problem);
         let none = |_| {
             self.broke_down(
                 guess.depth_m,
@@ -233,15 +237,15 @@ impl<'a> Follower<'a> {
             )
         };
         if problem.is_linear() {
-            return Orbit::of_linear(&problem, &self.mesh, guess.depth_m).map_err(none);
+            return Orbit::of_linear(&map, guess.depth_m).map_err(none);
         }
         let scale = Scale {
-            state: size_at(&problem, &self.mesh, guess.depth_m),
+            state: size_at(&map, guess.depth_m),
             depth_m: guess.depth_m,
         };
-        let mut along_depth = DVector::zeros(problem.order() + 1);
-        along_depth[problem.order()] = 1.0;
-        Orbit::correct(&problem, &self.mesh, guess, scale, &along_depth)
+        let mut along_depth = DVector::zeros(map.size() + 1);
+        along_depth[map.size()] = 1.0;
+        Orbit::correct(&map, guess, scale, &along_depth)
             .map(|(orbit, _)| orbit)
             .map_err(none)
     }
@@ -254,11 +258,11 @@ impl<'a> Follower<'a> {
 
     /// The multipliers with these springs about an orbit.
     fn roots(&self, springs: &[Spring; 3], orbit: &Orbit) -> Result<Vec<Complex64>, StabilityError> {
-        let all = variation::about(&self.problem.with(springs), &self.mesh, orbit)
-            .and_then(|period| period_map::multipliers(&period, orbit.depth_m))
-            .ok_or_else(|| {
-                self.broke_down(orbit.depth_m, "the equations of the forced orbit are singular")
-            })?;
+        let problem = self.problem.with(springs);
+        let all = self.map.of(&problem).multipliers(orbit);
+        let all = all.ok_or_else(|| {
+            self.broke_down(orbit.depth_m, "the equations of the forced orbit are singular")
+        })?;
         Ok(all
             .into_iter()
             .take_while(|multiplier| multiplier.norm() > FOLLOWED)
@@ -268,8 +272,7 @@ impl<'a> Follower<'a> {
 
     fn chatter_hz(&self, sample: &Sample, root: Complex64) -> Option<f64> {
         let problem = self.problem.with(&sample.settled.springs);
-        let period = variation::about(&problem, &self.mesh, &sample.settled.orbit)?;
-        chatter_hz(&problem.linear, self.rpm, &period, root, sample.depth_m())
+        self.map.of(&problem).chatter_hz(&sample.settled.orbit, root)
     }
 
     /// How far |μ| is from that of what a small disturbance feels.
@@ -416,7 +419,7 @@ impl Method for EquivalentProblem {
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        let follower = Follower::new(self, rpm, PIECE_ANGLE);
+        let follower = Follower::new(self, rpm);
         let last_m = 1e-3 * depth_mm.max(NONE_MM);
         let mut settled = follower.rest();
         // In a few steps: at an amplitude that jumps it is the lower one.
@@ -436,7 +439,7 @@ impl Method for EquivalentProblem {
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
-        let follower = Follower::new(self, rpm, PIECE_ANGLE);
+        let follower = Follower::new(self, rpm);
         let last_m = 1e-3 * depth_mm;
         let samples = samples.max(SAMPLES);
         let none_m = (1e-3 * NONE_MM).min(last_m / samples as f64);

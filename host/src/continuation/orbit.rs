@@ -128,17 +128,17 @@ impl Orbit {
     }
 
     /// The orbit of a problem whose equations are linear.
-    pub(super) fn of_linear(problem: &ForcedProblem, mesh: &Mesh, depth_m: f64) -> Result<Self, OrbitError> {
+    pub(super) fn of_linear(map: &impl PeriodMap, depth_m: f64) -> Result<Self, OrbitError> {
         let depth_mm = depth_m * 1e3;
         let singular = OrbitError::Singular { depth_mm };
-        let rest = Self::rest(problem, mesh);
-        let from_rest = pass(problem, mesh, &rest.start, depth_m, &rest.states).ok_or(singular)?;
+        let rest = Self::rest(map);
+        let from_rest = map.pass(&rest.start, depth_m, &rest.states).ok_or(singular)?;
         let mut periodic = -from_rest.by_start;
-        for i in 0..problem.order() {
+        for i in 0..map.size() {
             periodic[(i, i)] += 1.0;
         }
         let start = periodic.lu().solve(&from_rest.end).ok_or(singular)?;
-        let around = pass(problem, mesh, &start, depth_m, &rest.states).ok_or(singular)?;
+        let around = map.pass(&start, depth_m, &rest.states).ok_or(singular)?;
         Ok(Self {
             depth_m,
             start,

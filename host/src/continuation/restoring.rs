@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 
-use super::orbit::{Mesh, Orbit};
+use super::orbit::{Orbit, Span};
 use crate::simulate::Term;
 use crate::simulate::path::{Motion, restoring_along, restoring_from};
 
@@ -45,21 +45,19 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// From the states at the nodes of a mesh; `seen` gives displacement and velocity by states.
-    pub(super) fn new(mesh: &Mesh, orbit: &Orbit, period_s: f64, seen: [&DMatrix<f64>; 2]) -> Self {
-        let count = (PER_PIECE * mesh.pieces.len()).max(LEAST);
+    /// From the states at the nodes of the pieces of a period; `seen` gives displacement and velocity by states.
+    pub(super) fn new(spans: &[Span<'_>], orbit: &Orbit, period_s: f64, seen: [&DMatrix<f64>; 2]) -> Self {
+        let count = (PER_PIECE * spans.len()).max(LEAST);
         let step_s = period_s / count as f64;
-        let nodes = &mesh.gauss.nodes;
         let (mut x, mut v) = ([(); 3].map(|()| Vec::new()), [(); 3].map(|()| Vec::new()));
-        let mut weights = vec![0.0; nodes.len()];
-        let (mut index, mut start_s) = (0, 0.0);
-        for (place, (piece, states)) in mesh.pieces.iter().zip(&orbit.states).enumerate() {
+        let mut index = 0;
+        for (place, (span, states)) in spans.iter().zip(&orbit.states).enumerate() {
             let at_nodes = seen.map(|seen| seen * states);
-            let is_last = place + 1 == mesh.pieces.len();
-            let end_s = start_s + piece.duration;
+            let is_last = place + 1 == spans.len();
+            let end_s = span.start_s + span.duration_s;
             while index < count && (is_last || (index as f64 + 0.5) * step_s <= end_s) {
-                let share = ((index as f64 + 0.5) * step_s - start_s) / piece.duration;
-                lagrange(nodes, share, &mut weights);
+                let share = ((index as f64 + 0.5) * step_s - span.start_s) / span.duration_s;
+                let weights = span.gauss.lagrange(share);
                 for (signal, at_nodes) in [&mut x, &mut v].into_iter().zip(&at_nodes) {
                     for (signal, row) in signal.iter_mut().zip(at_nodes.row_iter()) {
                         signal.push(row.iter().zip(&weights).map(|(a, b)| a * b).sum());
@@ -67,7 +65,6 @@ impl Samples {
                 }
                 index += 1;
             }
-            start_s = end_s;
         }
         Self { step_s, x, v }
     }
@@ -149,16 +146,6 @@ impl Samples {
             signal.truncate(self.len());
         }
         force
-    }
-}
-
-/// The polynomials of Lagrange at a share of a piece.
-fn lagrange(nodes: &[f64], share: f64, values: &mut [f64]) {
-    for (i, value) in values.iter_mut().enumerate() {
-        let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
-        *value = others
-            .map(|(_, node)| (share - node) / (nodes[i] - node))
-            .product();
     }
 }
 

@@ -61,6 +61,17 @@ impl<'a> ToothPeriod<'a> {
         Self::with_pieces(problem, rpm, PIECE_ANGLE)
     }
 
+    /// Another problem of the same cut on the same pieces.
+    pub(super) fn of<'b>(&self, problem: &'b ForcedProblem) -> ToothPeriod<'b> {
+        ToothPeriod {
+            problem,
+            rpm: self.rpm,
+            piece_angle: self.piece_angle,
+            gauss: self.gauss.clone(),
+            pieces: self.pieces.clone(),
+        }
+    }
+
     /// In pieces over which nothing turns by more than an angle, rad.
     fn with_pieces(problem: &'a ForcedProblem, rpm: f64, piece_angle: f64) -> Self {
         let linear = &problem.linear;

@@ -10,7 +10,7 @@ use crate::diagnose::answer::{Figure, NamedCause, Outcome};
 use crate::diagnose::{Diagnosis, View};
 
 /// Channels that get pictures: those that miss most.
-const PICTURED: usize = 4;
+const PICTURED: usize = 3;
 
 /// The whole page; `case_name` is what was believed, `extended` the text of the extended case.
 ///

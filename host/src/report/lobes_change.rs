@@ -10,6 +10,41 @@ use crate::diagnose::lobes::{Change, Lobes};
 
 /// The change in sentences.
 pub fn sentences(lobes: &Lobes) -> Vec<String> {
+    let changes = lobes
+        .speeds
+        .iter()
+        .map(|change| change.relative(lobes.searched_mm).abs());
+    let most = changes.fold(0.0, f64::max);
+    let mut all = Vec::new();
+    if most < SAME {
+        all.push("the extension changes no limit: the machine and its cut are as believed".into());
+    } else {
+        all.extend(limits(lobes));
+    }
+    if let Some(calls) = lobes.calls {
+        all.push(format!(
+            "of {} cuts that were tried the case calls {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
+            calls.before.cuts,
+            calls.before.wrong,
+            calls.before.missed_chatter,
+            calls.before.false_alarms,
+            calls.after.wrong,
+            calls.after.missed_chatter,
+            calls.after.false_alarms,
+        ));
+    }
+    if let Some(after_s) = lobes.after_s {
+        all.push(format!(
+            "drift and wear as they are after {after_s:.0} s, the end of the longest recording"
+        ));
+    }
+    all
+}
+
+/// Relative changes of limits below this are none.
+const SAME: f64 = 1e-6;
+
+fn limits(lobes: &Lobes) -> Vec<String> {
     let mut all = vec![format!(
         "at {:.1} rev/min the limit was {} and is {} with the extension",
         lobes.at.at_rpm,
@@ -37,23 +72,6 @@ pub fn sentences(lobes: &Lobes) -> Vec<String> {
         all.push(format!(
             "from {:.0} to {:.0} rev/min limits change by {lowest:+.1} to {highest:+.1} %",
             first.at_rpm, last.at_rpm
-        ));
-    }
-    if let Some(calls) = lobes.calls {
-        all.push(format!(
-            "of {} cuts that were tried the case calls {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
-            calls.before.cuts,
-            calls.before.wrong,
-            calls.before.missed_chatter,
-            calls.before.false_alarms,
-            calls.after.wrong,
-            calls.after.missed_chatter,
-            calls.after.false_alarms,
-        ));
-    }
-    if let Some(after_s) = lobes.after_s {
-        all.push(format!(
-            "drift and wear as they are after {after_s:.0} s, the end of the longest recording"
         ));
     }
     all
@@ -96,10 +114,12 @@ pub(super) fn section(lobes: &Lobes) -> Result<Markup, PictureError> {
             .collect();
         charts.push(lobe_chart(title, &columns, lobes.searched_mm, &marks)?);
     }
-    let by = format!(
-        "By {}. Circles: cuts that were stable; crosses: that chattered; squares: of which it cannot be told; an orange ring: the chart calls it wrong.",
-        lobes.method_after
-    );
+    let mut by = format!("By {}.", lobes.method_after);
+    if !lobes.cuts.is_empty() {
+        by.push_str(
+            " Circles: cuts that were stable; crosses: that chattered; squares: of which it cannot be told; an orange ring: the chart calls it wrong.",
+        );
+    }
     Ok(html! {
         ul { @for sentence in sentences(lobes) { li { (sentence) "." } } }
         (figure(&charts[0], "What was believed."))
