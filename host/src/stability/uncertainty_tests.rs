@@ -59,6 +59,9 @@ struct MonteCarlo<'a> {
     case: &'a Case,
     rpm: f64,
     depth_mm: f64,
+    /// Where not 0 and the last depth: only limits between these depths are solved for; of others it is known that they are
+    /// shallower, 0, or deeper, infinite.
+    bracket_mm: [f64; 2],
     /// How many were drawn; impossible ones leave no limit.
     drawn: u64,
     /// First limits, sorted, infinite where nothing is lost.
@@ -71,6 +74,7 @@ impl<'a> MonteCarlo<'a> {
             case,
             rpm,
             depth_mm,
+            bracket_mm: [0.0, depth_mm],
             drawn: 0,
             limits: Vec::new(),
         }
@@ -96,12 +100,26 @@ impl<'a> MonteCarlo<'a> {
         self.drawn = count.max(self.drawn);
     }
 
-    /// The first limit is also the first of a shorter line, with the same steps; the whole is searched where that has none.
+    /// As [`new`](Self::new), for a percentile: its own interval, six standard deviations wide, is the bracket.
+    fn around(other: &Self, share: f64) -> Self {
+        let [from, to] = other.interval(share, 6.0);
+        Self {
+            bracket_mm: [from, to.min(other.depth_mm)],
+            ..Self::new(other.case, other.rpm, other.depth_mm)
+        }
+    }
+
+    /// The first limit is also the first of a shorter line, with the same steps; the next longer one is searched where that has
+    /// none.
     fn first_limit(&self, method: &dyn Method) -> f64 {
-        let parts = [(0.2, 8), (0.4, 16), (1.0, 40)];
-        let found = parts.into_iter().find_map(|(part, samples)| {
-            let line = method.line(self.rpm, part * self.depth_mm, samples).unwrap();
-            limit_of(&line)
+        let [shallow_mm, deep_mm] = self.bracket_mm;
+        if shallow_mm > 0.0 && method.point(self.rpm, shallow_mm).unwrap().verdict == Verdict::Unstable {
+            return 0.0;
+        }
+        let parts = [0.2, 0.4, 1.0].map(|part| (part * self.depth_mm).min(deep_mm));
+        let found = parts.into_iter().find_map(|part_mm| {
+            let samples = (40.0 * part_mm / self.depth_mm).ceil() as usize;
+            limit_of(&method.line(self.rpm, part_mm, samples).unwrap())
         });
         found.unwrap_or(f64::INFINITY)
     }
@@ -182,62 +200,87 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
 /// The most machines that a percentile is decided with.
 const DRAWN_MAX: u64 = 1_024_000;
 
-/// Decides whether percentiles are within 2 % also where the Monte Carlo does not know them to 2 %: it is made larger until it
-/// knows them to 1 %.
-fn decide(spread: &LimitSpread, drawn: &mut MonteCarlo<'_>) {
+/// Decides whether percentiles are within 2 % also where the Monte Carlo does not know them to 2 %: a larger one is then drawn,
+/// until it knows them to 1 %.
+fn decide(spread: &LimitSpread, drawn: &MonteCarlo<'_>) {
     let rpm = drawn.rpm;
     for (share, found, _) in told(spread) {
-        let is_known_to = |drawn: &MonteCarlo<'_>, width: f64| drawn.half_width(share) <= width;
-        if !is_known_to(drawn, 0.02) {
-            while !is_known_to(drawn, 0.01) && drawn.drawn < DRAWN_MAX {
-                drawn.grow_to(2 * drawn.drawn);
-                println!(
-                    "  {:>2.0} %: {} machines know it to {:.1} %",
-                    100.0 * share,
-                    drawn.drawn,
-                    100.0 * drawn.half_width(share)
-                );
-            }
-            let [low, high] = drawn.interval(share, Z_90);
-            println!(
-                "  {:>2.0} %: Monte Carlo of {} {:.4}, {low:.4} to {high:.4}; {:+.2} %",
-                100.0 * share,
-                drawn.drawn,
-                drawn.quantile(share),
-                100.0 * (found.unwrap_or(f64::INFINITY) / drawn.quantile(share) - 1.0)
-            );
+        let found = found.unwrap_or(f64::INFINITY);
+        let check = |drawn: &MonteCarlo<'_>| {
+            let expected = drawn.quantile(share);
             assert!(
-                is_known_to(drawn, 0.01),
-                "{rpm} rev/min, {share}: not known to 1 % with {DRAWN_MAX} machines"
+                found == expected || (found / expected - 1.0).abs() < 0.02,
+                "{rpm} rev/min, {share}: {found} mm, {} machines have {expected}",
+                drawn.drawn
             );
+        };
+        if drawn.half_width(share) <= 0.02 {
+            check(drawn);
+            continue;
         }
-        let (found, expected) = (found.unwrap_or(f64::INFINITY), drawn.quantile(share));
+        let mut larger = MonteCarlo::around(drawn, share);
+        let mut count = drawn.drawn;
+        while count < DRAWN_MAX {
+            count *= 2;
+            larger.grow_to(count);
+            let [low, high] = larger.interval(share, Z_90);
+            println!(
+                "  {:>2.0} %: Monte Carlo of {count} {:.4}, {low:.4} to {high:.4}; {:+.2} %",
+                100.0 * share,
+                larger.quantile(share),
+                100.0 * (found / larger.quantile(share) - 1.0)
+            );
+            if larger.half_width(share) <= 0.01 {
+                break;
+            }
+        }
         assert!(
-            found == expected || (found / expected - 1.0).abs() < 0.02,
-            "{rpm} rev/min, {share}: {found} mm, {} machines have {expected}",
-            drawn.drawn
+            larger.half_width(share) <= 0.01,
+            "{rpm} rev/min, {share}: not known to 1 % with {count} machines"
+        );
+        check(&larger);
+    }
+}
+
+#[test]
+fn what_lies_beside_a_bracket_need_not_be_solved_for() {
+    let case = acetal();
+    let mut whole = MonteCarlo::new(&case, 1045.0, 8.0);
+    whole.grow_to(150);
+    for share in [0.05, 0.5, 0.95] {
+        let mut around = MonteCarlo::around(&whole, share);
+        around.grow_to(150);
+        let (found, expected) = (around.quantile(share), whole.quantile(share));
+        // Both solve for limits to 1e-9.
+        assert!(
+            (found - expected).abs() < 1e-8 * expected,
+            "{share}: {found} {expected}"
         );
     }
 }
 
-#[test]
-fn percentiles_at_a_cusp_are_those_of_2000_machines() {
-    compare(&acetal(), 1480.0, 8.0, 2000);
-}
-
 /// The whole comparison: `cargo test --release -p quietcut --lib percentiles_over -- --ignored --nocapture`
 #[test]
-#[ignore = "an hour of Monte Carlo on one core; see the comment above for the command"]
-fn percentiles_over_lobes_cusps_notch_and_islands_are_those_of_2000_machines() {
-    let case = acetal();
+#[ignore = "minutes of Monte Carlo; see the comment above for the command"]
+fn percentiles_over_lobes_cusps_and_islands_are_those_of_2000_machines() {
     for rpm in [
         650.0, 715.0, 812.0, 900.0, 1000.0, 1036.0, 1060.0, 1078.0, 1100.0, 1200.0, 1480.0, 2000.0,
-        // Beside the gap between the flip notch and the Hopf limits few machines have a limit.
-        1045.0,
     ] {
-        let (spread, mut drawn) = compare(&case, rpm, 8.0, 2000);
-        decide(&spread, &mut drawn);
+        compare_and_decide(rpm);
     }
+}
+
+/// Beside the gap between flip notch and Hopf limits few machines have a limit, and 2 000 know the 95 % limit to 20 %.
+#[test]
+#[ignore = "half a million machines; see the comment above for the command"]
+fn percentiles_over_the_bottom_of_the_flip_notch_are_those_of_as_many_machines_as_know_them() {
+    compare_and_decide(1045.0);
+}
+
+fn compare_and_decide(rpm: f64) {
+    let case = acetal();
+    let (spread, drawn) = compare(&case, rpm, 8.0, 2000);
+    decide(&spread, &drawn);
 }
 
 #[test]
