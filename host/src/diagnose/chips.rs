@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 use super::cut::CutForce;
-use crate::simulate::path::{Motion, between};
 use super::turning::Turning;
+use crate::simulate::path::{Motion, between};
 use crate::simulate::{Cutter, Immersion, Tooth};
 
 /// Samples that are done at a time.

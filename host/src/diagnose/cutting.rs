@@ -8,12 +8,12 @@ use super::chips::Chips;
 use super::cut::{CutForce, RecordedCut};
 use super::motion;
 use super::noise::rms;
-use crate::simulate::path::Motion;
 use super::record::{Observed, Record};
 use super::scene::{Baseline, Scene};
 use super::turning::Turning;
 use crate::recording::{Quantity, Recording};
 use crate::simulate::Cutter;
+use crate::simulate::path::Motion;
 
 /// Rounds in which force and motion settle: the motion comes from the force, the chip from the motion.
 const ROUNDS: usize = 4;

@@ -65,7 +65,7 @@ pub(super) fn guess(scene: &Scene<'_>, regression: &mut Regression) -> Option<St
     for axis in scene.driven_axes() {
         for term in terms(scene, axis) {
             if let Some(column) = column(scene, axis, term) {
-                all.push((axis, term, regression.add(scene, &column)));
+                all.push((axis, term, regression.add(&column)));
             }
         }
     }

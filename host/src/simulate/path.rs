@@ -63,7 +63,7 @@ impl Motion {
 }
 
 /// A signal between its samples, by a cubic through four of them; `place` counts samples.
-pub(super) fn between(samples: &[f64], place: f64) -> f64 {
+pub(crate) fn between(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
     };

@@ -9,10 +9,10 @@ use num_complex::Complex64;
 
 use crate::diagnose::cause::{Cause, Place, Regressor};
 use crate::diagnose::motion::main_axis;
-use crate::simulate::path::Motion;
 use crate::diagnose::record::{Observed, Record};
 use crate::diagnose::scene::{Domain, Scene};
 use crate::recording::Quantity;
+use crate::simulate::path::Motion;
 
 pub(super) fn all() -> Vec<Box<dyn Cause>> {
     vec![
