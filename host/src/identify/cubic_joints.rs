@@ -18,7 +18,7 @@ use super::dwell::{Dwell, Line};
 use super::harmonic_balance::{Grid, Problem, Solution};
 use super::joints::{self, JointFitError, JointParameter, PostureFrf};
 use super::law::{Extra, Law, Role};
-use super::least_squares::{Normal, Spread, minimum};
+use super::least_squares::{Normal, Spread, minimum, nearer};
 use super::steady_fit::derivative;
 use super::whitening::Seen;
 use crate::frf::{Frf, FrfTable};
@@ -142,7 +142,7 @@ pub fn fit(
             values[index].ln()
         }
     });
-    let (sought, _) = minimum(sought, 1e-2, |sought| {
+    let sought = nearer(sought, 1e-2, |sought| {
         let values = values_of(sought);
         sums(&all, values.len(), |placed, dwell| {
             let (residual, mut slope) = model.linearized(placed, dwell, &values)?;

@@ -135,12 +135,37 @@ impl Normal {
 /// See [`FitError`].
 pub(super) fn minimum(
     start: DVector<f64>,
-    mut damping: f64,
+    damping: f64,
     of: impl Fn(&DVector<f64>) -> Normal,
 ) -> Result<(DVector<f64>, Normal), FitError> {
+    match descend(start, damping, 60, of)? {
+        (theta, normal, true) => Ok((theta, normal)),
+        (_, normal, false) => Err(FitError::NotConverged(normal.misfit())),
+    }
+}
+
+/// Parameters that are nearer to the minimum: as [`minimum`], but for a guess a few rounds are enough.
+///
+/// # Errors
+/// The data do not determine them, or too many dwells have no motion.
+pub(super) fn nearer(
+    start: DVector<f64>,
+    damping: f64,
+    of: impl Fn(&DVector<f64>) -> Normal,
+) -> Result<DVector<f64>, FitError> {
+    descend(start, damping, 25, of).map(|(theta, ..)| theta)
+}
+
+/// Parameters, their sums, and whether the minimum was reached.
+fn descend(
+    start: DVector<f64>,
+    mut damping: f64,
+    rounds: usize,
+    of: impl Fn(&DVector<f64>) -> Normal,
+) -> Result<(DVector<f64>, Normal, bool), FitError> {
     let mut theta = start;
     let mut normal = of(&theta);
-    for _ in 0..60 {
+    for _ in 0..rounds {
         // A dwell or two without a motion near the measured one may be found once the parameters are better.
         if normal.failed * 2 > normal.dwells {
             return Err(normal.failure());
@@ -163,7 +188,7 @@ pub(super) fn minimum(
         // the sum itself need not fall at the very end.
         let length = step.dot(&(&normal.matrix * &step)).sqrt();
         if length < 1e-3 && tried.failed == normal.failed {
-            return Ok((next, tried));
+            return Ok((next, tried, true));
         }
         let better = tried.failed < normal.failed
             || (tried.failed == normal.failed && tried.sum <= normal.sum * (1.0 + 1e-6));
@@ -177,7 +202,7 @@ pub(super) fn minimum(
             }
         }
     }
-    Err(FitError::NotConverged(normal.misfit()))
+    Ok((theta, normal, false))
 }
 
 /// Least squares with columns brought to length 1: parameters differ by many powers of ten.

@@ -21,7 +21,7 @@ use crate::structure::{Direction, Form, Robot, Structure, tests::robot};
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
 /// Levels of force, N.
-const LEVELS: [f64; 2] = [8.0, 40.0];
+const LEVELS: [f64; 2] = [4.2, 16.5];
 
 const HARMONICS: usize = 3;
 
@@ -57,14 +57,14 @@ fn step_sine(robot: &Robot, direction: Direction, level: f64, frequencies: &[f64
         measured: vec![Quantity::Displacement],
         ..Rig::new(
             direction,
-            Signal::step_sine(frequencies, &[level], 12.0, 0.5),
+            Signal::step_sine(frequencies, &[level], 16.0, 0.5),
             256.0,
         )
     };
     rig.record(&structure(robot), Path::new("steps.csv")).unwrap().0
 }
 
-/// Dwells of the last 3 s, with 1 % noise per sample: before them lie 9 s in which the slowest mode decays to e⁻¹⁰.
+/// Dwells of the last 3 s, with 1 % noise per sample: before them lie 13 s in which the slowest mode decays to e⁻¹¹.
 fn dwells(recording: &Recording, seed: u64) -> Vec<Dwell> {
     let mut noisy = recording.clone();
     let noise = Noise {
@@ -92,7 +92,7 @@ fn tested(robot: &Robot, seed: u64) -> PostureDwells {
         .iter()
         .flat_map(|hz| [0.955, 0.985, 1.01].map(|share| share * hz))
         .collect();
-    frequencies.extend([2.5, 3.5, 6.0, 14.0, 21.0, 28.0]);
+    frequencies.extend([2.5, 3.5, 6.0, 12.0, 16.0, 21.0, 26.0, 31.0]);
     frequencies.sort_by(f64::total_cmp);
     let tests: Vec<(Direction, f64)> = AXES
         .iter()
@@ -171,7 +171,7 @@ fn cubic_joints_come_back_and_tell_peaks_at_unseen_postures() {
     for _ in 0..10 {
         let there = truth.at(&posture(&mut random));
         let axis = random.random_range(0..3);
-        let level = 30.0;
+        let level = 12.0;
         let mut force = Vector3::zeros();
         force[axis] = level;
         let predicted = |hz: f64| fit.response(&there.angles_rad, hz, force).unwrap().0[axis].norm();
@@ -213,7 +213,11 @@ fn cubic_joints_come_back_and_tell_peaks_at_unseen_postures() {
         100.0 * softened
     );
     assert!(largest < 0.03, "{largest}");
-    assert!(softened > 0.03, "{softened}");
+    // What the cubic terms do is told, not only what is small anyway.
+    assert!(
+        softened > 5e-3 && largest < 0.1 * softened,
+        "{largest} {softened}"
+    );
 }
 
 fn dwells_without_noise(recording: &Recording) -> Vec<Dwell> {
@@ -235,7 +239,7 @@ fn one_posture_and_one_level_give_wide_intervals_and_no_wrong_numbers() {
     let mut tests = tested(&truth, 1);
     tests
         .dwells
-        .retain(|dwell| dwell.force().unwrap().amplitude(1) < 20.0);
+        .retain(|dwell| dwell.force().unwrap().amplitude(1) < 10.0);
     let few = fit(
         &robot(),
         &[tests],
