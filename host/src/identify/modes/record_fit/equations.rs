@@ -236,7 +236,7 @@ fn of_transient(
         }
     }
     let powers = powers(data, line.s);
-    for k in 0..transient.smooth.len() {
+    for (k, _) in transient.smooth.iter().enumerate() {
         for power in powers {
             row[at][k] = power;
             at += 1;

@@ -357,24 +357,19 @@ impl Data<'_> {
 
     /// Directions that are both driven and seen, as indices of right and left shape.
     fn shared(&self, (rights, lefts): (usize, usize)) -> Vec<(usize, usize)> {
-        let direction = |pick: &dyn Fn(&(Vec<usize>, Vec<usize>), &RecordSpectra) -> Option<Direction>| {
-            self.axes
-                .iter()
-                .zip(self.records)
-                .find_map(|(axes, record)| pick(axes, record))
-        };
-        let of_right = |p: usize| {
-            direction(&|(responses, _), record| {
-                let at = responses.iter().position(|&index| index == p)?;
-                Some(record.responses[at].direction)
+        let directions = |index: usize, of_response: bool| {
+            self.axes.iter().zip(self.records).find_map(|(axes, record)| {
+                let (indices, channels) = if of_response {
+                    (&axes.0, &record.responses)
+                } else {
+                    (&axes.1, &record.forces)
+                };
+                let at = indices.iter().position(|&known| known == index)?;
+                Some(channels[at].direction)
             })
         };
-        let of_left = |q: usize| {
-            direction(&|(_, forces), record| {
-                let at = forces.iter().position(|&index| index == q)?;
-                Some(record.forces[at].direction)
-            })
-        };
+        let of_right = |p: usize| directions(p, true);
+        let of_left = |q: usize| directions(q, false);
         let pairs = (0..rights).flat_map(|p| (0..lefts).map(move |q| (p, q)));
         pairs
             .filter(|&(p, q)| of_right(p).is_some() && of_right(p) == of_left(q))
