@@ -179,13 +179,11 @@ const NOISY: f64 = 0.003;
 
 /// True where all records are cuts, and the motion of one has noise that is felt.
 pub(super) fn is_noisy(scene: &Scene<'_>) -> bool {
-    let motions = scene
+    let mut motions = scene
         .records
         .iter()
         .flat_map(|record| &record.channels)
         .filter(|channel| channel.pickup.quantity != Quantity::Force);
     scene.records.iter().all(|record| record.cut.is_some())
-        && motions
-            .into_iter()
-            .any(|channel| channel.deviation > NOISY * rms(&channel.measured))
+        && motions.any(|channel| channel.deviation > NOISY * rms(&channel.measured))
 }
