@@ -275,7 +275,8 @@ fn coverage_of_joints() {
         .ok()
         .and_then(|seeds| seeds.parse().ok())
         .unwrap_or(20);
-    let machines: [(&str, fn(&Robot) -> Structure); 2] = [("without", tool_space), ("with", sagged)];
+    type Machine = fn(&Robot) -> Structure;
+    let machines: [(&str, Machine); 2] = [("without", tool_space), ("with", sagged)];
     for (name, machine) in machines {
         let (mut largest, mut held, mut joints) = (0.0_f64, 0, 0);
         for seed in 0..seeds {
