@@ -100,6 +100,7 @@ impl Shifted {
     }
 
     /// y with (H − s I)ᵀ y = b, in place of b.
+    #[cfg(test)]
     fn solve_transposed(&self, vector: &mut DVector<Complex64>) {
         let (size, band) = (self.size, self.band);
         for row in 0..size {
@@ -130,11 +131,13 @@ impl Shifted {
     }
 
     /// The left eigenvector y, yᵀ H = μ yᵀ, of length 1.
+    #[cfg(test)]
     fn left(&self) -> Option<DVector<Complex64>> {
         self.iterate(Self::solve_transposed)
     }
 
     /// By how much the eigenvalue changes per change of the matrix, 1/|yᵀ x| ≥ 1.
+    #[cfg(test)]
     pub(super) fn condition(&self) -> Option<f64> {
         let along: Complex64 = self.left()?.dot(&self.right()?);
         Some(along.norm().recip().max(1.0))
