@@ -1,7 +1,7 @@
 //! Least squares of all regressors at once, in units of the noise, with free decays taken out.
 //!
 //! Every record is looked at as a whole, and cut into blocks that are fitted and blocks that are held out. In each of
-//! these parts ([`super::part`]) residual and regressors are whitened. Their products (Gram matrices) then give the fit of any set of regressors.
+//! these parts residual and regressors are whitened. Their products (Gram matrices) then give the fit of any set of regressors.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

@@ -76,7 +76,7 @@ pub(super) fn file_name(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or(path)
 }
 
-fn signals<'a>(view: &'a View) -> Vec<(&'static str, Look, &'a [f64])> {
+fn signals(view: &View) -> Vec<(&'static str, Look, &[f64])> {
     let mut signals = vec![
         ("measured", Look::Measured, view.measured.as_slice()),
         ("missed by the case", Look::Missed, view.residual.as_slice()),

@@ -283,9 +283,8 @@ impl TaylorPeriod {
                 for k in 0..last {
                     let mut force = [Complex64::ZERO; 3];
                     if !step.force.is_empty() {
-                        for axis in 0..3 {
-                            let c = &self.c[axis * n..(axis + 1) * n];
-                            seen[k][axis] = c.iter().zip(&x[k * n..]).map(|(c, x)| x * *c).sum();
+                        for (seen, c) in seen[k].iter_mut().zip(self.c.chunks_exact(n)) {
+                            *seen = c.iter().zip(&x[k * n..]).map(|(c, x)| x * *c).sum();
                         }
                         for (matrix, seen) in step.force.iter().zip(seen[..=k].iter().rev()) {
                             for axis in 0..3 {
