@@ -1,6 +1,6 @@
 //! What `identify` writes goes on to `lobes` and `table`.
 
-#![allow(clippy::expect_used)]
+#![allow(clippy::expect_used, clippy::panic)]
 
 use std::fs;
 use std::path::Path;
