@@ -7,6 +7,8 @@ use crate::structure::FirstOrder;
 
 /// Poles closer than this, relative, are one.
 const SAME: f64 = 1e-9;
+/// Residues below this share of the largest are not felt.
+const FELT: f64 = 1e-3;
 
 /// H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N; rows displacement, columns force.
 #[derive(Clone, Debug)]
@@ -73,6 +75,20 @@ impl Receptance {
             }
         }
         sum
+    }
+
+    /// Poles above the real axis that the force along `axis` moves, seen along it.
+    pub fn poles_along(&self, axis: usize) -> impl Iterator<Item = Complex64> {
+        let size = move |residue: &Matrix3<Complex64>| residue[(axis, axis)].norm();
+        let largest = self
+            .terms
+            .iter()
+            .map(|(_, residue)| size(residue))
+            .fold(0.0, f64::max);
+        self.terms
+            .iter()
+            .filter(move |(pole, residue)| pole.im > 0.0 && size(residue) > FELT * largest)
+            .map(|(pole, _)| *pole)
     }
 
     /// Root of Σ |R_r/(iω − λ_r)|² along the diagonal entry of `axis`: what H would be if its parts did not cancel, m/N.

@@ -123,15 +123,24 @@ impl Cause for MissingMode {
         Some(vec![Regressor::of_channels(observed)])
     }
 
+    /// None where a mode of the case has its peak within the peak of this one: that is a change of a mode that is there.
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        scene: &Scene<'_>,
+        place: &Place,
         shape: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let per_mass = *coefficients.first()?;
-        (per_mass > 0.0).then(|| {
+        let (Place::Axis(axis), natural) = (place, TAU * shape[0]) else {
+            return None;
+        };
+        let is_known = scene
+            .baseline
+            .receptance
+            .poles_along(*axis)
+            .any(|pole| (pole.norm() - natural).abs() < -pole.re + shape[1] * natural);
+        (per_mass > 0.0 && !is_known).then(|| {
             vec![
                 ("frequency_hz", shape[0]),
                 ("damping_ratio", shape[1]),
