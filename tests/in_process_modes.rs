@@ -111,8 +111,8 @@ fn porous(folder: &Path, measured: &str, seed: u64) {
     assert!(drawn.contains("stable pole") && drawn.contains("Hyy"));
 }
 
-/// The same from speed sweeps in three immersions.
-fn speed_sweep(folder: &Path, measured: &str, seed: u64) {
+/// Recordings of speed sweeps in three immersions, with 1 % noise on every sample of every channel.
+fn simulate_speed_sweeps(folder: &Path, measured: &str, seed: u64) {
     let robot = case("kuka-kr90-acetal");
     // Thesis section 7.2.2: central, down- and up-milling; teeth pass at 15 to 23 Hz.
     for (index, (start, exit)) in (1..).zip([(68.4, 109.8), (138.6, 180.0), (0.0, 41.4)]) {
@@ -126,6 +126,12 @@ fn speed_sweep(folder: &Path, measured: &str, seed: u64) {
             ),
         );
     }
+}
+
+/// As [`porous`], from speed sweeps in three immersions.
+fn speed_sweep(folder: &Path, measured: &str, seed: u64) {
+    let robot = case("kuka-kr90-acetal");
+    simulate_speed_sweeps(folder, measured, seed);
     let answer = run(
         folder,
         &format!(
@@ -146,6 +152,28 @@ fn porous_milling_gives_the_modes_of_table_7_1_and_their_lobes() {
 #[test]
 fn speed_sweeps_with_accelerometers_give_the_modes_of_table_7_1_and_their_lobes() {
     speed_sweep(folder().path(), "acceleration", 1);
+}
+
+#[test]
+fn speed_sweeps_by_a_table_of_receptances_give_the_modes_of_table_7_1_and_their_lobes() {
+    let folder = folder();
+    let robot = case("kuka-kr90-acetal");
+    simulate_speed_sweeps(folder.path(), "displacement", 0);
+    let frf = run(
+        folder.path(),
+        "frf sweep1.csv sweep2.csv sweep3.csv --method pseudo-inverse --band-hz 14:24 --resolution-hz 0.08 --out frf.csv --json",
+    );
+    assert_eq!(frf["parts"][0]["excitation"], "sweep");
+    println!(
+        "speed sweep: smallest singular value of the forces {}",
+        frf["parts"][0]["least_singular_value"]
+    );
+    let answer = run(
+        folder.path(),
+        &format!("identify frf.csv --method modes --case {robot} --out found.toml --json"),
+    );
+    assert_modes(&answer, "speed sweep, receptances");
+    assert_lobes(folder.path(), "found.toml", "speed sweep, receptances");
 }
 
 #[test]

@@ -243,6 +243,11 @@ fn decide(spread: &LimitSpread, drawn: &MonteCarlo<'_>) {
 }
 
 #[test]
+fn percentiles_at_a_cusp_are_those_of_2000_machines() {
+    compare(&acetal(), 1480.0, 8.0, 2000);
+}
+
+#[test]
 fn what_lies_beside_a_bracket_need_not_be_solved_for() {
     let case = acetal();
     let mut whole = MonteCarlo::new(&case, 1045.0, 8.0);
