@@ -87,12 +87,19 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, Stabil
     let depth_m = depth_mm * 1e-3;
     let scan = Period::new(problem, rpm, 2.0 * depth_m, Resolution::SCAN);
     let candidates = period_map::largest(&scan, depth_m, RIVAL).unwrap_or_default();
-    let of_map = || {
-        let certain = Some(&candidates).filter(|candidates| candidates.is_certain)?;
-        coarse_and_fine(problem, rpm, depth_m, &certain.multipliers)
+    let certain = candidates
+        .is_certain
+        .then(|| Rough::new(&candidates.multipliers, depth_m));
+    let of_maps = || of_maps(problem, rpm, depth_m, certain.as_ref()?);
+    let found = match &certain {
+        Some(rough) if rough.kappa_m > KAPPA_MAX * depth_m => of_maps(),
+        Some(rough) => confirmed(problem, rpm, depth_m, rough),
+        None => None,
     };
-    let found = of_map()
+    // Where Newton leads nowhere from the multipliers of a map, rounding has moved them.
+    let found = found
         .or_else(|| searched(problem, rpm, depth_m, &candidates.multipliers))
+        .or_else(of_maps)
         .ok_or_else(|| {
             broke_down(
                 "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart",
@@ -122,42 +129,66 @@ fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
     (10.0 * (coarse - fine).norm()).max(least * fine.norm().max(1.0))
 }
 
-/// The dominant multiplier at the working and at a finer resolution, from the multipliers of a rough map.
-fn coarse_and_fine(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
-    let rough: Vec<Complex64> = candidates
-        .iter()
-        .copied()
-        .filter(|multiplier| multiplier.im >= 0.0)
-        .collect();
-    // The complex depth w (1 − 1/μ) of the smallest of them; for those near the unit circle it is about twice the depth.
-    let kappa_m = rough
-        .iter()
-        .map(|multiplier| (Complex64::ONE - multiplier.inv()).norm() * depth_m)
-        .fold(2.0 * depth_m, f64::max);
-    let period_at = |resolution| Period::new(problem, rpm, kappa_m.min(KAPPA_MAX * depth_m), resolution);
-    let working = period_at(Resolution::WORKING);
-    let finer = period_at(Resolution::FINE);
-    let solution = |coarse, fine, least| Solution {
-        multiplier: fine,
-        error: error(coarse, fine, least),
-        period: working.clone(),
-        verdict: None,
-    };
-    if kappa_m <= KAPPA_MAX * depth_m
-        && let Some(coarse) = dominant_of(&working, kappa_m, depth_m, &rough)
-        && let Some(fine) = dominant_of(&finer, kappa_m, depth_m, &[coarse])
-    {
-        return Some(solution(coarse, fine, LEAST_ERROR));
+/// Multipliers of a rough map.
+struct Rough {
+    /// Of pairs the upper ones.
+    multipliers: Vec<Complex64>,
+    /// The complex depth w (1 − 1/μ) of the smallest of them, m; for those near the unit circle it is about twice the depth.
+    kappa_m: f64,
+}
+
+impl Rough {
+    fn new(multipliers: &[Complex64], depth_m: f64) -> Self {
+        let upper = multipliers
+            .iter()
+            .copied()
+            .filter(|multiplier| multiplier.im >= 0.0);
+        let multipliers: Vec<Complex64> = upper.collect();
+        let kappa_m = multipliers
+            .iter()
+            .map(|multiplier| (Complex64::ONE - multiplier.inv()).norm() * depth_m)
+            .fold(2.0 * depth_m, f64::max);
+        Self { multipliers, kappa_m }
     }
-    let largest = |period, share| {
-        let found = period_map::largest(period, depth_m, share).filter(|found| found.is_certain);
-        found.map(|found| found.multipliers)
+}
+
+/// The dominant multiplier at the working and at a finer resolution by Newton; `None` where that leads nowhere.
+fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<Solution> {
+    let dominant = |resolution, guesses: &[Complex64]| {
+        let period = Period::new(problem, rpm, rough.kappa_m, resolution);
+        let found = dominant_of(&period, rough.kappa_m, depth_m, guesses);
+        found.map(|found| (found, period))
     };
-    let coarse = *largest(&working, 1.0)?.first()?;
-    let fine = largest(&finer, RIVAL)?
+    let (coarse, period) = dominant(Resolution::WORKING, &rough.multipliers)?;
+    let (fine, _) = dominant(Resolution::FINE, &[coarse])?;
+    Some(Solution {
+        multiplier: fine,
+        error: error(coarse, fine, LEAST_ERROR),
+        period,
+        verdict: None,
+    })
+}
+
+/// The same from the multipliers of the maps themselves: of small ones, which are out of Newton's reach.
+fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<Solution> {
+    let kappa_m = rough.kappa_m.min(KAPPA_MAX * depth_m);
+    let largest = |resolution, share| {
+        let period = Period::new(problem, rpm, kappa_m, resolution);
+        let found = period_map::largest(&period, depth_m, share).filter(|found| found.is_certain);
+        found.map(|found| (found.multipliers, period))
+    };
+    let (coarse, period) = largest(Resolution::WORKING, 1.0)?;
+    let coarse = *coarse.first()?;
+    let (fine, _) = largest(Resolution::FINE, RIVAL)?;
+    let fine = fine
         .into_iter()
         .min_by(|p, q| (p - coarse).norm().total_cmp(&(q - coarse).norm()))?;
-    Some(solution(coarse, fine, UNCONFIRMED))
+    Some(Solution {
+        multiplier: fine,
+        error: error(coarse, fine, UNCONFIRMED),
+        period,
+        verdict: None,
+    })
 }
 
 /// The dominant multiplier where maps do not tell: one that is found, and a radius beyond which none is.

@@ -1,4 +1,5 @@
-//! A reference for tests: motions by Taylor series in time, and the largest multiplier by Arnoldi's method on them.
+//! A reference for tests: motions by Taylor series in time, the largest multiplier by Arnoldi's method on them, and how many there
+//! are beyond a radius.
 //!
 //! Nothing of the default method is in it: no collocation, no matrix exponential, no characteristic matrix, no chip normals. On each
 //! step of length h, with σ = (t − t₀)/h, structure, forces and the surface before are power series in σ:
@@ -11,12 +12,16 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::Matrix3;
 use num_complex::Complex64;
 
 use super::Problem;
-use super::hessenberg::Shifted;
-use crate::eigenvalues::eigenvalues;
+
+mod counter;
+mod largest;
+
+pub(super) use counter::count_beyond;
+pub(super) use largest::largest_abs;
 
 /// How finely a period is computed.
 #[derive(Clone, Copy, Debug)]
@@ -49,12 +54,6 @@ const TURN: f64 = 0.7;
 
 /// Terms of coefficients below this share of the first are rounding.
 const TERM: f64 = 1e-17;
-
-/// The most vectors of a Krylov space: where more are needed counting is cheaper.
-const VECTORS_MAX: usize = 120;
-
-/// The residual of an eigenvector, and the change since the look before, with which an eigenvalue is taken, relative to the map.
-const SETTLED: f64 = 1e-10;
 
 /// Harmonics of a coefficient that turns with the tool: products of two of first order.
 const HARMONICS: usize = 2;
@@ -259,7 +258,8 @@ impl TaylorPeriod {
             }
             let size = |k: usize| x[k * n..][..n].iter().map(|x| x.abs()).fold(0.0, f64::max);
             largest = (0..=last).map(size).fold(largest, f64::max);
-            tails[step.part] = tails[step.part].max((size(last) + size(last - 1)) / largest);
+            let tail = &mut tails[step.part];
+            *tail = longer(*tail, (size(last) + size(last - 1)) / largest);
             // The series at σ = 1.
             for i in 0..n {
                 x[i] = (0..=last).rev().map(|k| x[k * n + i]).sum();
@@ -310,7 +310,8 @@ impl TaylorPeriod {
                 }
                 let size = |k: usize| x[k * n..][..n].iter().map(|x| x.l1_norm()).fold(0.0, f64::max);
                 let largest = (0..=last).map(size).fold(f64::MIN_POSITIVE, f64::max);
-                tails[step.part] = tails[step.part].max((size(last) + size(last - 1)) / largest);
+                let tail = &mut tails[step.part];
+                *tail = longer(*tail, (size(last) + size(last - 1)) / largest);
                 // The series at σ = 1.
                 for i in 0..n {
                     x[i] = (0..=last).rev().map(|k| x[k * n + i]).sum();
@@ -319,6 +320,13 @@ impl TaylorPeriod {
             out.copy_from_slice(&x[..n]);
         }
         phi
+    }
+
+    /// Operations of [`transition`](Self::transition), about: those of complex with real numbers are two each.
+    fn transition_operations(&self) -> f64 {
+        let (n, last) = (self.order as f64, self.series.last as f64);
+        let of_step = |step: &Step| 4.0 * n * n + 12.0 * n + 18.0 * step.force.len() as f64;
+        2.0 * n * last * self.steps.iter().map(of_step).sum::<f64>()
     }
 
     /// A state that is the same at every call and has a part along everything; the surface is one of steps.
@@ -354,8 +362,25 @@ fn least_counts(problem: &Problem, rpm: f64, series: Series) -> Vec<usize> {
         .collect()
 }
 
-/// More steps where the tails of the series were too large.
-fn refine(counts: &mut [usize], tails: &[f64], series: Series) {
+/// The larger tail; infinite where one is no number, of motions that grew out of all of them.
+fn longer(p: f64, q: f64) -> f64 {
+    if p.is_nan() || q.is_nan() {
+        f64::INFINITY
+    } else {
+        p.max(q)
+    }
+}
+
+/// True where all series end below this share of the motion.
+fn are_short(tails: &[f64], tail: f64) -> bool {
+    tails.iter().all(|&found| found < tail)
+}
+
+/// The most steps of a period: where more are needed motions leave the range of numbers, or take seconds.
+const STEPS_MAX: usize = 8000;
+
+/// More steps where the tails of the series were too large; `None` where these would be too many.
+fn refine(counts: &mut [usize], tails: &[f64], series: Series) -> Option<()> {
     for (count, tail) in counts.iter_mut().zip(tails) {
         if !tail.is_finite() {
             // The series grew out of all numbers.
@@ -365,184 +390,5 @@ fn refine(counts: &mut [usize], tails: &[f64], series: Series) {
             *count = (*count as f64 * finer.clamp(1.1, 4.0)).ceil() as usize;
         }
     }
-}
-
-/// The absolute value of the largest multiplier, and what the series and rounding leave open of it; `None` where nothing finite comes
-/// out or Arnoldi's method does not settle.
-pub(super) fn largest_abs(problem: &Problem, rpm: f64, depth_m: f64, series: Series) -> Option<(f64, f64)> {
-    let mut counts = least_counts(problem, rpm, series);
-    for _ in 0..12 {
-        let period = TaylorPeriod::new(problem, rpm, depth_m, series, &counts);
-        let mut tails = vec![0.0; counts.len()];
-        period.apply(&period.start(), &mut tails);
-        let found = tails
-            .iter()
-            .all(|&tail| tail < series.tail)
-            .then(|| arnoldi(&period, &mut tails));
-        if let Some(found) = found
-            && tails.iter().all(|&tail| tail < 100.0 * series.tail)
-        {
-            return found;
-        }
-        refine(&mut counts, &tails, series);
-    }
-    None
-}
-
-/// Counts multipliers, without the map on surfaces: by the phase of G(z) = det(I − z Φ(w (1 − z))), whose zeros are 1/μ, along
-/// circles. Φ is that of the series with the force of the surface before in proportion to that of the tooth.
-pub(super) struct Counter {
-    period: TaylorPeriod,
-}
-
-/// The most points on half of a circle.
-const POINTS_MAX: usize = 800;
-
-/// How much the phase may turn between neighbouring points, rad.
-const PHASE: f64 = 0.6;
-
-impl Counter {
-    /// For multipliers beyond `least`; `None` where the series do not settle.
-    pub(super) fn new(problem: &Problem, rpm: f64, depth_m: f64, least: f64) -> Option<Self> {
-        let series = Series::FINE;
-        let mut counts = least_counts(problem, rpm, series);
-        for _ in 0..12 {
-            let period = TaylorPeriod::new(problem, rpm, depth_m, series, &counts);
-            let mut tails = vec![0.0; counts.len()];
-            for z in [1.0, -1.0].map(|sign| Complex64::from(sign / least)) {
-                period.transition(Complex64::ONE - z, &mut tails);
-            }
-            if tails.iter().all(|&tail| tail < series.tail) {
-                return Some(Self { period });
-            }
-            refine(&mut counts, &tails, series);
-        }
-        None
-    }
-
-    /// The phase of G at z, to whole turns; `None` where Φ is not finite.
-    fn phase(&self, z: Complex64) -> Option<f64> {
-        let n = self.period.order;
-        let mut tails = vec![0.0; self.period.steps.len()];
-        let mut g = self.period.transition(Complex64::ONE - z, &mut tails);
-        for (index, entry) in g.iter_mut().enumerate() {
-            *entry *= -z;
-            if index / n == index % n {
-                *entry += 1.0;
-            }
-        }
-        let largest = g.iter().map(|entry| entry.l1_norm()).fold(0.0, f64::max);
-        if !largest.is_finite() {
-            return None;
-        }
-        let mut matrix = DMatrix::from_vec(n, n, g) / Complex64::from(largest);
-        let mut phase = 0.0;
-        for column in 0..n {
-            let size = |row: &usize| matrix[(*row, column)].l1_norm();
-            let pivot = (column..n)
-                .max_by(|p, q| size(p).total_cmp(&size(q)))
-                .unwrap_or(column);
-            if pivot != column {
-                matrix.swap_rows(pivot, column);
-                phase += 0.5 * TAU;
-            }
-            let head = matrix[(column, column)];
-            phase += head.arg();
-            if head == Complex64::ZERO {
-                return None;
-            }
-            for row in column + 1..n {
-                let factor = matrix[(row, column)] / head;
-                for j in column + 1..n {
-                    let known = matrix[(column, j)];
-                    matrix[(row, j)] -= factor * known;
-                }
-            }
-        }
-        Some(phase)
-    }
-
-    /// How many multipliers are larger than a radius; `None` where the points allowed do not tell.
-    pub(super) fn beyond(&self, radius: f64) -> Option<usize> {
-        const FIRST: usize = 32;
-        let half = 0.5 * TAU;
-        let at = |angle: f64| self.phase(Complex64::from_polar(radius.recip(), angle));
-        let turn = |from: f64, to: f64| {
-            let turn = to - from;
-            turn - TAU * (turn / TAU).round()
-        };
-        let (mut turned, mut points) = (0.0, FIRST);
-        // Values at conjugate points are conjugate: half of the circle will do.
-        let mut last = (0.0, at(0.0)?);
-        for i in 1..=FIRST {
-            let angle = half * i as f64 / FIRST as f64;
-            // Segments that remain, the nearest last.
-            let mut ends = vec![(angle, at(angle)?)];
-            while let Some(&end) = ends.last() {
-                let middle = 0.5 * (last.0 + end.0);
-                let between = (middle, at(middle)?);
-                points += 1;
-                let turns = [turn(last.1, between.1), turn(between.1, end.1)];
-                if turns.iter().all(|turn| turn.abs() < PHASE) {
-                    turned += turns[0] + turns[1];
-                    last = end;
-                    ends.pop();
-                } else if points > POINTS_MAX {
-                    return None;
-                } else {
-                    ends.push(between);
-                }
-            }
-        }
-        let count = turned / half;
-        ((count - count.round()).abs() < 0.01 && count > -0.5).then_some(count.round() as usize)
-    }
-}
-
-/// The size of the largest eigenvalue of the map of a period; its change with the last vectors, and what the series leave out of the map.
-fn arnoldi(period: &TaylorPeriod, tails: &mut [f64]) -> Option<(f64, f64)> {
-    let most = VECTORS_MAX.min(period.size);
-    let mut basis: Vec<DVector<f64>> = vec![DVector::from_vec(period.start()).normalize()];
-    let mut hessenberg = DMatrix::zeros(most + 1, most);
-    let (mut look, mut before) = (8, f64::INFINITY);
-    for k in 0..most {
-        let mut image = DVector::from_vec(period.apply(basis[k].as_slice(), tails));
-        let whole = image.norm();
-        for _ in 0..2 {
-            for (j, known) in basis.iter().enumerate() {
-                let part = known.dot(&image);
-                hessenberg[(j, k)] += part;
-                image.axpy(-part, known, 1.0);
-            }
-        }
-        let left = image.norm();
-        let is_closed = left <= 1e-14 * whole || k + 1 == most;
-        if is_closed || k + 1 == look {
-            look += (look / 3).max(4);
-            let within = hessenberg.view((0, 0), (k + 1, k + 1)).into_owned();
-            let found = eigenvalues(within.clone())?
-                .into_iter()
-                .max_by(|p, q| p.norm_sqr().total_cmp(&q.norm_sqr()))?;
-            let size = found.norm();
-            let shifted = Shifted::new(&within, 1, found);
-            // What the series leave out changes the eigenvalue by its condition times as much.
-            let left_out = period.series.tail * within.norm() * shifted.condition()?;
-            if k + 1 == period.size || left <= 1e-14 * whole {
-                return Some((size, left_out));
-            }
-            // Maps far from normal keep no more than rounding of their norm.
-            let scale = SETTLED * size.max(within.norm());
-            let change = (size - before).abs();
-            if change < scale {
-                let vector = shifted.right()?;
-                if left * vector[k].norm() < scale {
-                    return Some((size, change + left_out));
-                }
-            }
-            before = size;
-        }
-        hessenberg[(k + 1, k)] = left;
-        basis.push(image / left);
-    }
-    None
+    (counts.iter().sum::<usize>() <= STEPS_MAX).then_some(())
 }
