@@ -1,11 +1,47 @@
 //! A piece of a period without a switch, collocated about the states at its nodes.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::stability::gauss::Gauss;
 
 /// Newton stops at steps below this, relative to the size of the orbit.
 pub(super) const TOLERANCE: f64 = 1e-12;
+
+/// Derivatives about states within this share of the orbit are those about the states themselves: Newton that uses them gains
+/// eight digits in a step.
+const SAME: f64 = 1e-8;
+
+/// Solves for the states at the nodes of a piece from a guess, and linearizes about them.
+///
+/// Newton with a factorization that is kept while steps shrink tenfold. `None` where it does not settle.
+pub(super) fn settle<'a>(
+    start: &DVector<f64>,
+    guess: &DMatrix<f64>,
+    rates: impl Fn(&DMatrix<f64>) -> Vec<DVector<f64>>,
+    linearized: impl Fn(&DMatrix<f64>) -> Linearized<'a>,
+) -> Option<(DMatrix<f64>, Linearized<'a>)> {
+    let mut states = guess.clone();
+    let mut about = linearized(&states);
+    let (mut moved, mut last) = (0.0, f64::INFINITY);
+    for _ in 0..24 {
+        let step = about.correction(start, &states, &rates(&states))?;
+        states += &step;
+        let size = step.amax();
+        moved += size;
+        if size <= TOLERANCE * states.amax() {
+            if moved > SAME * states.amax() {
+                about = linearized(&states);
+            }
+            return Some((states, about));
+        }
+        if size > 0.1 * last {
+            about = linearized(&states);
+            moved = 0.0;
+        }
+        last = size;
+    }
+    None
+}
 
 /// A piece linearized about the states at its nodes.
 pub(super) struct Linearized<'a> {
@@ -62,9 +98,9 @@ impl<'a> Linearized<'a> {
     /// singular or the numbers are no longer finite.
     pub(super) fn correction(
         &self,
-        start: &nalgebra::DVector<f64>,
+        start: &DVector<f64>,
         states: &DMatrix<f64>,
-        rates: &[nalgebra::DVector<f64>],
+        rates: &[DVector<f64>],
     ) -> Option<DMatrix<f64>> {
         let (order, nodes) = (self.order(), self.gauss.nodes.len());
         let mut residual = DMatrix::zeros(order * nodes, 1);

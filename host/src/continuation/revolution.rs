@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector, RowDVector, Vector3};
 use num_complex::Complex64;
 
-use super::collocated::{Linearized, TOLERANCE};
+use super::collocated::{Linearized, settle};
 use super::forced::{ForcedProblem, Uneven};
 use super::orbit::{Orbit, Passage, PeriodMap, Span};
 use crate::stability::multiplier::{eigenvector, loudest_hz};
@@ -130,21 +130,15 @@ impl<'a> RevolutionPeriod<'a> {
     ) -> Option<(DMatrix<f64>, Linearized<'_>)> {
         let stretch = &self.mesh.stretches[index];
         let forces = &self.forces[index];
-        let linearized = |states: &DMatrix<f64>| {
-            let jacobians = forces.jacobians(self.problem, past, states, depth_m);
-            Linearized::new(stretch.gauss, stretch.duration_s, jacobians)
-        };
-        let mut states = guess.clone();
-        for _ in 0..12 {
-            let rates = forces.rates(self.problem, past, &states, depth_m);
-            let step = linearized(&states).correction(start, &states, &rates)?;
-            states += &step;
-            if step.amax() <= TOLERANCE * states.amax() {
-                let linearized = linearized(&states);
-                return Some((states, linearized));
-            }
-        }
-        None
+        settle(
+            start,
+            guess,
+            |states| forces.rates(self.problem, past, states, depth_m),
+            |states| {
+                let jacobians = forces.jacobians(self.problem, past, states, depth_m);
+                Linearized::new(stretch.gauss, stretch.duration_s, jacobians)
+            },
+        )
     }
 
     fn trace(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Trace> {

@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 
-use super::collocated::{Linearized, TOLERANCE};
+use super::collocated::{Linearized, settle};
 use super::forced::ForcedProblem;
 use super::orbit::{Orbit, Passage, PeriodMap, Span};
 use super::variation;
@@ -195,19 +195,12 @@ impl ToothPeriod<'_> {
         depth_m: f64,
         guess: &DMatrix<f64>,
     ) -> Option<(DMatrix<f64>, Linearized<'_>)> {
-        let mut states = guess.clone();
-        for _ in 0..12 {
-            let rates = rates(self.problem, piece, &states, depth_m);
-            let linearized = self.linearized(piece, &states, depth_m);
-            let step = linearized.correction(start, &states, &rates)?;
-            states += &step;
-            // Where the structure is linear one step is exact.
-            if self.problem.is_linear() || step.amax() <= TOLERANCE * states.amax() {
-                let linearized = self.linearized(piece, &states, depth_m);
-                return Some((states, linearized));
-            }
-        }
-        None
+        settle(
+            start,
+            guess,
+            |states| rates(self.problem, piece, states, depth_m),
+            |states| self.linearized(piece, states, depth_m),
+        )
     }
 }
 

@@ -52,6 +52,50 @@ fn the_limits_of_the_thesis_lie_within_their_errors() {
     assert!(limit.error_mm.unwrap() < 1e-5, "{limit:?}");
 }
 
+/// Fig. 6.4: at half immersion an island of period doubling near 1/τ = 0.11, with (τ, w) = (8.7, 0.16) in it.
+#[test]
+fn the_flip_island_of_half_immersion_is_found_and_closed() {
+    /// w per mm of depth.
+    const PER_MM: f64 = 0.033_628;
+    let half = problem("kuka-kr90-half");
+    let flips_mm = |tau: f64| -> Vec<f64> {
+        let found = line(&half, rpm_of(tau), 12.0, 40).unwrap();
+        let flips = found.switches.iter().filter(|switch| switch.kind == Kind::Flip);
+        flips.map(|switch| switch.depth_mm).collect()
+    };
+    let reaches: Vec<(f64, [f64; 2])> = (0..60)
+        .map(|i| 0.105 + 0.0003 * f64::from(i))
+        .filter_map(|inverse| match flips_mm(inverse.recip())[..] {
+            [] => None,
+            [from, to] => Some((inverse, [from, to])),
+            ref other => panic!("1/τ = {inverse}: {other:?}"),
+        })
+        .collect();
+    // One interval of speeds, with an end on both sides of it, and the tips of the island shorter than its middle.
+    let (first, last) = (reaches[0], reaches[reaches.len() - 1]);
+    assert!(0.1105 < first.0 && first.0 < 0.1120 && 0.1160 < last.0 && last.0 < 0.1180);
+    assert!(((last.0 - first.0) / 0.0003 - (reaches.len() - 1) as f64).abs() < 0.5);
+    let height = |(_, [from, to]): &(f64, [f64; 2])| to - from;
+    let highest = reaches.iter().map(height).fold(0.0, f64::max);
+    assert!(
+        height(&first) < 0.7 * highest && height(&last) < 0.7 * highest,
+        "{reaches:?}"
+    );
+    for (inverse, [from, to]) in reaches {
+        let rpm = rpm_of(inverse.recip());
+        // Motions by Taylor series double their period within, and die out below.
+        let inside = reference(&half, rpm, 0.5 * (from + to));
+        let below = reference(&half, rpm, from - 0.01);
+        assert!(inside > 1.0 && below < 1.0, "1/τ = {inverse}: {inside} {below}");
+    }
+    let [from, to] = flips_mm(8.7)[..] else {
+        panic!("no island at τ = 8.7")
+    };
+    assert!((from * PER_MM - 0.14861).abs() < 1e-5 && from < 0.16 / PER_MM && 0.16 / PER_MM < to);
+    let inside = point(&half, rpm_of(8.7), 0.16 / PER_MM).unwrap();
+    assert_eq!((inside.verdict, inside.kind), (Verdict::Unstable, Kind::Flip));
+}
+
 #[test]
 fn limits_of_random_machines_lie_within_their_errors() {
     use rand::{RngExt, SeedableRng};
