@@ -1,7 +1,8 @@
 //! Time of every method, per point and per chart, at equal accuracy.
 //!
 //! `cargo bench -p quietcut --bench lobes` first prints how fine each method must be for a relative error of 1e-4 in
-//! every multiplier with |μ| ≤ 2 of a coarse chart, what a point and a chart then cost, and the ratio to the default;
+//! every multiplier with |μ| ≤ 2 of a coarse chart, what a point and a chart then cost, and the ratio to the default; then what
+//! a limit costs where a structure has cubic terms;
 //! then criterion measures the default on the charts of 200 × 100 cells. All of it on one thread.
 
 #![allow(missing_docs, clippy::expect_used, clippy::panic)]
@@ -11,6 +12,7 @@ use std::time::Instant;
 
 use criterion::Criterion;
 use quietcut::case::Case;
+use quietcut::continuation::ForcedProblem;
 use quietcut::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, MultiFrequency, Nyquist,
     Pitched, Problem, Sdm, SdmOrder, SemiDiscretization, Zoa, cell_chart,
@@ -237,6 +239,31 @@ fn compare_limits(setting: &Setting, default: &Collocation, receptances: &Freque
     }
 }
 
+/// Limits about the forced orbits of structures with cubic terms: over a whole range, and where feed moves them most.
+fn limits_with_cubic_terms() {
+    for (file, rpm) in [
+        ("kuka-kr90-full-cubic.toml", (480.0, 1_060.0)),
+        ("kuka-kr90-full-cubic.toml", (495.0, 525.0)),
+        ("kuka-kr90-half-cubic.toml", (480.0, 620.0)),
+    ] {
+        let setting = Setting {
+            file,
+            rpm,
+            depth_mm: 16.0,
+        };
+        let problem = ForcedProblem::new(&setting.case()).expect("a case with cubic terms");
+        let speeds_rpm = setting.speeds_rpm(30);
+        let began = Instant::now();
+        problem.lines(&speeds_rpm, setting.depth_mm, 40).expect("limits");
+        println!(
+            "{file}, {} to {} rev/min, cubic terms: {:.1} ms a limit",
+            rpm.0,
+            rpm.1,
+            began.elapsed().as_secs_f64() * 1e3 / speeds_rpm.len() as f64
+        );
+    }
+}
+
 fn main() {
     let one_thread = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -246,6 +273,7 @@ fn main() {
         for setting in &SETTINGS {
             compare(setting);
         }
+        limits_with_cubic_terms();
     });
     let mut criterion = Criterion::default().configure_from_args().sample_size(10);
     for setting in &SETTINGS {

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::stability::gauss::Gauss;
 
 /// Newton stops at steps below this, relative to the size of the orbit.
-pub(super) const TOLERANCE: f64 = 1e-12;
+const TOLERANCE: f64 = 1e-12;
 
 /// Derivatives about states within this share of the orbit are those about the states themselves: Newton that uses them gains
 /// eight digits in a step.

@@ -3,7 +3,6 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::collocated::TOLERANCE;
 use super::forced::ForcedProblem;
 use crate::stability::gauss::Gauss;
 
@@ -58,6 +57,10 @@ pub(super) struct Span<'a> {
     pub(super) duration_s: f64,
     pub(super) gauss: &'a Gauss,
 }
+
+/// Newton stops at steps below this, relative to the orbit: the step after it would be far below rounding, and the states at the
+/// nodes, which are those before it, are as good as the collocation.
+const SETTLED: f64 = 1e-10;
 
 /// The map of a forced problem over a period at one speed, on one mesh. Orbits are its fixed points.
 pub(super) trait PeriodMap: Sized {
@@ -191,7 +194,7 @@ impl Orbit {
                 return Err(OrbitError::NoConvergence { depth_mm });
             }
             last = size;
-            if size < TOLERANCE.max(1e-13) {
+            if size < SETTLED {
                 let mut along = DVector::zeros(order + 1);
                 along[order] = 1.0;
                 let tangent = lu.solve(&along).ok_or(OrbitError::Singular { depth_mm })?;

@@ -37,7 +37,7 @@ impl Method for RevolutionCollocation {
         let broke_down = || StabilityError::BrokeDown {
             rpm,
             depth_mm,
-            what: "the collocation equations of the revolution have no finite solution",
+            what: "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart",
         };
         let map = |fineness| {
             let revolution = Revolution::new(&self.pitched, rpm, depth_m, fineness)?;
