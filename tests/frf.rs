@@ -69,7 +69,7 @@ fn truth(hertz: f64) -> Complex64 {
 fn a_hammer_test_becomes_tables_and_pictures() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
-    blows(1.0).write_csv(&at("hammer.csv")).expect("written");
+    blows(1.0).write(&at("hammer.csv")).expect("written");
     blows(1.0)
         .write_uff(&at("hammer.uff"), quietcut::recording::UffForm::Binary)
         .expect("written");
@@ -147,7 +147,7 @@ fn a_sensor_on_the_housing_is_calibrated_to_the_tool_tip() {
     let ratio = 0.7;
     for (name, ratio) in [("tip", 1.0), ("housing", ratio)] {
         let path = folder.path().join(format!("{name}-test.csv"));
-        blows(ratio).write_csv(&path).expect("written");
+        blows(ratio).write(&path).expect("written");
         let (record, out) = (format!("{name}-test.csv"), format!("{name}.csv"));
         quietcut(
             folder.path(),
@@ -189,7 +189,7 @@ fn a_sensor_on_the_housing_is_calibrated_to_the_tool_tip() {
 fn what_cannot_be_measured_is_refused_with_the_reason() {
     let folder = folder();
     let here: &Path = folder.path();
-    blows(1.0).write_csv(&here.join("hammer.csv")).expect("written");
+    blows(1.0).write(&here.join("hammer.csv")).expect("written");
     std::fs::write(here.join("idle.csv"), "t [s],ax [m/s^2]\n0,0\n0.1,1\n0.2,0\n").expect("written");
     quietcut(here, &["frf", "idle.csv"]).refused(&["idle.csv", "no force"]);
     quietcut(here, &["frf", "none.csv"]).refused(&["none.csv"]);

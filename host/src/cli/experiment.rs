@@ -132,7 +132,7 @@ pub(super) fn run(
     let (mut recording, statistics) = rig.record(structure, common.out).map_err(|error| input(&error))?;
     recording.sidecar.posture = case.posture.recorded();
     common.channels.add_noise(&mut recording, common.seed)?;
-    recording.write_csv(common.out)?;
+    recording.write(common.out)?;
     let largest = recording
         .channels
         .iter()

@@ -97,7 +97,7 @@ pub(super) fn run(
         .flat_map(|channel| &channel.samples)
         .fold(0.0_f64, |a, b| a.max(b.abs()));
     common.channels.add_noise(&mut recording, common.seed)?;
-    recording.write_csv(common.out)?;
+    recording.write(common.out)?;
     let forces = recording
         .channels
         .iter()

@@ -11,7 +11,8 @@ use super::experiment::{self, Experiment};
 use super::milling_rig::{self, MillingRig};
 use super::{Error, Output, finite, non_negative, positive};
 use crate::case::Case;
-use crate::recording::{Quantity, Sidecar};
+use crate::file;
+use crate::recording::{Quantity, Sidecar, WRITTEN};
 use crate::simulate::{
     Accelerometer, Effects, Entry, Recorder, SimulateError, Statistics, TachometerModel, VirtualCut,
     VirtualCutError,
@@ -86,8 +87,9 @@ pub struct Args {
     /// Seed of the sensor's noise; the same seed gives the same file.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The recording to write; what its columns cannot say goes into the .toml beside it.
-    #[arg(long, value_name = "REC.csv")]
+    /// The recording to write: csv, uff or bunv (UFF 58 as text, in binary) by its ending; what it cannot say goes into the .toml
+    /// beside it.
+    #[arg(long, value_name = "REC.csv", value_parser = recording_to_write)]
     out: PathBuf,
     #[command(flatten)]
     output: Output,
@@ -117,6 +119,19 @@ struct Answer {
     largest_displacement_mm: f64,
     steps: u64,
     contact_changes: u64,
+}
+
+/// The name of a recording in a form that can be written.
+fn recording_to_write(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let ending = file::ending(&path);
+    if WRITTEN.contains(&ending.as_str()) {
+        Ok(path)
+    } else {
+        Err(format!(
+            "`{text}` ends in \"{ending}\"; csv, uff or bunv is needed"
+        ))
+    }
 }
 
 /// Runs the verb.
@@ -196,7 +211,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         .record(&case, recorder, tachometer, &args.out)
         .map_err(named)?;
     args.channels.add_noise(&mut recording, args.seed)?;
-    recording.write_csv(&args.out)?;
+    recording.write(&args.out)?;
     let displacements = recording
         .channels
         .iter()

@@ -19,6 +19,14 @@ pub enum RecordingError {
         /// The ending.
         found: String,
     },
+    /// The ending of the name says a format that is not written.
+    #[error("{}: \"{found}\" is no format that can be written; csv, uff and bunv are", path.display())]
+    Written {
+        /// The file.
+        path: PathBuf,
+        /// The ending.
+        found: String,
+    },
     /// The bytes do not make the format that the name says.
     #[error("{}: {what}", path.display())]
     Content {

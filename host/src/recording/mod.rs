@@ -22,6 +22,9 @@ pub use spindle_angle::SpindleAngle;
 pub use uff::UffForm;
 pub use unit::{Quantity, Sensitivity, Unit, UnknownUnit};
 
+/// Endings of the names of recordings that can be written: CSV, UFF 58 as text, and in binary.
+pub const WRITTEN: [&str; 4] = ["csv", "uff", "unv", "bunv"];
+
 /// Channels that were sampled together, evenly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
@@ -90,13 +93,23 @@ impl Recording {
         assemble::recording(path, raw, Sidecar::beside(path)?)
     }
 
-    /// Writes it to `path` as CSV, with its sidecar: both whole, or as they were before.
+    /// Writes it to `path`, with its sidecar, in the form that the ending says: both whole, or as they were before.
     ///
     /// # Errors
-    /// A file cannot be written.
-    pub fn write_csv(&self, path: &Path) -> Result<(), RecordingError> {
-        csv::write(path, self)?;
-        self.sidecar.write_beside(path)
+    /// Another ending than those of [`WRITTEN`], or a file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), RecordingError> {
+        match crate::file::ending(path).as_str() {
+            "csv" => {
+                csv::write(path, self)?;
+                self.sidecar.write_beside(path)
+            }
+            "uff" | "unv" => self.write_uff(path, UffForm::Text),
+            "bunv" => self.write_uff(path, UffForm::Binary),
+            ending => Err(RecordingError::Written {
+                path: path.into(),
+                found: ending.into(),
+            }),
+        }
     }
 
     /// Writes it to `path` as UFF 58, with its sidecar: both whole, or as they were before.

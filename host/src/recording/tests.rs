@@ -204,7 +204,7 @@ proptest! {
             channels: vec![Channel { name: "fx".into(), quantity: Quantity::Force, samples }],
             sidecar: Sidecar { kind: Some(Kind::Sweep), ..Sidecar::default() },
         };
-        recording.write_csv(&path).unwrap();
+        recording.write(&path).unwrap();
         let back = Recording::read(&path).unwrap();
         prop_assert_eq!(&back.sidecar, &recording.sidecar);
         // Rounding of the time stamps, and nine digits of the samples.
