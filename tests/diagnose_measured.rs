@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use quietcut::case::Case;
 use quietcut::diagnose::answer::Outcome;
 use quietcut::diagnose::{Diagnosis, Options, diagnose};
+use quietcut::identify::response;
+use quietcut::identify::restoring_force::Term;
 use quietcut::recording::{Channel, Kind, Quantity, Recording, Sidecar};
 
 fn folder(name: &str) -> Option<PathBuf> {
@@ -107,5 +109,55 @@ fn the_silverbox_has_a_cubic_spring() {
     assert_eq!(found.causes[0].name, "cubic-stiffness");
     let k3 = found.causes[0].parameters["k3_n_per_m3"].value;
     assert!((k3 / 3.99 - 1.0).abs() < 0.02, "{k3}");
-    not_again(&believed, &found, &[train]);
+    not_again(&believed, &found, std::slice::from_ref(&train));
+
+    // The arrow is not part of the record above.
+    let arrow = 40_585;
+    let (mass, damping) = (1.0 / (omega * omega), 2.0 * 0.0486 / omega);
+    let missed_mv = |k3: f64, gain: f64| {
+        let law = [
+            (Term::Mass, mass),
+            (Term::Damping, damping),
+            (Term::Stiffness, 1.0),
+            (Term::CubicStiffness, k3),
+        ];
+        let motion = response::displacement(&law, &force[..arrow], SILVERBOX_RATE_HZ).unwrap();
+        let missed = motion.iter().zip(&displacement).map(|(x, y)| gain * x - y);
+        1e3 * (missed.map(|missed| missed * missed).sum::<f64>() / arrow as f64).sqrt()
+    };
+    let of_sensor = found.causes.iter().find(|cause| cause.name == "sensor-gain");
+    let gain = of_sensor.map_or(1.0, |cause| cause.parameters["gain"].value);
+    let (before, after) = (missed_mv(0.0, 1.0), missed_mv(k3, gain));
+    println!("arrow: {before:.2} mV -> {after:.3} mV, k3 {k3:.3}, sensor gain {gain:.4}");
+    assert!(before > 14.0 && after <= 0.96, "{before} {after}");
+}
+
+#[test]
+fn the_positioning_stage_has_dry_friction() {
+    let Some(folder) = folder("emps") else { return };
+    let raw = Recording::read(folder.join("DATA_EMPS.mat")).unwrap();
+    let samples = |name: &str| raw.channel(name).unwrap().samples.clone();
+    // gtau of the file.
+    let force: Vec<f64> = samples("vir").iter().map(|volts| 35.150_651_88 * volts).collect();
+    let record = recording("emps.csv", 1000.0, &force, &samples("qm"), None);
+    // What a fit of mass and viscous damping alone gives.
+    let believed = case_text(95.208, 411.26, 0.0);
+    let found = ask(&believed, std::slice::from_ref(&record));
+    assert_eq!(names(&found), ["damping", "coulomb-friction"]);
+    let near = |name: &str, key: &str, published: f64| {
+        let cause = found.causes.iter().find(|cause| cause.name == name).unwrap();
+        let value = cause.parameters[key].value;
+        println!("{name}.{key}: {value:.2}, published {published:.2}");
+        assert!((value / published - 1.0).abs() < 0.03, "{name}.{key}: {value}");
+    };
+    // Published are 20.394 N both ways and an offset of −3.165 N.
+    near("damping", "damping_ns_per_m", 203.50);
+    near("coulomb-friction", "fc_n", 20.394 - 3.165);
+    near("coulomb-friction", "fc_minus_n", 20.394 + 3.165);
+    let extended = found.extended_case(&believed).unwrap();
+    let again = ask(&extended, std::slice::from_ref(&record));
+    let (before, after) = (found.baseline.nrmse_heldout, again.baseline.nrmse_heldout);
+    println!("force error {:.2} % -> {:.2} %", 100.0 * before, 100.0 * after);
+    assert!(names(&again).is_empty(), "{:?}", names(&again));
+    assert!(before > 0.167 && after < 0.045, "{before} {after}");
 }

@@ -33,8 +33,11 @@ use puzzle::{Family, Puzzle};
 use quietcut::diagnose::{Options, diagnose};
 use serde_json::Value;
 
-/// What the tool answers; an error is an outcome of its own.
+/// What the tool answers; an error is an outcome of its own. Case and recordings are kept where `QUIETCUT_KEEP` names a folder.
 fn ask(puzzle: &Puzzle) -> Value {
+    if let Some(folder) = std::env::var_os("QUIETCUT_KEEP") {
+        puzzle.keep(std::path::Path::new(&folder));
+    }
     match diagnose(&puzzle.case, &puzzle.recordings, &Options { seed: puzzle.seed }) {
         Ok(diagnosis) => serde_json::to_value(diagnosis).unwrap(),
         Err(error) => serde_json::json!({ "outcome": format!("error: {error}") }),

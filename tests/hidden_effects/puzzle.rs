@@ -1,5 +1,7 @@
 //! What is handed to the tool: a case, recordings; and beside it what is hidden.
 
+use std::path::Path;
+
 use quietcut::case::Case;
 use quietcut::recording::Recording;
 use rand::seq::IndexedRandom;
@@ -67,6 +69,7 @@ pub(crate) struct Puzzle {
     pub(crate) family: Family,
     pub(crate) seed: u64,
     pub(crate) case: Case,
+    case_text: String,
     pub(crate) recordings: Vec<Recording>,
     pub(crate) hidden: Vec<Hidden>,
     /// Root mean square of the change that the effect makes, over the noise, in the channel where it is largest.
@@ -90,6 +93,15 @@ impl Puzzle {
                 return puzzle;
             }
             redrawn += 1;
+        }
+    }
+
+    /// Writes case and recordings to a folder, for `quietcut diagnose`.
+    pub(crate) fn keep(&self, folder: &Path) {
+        let name = format!("{}-{}.toml", self.family.name(), self.seed);
+        std::fs::write(folder.join(name), &self.case_text).unwrap();
+        for recording in &self.recordings {
+            recording.write(&folder.join(&recording.path)).unwrap();
         }
     }
 
@@ -147,10 +159,12 @@ impl Puzzle {
             values: cause.values(machine, scale),
             place: bench.place(cause),
         };
+        let case_text = bench.case_text();
         Some(Self {
             family,
             seed,
-            case: Case::parse("believed.toml".as_ref(), &bench.case_text()).unwrap(),
+            case: Case::parse("believed.toml".as_ref(), &case_text).unwrap(),
+            case_text,
             recordings: match &bench {
                 Bench::Rig(bench) => bench.rig.recordings(&output, &sigma, random, &name),
                 Bench::Cut(bench) => bench.recordings(&output, &sigma, random, &name),

@@ -130,30 +130,35 @@ const UNITS: [(f64, &str); 5] = [
 /// A model may be wrong by this factor before a unit is suspected.
 const WRONG_BY: f64 = 4.0;
 
+/// A prediction of less than so many times the energy that noise of the forces alone would bring tells nothing.
+const MOST_BY_NOISE: f64 = 25.0;
+
 /// Refuses a channel whose size cannot be that of the case: a wrong unit.
 ///
-/// `response` is what the case predicts of the forces alone. The factor is that by which it fits best; it counts where the two look alike.
+/// `response` is what the case predicts of the forces alone, `by_noise` the energy that it would have by the noise of the force
+/// sensors. The factor is that by which it fits best; it counts where the two look alike.
 pub(super) fn unit(
     path: &std::path::Path,
     channel: &Observed,
     response: &[f64],
+    by_noise: f64,
 ) -> Result<(), DiagnoseError> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let (own, cross) = (dot(response, response), dot(response, &channel.measured));
     let whole = dot(&channel.measured, &channel.measured);
-    if own <= 0.0 || whole <= 0.0 {
+    if own <= MOST_BY_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
-    if alike < 0.3 || (1.0 / WRONG_BY..WRONG_BY).contains(&factor) {
+    let size = factor.max(1.0 / factor);
+    let likely = UNITS.iter().find(|(unit, _)| (size / unit).ln().abs() < 0.4);
+    // Where no unit is known that would do, the shapes must be the same.
+    let least_alike = if likely.is_some() { 0.3 } else { 0.8 };
+    if alike < least_alike || (1.0 / WRONG_BY..WRONG_BY).contains(&factor) {
         return Ok(());
     }
-    let size = factor.max(1.0 / factor);
-    let likely = UNITS
-        .iter()
-        .find(|(unit, _)| (size / unit).ln().abs() < 0.4)
-        .map_or_else(String::new, |(_, meant)| format!(" It is about {meant}."));
+    let likely = likely.map_or_else(String::new, |(_, meant)| format!(" It is about {meant}."));
     Err(DiagnoseError::record(
         path,
         format!(

@@ -70,6 +70,10 @@ const STEP_ERROR: f64 = 1e-7;
 /// Largest displacement of a simulation over that of the record.
 const AWAY: f64 = 100.0;
 
+/// Steps for each sample of a record, in the mean, beyond which a simulation is given up: smooth motion needs one or two, and dry
+/// friction a few for each reversal.
+const STEPS_PER_SAMPLE: u64 = 25;
+
 /// What a term's own state is at rest, as a share of the largest displacement: nothing that could be seen.
 const AT_REST: f64 = 1e-9;
 
@@ -178,6 +182,7 @@ impl ClosedLoop {
             relative: STEP_ERROR,
             // Records may be in other units than meters: what is far beyond the measured motion has run away.
             largest_m: AWAY * largest_m(record),
+            steps_max: STEPS_PER_SAMPLE * count as u64,
             ..Settings::default()
         };
         let rate_hz = record.grid.rate_hz();

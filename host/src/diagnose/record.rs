@@ -179,12 +179,31 @@ impl Record {
                 }
                 for (index, channel) in record.channels.iter().enumerate() {
                     let response = record.decays.without(index, &channel.predicted);
-                    checks::unit(&record.path, channel, &response)?;
+                    let by_noise = record.energy_by_force_noise(index);
+                    checks::unit(&record.path, channel, &response, by_noise)?;
                 }
             }
             Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,
         }
         Ok(record)
+    }
+
+    /// Σ y² of what a channel reads of the response to the noise of the force sensors: σ² (N/N′) Σ |H|² over the N′ bins.
+    fn energy_by_force_noise(&self, channel: usize) -> f64 {
+        let nyquist = std::f64::consts::PI * self.grid.rate_hz();
+        let bins = 2.0 * nyquist / self.grid.omega(1);
+        let of_axis = |(deviation_n, response): (&f64, &Vec<Complex64>)| {
+            let below = response.iter().enumerate();
+            let below = below.take_while(|(bin, _)| self.grid.omega(*bin) <= nyquist);
+            deviation_n * deviation_n * below.map(|(_, response)| response.norm_sqr()).sum::<f64>()
+        };
+        let one_sided: f64 = self
+            .force_deviation_n
+            .iter()
+            .zip(&self.responses[channel])
+            .map(of_axis)
+            .sum();
+        2.0 * one_sided * self.grid.count() as f64 / bins
     }
 
     /// True where the motion along `axis` is more than what could be noise.

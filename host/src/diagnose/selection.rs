@@ -20,6 +20,8 @@ const SAMPLING_SIMULATED: f64 = 2e-4;
 const NUMERICS: f64 = 1e-4;
 /// What may be left beyond the noise, as a share of the noise: that of the estimate of the noise and of chance.
 pub(super) const WITHIN_NOISE: f64 = 0.15;
+/// What further causes must take of what is left beyond the noise: less is how one wrong equation mends another.
+const SHARE: f64 = 0.2;
 /// Most causes that act together.
 const CAUSES: usize = 3;
 /// Explanations of the regression that are simulated, by the number of their causes.
@@ -55,10 +57,9 @@ pub(super) struct Scale<'a> {
 impl<'a> Scale<'a> {
     pub(super) fn new(scene: &'a Scene<'a>, library: &Library, regression: &Regression) -> Self {
         let output_error = OutputError::new(scene);
-        // Along the measured motion terms of the baseline carry the noise of that motion: in closed loop they do not.
+        // Simulations are free to begin elsewhere, and do not carry the noise of the measured motion: like is compared with like.
         let closed = output_error
             .as_ref()
-            .filter(|_| !scene.baseline.terms.is_empty())
             .and_then(|output_error| output_error.left_by_baseline(library));
         Self {
             scene,
@@ -122,6 +123,24 @@ impl<'a> Scale<'a> {
         };
         of_noise / inflation < (4.0 * (2.0 / count).sqrt()).min(WITHIN_NOISE)
             || (best.is_some() && of_excess < sampling)
+    }
+
+    /// True where `more` takes enough of what `fewer` leave beyond the noise.
+    fn takes_its_share(
+        &self,
+        regression: &Regression,
+        fewer: Option<&Explanation>,
+        more: &Explanation,
+    ) -> bool {
+        let noise = regression.count(Share::Whole) as f64;
+        let before = fewer.map_or_else(
+            || match more.simulated {
+                Some(_) => self.reference,
+                None => regression.residual(Share::Whole),
+            },
+            |fewer| fewer.fit.left,
+        );
+        before - more.fit.left > SHARE * (before - noise).max(0.0)
     }
 
     /// What is left of the held-out parts if the parameters come from the fitted ones alone.
@@ -272,7 +291,10 @@ pub(super) fn select(
         let held_out = scale.left_held_out(library, regression, best);
         // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
         let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
-        if gained < reached + BELIEVED || held_out > regression.residual(Share::HeldOut) + chance {
+        if gained < reached + BELIEVED
+            || !scale.takes_its_share(regression, selection.best.as_ref(), best)
+            || held_out > regression.residual(Share::HeldOut) + chance
+        {
             continue;
         }
         let who = names(library, best);

@@ -36,6 +36,16 @@ pub enum SimulateError {
         /// How far the tool was.
         displacement_mm: f64,
     },
+    /// More steps than were allowed.
+    #[error(
+        "at {time_s:.6} s {steps} steps were taken, and no more are allowed: the equations are too stiff"
+    )]
+    TooManySteps {
+        /// When.
+        time_s: f64,
+        /// How many.
+        steps: u64,
+    },
     /// A tooth that neither cuts nor leaves the surface.
     #[error(
         "at {time_s:.6} s tooth {tooth} leaves the surface the moment it touches it and touches it the moment it leaves: the edge force is too large for this structure"

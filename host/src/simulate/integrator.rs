@@ -170,6 +170,11 @@ impl<'a> Integrator<'a> {
         self.start();
         let mut stuck = 0;
         while self.t < end_s {
+            let steps = self.statistics.steps + self.statistics.rejected;
+            if steps > self.settings.steps_max {
+                let time_s = self.t;
+                return Err(SimulateError::TooManySteps { time_s, steps });
+            }
             let stop_s = self.next_stop(end_s);
             let (h, event) = self.step_towards(stop_s)?;
             if h > 0.0 {

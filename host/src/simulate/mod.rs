@@ -113,6 +113,8 @@ pub struct Settings {
     pub relative: f64,
     /// A displacement beyond this ends the run as diverged, m.
     pub largest_m: f64,
+    /// More steps than this end the run: of equations that are too stiff to be worth it.
+    pub steps_max: u64,
 }
 
 impl Default for Settings {
@@ -122,6 +124,7 @@ impl Default for Settings {
             absolute_m: 1e-12,
             relative: 1e-8,
             largest_m: 0.1,
+            steps_max: u64::MAX,
         }
     }
 }

@@ -109,6 +109,7 @@ pub fn restoring_from(term: &dyn Term, motion: &Motion, own: &mut [f64]) -> [Vec
         let at = motion.at(sample);
         if let (Some(before), Some(branch)) = (before, branch)
             && !own.is_empty()
+            && !term.follow(&at, own)
         {
             step(term, branch, (&before, &at), motion.step_s, own);
         }

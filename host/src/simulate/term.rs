@@ -40,6 +40,12 @@ pub trait Term: Debug + Send + Sync {
         0
     }
 
+    /// Moves its states along a way that is known, from wherever they were to `at`, and true; false where they do not follow from the
+    /// way alone but from its speed.
+    fn follow(&self, _at: &At, _own: &mut [f64]) -> bool {
+        false
+    }
+
     /// Puts its own states to what they are where a motion is found going on; a simulation begins with zeros.
     fn begin(&self, _at: &At, _own: &mut [f64]) {}
 

@@ -198,7 +198,7 @@ fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpr
 }
 
 /// The most machines that a percentile is decided with.
-const DRAWN_MAX: u64 = 2_048_000;
+const DRAWN_MAX: u64 = 4_096_000;
 
 /// Decides whether percentiles are within 2 % also where the Monte Carlo does not know them to 2 %: a larger one is then drawn,
 /// until it knows them to 1 %.
@@ -277,7 +277,7 @@ fn percentiles_over_lobes_cusps_and_islands_are_those_of_2000_machines() {
 
 /// Beside the gap between flip notch and Hopf limits few machines have a limit, and 2 000 know the 95 % limit to 20 %.
 #[test]
-#[ignore = "two million machines; see the comment above for the command"]
+#[ignore = "four million machines; see the comment above for the command"]
 fn percentiles_over_the_bottom_of_the_flip_notch_are_those_of_as_many_machines_as_know_them() {
     compare_and_decide(1045.0);
 }

@@ -96,6 +96,7 @@ fn settled(case: &Case, rpm: f64, depth_mm: f64, turns: usize, regeneration: Reg
         absolute_m: 1e-14,
         relative: 1e-10,
         largest_m: 0.1,
+        ..Settings::default()
     };
     model
         .run(at_s + 0.1 * turn_s, settings, |segment| {

@@ -46,6 +46,8 @@ struct Restoring {
     shape: &'static [&'static str],
     /// How many axes it joins.
     axes: usize,
+    /// Whether it may also act along all axes at once, by one law.
+    everywhere: bool,
     /// A grid of shapes for what moves as it does in the scene.
     shapes: fn(&Scene<'_>, usize) -> Vec<Vec<f64>>,
     /// Bounds of the shape.
@@ -63,6 +65,7 @@ const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring
         linear,
         shape: &[],
         axes: 1,
+        everywhere: false,
         shapes: |_, _| vec![Vec::new()],
         bounds: |_, _| Vec::new(),
         behind_play: false,
@@ -175,7 +178,10 @@ impl Cause for Restoring {
         }
         let axes = scene.driven_axes();
         match self.axes {
-            1 => axes.into_iter().map(Place::Axis).collect(),
+            1 => {
+                let together = (self.everywhere && axes.len() > 1).then_some(Place::Everywhere);
+                axes.into_iter().map(Place::Axis).chain(together).collect()
+            }
             _ => axes
                 .iter()
                 .flat_map(|a| axes.iter().map(move |b| (*a, *b)))

@@ -190,6 +190,15 @@ impl Term for BehindPlay {
         self.friction.sliding(branch)
     }
 
+    /// The play operator: the slider stays where it is as long as the tool is no further from it than half the play. A hair
+    /// beyond that is the end of the play.
+    fn follow(&self, at: &At, own: &mut [f64]) -> bool {
+        let reach_m = self.half_play_m * (1.0 + 1e-9);
+        let x = at.x[self.friction.axis];
+        own[0] = own[0].clamp(x - reach_m, x + reach_m);
+        true
+    }
+
     fn rate(&self, branch: Branch, at: &At, _: &[f64], rate: &mut [f64]) {
         rate[0] = match branch {
             FORWARD | BACKWARD => at.v[self.friction.axis],

@@ -83,5 +83,6 @@ fn exact(relative: f64) -> Settings {
         absolute_m: 1e-4 * relative,
         relative,
         largest_m: f64::INFINITY,
+        ..Settings::default()
     }
 }

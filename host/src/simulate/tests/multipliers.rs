@@ -80,6 +80,7 @@ fn multiplier_over(
         absolute_m: if model.drive.is_some() { 1e-18 } else { 1e-300 },
         relative: 1e-9,
         largest_m: f64::INFINITY,
+        ..Settings::default()
     };
     // Not where a tooth enters or leaves: velocities may jump there.
     let end_s = (periods as f64 + 0.5) * period_s;

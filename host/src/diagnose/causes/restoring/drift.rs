@@ -2,7 +2,10 @@
 
 use super::{Restoring, logarithmic, longest_s, plain};
 
-pub(super) const RATE: Restoring = plain("drift", &["relative_rate_per_s"]);
+pub(super) const RATE: Restoring = Restoring {
+    everywhere: true,
+    ..plain("drift", &["relative_rate_per_s"])
+};
 
 pub(super) const SETTLING: Restoring = Restoring {
     shape: &["time_constant_s"],
@@ -13,6 +16,9 @@ pub(super) const SETTLING: Restoring = Restoring {
             .map(|t| vec![t])
             .collect()
     },
+    everywhere: true,
+    // A stiffness that more than doubles, or vanishes, is another machine.
+    physical: |change| change.iter().all(|change| change.abs() <= 1.0),
     bounds: |scene, _| vec![[0.05 * longest_s(scene), 2.0 * longest_s(scene)]],
     ..plain("drift", &["relative_change"])
 };
