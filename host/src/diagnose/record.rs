@@ -482,5 +482,5 @@ fn response(baseline: &Baseline<'_>, grid: &Grid) -> Vec<Matrix3<Complex64>> {
 
 /// Z(iω) over the axes of the structure; zero where it is not known.
 fn dynamic_stiffness(baseline: &Baseline<'_>, grid: &Grid) -> Vec<Matrix3<Complex64>> {
-    super::stiffness::table(baseline.structure, &baseline.first_order, &baseline.axes, grid)
+    super::stiffness::table(&baseline.altered, &baseline.first_order, &baseline.axes, grid)
 }

@@ -29,6 +29,8 @@ pub struct Baseline<'a> {
     pub structure: &'a Structure,
     /// Its extensions.
     pub effects: Effects,
+    /// The structure with what the case's extensions make of its numbers.
+    pub altered: Structure,
     /// What the equation of motion has besides the linear structure.
     pub terms: Vec<Box<dyn Term>>,
     /// The linear structure with all that extensions change in it.
@@ -61,7 +63,9 @@ impl<'a> Baseline<'a> {
             terms.push(cubic);
         }
         let first_order = dynamics.first_order();
+        let altered = effects.altered(structure).map_err(|error| wrong(error.into()))?;
         Ok(Self {
+            altered,
             case,
             structure,
             effects,

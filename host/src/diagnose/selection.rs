@@ -291,8 +291,13 @@ pub(super) fn select(
         let held_out = scale.left_held_out(library, regression, best);
         // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
         let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
+        let takes_its_share = scale.takes_its_share(regression, selection.best.as_ref(), best);
+        // Where two more take little, a third would mend what the others get wrong.
+        if size > 1 && !takes_its_share {
+            break;
+        }
         if gained < reached + BELIEVED
-            || !scale.takes_its_share(regression, selection.best.as_ref(), best)
+            || !takes_its_share
             || held_out > regression.residual(Share::HeldOut) + chance
         {
             continue;

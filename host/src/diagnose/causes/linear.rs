@@ -138,10 +138,12 @@ impl Cause for Linear {
             }
             Domain::Force => {
                 let of = |effect: &Effects, first_order| {
-                    let mut structure = baseline.structure.clone();
-                    for effect in &baseline.effects.clone().and(effect).0 {
-                        effect.alter_structure(&mut structure).ok()?;
-                    }
+                    let structure = baseline
+                        .effects
+                        .clone()
+                        .and(effect)
+                        .altered(baseline.structure)
+                        .ok()?;
                     Some(stiffness::table(&structure, first_order, &baseline.axes, grid))
                 };
                 let (below, above) = (of(&below_effect, &below)?, of(&above_effect, &above)?);

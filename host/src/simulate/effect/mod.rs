@@ -265,15 +265,24 @@ impl Effects {
         self
     }
 
+    /// The structure as these effects make it, as far as that is a change of its own numbers.
+    ///
+    /// # Errors
+    /// An effect that the structure cannot have.
+    pub fn altered(&self, structure: &Structure) -> Result<Structure, EffectError> {
+        let mut structure = structure.clone();
+        for effect in &self.0 {
+            effect.alter_structure(&mut structure)?;
+        }
+        Ok(structure)
+    }
+
     /// The equations of `structure` with these effects.
     ///
     /// # Errors
     /// What an effect cannot do to this structure, or an indefinite structure.
     pub fn dynamics(&self, structure: &Structure) -> Result<(Dynamics, Vec<Box<dyn Term>>), SimulateError> {
-        let mut structure = structure.clone();
-        for effect in &self.0 {
-            effect.alter_structure(&mut structure)?;
-        }
+        let structure = self.altered(structure)?;
         let mut dynamics = Dynamics::new(&structure)?;
         let mut terms = Vec::new();
         for effect in &self.0 {
