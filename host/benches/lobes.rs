@@ -253,13 +253,26 @@ fn limits_with_cubic_terms() {
         };
         let problem = ForcedProblem::new(&setting.case()).expect("a case with cubic terms");
         let speeds_rpm = setting.speeds_rpm(30);
-        let began = Instant::now();
-        problem.lines(&speeds_rpm, setting.depth_mm, 40).expect("limits");
+        let (mut limits, mut all_s, mut slowest) = (0, 0.0, (0.0, 0.0));
+        for rpm in &speeds_rpm {
+            let began = Instant::now();
+            let lines = problem.lines(&[*rpm], setting.depth_mm, 40).expect("limits");
+            let taken_s = began.elapsed().as_secs_f64();
+            limits += lines.iter().map(|line| line.switches.len()).sum::<usize>();
+            all_s += taken_s;
+            if taken_s > slowest.0 {
+                slowest = (taken_s, *rpm);
+            }
+        }
         println!(
-            "{file}, {} to {} rev/min, cubic terms: {:.1} ms a limit",
+            "{file}, {} to {} rev/min, cubic terms: {:.1} ms a speed with all its limits, {:.1} ms a limit; the slowest speed, \
+             {:.0} rev/min, {:.1} ms",
             rpm.0,
             rpm.1,
-            began.elapsed().as_secs_f64() * 1e3 / speeds_rpm.len() as f64
+            all_s * 1e3 / speeds_rpm.len() as f64,
+            all_s * 1e3 / limits as f64,
+            slowest.1,
+            slowest.0 * 1e3
         );
     }
 }
@@ -270,10 +283,10 @@ fn main() {
         .build()
         .expect("one thread");
     one_thread.install(|| {
+        limits_with_cubic_terms();
         for setting in &SETTINGS {
             compare(setting);
         }
-        limits_with_cubic_terms();
     });
     let mut criterion = Criterion::default().configure_from_args().sample_size(10);
     for setting in &SETTINGS {

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::forced::ForcedProblem;
-use super::orbit::{Orbit, OrbitError, PeriodMap, Scale};
+use super::orbit::{Orbit, OrbitError, PeriodMap, Scale, Tangent};
 use super::revolution::RevolutionPeriod;
 use super::tooth_period::ToothPeriod;
 use crate::stability::line::union;
@@ -168,11 +168,8 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
 pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
     let rest = Orbit::rest(map);
     let linear = map.pass(&rest.start, 0.0, &rest.states).and_then(|passage| {
-        let mut periodic = -passage.by_start;
-        for i in 0..map.size() {
-            periodic[(i, i)] += 1.0;
-        }
-        periodic.lu().solve(&(passage.by_depth * depth_m))
+        let by_depth = passage.by.column(map.size()) * depth_m;
+        passage.periodic().lu().solve(&by_depth)
     });
     // Without a force the orbit is rest, and any length will do.
     linear
@@ -191,7 +188,7 @@ struct Follower<M> {
 #[derive(Clone)]
 struct Sample {
     orbit: Orbit,
-    tangent: DVector<f64>,
+    tangent: Tangent,
     /// Multipliers in the upper half plane or on the real axis that are near the circle or outside.
     roots: Vec<Complex64>,
     largest: f64,
@@ -227,14 +224,14 @@ impl<M: PeriodMap> Follower<M> {
         let mut step = STEP_MAX;
         while here.orbit.depth_m < depth_m {
             let depth_mm = here.orbit.depth_m * 1e3;
-            if here.tangent[order] <= 0.0 {
+            let towards = here.tangent.along[order] * self.scale.depth_m;
+            if towards <= 0.0 {
                 return Err(OrbitError::Lost { depth_mm });
             }
-            let next = if here.orbit.depth_m + here.tangent[order] * step * self.scale.depth_m >= depth_m {
+            let next = if here.orbit.depth_m + towards * step >= depth_m {
                 // The last step ends at the depth itself.
-                let mut guess = here.orbit.clone();
-                let rest = (depth_m - guess.depth_m) / (here.tangent[order] * self.scale.depth_m);
-                guess.start += here.tangent.rows(0, order) * (rest * self.scale.state);
+                let rest = (depth_m - here.orbit.depth_m) / towards;
+                let mut guess = here.orbit.along(&here.tangent, rest, self.scale);
                 guess.depth_m = depth_m;
                 self.sample(&guess, &along_depth)
             } else {
@@ -296,11 +293,15 @@ impl<M: PeriodMap> Follower<M> {
 
     /// The sample a step further along the branch.
     fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
-        let order = self.map.size();
-        let mut guess = from.orbit.clone();
-        guess.start += from.tangent.rows(0, order) * (step * self.scale.state);
-        guess.depth_m += from.tangent[order] * step * self.scale.depth_m;
-        self.sample(&guess, &from.tangent)
+        let guess = from.orbit.along(&from.tangent, step, self.scale);
+        self.sample(&guess, &from.tangent.along)
+    }
+
+    /// The depth a step further along the branch, m.
+    fn depth_m(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
+        let guess = from.orbit.along(&from.tangent, step, self.scale);
+        let (orbit, _) = Orbit::correct(&self.map, &guess, self.scale, &from.tangent.along)?;
+        Ok(orbit.depth_m)
     }
 
     fn sample(&self, guess: &Orbit, normal: &DVector<f64>) -> Result<Sample, OrbitError> {
@@ -325,13 +326,15 @@ impl<M: PeriodMap> Follower<M> {
     }
 
     /// The crossing of the multiplier that goes from one value to another over a step, with the length of the step to
-    /// it: false position with halved weights (Illinois), which keeps the crossing enclosed.
+    /// it: regula falsi, in which an end that stays is weighed less by what its last step gained (Anderson and Björck), which
+    /// keeps the crossing enclosed.
     fn refine(&self, here: &Sample, step: f64, from: Complex64, to: Complex64) -> Option<(f64, Event)> {
         let (mut low, mut high) = ((0.0, from.norm() - 1.0), (step, to.norm() - 1.0));
         let outward = high.1 > 0.0;
         let (mut low_root, mut high_root) = (from, to);
         let mut sample = here.clone();
         let mut root = from;
+        let mut stays = None;
         for _ in 0..60 {
             let middle = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
             let share = ((middle - low.0) / (high.0 - low.0)).clamp(0.0, 1.0);
@@ -342,15 +345,18 @@ impl<M: PeriodMap> Follower<M> {
             if excess.abs() < 1e-11 || high.0 - low.0 < 1e-11 {
                 break;
             }
-            if (excess > 0.0) == (high.1 > 0.0) {
-                high = (middle, excess);
-                high_root = root;
-                low.1 *= 0.5;
+            let is_high = (excess > 0.0) == outward;
+            let (new, new_root, old) = if is_high {
+                (&mut high, &mut high_root, &mut low)
             } else {
-                low = (middle, excess);
-                low_root = root;
-                high.1 *= 0.5;
+                (&mut low, &mut low_root, &mut high)
+            };
+            if stays == Some(!is_high) {
+                let gained = 1.0 - excess / new.1;
+                old.1 *= if gained > 0.0 { gained } else { 0.5 };
             }
+            stays = Some(!is_high);
+            (*new, *new_root) = ((middle, excess), root);
         }
         let on_circle = root / root.norm();
         let kind = Kind::of(root);
@@ -380,8 +386,10 @@ impl<M: PeriodMap> Follower<M> {
         };
         // Across the branch as far as states of the structure go, which are the same on both meshes.
         let mut normal = DVector::zeros(finer.map.size() + 1);
-        normal.rows_mut(0, order).copy_from(&at.tangent.rows(0, order));
-        normal[finer.map.size()] = at.tangent[self.map.size()];
+        normal
+            .rows_mut(0, order)
+            .copy_from(&at.tangent.along.rows(0, order));
+        normal[finer.map.size()] = at.tangent.along[self.map.size()];
         let length = normal.norm();
         let there = finer
             .sample(&at.orbit.onto(&self.map, &finer.map), &(normal / length))
@@ -395,7 +403,7 @@ impl<M: PeriodMap> Follower<M> {
             return None;
         }
         let depth_m = at.orbit.depth_m;
-        let shift_m = |step: f64| Some((self.step(at, step).ok()?.orbit.depth_m - depth_m).abs());
+        let shift_m = |step: f64| Some((self.depth_m(at, step).ok()? - depth_m).abs());
         let along_m = shift_m(reach)?.max(shift_m(-reach)?);
         // At a fold the depth does not change along the branch: there, what has been checked of orbits is the least.
         Some(along_m.max(LEAST_ERROR * depth_m) + ROOM * (there.orbit.depth_m - depth_m).abs())
@@ -425,12 +433,14 @@ impl<M: PeriodMap> Follower<M> {
 
 /// Pairs the multipliers of two samples; `None` where one near the circle cannot be recognized again.
 ///
-/// With `anyhow` the nearest is taken however far: two real multipliers that meet and leave the axis move infinitely
-/// fast there, and no step is short enough.
+/// With `anyhow` the nearest is taken however far: two real multipliers that meet on the circle and leave the axis move
+/// infinitely fast there, and no step is short enough.
 fn pair(from: &[Complex64], to: &[Complex64], anyhow: bool) -> Option<Vec<(Complex64, Complex64)>> {
-    let mut free = to.to_vec();
+    let (mut from, mut free) = (from.to_vec(), to.to_vec());
+    take_met(&mut from, &mut free);
+    take_met(&mut free, &mut from);
     let mut pairs = Vec::with_capacity(from.len());
-    for &root in from {
+    for root in from {
         let best = free
             .iter()
             .enumerate()
@@ -451,6 +461,26 @@ fn pair(from: &[Complex64], to: &[Complex64], anyhow: bool) -> Option<Vec<(Compl
         }
     }
     (anyhow || free.iter().all(|&root| is_far(root))).then_some(pairs)
+}
+
+/// Takes out conjugate pairs of one sample that are two real multipliers in the other, on the same side of the circle: they have
+/// met on the axis over the step, and none of them has crossed.
+fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
+    conjugate.retain(|&root| {
+        let reach = MOVE_MAX * root.norm().max(1.0);
+        let is_near = |other: &Complex64| (other - root).norm() < reach;
+        if root.im == 0.0 || real.iter().any(|other| other.im != 0.0 && is_near(other)) {
+            return true;
+        }
+        let is_half = |other: &Complex64| {
+            other.im == 0.0 && is_near(other) && (other.norm() > 1.0) == (root.norm() > 1.0)
+        };
+        if real.iter().filter(|other| is_half(other)).count() != 2 {
+            return true;
+        }
+        real.retain(|other| !is_half(other));
+        false
+    });
 }
 
 /// True where a multiplier cannot reach the circle in a step.

@@ -4,43 +4,18 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::stability::gauss::Gauss;
 
-/// Newton stops at steps below this, relative to the size of the orbit.
-const TOLERANCE: f64 = 1e-12;
-
-/// Derivatives about states within this share of the orbit are those about the states themselves: Newton that uses them gains
-/// eight digits in a step.
-const SAME: f64 = 1e-8;
-
-/// Solves for the states at the nodes of a piece from a guess, and linearizes about them.
-///
-/// Newton with a factorization that is kept while steps shrink tenfold. `None` where it does not settle.
-pub(super) fn settle<'a>(
-    start: &DVector<f64>,
-    guess: &DMatrix<f64>,
-    rates: impl Fn(&DMatrix<f64>) -> Vec<DVector<f64>>,
-    linearized: impl Fn(&DMatrix<f64>) -> Linearized<'a>,
-) -> Option<(DMatrix<f64>, Linearized<'a>)> {
-    let mut states = guess.clone();
-    let mut about = linearized(&states);
-    let (mut moved, mut last) = (0.0, f64::INFINITY);
-    for _ in 0..24 {
-        let step = about.correction(start, &states, &rates(&states))?;
-        states += &step;
-        let size = step.amax();
-        moved += size;
-        if size <= TOLERANCE * states.amax() {
-            if moved > SAME * states.amax() {
-                about = linearized(&states);
-            }
-            return Some((states, about));
-        }
-        if size > 0.1 * last {
-            about = linearized(&states);
-            moved = 0.0;
-        }
-        last = size;
-    }
-    None
+/// A piece after a step of Newton from its start.
+pub(super) struct Advanced {
+    /// The states at the nodes, n × m.
+    pub(super) states: DMatrix<f64>,
+    /// The state at the end.
+    pub(super) end: DVector<f64>,
+    /// The derivatives of the states at the nodes, (n m) × anything.
+    pub(super) values: DMatrix<f64>,
+    /// The derivatives of the state at the end.
+    pub(super) end_by: DMatrix<f64>,
+    /// The largest change of a state at a node, as a share of the largest there.
+    pub(super) moved: f64,
 }
 
 /// A piece linearized about the states at its nodes.
@@ -94,50 +69,65 @@ impl<'a> Linearized<'a> {
         sum
     }
 
-    /// The change of the states at the nodes, n × m, that Newton makes of their rates, from a start; `None` where the piece is
-    /// singular or the numbers are no longer finite.
-    pub(super) fn correction(
+    /// Newton's step from a start with its derivatives `by`, for the states at the nodes that the piece is linearized about,
+    /// their rates, and what acts on them: the derivatives of the rates beside those through the states, n × anything each.
+    ///
+    /// `None` where the piece is singular or the numbers are no longer finite.
+    pub(super) fn advance(
         &self,
         start: &DVector<f64>,
+        by: &DMatrix<f64>,
         states: &DMatrix<f64>,
         rates: &[DVector<f64>],
-    ) -> Option<DMatrix<f64>> {
-        let (order, nodes) = (self.order(), self.gauss.nodes.len());
-        let mut residual = DMatrix::zeros(order * nodes, 1);
+        forces: &[DMatrix<f64>],
+    ) -> Option<Advanced> {
+        let (order, nodes, columns) = (self.order(), self.gauss.nodes.len(), by.ncols());
+        // The first column is the residual, the others are the derivatives.
+        let mut right = DMatrix::zeros(order * nodes, columns + 1);
         for i in 0..nodes {
-            let mut row = start - states.column(i);
-            for (j, rate) in rates.iter().enumerate() {
-                row.axpy(self.duration_s * self.gauss.integrals[(i, j)], rate, 1.0);
+            let mut block = right.view_mut((i * order, 0), (order, columns + 1));
+            block.column_mut(0).copy_from(&(start - states.column(i)));
+            block.columns_mut(1, columns).copy_from(by);
+            for (j, (rate, force)) in rates.iter().zip(forces).enumerate() {
+                let weight = self.duration_s * self.gauss.integrals[(i, j)];
+                block.column_mut(0).axpy(weight, rate, 1.0);
+                let mut others = block.columns_mut(1, columns);
+                others.zip_apply(force, |entry, value| *entry += weight * value);
             }
-            residual.view_mut((i * order, 0), (order, 1)).copy_from(&row);
         }
-        let step = self.solve(&residual)?;
-        step.iter()
-            .all(|entry| entry.is_finite())
-            .then(|| DMatrix::from_column_slice(order, nodes, step.as_slice()))
+        if !self.factored.solve_mut(&mut right) {
+            return None;
+        }
+        let gathered = self.gather(&right);
+        let mut end = start + gathered.column(0);
+        let mut end_by = by + gathered.columns(1, columns);
+        for ((rate, force), weight) in rates.iter().zip(forces).zip(&self.gauss.weights) {
+            let weight = self.duration_s * weight;
+            end.axpy(weight, rate, 1.0);
+            end_by.zip_apply(force, |entry, value| *entry += weight * value);
+        }
+        let step = DMatrix::from_column_slice(order, nodes, right.column(0).as_slice());
+        let states = states + &step;
+        let moved = step.amax() / states.amax().max(f64::MIN_POSITIVE);
+        (moved.is_finite() && end.iter().all(|entry| entry.is_finite())).then(|| Advanced {
+            states,
+            end,
+            values: right.remove_column(0),
+            end_by,
+            moved,
+        })
     }
 
-    /// What the values at the nodes and the end of the piece become under forces at the nodes, n × anything each, and a start.
-    pub(super) fn response(
-        &self,
-        start: &DMatrix<f64>,
-        forces: &[DMatrix<f64>],
-    ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    /// The values at the nodes and the end of the piece, both by its start.
+    pub(super) fn flow(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (order, nodes) = (self.order(), self.gauss.nodes.len());
-        let mut right = DMatrix::zeros(order * nodes, start.ncols());
-        for i in 0..nodes {
-            let mut row = start.clone();
-            for (j, force) in forces.iter().enumerate() {
-                let weight = self.duration_s * self.gauss.integrals[(i, j)];
-                row.zip_apply(force, |entry, value| *entry += weight * value);
-            }
-            right.rows_mut(i * order, order).copy_from(&row);
-        }
-        let values = self.solve(&right)?;
-        let mut end = start + self.gather(&values);
-        for (force, weight) in forces.iter().zip(&self.gauss.weights) {
-            let weight = self.duration_s * weight;
-            end.zip_apply(force, |entry, value| *entry += weight * value);
+        let start = DMatrix::from_fn(order * nodes, order, |row, column| {
+            f64::from(row % order == column)
+        });
+        let values = self.solve(&start)?;
+        let mut end = self.gather(&values);
+        for i in 0..order {
+            end[(i, i)] += 1.0;
         }
         Some((values, end))
     }

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use super::collocated::Advanced;
 use super::forced::ForcedProblem;
 use crate::stability::gauss::Gauss;
 
@@ -40,14 +41,58 @@ pub struct Orbit {
     pub(super) states: Vec<DMatrix<f64>>,
 }
 
-/// The map over the period at a start and a depth.
+/// Newton's step over the period at a start and a depth: what the equations linearized about the states at the nodes make of it.
 pub(super) struct Passage {
     pub(super) end: DVector<f64>,
-    /// ∂end/∂start.
-    pub(super) by_start: DMatrix<f64>,
-    /// ∂end/∂depth, 1/m.
-    pub(super) by_depth: DVector<f64>,
+    /// ∂end/∂(start, depth); the last column is that of the depth, 1/m.
+    pub(super) by: DMatrix<f64>,
+    /// For each piece the states at its nodes.
     pub(super) states: Vec<DMatrix<f64>>,
+    /// For each piece the derivatives of the states at its nodes, (n m) × those of the end.
+    pub(super) values: Vec<DMatrix<f64>>,
+    /// The largest change of a state at a node, as a share of the largest in its piece: what the states before were off.
+    pub(super) moved: f64,
+}
+
+impl Passage {
+    /// Before the first piece: a state with `columns` derivatives, the first of them in its own numbers.
+    pub(super) fn from(start: DVector<f64>, columns: usize) -> Self {
+        Self {
+            by: DMatrix::identity(start.len(), columns),
+            end: start,
+            states: Vec::new(),
+            values: Vec::new(),
+            moved: 0.0,
+        }
+    }
+
+    /// Goes over a piece.
+    pub(super) fn take(&mut self, piece: Advanced) {
+        self.end = piece.end;
+        self.by = piece.end_by;
+        self.states.push(piece.states);
+        self.values.push(piece.values);
+        self.moved = self.moved.max(piece.moved);
+    }
+
+    /// I − ∂end/∂start: what a periodic start is solved with.
+    pub(super) fn periodic(&self) -> DMatrix<f64> {
+        let size = self.end.len();
+        let mut periodic = -self.by.columns(0, size);
+        for i in 0..size {
+            periodic[(i, i)] += 1.0;
+        }
+        periodic
+    }
+}
+
+/// Which way a branch goes at an orbit.
+#[derive(Clone, Debug)]
+pub(super) struct Tangent {
+    /// The unit vector along (start/size, depth/depth size).
+    pub(super) along: DVector<f64>,
+    /// For each piece the change of the states at its nodes over a unit of length, n × m.
+    states: Vec<DMatrix<f64>>,
 }
 
 /// A part of the period without a switch: when, and where its nodes are.
@@ -58,9 +103,13 @@ pub(super) struct Span<'a> {
     pub(super) gauss: &'a Gauss,
 }
 
-/// Newton stops at steps below this, relative to the orbit: the step after it would be far below rounding, and the states at the
-/// nodes, which are those before it, are as good as the collocation.
-const SETTLED: f64 = 1e-10;
+/// Newton stops where the step after the last would be below this, relative to the orbit.
+///
+/// Steps of Newton shrink as e' = C e², so that two of them, e and then e', foretell the next: C e'² = e'³/e².
+const SETTLED: f64 = 1e-12;
+
+/// Steps above this foretell nothing yet.
+const NEAR: f64 = 1e-3;
 
 /// The map of a forced problem over a period at one speed, on one mesh. Orbits are its fixed points.
 pub(super) trait PeriodMap: Sized {
@@ -73,7 +122,8 @@ pub(super) trait PeriodMap: Sized {
     /// The pieces of the period, in order.
     fn spans(&self) -> Vec<Span<'_>>;
 
-    /// The map, with derivatives; `guess` holds states at the nodes to begin with. `None` where Newton does not settle.
+    /// The map, with derivatives, linearized about states at the nodes: exact where `guess` holds those of the motion from the start.
+    /// `None` where a piece is singular.
     fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage>;
 
     /// What the map takes of a motion with a state at the start and with states at the nodes.
@@ -136,10 +186,7 @@ impl Orbit {
         let singular = OrbitError::Singular { depth_mm };
         let rest = Self::rest(map);
         let from_rest = map.pass(&rest.start, depth_m, &rest.states).ok_or(singular)?;
-        let mut periodic = -from_rest.by_start;
-        for i in 0..map.size() {
-            periodic[(i, i)] += 1.0;
-        }
+        let periodic = from_rest.periodic();
         let start = periodic.lu().solve(&from_rest.end).ok_or(singular)?;
         let around = map.pass(&start, depth_m, &rest.states).ok_or(singular)?;
         Ok(Self {
@@ -149,16 +196,27 @@ impl Orbit {
         })
     }
 
+    /// A guess at the orbit a length further along a branch.
+    pub(super) fn along(&self, tangent: &Tangent, length: f64, scale: Scale) -> Self {
+        let order = self.start.len();
+        let states = self.states.iter().zip(&tangent.states);
+        Self {
+            depth_m: self.depth_m + tangent.along[order] * length * scale.depth_m,
+            start: &self.start + tangent.along.rows(0, order) * (length * scale.state),
+            states: states.map(|(states, by)| states + by * length).collect(),
+        }
+    }
+
     /// Corrects a guess to the orbit on the hyperplane ⟨normal, (start/size, depth/depth_size) − guess⟩ = 0.
     ///
-    /// With a normal along depth alone this is Newton at fixed depth; with the tangent it passes folds. Returns
-    /// the orbit and the unit tangent there, oriented along `normal`.
+    /// With a normal along depth alone this is Newton at fixed depth; with the tangent it passes folds. States at the nodes
+    /// are corrected together with the start. Returns the orbit and the tangent there, oriented along `normal`.
     pub(super) fn correct(
         map: &impl PeriodMap,
         guess: &Self,
         scale: Scale,
         normal: &DVector<f64>,
-    ) -> Result<(Self, DVector<f64>), OrbitError> {
+    ) -> Result<(Self, Tangent), OrbitError> {
         let order = map.size();
         let mut orbit = guess.clone();
         let mut distance = 0.0;
@@ -168,38 +226,45 @@ impl Orbit {
             let passage = map
                 .pass(&orbit.start, orbit.depth_m, &orbit.states)
                 .ok_or(OrbitError::NoConvergence { depth_mm })?;
-            orbit.states = passage.states;
             let mut matrix = DMatrix::zeros(order + 1, order + 1);
-            let mut periodic = passage.by_start;
-            for i in 0..order {
-                periodic[(i, i)] -= 1.0;
-            }
-            matrix.view_mut((0, 0), (order, order)).copy_from(&periodic);
+            matrix
+                .view_mut((0, 0), (order, order))
+                .copy_from(&passage.periodic());
             matrix
                 .view_mut((0, order), (order, 1))
-                .copy_from(&(passage.by_depth * (scale.depth_m / scale.state)));
+                .copy_from(&(passage.by.column(order) * (-scale.depth_m / scale.state)));
             matrix.row_mut(order).copy_from(&normal.transpose());
             let lu = matrix.lu();
             let mut residual = DVector::zeros(order + 1);
             residual
                 .rows_mut(0, order)
-                .copy_from(&((&orbit.start - passage.end) / scale.state));
+                .copy_from(&((&passage.end - &orbit.start) / scale.state));
             residual[order] = -distance;
             let step = lu.solve(&residual).ok_or(OrbitError::Singular { depth_mm })?;
-            orbit.start += step.rows(0, order) * scale.state;
-            orbit.depth_m += step[order] * scale.depth_m;
+            let change = scale.unscaled(&step);
+            orbit.start += change.rows(0, order);
+            orbit.depth_m += change[order];
             distance += normal.dot(&step);
-            let size = step.norm();
+            orbit.states = passage.states;
+            for (states, values) in orbit.states.iter_mut().zip(&passage.values) {
+                *states += shaped(values * &change, states.nrows());
+            }
+            let size = step.norm().max(passage.moved);
             if !size.is_finite() || (iteration > 4 && size > 2.0 * last) {
                 return Err(OrbitError::NoConvergence { depth_mm });
             }
-            last = size;
-            if size < SETTLED {
-                let mut along = DVector::zeros(order + 1);
-                along[order] = 1.0;
-                let tangent = lu.solve(&along).ok_or(OrbitError::Singular { depth_mm })?;
-                return Ok((orbit, tangent.normalize()));
+            if size < SETTLED || (last < NEAR && size * (size / last).powi(2) < SETTLED) {
+                let mut unit = DVector::zeros(order + 1);
+                unit[order] = 1.0;
+                let tangent = lu.solve(&unit).ok_or(OrbitError::Singular { depth_mm })?;
+                let along = tangent.normalize();
+                let change = scale.unscaled(&along);
+                let states = passage.values.iter().zip(&orbit.states);
+                let states = states.map(|(values, states)| shaped(values * &change, states.nrows()));
+                let states = states.collect();
+                return Ok((orbit, Tangent { along, states }));
             }
+            last = size;
         }
         Err(OrbitError::NoConvergence {
             depth_mm: orbit.depth_m * 1e3,
@@ -207,9 +272,24 @@ impl Orbit {
     }
 }
 
+/// Values at the nodes, one under the other, side by side.
+fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
+    let nodes = values.len() / order;
+    DMatrix::from_column_slice(order, nodes, values.as_slice())
+}
+
 /// What states and depth are divided by before lengths along a branch are taken.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) state: f64,
     pub(super) depth_m: f64,
+}
+
+impl Scale {
+    /// A change of (start/size, depth/depth size) as one of start and depth.
+    fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
+        let mut change = step * self.state;
+        change[step.len() - 1] = step[step.len() - 1] * self.depth_m;
+        change
+    }
 }

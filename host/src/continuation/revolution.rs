@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector, RowDVector, Vector3};
 use num_complex::Complex64;
 
-use super::collocated::{Linearized, settle};
+use super::collocated::Linearized;
 use super::forced::{ForcedProblem, Uneven};
 use super::orbit::{Orbit, Passage, PeriodMap, Span};
 use crate::stability::multiplier::{eigenvector, loudest_hz};
@@ -48,12 +48,6 @@ pub(super) struct RevolutionPeriod<'a> {
     mesh: RevolutionMesh,
     /// Of each stretch.
     forces: Vec<Forces>,
-}
-
-/// The map with what it took: for each stretch the derivatives of the states at its nodes.
-struct Trace {
-    passage: Passage,
-    values: Vec<DMatrix<f64>>,
 }
 
 impl<'a> RevolutionPeriod<'a> {
@@ -117,74 +111,6 @@ impl<'a> RevolutionPeriod<'a> {
             }
         }
         Some((past, by))
-    }
-
-    /// Solves for the states at the nodes of a stretch by Newton from a guess.
-    fn settle(
-        &self,
-        index: usize,
-        start: &DVector<f64>,
-        past: &DVector<f64>,
-        depth_m: f64,
-        guess: &DMatrix<f64>,
-    ) -> Option<(DMatrix<f64>, Linearized<'_>)> {
-        let stretch = &self.mesh.stretches[index];
-        let forces = &self.forces[index];
-        settle(
-            start,
-            guess,
-            |states| forces.rates(self.problem, past, states, depth_m),
-            |states| {
-                let jacobians = forces.jacobians(self.problem, past, states, depth_m);
-                Linearized::new(stretch.gauss, stretch.duration_s, jacobians)
-            },
-        )
-    }
-
-    fn trace(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Trace> {
-        let (order, size) = (self.problem.order(), self.mesh.size);
-        let mut end = start.rows(0, order).into_owned();
-        // The derivatives in the start, then that in depth.
-        let mut by = DMatrix::identity(order, size + 1);
-        let mut seen: Vec<(DVector<f64>, DMatrix<f64>)> = Vec::with_capacity(self.forces.len());
-        let mut all_states = Vec::with_capacity(self.forces.len());
-        let mut all_values = Vec::with_capacity(self.forces.len());
-        for (index, (stretch, forces)) in self.mesh.stretches.iter().zip(&self.forces).enumerate() {
-            let (past, past_by) = self.past(stretch, start, &seen)?;
-            let (states, linearized) = self.settle(index, &end, &past, depth_m, &guess[index])?;
-            let pushes = forces.pushes(self.problem, &past, &past_by, &states, depth_m);
-            let (values, end_by) = linearized.response(&by, &pushes)?;
-            by = end_by;
-            let rates = forces.rates(self.problem, &past, &states, depth_m);
-            for (rate, weight) in rates.iter().zip(&stretch.gauss.weights) {
-                end.axpy(stretch.duration_s * weight, rate, 1.0);
-            }
-            seen.push(forces.seen(&states, &values));
-            all_states.push(states);
-            all_values.push(values);
-        }
-        let mut image = DVector::zeros(size);
-        let mut image_by = DMatrix::zeros(size, size + 1);
-        image.rows_mut(0, order).copy_from(&end);
-        image_by.rows_mut(0, order).copy_from(&by);
-        for (series, first) in &self.mesh.kept {
-            let stretch = &self.mesh.stretches[series.stretch];
-            let (values, derivatives) = &seen[series.stretch];
-            for node in 0..stretch.gauss.nodes.len() {
-                let row = node * stretch.cutting.len() + series.tooth;
-                image[first + node] = values[row];
-                image_by.row_mut(first + node).copy_from(&derivatives.row(row));
-            }
-        }
-        image.iter().all(|entry| entry.is_finite()).then(|| Trace {
-            passage: Passage {
-                end: image,
-                by_start: image_by.columns(0, size).into_owned(),
-                by_depth: image_by.column(size).into_owned(),
-                states: all_states,
-            },
-            values: all_values,
-        })
     }
 }
 
@@ -349,7 +275,34 @@ impl PeriodMap for RevolutionPeriod<'_> {
     }
 
     fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage> {
-        Some(self.trace(start, depth_m, guess)?.passage)
+        let (order, size) = (self.problem.order(), self.mesh.size);
+        let mut passage = Passage::from(start.rows(0, order).into_owned(), size + 1);
+        let mut seen: Vec<(DVector<f64>, DMatrix<f64>)> = Vec::with_capacity(self.forces.len());
+        for ((stretch, forces), states) in self.mesh.stretches.iter().zip(&self.forces).zip(guess) {
+            let (past, past_by) = self.past(stretch, start, &seen)?;
+            let pushes = forces.pushes(self.problem, &past, &past_by, states, depth_m);
+            let rates = forces.rates(self.problem, &past, states, depth_m);
+            let jacobians = forces.jacobians(self.problem, &past, states, depth_m);
+            let linearized = Linearized::new(stretch.gauss, stretch.duration_s, jacobians);
+            let advanced = linearized.advance(&passage.end, &passage.by, states, &rates, &pushes)?;
+            seen.push(forces.seen(&advanced.states, &advanced.values));
+            passage.take(advanced);
+        }
+        let mut image = DVector::zeros(size);
+        let mut image_by = DMatrix::zeros(size, size + 1);
+        image.rows_mut(0, order).copy_from(&passage.end);
+        image_by.rows_mut(0, order).copy_from(&passage.by);
+        for (series, first) in &self.mesh.kept {
+            let stretch = &self.mesh.stretches[series.stretch];
+            let (values, derivatives) = &seen[series.stretch];
+            for node in 0..stretch.gauss.nodes.len() {
+                let row = node * stretch.cutting.len() + series.tooth;
+                image[first + node] = values[row];
+                image_by.row_mut(first + node).copy_from(&derivatives.row(row));
+            }
+        }
+        (passage.end, passage.by) = (image, image_by);
+        Some(passage)
     }
 
     fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64> {
@@ -367,17 +320,19 @@ impl PeriodMap for RevolutionPeriod<'_> {
     }
 
     fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>> {
-        period_map::of_matrix(self.pass(&orbit.start, orbit.depth_m, &orbit.states)?.by_start)
+        let passage = self.pass(&orbit.start, orbit.depth_m, &orbit.states)?;
+        period_map::of_matrix(passage.by.columns(0, self.mesh.size).into_owned())
     }
 
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64> {
-        let trace = self.trace(&orbit.start, orbit.depth_m, &orbit.states)?;
-        let vector = eigenvector(&trace.passage.by_start.map(Complex64::from), multiplier)?;
+        let passage = self.pass(&orbit.start, orbit.depth_m, &orbit.states)?;
         let (size, order) = (self.mesh.size, self.problem.order());
+        let by_start = passage.by.columns(0, size);
+        let vector = eigenvector(&by_start.map(Complex64::from), multiplier)?;
         let c = self.problem.linear.structure.c.map(Complex64::from);
         // The displacement at every node, with its time and its weight.
         let mut motion: Vec<(f64, Vector3<Complex64>)> = Vec::new();
-        for (stretch, values) in self.mesh.stretches.iter().zip(&trace.values) {
+        for (stretch, values) in self.mesh.stretches.iter().zip(&passage.values) {
             let states = values.columns(0, size).map(Complex64::from) * &vector;
             for (node, (place, weight)) in stretch.gauss.nodes.iter().zip(&stretch.gauss.weights).enumerate()
             {

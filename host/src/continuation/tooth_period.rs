@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 
-use super::collocated::{Linearized, settle};
+use super::collocated::Linearized;
 use super::forced::ForcedProblem;
 use super::orbit::{Orbit, Passage, PeriodMap, Span};
 use super::variation;
@@ -186,22 +186,6 @@ impl ToothPeriod<'_> {
         let jacobians = jacobians(self.problem, piece, states, depth_m);
         Linearized::new(&self.gauss, piece.duration, jacobians)
     }
-
-    /// Solves for the states at the nodes of a piece by Newton from a guess.
-    fn settle(
-        &self,
-        piece: &Piece,
-        start: &DVector<f64>,
-        depth_m: f64,
-        guess: &DMatrix<f64>,
-    ) -> Option<(DMatrix<f64>, Linearized<'_>)> {
-        settle(
-            start,
-            guess,
-            |states| rates(self.problem, piece, states, depth_m),
-            |states| self.linearized(piece, states, depth_m),
-        )
-    }
 }
 
 impl PeriodMap for ToothPeriod<'_> {
@@ -230,34 +214,20 @@ impl PeriodMap for ToothPeriod<'_> {
     fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage> {
         let order = self.size();
         let structure = &self.problem.linear.structure;
-        let mut end = start.clone();
-        // The derivatives in the start, then that in depth.
-        let mut by = DMatrix::identity(order, order + 1);
-        let mut all_states = Vec::with_capacity(self.pieces.len());
+        let mut passage = Passage::from(start.clone(), order + 1);
         for (piece, guess) in self.pieces.iter().zip(guess) {
-            let (states, linearized) = self.settle(piece, &end, depth_m, guess)?;
-            let forces: Vec<DMatrix<f64>> = (0..states.ncols())
+            let forces: Vec<DMatrix<f64>> = (0..guess.ncols())
                 .map(|node| {
                     let mut force = DMatrix::zeros(order, order + 1);
-                    force.set_column(order, &per_depth(structure, piece, &states, node));
+                    force.set_column(order, &per_depth(structure, piece, guess, node));
                     force
                 })
                 .collect();
-            by = linearized.response(&by, &forces)?.1;
-            for (rate, weight) in rates(self.problem, piece, &states, depth_m)
-                .iter()
-                .zip(&self.gauss.weights)
-            {
-                end.axpy(piece.duration * weight, rate, 1.0);
-            }
-            all_states.push(states);
+            let rates = rates(self.problem, piece, guess, depth_m);
+            let linearized = self.linearized(piece, guess, depth_m);
+            passage.take(linearized.advance(&passage.end, &passage.by, guess, &rates, &forces)?);
         }
-        end.iter().all(|entry| entry.is_finite()).then_some(Passage {
-            end,
-            by_start: by.columns(0, order).into_owned(),
-            by_depth: by.column(order).into_owned(),
-            states: all_states,
-        })
+        Some(passage)
     }
 
     fn start_of(&self, state: DVector<f64>, _states: &[DMatrix<f64>]) -> DVector<f64> {

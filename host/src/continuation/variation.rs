@@ -19,18 +19,12 @@ pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
     for (piece, states) in map.pieces.iter().zip(&orbit.states) {
         let linearized = map.linearized(piece, states, orbit.depth_m);
         if piece.teeth == 0 {
-            flight = flow(&linearized)?.1 * flight;
+            flight = linearized.flow()?.1 * flight;
         } else {
             elements.push(element(map, piece, states, orbit.depth_m, &linearized)?);
         }
     }
     Some(Period { elements, flight })
-}
-
-/// The values at the nodes of a piece and its end, both by its start.
-fn flow(linearized: &Linearized<'_>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let order = linearized.order();
-    linearized.response(&DMatrix::identity(order, order), &[])
 }
 
 fn element(
@@ -69,7 +63,7 @@ fn element(
             });
         }
     }
-    let (by_start, flow) = flow(linearized)?;
+    let (by_start, flow) = linearized.flow()?;
     let right = DMatrix::from_fn(order * nodes, nodes * teeth, |row, port| {
         let (i, state) = (row / order, row % order);
         piece.duration * gauss.integrals[(i, port / teeth)] * push[(state, port)]
