@@ -16,6 +16,7 @@ use super::cause::{Cause, Kind, PROCESS, Scale};
 use super::chip::{Chips, Job, Run};
 use super::judge::Lab;
 use super::machine::{Machine, between};
+use super::motion::interpolated;
 use super::motion::{Path, System};
 use super::process::{CutScale, Process};
 use super::rig::Output;
@@ -236,10 +237,23 @@ impl CutBench {
             }
             u.push(system.displacement(&y));
             let mut from = t;
-            for switch in chips.switches(t, to).into_iter().chain([to]) {
+            for switch in chips.switches(t, to) {
                 chips.advance(&system, [from, switch], &mut y, &u);
                 from = switch;
+                let x = system.displacement(&y);
+                let [before, after] = [-1e-6, 1e-6].map(|beside| {
+                    let cutting = chips.cutting(switch, x, chips.engaged(switch + beside * step_s), &u);
+                    let force = |t: f64, x: [f64; 3], v: [f64; 3]| chips.force(t, x, v, cutting, &u);
+                    let mut path = Path::default();
+                    system.note(switch, &y, &[], &force, &mut path);
+                    path.a[0]
+                });
+                let jump = std::array::from_fn(|axis| after[axis] - before[axis]);
+                found
+                    .jumps
+                    .push((switch - self.before as f64 / self.rate_hz, jump));
             }
+            chips.advance(&system, [from, to], &mut y, &u);
         }
         found
     }
@@ -253,13 +267,21 @@ impl CutBench {
             .map(|(index, sensed)| match sensed {
                 Sensed::Force(axis) => motion.force.iter().map(|force| force[*axis]).collect(),
                 Sensed::Motion(sensor) => {
-                    let series = if sensor.acceleration { &motion.a } else { &motion.u };
                     let about = |cause: &&Cause| cause.sensor == index || cause.sensor == EVERY_SENSOR;
-                    let causes: Vec<&Cause> = causes
+                    let mut causes: Vec<&Cause> = causes
                         .iter()
                         .filter(|cause| cause.kind.of_sensor())
                         .filter(about)
                         .collect();
+                    let late = |cause: &&Cause| cause.kind == Kind::SensorDelay && sensor.acceleration;
+                    let series = match causes.iter().position(late) {
+                        Some(place) => {
+                            let delay_s = causes.remove(place).values(&self.machine, &self.scale)[0].1;
+                            &motion.late(delay_s, self.rate_hz)
+                        }
+                        None if sensor.acceleration => &motion.a,
+                        None => &motion.u,
+                    };
                     read_by(
                         &self.machine,
                         &self.scale,
@@ -386,7 +408,37 @@ struct Motion {
     force: Vec<[f64; 3]>,
     u: Vec<[f64; 3]>,
     a: Vec<[f64; 3]>,
+    /// Where the acceleration jumps, s from the start of the record, and by how much.
+    jumps: Vec<(f64, [f64; 3])>,
     angle: Vec<f64>,
+}
+
+impl Motion {
+    /// The acceleration `delay_s` before each sample: its steps stay steps, between them it is smooth.
+    fn late(&self, delay_s: f64, rate_hz: f64) -> Vec<[f64; 3]> {
+        let jumped = |t: f64| {
+            let before = self.jumps.iter().take_while(|(at, _)| *at <= t);
+            before.fold([0.0; 3], |sum, (_, jump)| {
+                std::array::from_fn(|axis| sum[axis] + jump[axis])
+            })
+        };
+        let smooth: Vec<[f64; 3]> = self
+            .a
+            .iter()
+            .enumerate()
+            .map(|(k, a)| {
+                let jumped = jumped(k as f64 / rate_hz);
+                std::array::from_fn(|axis| a[axis] - jumped[axis])
+            })
+            .collect();
+        (0..self.a.len())
+            .map(|k| {
+                let t = (k as f64 / rate_hz - delay_s).max(0.0);
+                let (smooth, jumped) = (interpolated(&smooth, t * rate_hz), jumped(t));
+                std::array::from_fn(|axis| smooth[axis] + jumped[axis])
+            })
+            .collect()
+    }
 }
 
 impl Lab for CutBench {
@@ -452,8 +504,19 @@ impl Lab for CutBench {
         }
     }
 
-    fn nuisance(&self, _: &[f64]) -> DMatrix<f64> {
-        DMatrix::zeros(0, 0)
+    /// The offset of each sensor in each run; the angle has none.
+    fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64> {
+        let (runs, channels, samples) = (self.runs.len(), sigma.len(), self.samples);
+        let sensors = channels - 1;
+        let mut columns = DMatrix::zeros(runs * channels * samples, runs * sensors);
+        for run in 0..runs {
+            for sensor in 0..sensors {
+                let first = (run * channels + sensor) * samples;
+                let column = run * sensors + sensor;
+                columns.view_mut((first, column), (samples, 1)).fill(1.0);
+            }
+        }
+        columns
     }
 }
 

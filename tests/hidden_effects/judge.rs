@@ -240,11 +240,19 @@ impl<'a> Judge<'a> {
             if kind.parameters() > hidden.kind.parameters() {
                 continue;
             }
-            for candidate in self.candidates(kind, random) {
+            for candidate in self
+                .candidates(kind, random)
+                .into_iter()
+                .chain(stand_in(kind, hidden))
+            {
                 if kind == hidden.kind && candidate.axis == hidden.axis && candidate.sensor == hidden.sensor {
                     continue;
                 }
                 let (left, _) = self.nearest(&truth, &[candidate]);
+                if left < APART && kind.parameters() < hidden.kind.parameters() {
+                    // What a simpler cause explains as well nobody would call by the other.
+                    return Verdict::Borderline;
+                }
                 if left < SAME {
                     same.extend(self.lab.names(kind));
                 } else if left < APART {
@@ -258,6 +266,15 @@ impl<'a> Judge<'a> {
             Verdict::Equivalent(same)
         }
     }
+}
+
+/// Where a simpler kind begins that is what is hidden while the motion is small: within its gap a play is less stiffness.
+fn stand_in(kind: Kind, hidden: &Cause) -> Option<Cause> {
+    (kind == Kind::Stiffness && hidden.kind == Kind::Backlash).then(|| Cause {
+        kind,
+        shares: vec![-10.0 * hidden.shares[1]],
+        ..hidden.clone()
+    })
 }
 
 /// ∂residual/∂shares by differences.
@@ -288,6 +305,7 @@ impl Cause {
         match self.kind {
             Kind::MissingMode => s[0] > 0.1 && (0.0005..0.3).contains(&s[1]) && s[2] > 0.5,
             Kind::SofteningHardening => s[0].abs() < 4.0 && s[1] > 0.2,
+            Kind::Stiffness => (-9.5..4.0).contains(&s[0]),
             Kind::Backlash => s[0] > 0.0 && s[0] < 2.0 && (0.0..0.95).contains(&s[1]),
             Kind::Hysteresis => s[1] > 0.01 && s[0].abs() < 0.9,
             Kind::ForceExponent => (0.0..2.0).contains(&s[0]) && (0.05..20.0).contains(&s[1]),

@@ -96,10 +96,12 @@ impl Puzzle {
         }
     }
 
-    /// Writes case and recordings to a folder, for `quietcut diagnose`.
+    /// Writes case, recordings and what is hidden in them to a folder, for `quietcut diagnose`.
     pub(crate) fn keep(&self, folder: &Path) {
         let name = format!("{}-{}.toml", self.family.name(), self.seed);
-        std::fs::write(folder.join(name), &self.case_text).unwrap();
+        std::fs::write(folder.join(&name), &self.case_text).unwrap();
+        let hidden = format!("{:?}\n{:?}\n", self.hidden, self.verdict);
+        std::fs::write(folder.join(name.replace(".toml", ".hidden")), hidden).unwrap();
         for recording in &self.recordings {
             recording.write(&folder.join(&recording.path)).unwrap();
         }

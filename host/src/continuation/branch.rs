@@ -31,7 +31,7 @@ const FOLLOWED: f64 = 1.0 - 2.5 * MOVE_MAX;
 const ROOM: f64 = 10.0;
 
 /// The most steps of a branch: with the longest step a branch that is followed up and down needs about a hundred.
-const STEPS_MAX: usize = 4000;
+const STEPS_MAX: usize = 1000;
 
 /// A point on a branch.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -288,7 +288,9 @@ impl<M: PeriodMap> Follower<M> {
             }
             step = (1.5 * step).min(STEP_MAX);
         }
-        Ok(branch)
+        Err(OrbitError::NoConvergence {
+            depth_mm: here.orbit.depth_m * 1e3,
+        })
     }
 
     /// The sample a step further along the branch.

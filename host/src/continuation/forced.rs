@@ -247,6 +247,11 @@ impl ForcedProblem {
         self.inertial
     }
 
+    /// True where orbits are those of the whole revolution: a speed costs a hundred times that of a tooth period.
+    pub fn is_over_revolution(&self) -> bool {
+        self.uneven.is_some()
+    }
+
     /// True where an orbit is the solution of linear equations.
     pub(super) fn is_linear(&self) -> bool {
         self.cubic.is_none() && self.smooth.is_none()

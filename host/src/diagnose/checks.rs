@@ -136,16 +136,18 @@ const MOST_BY_NOISE: f64 = 25.0;
 /// Refuses a channel whose size cannot be that of the case: a wrong unit.
 ///
 /// `response` is what the case predicts of the forces alone, `by_noise` the energy that it would have by the noise of the force
-/// sensors. The factor is that by which it fits best; it counts where the two look alike.
+/// sensors, over the samples that are compared. The factor is that by which it fits best; it counts where the two look alike.
 pub(super) fn unit(
     path: &std::path::Path,
     channel: &Observed,
     response: &[f64],
+    compared: std::ops::Range<usize>,
     by_noise: f64,
 ) -> Result<(), DiagnoseError> {
+    let (response, measured) = (&response[compared.clone()], &channel.measured[compared]);
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let (own, cross) = (dot(response, response), dot(response, &channel.measured));
-    let whole = dot(&channel.measured, &channel.measured);
+    let (own, cross) = (dot(response, response), dot(response, measured));
+    let whole = dot(measured, measured);
     if own <= MOST_BY_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }

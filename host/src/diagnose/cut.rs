@@ -14,9 +14,9 @@ use crate::recording::Recording;
 use crate::simulate::path::Motion;
 use crate::simulate::{Cutter, Effects, Spindle};
 
-/// Force samples closer to an entry or exit than this share of a sample are not compared: the tachometer does not say on
+/// Samples of forces and accelerations closer to
 /// which side they are.
-const BESIDE: f64 = 0.25;
+const BESIDE: f64 = 0.375;
 
 /// A recorded cut.
 #[derive(Clone, Debug)]
@@ -120,6 +120,11 @@ impl RecordedCut {
         Chips::new(&self.cutter, turning, motion, sampling, |sample| {
             with_force && !self.is_beside(sample as f64 / self.rate_hz)
         })
+    }
+
+    /// Samples per second.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
     }
 
     /// Samples of the first turn: what it cuts was left before the record.

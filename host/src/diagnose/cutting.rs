@@ -29,17 +29,12 @@ pub struct Cutting {
     finer: usize,
     /// True where forces are measured.
     with_force: bool,
-    /// True at samples beside an entry or exit, whose forces are not compared.
-    beside: Vec<bool>,
 }
 
 impl Cutting {
     fn new(baseline: &Baseline<'_>, record: &Record, recording: &Recording) -> Result<Self, DiagnoseError> {
         let cut = RecordedCut::new(baseline.case, &baseline.effects, recording)?;
         let grid = &record.grid;
-        let beside = (0..grid.count())
-            .map(|sample| cut.is_beside(sample as f64 / grid.rate_hz()))
-            .collect();
         let with_force = record
             .channels
             .iter()
@@ -51,8 +46,17 @@ impl Cutting {
             finer: grid.finer(),
             with_force,
             cut,
-            beside,
         })
+    }
+
+    /// Samples of a channel that are not compared: forces and accelerations jump where a tooth enters or leaves, and the tachometer
+    /// does not say on which side a sample beside that is.
+    fn skipped(&self, channel: &Observed) -> Vec<usize> {
+        if !matches!(channel.pickup.quantity, Quantity::Force | Quantity::Acceleration) {
+            return Vec::new();
+        }
+        let is_beside = |sample: &usize| self.cut.is_beside(*sample as f64 / self.cut.rate_hz());
+        (0..channel.measured.len()).filter(is_beside).collect()
     }
 
     /// Goes along another motion.
@@ -121,8 +125,13 @@ impl Record {
         baseline: &Baseline<'_>,
         recording: &Recording,
     ) -> Result<(), DiagnoseError> {
-        self.prepare_decays(baseline);
         let mut cutting = Cutting::new(baseline, self, recording)?;
+        self.skipped = self
+            .channels
+            .iter()
+            .map(|channel| cutting.skipped(channel))
+            .collect();
+        self.prepare_decays(baseline);
         for round in 0..ROUNDS {
             if round > 0 {
                 cutting.follow(&self.motion);
@@ -149,28 +158,16 @@ impl Record {
                 }
                 self.add_terms(baseline, &mut force);
             }
-            skip_beside(&cutting.beside, &self.channels, &mut predicted);
             self.accept(predicted);
             motion::learn(self, baseline, &force);
         }
         // What the causes add is measured from the force along the motion as it is known now.
         cutting.follow(&self.motion);
-        self.compared_from = cutting.cut.first_turn();
+        let turn = cutting.cut.first_turn();
+        let count = self.grid.count();
+        self.compared = turn..if count > 4 * turn { count - turn } else { count };
         self.cut = Some(cutting);
         Ok(())
-    }
-}
-
-/// Force samples that are not compared are predicted as they were measured.
-fn skip_beside(beside: &[bool], channels: &[Observed], predicted: &mut [Vec<f64>]) {
-    for (channel, predicted) in channels.iter().zip(predicted) {
-        if channel.pickup.quantity == Quantity::Force {
-            for ((predicted, measured), beside) in predicted.iter_mut().zip(&channel.measured).zip(beside) {
-                if *beside {
-                    *predicted = *measured;
-                }
-            }
-        }
     }
 }
 

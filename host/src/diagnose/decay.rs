@@ -1,5 +1,7 @@
 //! Free decays: what a record owes to the state in which it began.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::record::Record;
@@ -11,6 +13,8 @@ use crate::recording::Quantity;
 pub struct Decays {
     /// By channel, by state: samples.
     columns: Vec<Vec<Vec<f64>>>,
+    /// By channel: samples that are not compared, which owe nothing to a decay.
+    skipped: Vec<Vec<usize>>,
     /// The state at the start of the record.
     pub start: Vec<f64>,
 }
@@ -47,6 +51,7 @@ impl Decays {
             .collect();
         Self {
             columns,
+            skipped: record.skipped.clone(),
             start: vec![0.0; order],
         }
     }
@@ -66,7 +71,8 @@ impl Decays {
         let order = self.start.len();
         let mut gram = DMatrix::<f64>::zeros(order, order);
         let mut right = DVector::<f64>::zeros(order);
-        for ((columns, residual), size) in self.columns.iter().zip(residuals).zip(sizes) {
+        for (channel, (residual, size)) in residuals.iter().zip(sizes).enumerate() {
+            let columns = self.compared(channel);
             let weight = 1.0 / (size * size).max(f64::MIN_POSITIVE);
             for i in 0..order {
                 right[i] += weight * dot(&columns[i], residual);
@@ -95,10 +101,23 @@ impl Decays {
             .collect();
     }
 
+    /// The decays of a channel at the samples that are compared.
+    fn compared(&self, channel: usize) -> Cow<'_, [Vec<f64>]> {
+        let mut columns = Cow::Borrowed(&self.columns[channel][..]);
+        if !self.skipped[channel].is_empty() {
+            for column in columns.to_mut() {
+                for &sample in &self.skipped[channel] {
+                    column[sample] = 0.0;
+                }
+            }
+        }
+        columns
+    }
+
     /// What a channel reads without the decay of the record.
     pub(super) fn without(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
         let mut without = samples.to_vec();
-        for (column, start) in self.columns[channel].iter().zip(&self.start) {
+        for (column, start) in self.compared(channel).iter().zip(&self.start) {
             for (sample, value) in without.iter_mut().zip(column) {
                 *sample -= start * value;
             }
@@ -108,7 +127,7 @@ impl Decays {
 
     /// Adds the decay of the record to what a channel reads.
     pub(super) fn add_to(&self, channel: usize, samples: &mut [f64]) {
-        for (column, start) in self.columns[channel].iter().zip(&self.start) {
+        for (column, start) in self.compared(channel).iter().zip(&self.start) {
             for (sample, value) in samples.iter_mut().zip(column) {
                 *sample += start * value;
             }

@@ -58,6 +58,13 @@ pub struct Library {
     pub candidates: Vec<Candidate>,
 }
 
+/// What the force of a cause is a function of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Law {
+    OfDisplacement,
+    OfVelocity,
+}
+
 /// How many of the best pairs are tried with a third cause.
 const PAIRS_KEPT: usize = 24;
 
@@ -275,15 +282,31 @@ impl Library {
         self.best_of_each(found)
     }
 
-    /// A case holds one extension of a name: the same cause does not act twice.
+    /// A case holds one extension of a name: the same cause does not act twice. And three terms of one law, of the displacement or
+    /// of the velocity along one axis, are the series of a law that nobody knows, and no causes.
     pub fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
         let new = self.cause(other.candidate).names();
-        some.iter().all(|choice| {
+        let is_new = some.iter().all(|choice| {
             self.cause(choice.candidate)
                 .names()
                 .iter()
                 .all(|name| !new.contains(name))
-        })
+        });
+        let own = self.law(other);
+        let alike = some.iter().filter(|choice| self.law(**choice) == own).count();
+        is_new && (own.is_none() || alike < 2)
+    }
+
+    /// Of what a choice is a law, and where.
+    fn law(&self, choice: Choice) -> Option<(Law, &Place)> {
+        let law = match self.cause(choice.candidate).name() {
+            "stiffness" | "quadratic-stiffness" | "cubic-stiffness" | "softening-hardening" | "backlash" => {
+                Law::OfDisplacement
+            }
+            "damping" | "cubic-damping" | "coulomb-friction" => Law::OfVelocity,
+            _ => return None,
+        };
+        Some((law, &self.candidates[choice.candidate].place))
     }
 
     fn best_of_each(&self, mut found: Vec<Explanation>) -> Vec<Explanation> {

@@ -3,15 +3,19 @@
 use serde::Serialize;
 
 use crate::case::Case;
-use crate::continuation::collocation_of;
+use crate::continuation::{ForcedProblem, collocation_of};
 use crate::recording::{Kind as RecordKind, Recording};
 use crate::stability::{
-    CubicTerms, Kind, Limit, Method, Pitched, SpeedLine, StabilityError, after, chart, default_speeds, spaced,
+    CubicTerms, Kind, Limit, Method, Pitched, SpeedLine, StabilityError, after, chart, default_speeds,
+    needs_orbit, spaced,
 };
 use crate::test_cuts::{Call, Calls, TestCut, calls};
 
 /// Speeds of the charts.
 const SPEEDS: usize = 41;
+
+/// The same where a speed takes seconds, as forced orbits over the revolution do.
+const FEW_SPEEDS: usize = 2;
 
 /// Speeds at which the lowest limit is sought.
 const COARSE: usize = 12;
@@ -99,7 +103,15 @@ pub fn lobes(
         .filter(|recording| recording.sidecar.kind == Some(RecordKind::Cutting))
         .filter_map(|recording| recording.sidecar.cut?.spindle_rpm)
         .collect();
-    let speeds_rpm = speeds(case, cuts, &recorded_rpm)?;
+    let is_costly = [case, extended].into_iter().any(|case| {
+        needs_orbit(case) && ForcedProblem::new(case).is_ok_and(|problem| problem.is_over_revolution())
+    });
+    let speeds_rpm = speeds(
+        case,
+        cuts,
+        &recorded_rpm,
+        if is_costly { FEW_SPEEDS } else { SPEEDS },
+    )?;
     let searched_mm = match cuts.iter().map(|cut| cut.depth_mm).max_by(f64::total_cmp) {
         Some(deepest_mm) => 1.2 * deepest_mm,
         None => depth_mm(&*methods[0], &speeds_rpm)?,
@@ -178,7 +190,12 @@ fn method(case: &Case, after_s: Option<f64>) -> Result<Box<dyn Method>, Stabilit
 }
 
 /// Those of the cuts, else around those of the recorded cuts, else of the machine; with the speeds of recorded cuts among them.
-fn speeds(case: &Case, cuts: &[TestCut], recorded_rpm: &[f64]) -> Result<Vec<f64>, StabilityError> {
+fn speeds(
+    case: &Case,
+    cuts: &[TestCut],
+    recorded_rpm: &[f64],
+    count: usize,
+) -> Result<Vec<f64>, StabilityError> {
     let ends = |speeds: &mut dyn Iterator<Item = f64>| {
         speeds.fold(None, |ends: Option<(f64, f64)>, rpm| {
             Some(ends.map_or((rpm, rpm), |(from, to)| (from.min(rpm), to.max(rpm))))
@@ -196,7 +213,7 @@ fn speeds(case: &Case, cuts: &[TestCut], recorded_rpm: &[f64]) -> Result<Vec<f64
             }
         },
     };
-    let mut speeds = spaced(from_rpm, to_rpm, SPEEDS);
+    let mut speeds = spaced(from_rpm, to_rpm, count);
     speeds.extend(recorded_rpm);
     speeds.sort_by(f64::total_cmp);
     speeds.dedup();

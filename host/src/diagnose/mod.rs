@@ -45,6 +45,8 @@ mod tests;
 pub mod turning;
 mod views;
 
+use answer::Outcome;
+
 pub use answer::Diagnosis;
 pub use cutting::Cutting;
 pub use error::DiagnoseError;
@@ -104,17 +106,20 @@ pub fn diagnose_watched(
     watch(Stage::Records);
     let scene = Scene::new(case, recordings)?;
     let diagnosis = judge::judge(&scene, options, watch);
-    // A second look at a cut, along the motion that the first one explains.
-    let again = cutting::is_noisy(&scene)
-        .then(|| diagnosis.extended(case))
-        .flatten()
-        .and_then(|extended| {
-            watch(Stage::Records);
-            let better = Scene::new(&extended, recordings).ok()?;
-            let scene = Scene::along(case, recordings, &better).ok()?;
-            Some(judge::judge(&scene, options, watch))
-        });
+    if diagnosis.outcome == Outcome::None || !cutting::is_noisy(&scene) {
+        return Ok(diagnosis);
+    }
+    // A second look at a cut, along the motion that the first one explains, or that is believed.
+    watch(Stage::Records);
+    let extended = diagnosis.extended(case);
+    let better = match &extended {
+        Some(extended) => Scene::new(extended, recordings).ok(),
+        None => Some(scene),
+    };
+    let again = better
+        .and_then(|better| Scene::along(case, recordings, &better).ok())
+        .map(|scene| judge::judge(&scene, options, watch));
     Ok(again
-        .filter(|again| !again.causes.is_empty())
+        .filter(|again| again.outcome != Outcome::Unexplained)
         .unwrap_or(diagnosis))
 }

@@ -1,6 +1,7 @@
 //! Parts of records as they are compared: transformed, cut to the band, in units of the noise, and freed of what decays of
 //! the initial state and constant offsets of the sensors could explain.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::decay::dot;
@@ -19,6 +20,8 @@ pub(super) struct Part {
     stretch: Stretch,
     /// By channel: one over the deviation of each transformed number.
     weights: Vec<Vec<f64>>,
+    /// By channel: samples, counted from the start of the part, that are not compared.
+    skipped: Vec<Vec<usize>>,
     /// Orthonormal: what decays and offsets can be.
     nuisance: Vec<Vec<f64>>,
 }
@@ -54,7 +57,7 @@ pub(super) fn split(scene: &Scene<'_>, unknown: impl Fn(&Record) -> Unknown) -> 
         .iter()
         .enumerate()
         .flat_map(|(index, record)| {
-            let (from, end) = (record.compared_from, record.grid.count());
+            let Range { start: from, end } = record.compared.clone();
             let count = end - from;
             let mut ranges = vec![(from..end, Share::Whole)];
             if several && record.kind == Some(Kind::FreeDecay) {
@@ -93,6 +96,16 @@ impl Part {
         let mut part = Self {
             record: index,
             bins: bins_of(record, range.len()),
+            skipped: record
+                .skipped
+                .iter()
+                .map(|of| {
+                    of.iter()
+                        .filter(|sample| range.contains(sample))
+                        .map(|sample| sample - range.start)
+                        .collect()
+                })
+                .collect(),
             stretch: Stretch::new(range.len()),
             range,
             share,
@@ -117,9 +130,9 @@ impl Part {
         column
     }
 
-    /// Numbers that nuisances take.
+    /// Numbers that nuisances take, and that are not compared.
     pub(super) fn taken(&self) -> usize {
-        self.nuisance.len()
+        self.nuisance.len() + self.skipped.iter().map(Vec::len).sum::<usize>()
     }
 }
 
@@ -130,10 +143,13 @@ fn bins_of(record: &Record, length: usize) -> usize {
 
 fn raw(part: &Part, samples: &[Vec<f64>]) -> Vec<f64> {
     let mut column = Vec::with_capacity(2 * part.bins * samples.len());
-    for (samples, weights) in samples.iter().zip(&part.weights) {
+    for ((samples, weights), skipped) in samples.iter().zip(&part.weights).zip(&part.skipped) {
         let from = column.len();
-        part.stretch
-            .parts(&samples[part.range.clone()], part.bins, &mut column);
+        let mut samples = Cow::Borrowed(&samples[part.range.clone()]);
+        for &sample in skipped {
+            samples.to_mut()[sample] = 0.0;
+        }
+        part.stretch.parts(&samples, part.bins, &mut column);
         for (value, weight) in column[from..].iter_mut().zip(weights) {
             *value *= weight;
         }

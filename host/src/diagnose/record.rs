@@ -1,5 +1,6 @@
 //! One recording beside what the baseline predicts of it.
 
+use std::ops::Range;
 use std::path::PathBuf;
 
 use nalgebra::Matrix3;
@@ -17,6 +18,10 @@ use super::scene::{Baseline, Domain, derivatives};
 use crate::recording::{Kind, Quantity, Recording};
 use crate::simulate::effect::Pickup;
 use crate::simulate::path::{Motion, restoring_along};
+
+/// Share of what a channel reads of a cut to which that is computed: where a tooth enters or leaves is known to a share of a
+/// sample, and with it the step of the force.
+const TRUSTED_IN_CUTS: f64 = 2e-4;
 
 /// Finer samples per sample of a cut, at least: its force jumps.
 const FINER_IN_CUTS: usize = 8;
@@ -80,8 +85,11 @@ pub struct Record {
     /// By channel of motion and axis of force: what the channel reads per newton at the bins of the finer samples; empty where
     /// it hears nothing of that axis.
     responses: Vec<[Vec<Complex64>; 3]>,
-    /// The first sample that is compared: those before it are only the past of what follows.
-    pub compared_from: usize,
+    /// The samples that are compared: those before are only the past of what follows, and at the end of a cut the motion is known
+    /// less well, where its sensors derive from it.
+    pub compared: Range<usize>,
+    /// By channel: samples that are not compared.
+    pub skipped: Vec<Vec<usize>>,
     /// Free decays of the baseline, as the channels read them.
     pub decays: Decays,
     /// The cut, where it is the record of one.
@@ -142,6 +150,7 @@ impl Record {
             Domain::Response => response(baseline, &grid),
             Domain::Force => dynamic_stiffness(baseline, &grid),
         };
+        let count = channels.len();
         let mut record = Self {
             index,
             path: recording.path.clone(),
@@ -164,7 +173,8 @@ impl Record {
             },
             transfer,
             responses: Vec::new(),
-            compared_from: 0,
+            compared: 0..recording.len(),
+            skipped: vec![Vec::new(); count],
             decays: Decays::default(),
             cut: None,
             clean,
@@ -180,7 +190,13 @@ impl Record {
                 for (index, channel) in record.channels.iter().enumerate() {
                     let response = record.decays.without(index, &channel.predicted);
                     let by_noise = record.energy_by_force_noise(index);
-                    checks::unit(&record.path, channel, &response, by_noise)?;
+                    checks::unit(
+                        &record.path,
+                        channel,
+                        &response,
+                        record.compared.clone(),
+                        by_noise,
+                    )?;
                 }
             }
             Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,
@@ -328,9 +344,13 @@ impl Record {
         self.decays = Decays::of(baseline, self);
     }
 
-    /// Takes a prediction without free decay, adds the one that fits best, and looks at the noise of what is left.
+    /// Takes a prediction without free decay, as measured where it is not compared, adds the one that fits best, and looks at the noise of what is left.
     pub(super) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
-        for (channel, predicted) in self.channels.iter_mut().zip(predicted) {
+        for ((channel, mut predicted), skipped) in self.channels.iter_mut().zip(predicted).zip(&self.skipped)
+        {
+            for &sample in skipped {
+                predicted[sample] = channel.measured[sample];
+            }
             channel.predicted = predicted;
         }
         let residuals: Vec<Vec<f64>> = self.channels.iter().map(Observed::residual).collect();
@@ -345,7 +365,9 @@ impl Record {
             let (residual, size) = (channel.residual(), rms(&channel.measured));
             channel.deviation = match &self.clean {
                 Some(clean) => clean.deviations[index],
-                None if self.kind == Some(Kind::Cutting) => floor_between_lines(&residual, size),
+                None if self.kind == Some(Kind::Cutting) => {
+                    floor_between_lines(&residual, size).hypot(TRUSTED_IN_CUTS * size)
+                }
                 None => white_floor(&residual, size),
             };
         }

@@ -55,7 +55,10 @@ fn one(
     }
 }
 
-/// Goes to the shape that the coefficients ask for, a few times.
+/// Most steps towards a shape that settles by itself: where teeth lose contact it takes some.
+const SETTLINGS: usize = 12;
+
+/// Goes to the shape that the coefficients ask for until it stays, by half where all of the way leaves more.
 fn settle(
     scene: &Scene<'_>,
     library: &mut Library,
@@ -63,23 +66,31 @@ fn settle(
     mut explanation: Explanation,
     place: usize,
 ) -> Explanation {
-    for _ in 0..4 {
+    for _ in 0..SETTLINGS {
         let choice = explanation.choices[place];
         let shape = library.candidates[choice.candidate].shapes[choice.shape]
             .0
             .clone();
         let coefficients = library.coefficients(&explanation, place);
-        let Some(next) = library.cause(choice.candidate).settled(&shape, &coefficients) else {
+        let Some(asked) = library.cause(choice.candidate).settled(&shape, &coefficients) else {
             break;
         };
-        if next
+        if asked
             .iter()
             .zip(&shape)
             .all(|(a, b)| (a - b).abs() <= 1e-4 * b.abs())
         {
             break;
         }
-        let Some(better) = with_shape(scene, library, regression, &explanation, place, next) else {
+        let better = [1.0, 0.5].into_iter().find_map(|share| {
+            let next = shape
+                .iter()
+                .zip(&asked)
+                .map(|(shape, asked)| shape + share * (asked - shape));
+            with_shape(scene, library, regression, &explanation, place, next.collect())
+                .filter(|better| better.fit.left < explanation.fit.left)
+        });
+        let Some(better) = better else {
             break;
         };
         explanation = better;

@@ -364,11 +364,12 @@ fn simplest(
     best: &Explanation,
 ) -> Explanation {
     let inflation = scale.inflation;
+    let apart = APART.max(NUMERICS * regression.residual(Share::Whole) / inflation);
     let as_good = |other: &&Explanation| {
         other.simulated.is_none()
             && other.freedoms < best.freedoms
             && scale.excess(regression, Some(other)).1 < SAMPLING
-            && scale.gain(regression, other, inflation) > scale.gain(regression, best, inflation) - APART
+            && scale.gain(regression, other, inflation) > scale.gain(regression, best, inflation) - apart
     };
     found.iter().find(as_good).unwrap_or(best).clone()
 }

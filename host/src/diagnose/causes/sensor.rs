@@ -43,17 +43,17 @@ fn one_or_all(scene: &Scene<'_>, name: &str) -> Vec<Place> {
         return Vec::new();
     }
     let names = channels(scene);
-    // Without a motion that a force drives, nothing says how large it should be.
+    // Without a motion that a force drives, nothing says how large or late it should be but another channel.
     let free = scene
         .records
         .iter()
         .all(|record| record.force_n.iter().all(Vec::is_empty));
-    if free {
+    let several = names.len() > 1;
+    if free && !several {
         return Vec::new();
     }
-    let several = names.len() > 1;
     let mut places: Vec<Place> = names.into_iter().map(Place::Channel).collect();
-    if several {
+    if several && !free {
         places.push(Place::Everywhere);
     }
     places
@@ -126,6 +126,35 @@ fn of_meant(
         }
     };
     vec![Regressor::of_channels(record.channels.iter().map(of).collect())]
+}
+
+/// The change of what a channel reads of a cut, ω turned by `change`: of the response to its force over the finer samples, so that
+/// steps stay steps, and of what the motion has besides.
+fn in_steps(record: &Record, channel: usize, change: impl Fn(f64) -> Complex64) -> Option<Vec<f64>> {
+    let cutting = record.cut.as_ref()?;
+    let grid = &record.grid;
+    let mut force = record.cut_spectra(&cutting.force);
+    let known = record.read_response(&force, channel);
+    for force in force.iter_mut().flatten() {
+        for (bin, value) in force.iter_mut().enumerate() {
+            *value *= change(grid.omega(bin));
+        }
+    }
+    let mut changed = record.read_response(&force, channel);
+    let readings = record.readings[channel].iter().zip(&known);
+    let mut besides: Vec<f64> = readings.map(|(all, known)| all - known).collect();
+    // Where a sample is not compared nothing is known of it: it is as the one before.
+    for &sample in record.skipped[channel].iter().filter(|sample| **sample > 0) {
+        besides[sample] = besides[sample - 1];
+    }
+    let mut spectrum = grid.continued_spectrum(&besides);
+    for (bin, value) in spectrum.iter_mut().enumerate() {
+        *value *= change(grid.omega(bin));
+    }
+    for (changed, besides) in changed.iter_mut().zip(grid.samples(&spectrum)) {
+        *changed += besides;
+    }
+    Some(changed)
 }
 
 /// The same regressor in a cut, where the chip was taken along a motion that the sensor tells wrongly: what the force is less

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::{in_cut, of_meant, one_or_all};
+use super::{in_cut, in_steps, meant, of_meant, one_or_all};
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
 use crate::diagnose::record::Record;
 use crate::diagnose::scene::Scene;
@@ -46,12 +46,21 @@ impl Cause for Delay {
     ) -> Option<Vec<Regressor>> {
         let delay = *shape.first()?;
         // Per second of delay, so that the coefficient is the delay.
-        let read = of_meant(
-            record,
-            place,
-            |channel| channel.pickup.weights,
-            |omega| (Complex64::ONE - Complex64::cis(omega * delay)) / delay,
-        );
+        let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
+        let read = if record.cut.is_some() {
+            let of = |channel: usize| {
+                if meant(place, &record.channels[channel]) {
+                    in_steps(record, channel, change)
+                } else {
+                    Some(Vec::new())
+                }
+            };
+            vec![Regressor::of_channels(
+                (0..record.channels.len()).map(of).collect::<Option<_>>()?,
+            )]
+        } else {
+            of_meant(record, place, |channel| channel.pickup.weights, change)
+        };
         // x(t) = y(t + τ).
         Some(in_cut(record, place, read, delay, |motion, axis| {
             motion.advance(axis, delay);
