@@ -6,6 +6,7 @@
 //! likelihood, parsimony and records that were held out ([`evidence`]).
 
 pub mod answer;
+mod beginning;
 pub mod cause;
 mod causes;
 mod checks;
@@ -103,6 +104,10 @@ pub fn diagnose_watched(
     options: &Options,
     watch: &dyn Fn(Stage),
 ) -> Result<Diagnosis, DiagnoseError> {
+    watch(Stage::Records);
+    if let Some(diagnosis) = beginning::diagnosed(case, recordings, options, watch) {
+        return Ok(diagnosis);
+    }
     watch(Stage::Records);
     let scene = Scene::new(case, recordings)?;
     let diagnosis = judge::judge(&scene, options, watch);

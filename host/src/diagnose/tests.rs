@@ -5,7 +5,7 @@ use std::path::Path;
 use super::answer::Outcome;
 use super::{DiagnoseError, Diagnosis, Options, diagnose};
 use crate::case::Case;
-use crate::recording::{Channel, Quantity, Recording};
+use crate::recording::{Channel, Kind, Quantity, Recording};
 use crate::simulate::Effects;
 use crate::simulate::rig::{Noise, Rig, Signal};
 use crate::structure::Direction;
@@ -185,5 +185,64 @@ fn records_that_tell_nothing_are_refused_with_what_is_needed() {
             };
         },
         "direction of the case",
+    );
+}
+
+/// Four records of a minute at 2 kHz, of tones with no common period, with 1 % of noise on the displacement.
+fn long_records(effects: &[&str]) -> Vec<Recording> {
+    let case = believed();
+    [4.0, 8.0, 12.0, 16.0]
+        .into_iter()
+        .enumerate()
+        .map(|(index, last_n)| {
+            let tones =
+                (0..25).map(|k: u32| (10.0 + f64::from(k).powf(0.9), f64::from(k * k + index as u32)));
+            let signal = Signal::Tones {
+                tones: tones.collect(),
+                first_n: last_n,
+                last_n,
+                seconds: 60.0,
+            };
+            let mut rig = Rig::new(Direction::X, signal, 2000.0);
+            rig.measured = vec![Quantity::Displacement];
+            rig.effects = Effects::parse(effects.iter().copied()).unwrap();
+            let path = format!("tones-{index}.csv");
+            let (mut recording, _) = rig.record(case.structure().unwrap(), Path::new(&path)).unwrap();
+            recording.sidecar.kind = Some(Kind::Shaker);
+            let mut noise = Noise {
+                relative: 0.01,
+                ..Noise::default()
+            };
+            noise.absolute.insert("fx".into(), 0.0);
+            noise.add(&mut recording, 11 + index as u64);
+            recording
+        })
+        .collect()
+}
+
+#[test]
+fn of_long_records_the_beginnings_are_searched_and_all_is_checked() {
+    let recordings = long_records(&["cubic-stiffness=2e12"]);
+    let answer = diagnose(&believed(), &recordings, &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
+    assert_eq!(answer.causes[0].name, "cubic-stiffness");
+    let found = value(&answer, "cubic-stiffness", "k3_n_per_m3");
+    assert!((found / 2e12 - 1.0).abs() < 0.02, "{found}");
+    assert!(answer.gain.unwrap().residual_energy_removed > 0.95);
+    assert!(
+        answer.warnings.iter().any(|said| said.contains("first 4.1 s")),
+        "{:?}",
+        answer.warnings
+    );
+}
+
+/// A drift of 4 % within a minute is a quarter of a percent within its first seconds.
+#[test]
+fn what_only_the_whole_of_long_records_shows_is_not_overlooked() {
+    let recordings = long_records(&["drift.relative_rate_per_s=0.0007"]);
+    let beginning = super::beginning::diagnosed(&believed(), &recordings, &Options::default(), &|_| ());
+    assert!(
+        beginning.is_none_or(|answer| answer.outcome != Outcome::None),
+        "nothing is said to be wrong"
     );
 }

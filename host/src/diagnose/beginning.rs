@@ -1,0 +1,119 @@
+//! Long random records: their beginnings are searched, and what is found there is held against all of them.
+//!
+//! A search simulates its records hundreds of times, and a random excitation tells in its first seconds what it tells in a
+//! minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of the whole records
+//! as of their beginnings.
+
+use super::answer::{Diagnosis, Gain, Outcome, Quality};
+use super::regression::{Regression, Share};
+use super::scene::{Baseline, Scene};
+use super::selection::WITHIN_NOISE;
+use super::{Options, Stage, judge};
+use crate::case::Case;
+use crate::recording::{Channel, Kind, Recording};
+
+/// Samples of all records together that are searched.
+const SEARCHED: usize = 32_768;
+/// Periods of the slowest mode that the beginning of each record must hold.
+const PERIODS: f64 = 60.0;
+/// Records are shortened where that leaves less than this share of them.
+const WORTH: f64 = 0.5;
+/// Share of the residual's energy that what was found may leave of the whole records beyond their noise.
+const LEFT: f64 = 0.012;
+
+/// The beginnings of records, all of them random; `None` where they are too short to be shortened.
+fn beginnings(case: &Case, recordings: &[Recording]) -> Option<Vec<Recording>> {
+    let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
+    let all: usize = recordings.iter().map(Recording::len).sum();
+    let shortened: Vec<Recording> = recordings
+        .iter()
+        .map(|recording| {
+            let least = (PERIODS / lowest_hz * recording.sample_rate_hz).ceil() as usize;
+            let count = (SEARCHED / recordings.len()).max(least).min(recording.len());
+            (recording.sidecar.kind == Some(Kind::Shaker)).then(|| beginning(recording, count))
+        })
+        .collect::<Option<_>>()?;
+    let left: usize = shortened.iter().map(Recording::len).sum();
+    ((left as f64) < WORTH * all as f64).then_some(shortened)
+}
+
+fn beginning(recording: &Recording, count: usize) -> Recording {
+    let channels = recording.channels.iter().map(|channel| Channel {
+        samples: channel.samples[..count].to_vec(),
+        ..channel.clone()
+    });
+    Recording {
+        channels: channels.collect(),
+        path: recording.path.clone(),
+        sidecar: recording.sidecar.clone(),
+        ..*recording
+    }
+}
+
+/// What the beginnings of the records tell, where that holds for all of them; `None` where it does not, or where they are short.
+pub(super) fn diagnosed(
+    case: &Case,
+    recordings: &[Recording],
+    options: &Options,
+    watch: &dyn Fn(Stage),
+) -> Option<Diagnosis> {
+    let beginnings = beginnings(case, recordings)?;
+    let scene = Scene::new(case, &beginnings).ok()?;
+    let mut diagnosis = judge::judge(&scene, options, watch);
+    drop(scene);
+    watch(Stage::Records);
+    let believed = Left::of(case, recordings)?;
+    diagnosis.baseline = Quality {
+        nrmse_heldout: believed.missed,
+    };
+    let searched_s = beginnings
+        .iter()
+        .map(|record| record.len() as f64 / record.sample_rate_hz);
+    diagnosis.warnings.push(format!(
+        "causes were sought in the first {:.1} s of each record, and what was found was held against all of them",
+        searched_s.fold(0.0, f64::max)
+    ));
+    let extended = match diagnosis.outcome {
+        // More of the same explains nothing.
+        Outcome::Unexplained => return Some(diagnosis),
+        Outcome::None => case.clone(),
+        _ => diagnosis.extended(case)?,
+    };
+    let explained = Left::of(&extended, recordings)?;
+    let beyond = explained.energy - explained.count;
+    if beyond > WITHIN_NOISE * explained.count && beyond > LEFT * (believed.energy - believed.count) {
+        return None;
+    }
+    if diagnosis.outcome != Outcome::None {
+        diagnosis.extended = Some(Quality {
+            nrmse_heldout: explained.missed,
+        });
+        let there = (believed.energy - believed.count).max(1e-9 * believed.energy);
+        diagnosis.gain = Some(Gain {
+            residual_energy_removed: (1.0 - beyond / there).min(1.0),
+        });
+    }
+    Some(diagnosis)
+}
+
+/// What a case leaves of records.
+struct Left {
+    /// In units of the noise.
+    energy: f64,
+    /// Numbers that were compared.
+    count: f64,
+    /// Residual over signal.
+    missed: f64,
+}
+
+impl Left {
+    fn of(case: &Case, recordings: &[Recording]) -> Option<Self> {
+        let scene = Scene::new(case, recordings).ok()?;
+        let regression = Regression::new(&scene);
+        Some(Self {
+            energy: regression.residual(Share::Whole),
+            count: regression.count(Share::Whole) as f64,
+            missed: regression.missed(&scene),
+        })
+    }
+}
