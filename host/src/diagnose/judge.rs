@@ -94,10 +94,12 @@ fn answer(
         1.0
     };
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
-    diagnosis.causes = named(scene, library, regression, best, inflation, confidence);
+    // Errors of the computation go along with the signal: where they are like a cause, they are not averaged away.
+    let uncertain = inflation + scale.coherent;
+    diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
     for other in &selection.others {
-        for cause in named(scene, library, regression, other, inflation, confidence) {
+        for cause in named(scene, library, regression, other, uncertain, confidence) {
             if !diagnosis.causes.iter().any(|known| known.name == cause.name) {
                 diagnosis.causes.push(cause);
             }

@@ -90,6 +90,8 @@ fn settle(
             with_shape(scene, library, regression, &explanation, place, next.collect())
                 .filter(|better| better.fit.left < explanation.fit.left)
         });
+        // What leaves less where it contradicts itself is no explanation.
+        let better = better.or_else(|| with_shape(scene, library, regression, &explanation, place, asked));
         let Some(better) = better else {
             break;
         };

@@ -69,6 +69,18 @@ impl Regression {
         regression
     }
 
+    /// Σ y² of what was measured in the whole records, in units of the noise.
+    pub fn signal(&self, scene: &Scene<'_>) -> f64 {
+        let of_part = |part: &Part| {
+            let channels = scene.records[part.record].channels.iter();
+            let measured: Vec<Vec<f64>> = channels.map(|channel| channel.measured.clone()).collect();
+            let whitened = part.whiten(&measured);
+            dot(&whitened, &whitened)
+        };
+        let whole = self.parts.iter().filter(|part| part.share == Share::Whole);
+        whole.map(of_part).sum()
+    }
+
     /// Adds a regressor, given as samples by record and channel; its number.
     pub fn add(&mut self, samples: &[Vec<Vec<f64>>]) -> usize {
         let column: Vec<Vec<f64>> = self

@@ -3,6 +3,7 @@
 use super::Stage;
 use super::evidence::{Explanation, Library};
 use super::output_error::OutputError;
+use super::record::TRUSTED_IN_CUTS;
 use super::refine::refine;
 use super::regression::{Regression, Share};
 use super::scene::Scene;
@@ -22,6 +23,8 @@ const NUMERICS: f64 = 1e-4;
 pub(super) const WITHIN_NOISE: f64 = 0.15;
 /// What further causes must take of what is left beyond the noise: less is how one wrong equation mends another.
 const SHARE: f64 = 0.2;
+/// How many times what errors of the computation may be is plainly something else: twice their amplitude.
+const PLAIN: f64 = 4.0;
 /// Most causes that act together.
 const CAUSES: usize = 3;
 /// Explanations of the regression that are simulated, by the number of their causes.
@@ -52,6 +55,8 @@ pub(super) struct Scale<'a> {
     inflation: f64,
     /// What the case alone leaves, in units of the noise.
     pub(super) reference: f64,
+    /// The most that errors of the computation, which go along with the signal, leave or give to a cause, in units of the noise.
+    pub(super) coherent: f64,
 }
 
 impl<'a> Scale<'a> {
@@ -61,9 +66,15 @@ impl<'a> Scale<'a> {
         let closed = output_error
             .as_ref()
             .and_then(|output_error| output_error.left_by_baseline(library));
+        let is_cut = scene.records.iter().any(|record| record.cut.is_some());
         Self {
             scene,
             output_error,
+            coherent: if is_cut {
+                TRUSTED_IN_CUTS * TRUSTED_IN_CUTS * regression.signal(scene)
+            } else {
+                0.0
+            },
             inflation: inflation(regression),
             reference: closed.unwrap_or_else(|| regression.residual(Share::Whole)),
         }
@@ -106,7 +117,7 @@ impl<'a> Scale<'a> {
         let noise = regression.count(Share::Whole) as f64;
         let left = best.map_or(self.reference, |best| best.fit.left);
         let reference = self.reference.max(regression.residual(Share::Whole));
-        let beyond = (left - noise).max(0.0);
+        let beyond = (left - noise - PLAIN * self.coherent).max(0.0);
         let there = (reference - noise).max(1e-9 * noise);
         (beyond / noise, beyond / there)
     }
@@ -296,7 +307,7 @@ pub(super) fn select(
         if size > 1 && !takes_its_share {
             break;
         }
-        if gained < reached + BELIEVED
+        if gained < reached + BELIEVED + PLAIN * scale.coherent
             || !takes_its_share
             || held_out > regression.residual(Share::HeldOut) + chance
         {

@@ -12,6 +12,9 @@ pub(super) struct Delay;
 /// Delays up to this share of the period of the highest frequency are looked for.
 const LONGEST: f64 = 0.4;
 
+/// Delays that differ by this factor are of another size.
+const ANOTHER: f64 = 100.0;
+
 impl Cause for Delay {
     fn name(&self) -> &'static str {
         "sensor-delay"
@@ -75,14 +78,15 @@ impl Cause for Delay {
             .map(|delay| vec![*delay])
     }
 
+    /// None where the regressor was made for a delay of another size: that is no delay.
     fn parameters(
         &self,
         _: &Scene<'_>,
         _: &Place,
-        _: &[f64],
+        shape: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        let delay = *coefficients.first()?;
-        (delay > 0.0).then(|| vec![("delay_s", delay)])
+        let (delay, made_for) = (*coefficients.first()?, *shape.first()?);
+        (delay > made_for / ANOTHER && delay < made_for * ANOTHER).then(|| vec![("delay_s", delay)])
     }
 }
