@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::forced::ForcedProblem;
 use super::orbit::{Orbit, OrbitError, PeriodMap, Scale, Tangent};
+use super::pairing::{FOLLOWED, nearest, pair};
 use super::revolution::RevolutionPeriod;
 use super::tooth_period::ToothPeriod;
 use crate::stability::line::union;
@@ -20,12 +21,6 @@ const STEP_MAX: f64 = 1.0 / 30.0;
 
 /// The shortest step: below it multipliers that come together cannot be told apart, and are paired as they are.
 const STEP_MIN: f64 = 1e-5;
-
-/// How far a multiplier near the circle may move in one step.
-const MOVE_MAX: f64 = 0.12;
-
-/// Multipliers below this size are not followed: they are more than two steps away from the circle.
-const FOLLOWED: f64 = 1.0 - 2.5 * MOVE_MAX;
 
 /// By how much less a mesh twice as fine errs, at the least: what changes to it times this is an estimate with room to spare.
 const ROOM: f64 = 10.0;
@@ -431,70 +426,6 @@ impl<M: PeriodMap> Follower<M> {
             outside: sample.outside(),
         }
     }
-}
-
-/// Pairs the multipliers of two samples; `None` where one near the circle cannot be recognized again.
-///
-/// With `anyhow` the nearest is taken however far: two real multipliers that meet on the circle and leave the axis move
-/// infinitely fast there, and no step is short enough.
-fn pair(from: &[Complex64], to: &[Complex64], anyhow: bool) -> Option<Vec<(Complex64, Complex64)>> {
-    let (mut from, mut free) = (from.to_vec(), to.to_vec());
-    take_met(&mut from, &mut free);
-    take_met(&mut free, &mut from);
-    let mut pairs = Vec::with_capacity(from.len());
-    for root in from {
-        let best = free
-            .iter()
-            .enumerate()
-            .min_by(|(_, a), (_, b)| (*a - root).norm().total_cmp(&(*b - root).norm()));
-        match best {
-            Some((index, &next))
-                if anyhow
-                    || ((next - root).norm() < MOVE_MAX * root.norm().max(1.0)
-                        && (Kind::of(root) == Kind::of(next) || is_far(root) && is_far(next))) =>
-            {
-                pairs.push((root, next));
-                free.swap_remove(index);
-            }
-            // A multiplier that has sunk below what is followed, or half of a pair that met on the axis.
-            None if is_far(root) || anyhow => {}
-            _ if is_far(root) => {}
-            _ => return None,
-        }
-    }
-    (anyhow || free.iter().all(|&root| is_far(root))).then_some(pairs)
-}
-
-/// Takes out conjugate pairs of one sample that are two real multipliers in the other, on the same side of the circle: they have
-/// met on the axis over the step, and none of them has crossed.
-fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
-    conjugate.retain(|&root| {
-        let reach = MOVE_MAX * root.norm().max(1.0);
-        let is_near = |other: &Complex64| (other - root).norm() < reach;
-        if root.im == 0.0 || real.iter().any(|other| other.im != 0.0 && is_near(other)) {
-            return true;
-        }
-        let is_half = |other: &Complex64| {
-            other.im == 0.0 && is_near(other) && (other.norm() > 1.0) == (root.norm() > 1.0)
-        };
-        if real.iter().filter(|other| is_half(other)).count() != 2 {
-            return true;
-        }
-        real.retain(|other| !is_half(other));
-        false
-    });
-}
-
-/// True where a multiplier cannot reach the circle in a step.
-fn is_far(multiplier: Complex64) -> bool {
-    (multiplier.norm() - 1.0).abs() > MOVE_MAX
-}
-
-fn nearest(roots: &[Complex64], expected: Complex64) -> Option<Complex64> {
-    roots
-        .iter()
-        .copied()
-        .min_by(|a, b| (a - expected).norm().total_cmp(&(b - expected).norm()))
 }
 
 impl Branch {

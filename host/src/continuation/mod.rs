@@ -15,6 +15,7 @@ mod collocated;
 mod equivalent;
 mod forced;
 mod orbit;
+mod pairing;
 mod restoring;
 mod revolution;
 mod tooth_period;

@@ -4,9 +4,9 @@
 //!
 //!   Y_i = x₀ + h Σ_j a_ij f(t_j, Y_j),   x₁ = x₀ + h Σ_j b_j f(t_j, Y_j),
 //!
-//! which has order 2m at the ends. The values Y are solved for within each piece, so that what remains is the map
-//! x(0) → x(T) over the period with its exact derivatives in x(0) and in depth. A periodic orbit is its fixed point: on it
-//! u = u_τ, and the surface that was cut before does not act.
+//! which has order 2m at the ends. Linearized about values Y, a piece gives Newton's step of its own values and of x₁ in x₀ and in
+//! depth; piece after piece what remains is the map x(0) → x(T) over the period with its exact derivatives. A periodic orbit is
+//! its fixed point: on it u = u_τ, and the surface that was cut before does not act.
 //! Pieces end where teeth enter and leave the cut: no switch lies inside one.
 
 use nalgebra::{DMatrix, DVector, Vector3};
