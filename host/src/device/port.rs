@@ -23,6 +23,11 @@ pub trait Port: Send {
     fn receive(&mut self, into: &mut [u8], timeout: Duration) -> Result<usize, DeviceError>;
 }
 
+/// How often a port that is in use is tried, and after how long again: a process that is being started holds a copy of the lock of
+/// its parent until its own program runs.
+const TRIES: usize = 6;
+const BETWEEN_TRIES: Duration = Duration::from_millis(50);
+
 /// A serial port of this computer.
 pub struct SerialLine {
     name: String,
@@ -35,13 +40,22 @@ impl SerialLine {
     /// # Errors
     /// Where there is no such port, it is in use, or may not be used; the message says which.
     pub fn open(name: &str) -> Result<Self, DeviceError> {
-        let line = serialport::new(name, BAUD_RATE)
-            .open()
-            .map_err(|error| DeviceError::open(name, &error))?;
-        Ok(Self {
-            name: name.into(),
-            line,
-        })
+        let mut tries_left = TRIES;
+        loop {
+            tries_left -= 1;
+            match serialport::new(name, BAUD_RATE).open() {
+                Ok(line) => {
+                    return Ok(Self {
+                        name: name.into(),
+                        line,
+                    });
+                }
+                Err(error) if error.kind() == serialport::ErrorKind::NoDevice && tries_left > 0 => {
+                    std::thread::sleep(BETWEEN_TRIES);
+                }
+                Err(error) => return Err(DeviceError::open(name, &error)),
+            }
+        }
     }
 }
 
