@@ -17,6 +17,8 @@ pub(crate) struct Said {
     /// Causes in their order.
     causes: Vec<SaidCause>,
     energy_removed: Option<f64>,
+    /// What it leaves beyond the noise, as a share of what was there.
+    left: f64,
     seconds: f64,
 }
 
@@ -74,6 +76,7 @@ impl Said {
                 })
                 .collect(),
             energy_removed: answer["gain"]["residual_energy_removed"].as_f64(),
+            left: answer["unexplained"]["fraction"].as_f64().unwrap_or(f64::NAN),
             seconds,
         }
     }
@@ -192,12 +195,13 @@ impl fmt::Display for Finding {
             .map_or(f64::NAN, |cause| cause.confidence);
         write!(
             out,
-            "seed {} {}: hidden {} at {:.2}× noise, said {} ({confidence:.3}, {:.2} s)",
+            "seed {} {}: hidden {} at {:.2}× noise, said {} ({confidence:.3}, left {:.1e}, {:.2} s)",
             self.seed,
             if self.right { "right" } else { "WRONG" },
             self.hidden_label(),
             self.ratio,
             self.said.label(),
+            self.said.left,
             self.said.seconds
         )?;
         self.missed

@@ -59,7 +59,7 @@ pub(super) fn diagnosed(
 ) -> Option<Diagnosis> {
     let beginnings = beginnings(case, recordings)?;
     let scene = Scene::new(case, &beginnings).ok()?;
-    let mut diagnosis = judge::judge(&scene, options, watch);
+    let mut diagnosis = judge::judge(&scene, &beginnings, options, watch);
     drop(scene);
     watch(Stage::Records);
     let believed = Left::of(case, recordings)?;

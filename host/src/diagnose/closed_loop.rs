@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::grid::{Grid, catmull_rom};
 use super::record::Record;
 use super::scene::{Domain, Scene};
 use crate::recording::{Kind, Quantity};
-use crate::simulate::{At, Drive, Effects, Model, Room, Settings};
+use crate::simulate::{At, Drive, Dynamics, Effects, Model, Room, Settings};
+use crate::structure::FirstOrder;
 
 /// Instants between two samples at which a force is interpolated without changing its band; between these by cubics.
 const FINER: usize = 8;
@@ -41,18 +43,6 @@ impl Drive for Measured {
         let place = t * self.rate_hz;
         self.force_n.each_ref().map(|force| catmull_rom(force, place))
     }
-}
-
-/// A cubic through the two samples beside `place` with the slopes of their neighbours.
-fn catmull_rom(samples: &[f64], place: f64) -> f64 {
-    let Some(last) = samples.len().checked_sub(1) else {
-        return 0.0;
-    };
-    let index = (place.max(0.0) as usize).min(last);
-    let u = (place - index as f64).clamp(0.0, 1.0);
-    let at = |offset: isize| samples[index.saturating_add_signed(offset).min(last)];
-    let (a, b, c, d) = (at(-1), at(0), at(1), at(2));
-    b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
 }
 
 impl Drive for Shared {
@@ -101,6 +91,56 @@ fn can(record: &Record) -> bool {
         && (driven || starts_anywhere(record))
 }
 
+/// The static force that holds the structure of the first `own` states of `first_order` where they have the tool, N along the axes
+/// of the scene: F = H(0)⁻¹ u with H(0) = −C A⁻¹ B; `None` where a force is not held.
+pub(super) fn holding_force_n(
+    scene: &Scene<'_>,
+    first_order: &FirstOrder,
+    states: &[f64],
+) -> Option<Vector3<f64>> {
+    let own = states.len();
+    let (a, b) = (first_order.a.view((0, 0), (own, own)), first_order.b.rows(0, own));
+    let c = first_order.c.columns(0, own);
+    let compliance = -(c * a.lu().solve(&b)?);
+    let moved = c * DVector::from_column_slice(states);
+    let axes = &scene.baseline.axes;
+    let compliance = DMatrix::from_fn(axes.len(), axes.len(), |i, j| compliance[(axes[i], axes[j])]);
+    let force = compliance
+        .lu()
+        .solve(&DVector::from_fn(axes.len(), |i, _| moved[axes[i]]))?;
+    let mut along = Vector3::zeros();
+    for (axis, force) in axes.iter().zip(force.iter()) {
+        along[*axis] = *force;
+    }
+    along.iter().all(|force| force.is_finite()).then_some(along)
+}
+
+/// Modes that the extended case has more than the baseline begin where the static force has them that holds the rest where it
+/// begins: what was let go was pulled as a whole. Without such a force they begin at rest.
+fn let_go(scene: &Scene<'_>, dynamics: &Dynamics, states: &mut [f64]) {
+    let (own, all) = (scene.baseline.first_order.order(), dynamics.order());
+    if own >= all {
+        return;
+    }
+    let first_order = dynamics.first_order();
+    let Some(force) = holding_force_n(scene, &first_order, &states[..own]) else {
+        return;
+    };
+    let more = all - own;
+    let pulled = first_order.b.rows(own, more) * force;
+    if let Some(held) = first_order
+        .a
+        .view((own, own), (more, more))
+        .clone_owned()
+        .lu()
+        .solve(&pulled)
+    {
+        for (state, held) in states[own..all].iter_mut().zip(held.iter()) {
+            *state = -held;
+        }
+    }
+}
+
 impl ClosedLoop {
     /// `None` where some record cannot be simulated.
     pub(super) fn new(scene: &Scene<'_>) -> Option<Self> {
@@ -130,19 +170,21 @@ impl ClosedLoop {
         Some(model.terms.iter().any(|term| term.holds().is_some()))
     }
 
-    /// The states of the extended case where those of the baseline are `structure`: what it has more begins at rest, states of
-    /// terms where they are found going on. Beside them about the size of each, for a displacement of one meter.
+    /// The states of the extended case where those of the baseline are `structure`: what it has more is let go with it
+    /// ([`let_go`]), states of terms are where they are found going on. Beside them about the size of each, for a displacement of
+    /// one meter; `None` for those that follow from others.
     pub(super) fn begin(
         &self,
         scene: &Scene<'_>,
         record: usize,
         effects: &Effects,
         structure: &[f64],
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
+    ) -> Option<(Vec<f64>, Vec<Option<f64>>)> {
         let model = self.model(scene, record, effects)?;
         let order = model.dynamics.order();
         let mut states = structure.to_vec();
         states.resize(order, 0.0);
+        let_go(scene, &model.dynamics, &mut states);
         let at = At {
             t: 0.0,
             x: model.dynamics.displacement(&states),
@@ -153,8 +195,9 @@ impl ClosedLoop {
             states.resize(from + term.states(), 0.0);
             term.begin(&at, &mut states[from..]);
         }
-        let mut sizes = model.dynamics.sizes().to_vec();
-        sizes.resize(states.len(), 1.0);
+        let mut sizes: Vec<Option<f64>> = model.dynamics.sizes().iter().map(|size| Some(*size)).collect();
+        sizes[structure.len()..].fill(None);
+        sizes.resize(states.len(), Some(1.0));
         Some((states, sizes))
     }
 
@@ -193,6 +236,9 @@ impl ClosedLoop {
             states.resize(model.order(), AT_REST * largest_m(record));
         }
         states.resize(model.order(), 0.0);
+        if starts_anywhere(record) {
+            let_go(scene, &model.dynamics, &mut states);
+        }
         let end_s = (length.max(2) - 1) as f64 / rate_hz;
         model
             .run_from(states, end_s, settings, |segment| {
@@ -227,22 +273,5 @@ impl ClosedLoop {
             .flatten()
             .all(|sample| sample.is_finite())
             .then_some(samples)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cubics_go_through_their_samples_and_are_exact_for_lines() {
-        let samples = [0.0, 1.0, 2.0, 3.0, 4.0];
-        for place in [0.0, 0.7, 1.5, 2.0, 2.9, 4.0] {
-            if (1.0..=3.0).contains(&place) {
-                assert!((catmull_rom(&samples, place) - place).abs() < 1e-12);
-            }
-        }
-        assert_eq!(catmull_rom(&[], 1.0), 0.0);
-        assert_eq!(catmull_rom(&samples, 9.0), 4.0);
     }
 }

@@ -7,9 +7,8 @@ use super::DiagnoseError;
 use super::chips::Chips;
 use super::cut::{CutForce, RecordedCut};
 use super::motion;
-use super::noise::rms;
 use super::record::{Observed, Record};
-use super::scene::{Baseline, Scene};
+use super::scene::Baseline;
 use super::turning::Turning;
 use crate::recording::{Quantity, Recording};
 use crate::simulate::Cutter;
@@ -169,18 +168,4 @@ impl Record {
         self.cut = Some(cutting);
         Ok(())
     }
-}
-
-/// Noise over signal from which on the noise of the motion is felt in what is found along it.
-const NOISY: f64 = 0.003;
-
-/// True where all records are cuts, and the motion of one has noise that is felt.
-pub(super) fn is_noisy(scene: &Scene<'_>) -> bool {
-    let mut motions = scene
-        .records
-        .iter()
-        .flat_map(|record| &record.channels)
-        .filter(|channel| channel.pickup.quantity != Quantity::Force);
-    scene.records.iter().all(|record| record.cut.is_some())
-        && motions.any(|channel| channel.deviation > NOISY * rms(&channel.measured))
 }

@@ -1,5 +1,7 @@
 //! Which causes explain the residual, and which do so equally well.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -48,6 +50,8 @@ pub struct Simulated {
     pub covariance: Vec<DMatrix<f64>>,
     /// By record: states at its start; empty where it starts from rest.
     pub starts: Vec<Vec<f64>>,
+    /// By record and channel: what is left, where that is kept.
+    pub left: Option<Arc<Vec<Vec<Vec<f64>>>>>,
 }
 
 /// The library on a scene.
@@ -109,6 +113,7 @@ impl Library {
                 }),
             }
         }
+        regression.complete();
         library
     }
 
@@ -228,6 +233,21 @@ impl Library {
             .collect()
     }
 
+    /// The extensions that make an explanation part of a case.
+    pub fn extensions(
+        &self,
+        scene: &Scene<'_>,
+        explanation: &Explanation,
+    ) -> Option<Vec<(&'static str, toml::Table)>> {
+        let parameters = self.parameters(scene, explanation)?;
+        let of = |(choice, parameters): (&Choice, Vec<Parameter>)| {
+            let place = &self.candidates[choice.candidate].place;
+            self.cause(choice.candidate).parts(place, &parameters)
+        };
+        let parts = explanation.choices.iter().zip(parameters).flat_map(of);
+        Some(parts.map(|part| (part.name, part.extension)).collect())
+    }
+
     /// The best explanation by each single candidate, best first.
     pub fn singles(&self, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
         let found = self
@@ -283,7 +303,8 @@ impl Library {
     }
 
     /// A case holds one extension of a name: the same cause does not act twice. And three terms of one law, of the displacement or
-    /// of the velocity along one axis, are the series of a law that nobody knows, and no causes.
+    /// of the velocity along one axis, are the series of a law that nobody knows, and no causes: a spring that changes with time
+    /// counts as a spring, and a loop, which is what friction is before it slips, as friction.
     pub fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
         let new = self.cause(other.candidate).names();
         let is_new = some.iter().all(|choice| {
@@ -300,10 +321,13 @@ impl Library {
     /// Of what a choice is a law, and where.
     fn law(&self, choice: Choice) -> Option<(Law, &Place)> {
         let law = match self.cause(choice.candidate).name() {
-            "stiffness" | "quadratic-stiffness" | "cubic-stiffness" | "softening-hardening" | "backlash" => {
-                Law::OfDisplacement
-            }
-            "damping" | "cubic-damping" | "coulomb-friction" => Law::OfVelocity,
+            "stiffness"
+            | "drift"
+            | "quadratic-stiffness"
+            | "cubic-stiffness"
+            | "softening-hardening"
+            | "backlash" => Law::OfDisplacement,
+            "damping" | "cubic-damping" | "coulomb-friction" | "hysteresis" => Law::OfVelocity,
             _ => return None,
         };
         Some((law, &self.candidates[choice.candidate].place))

@@ -106,6 +106,7 @@ impl Grid {
         let mut bins = vec![Complex64::ZERO; self.finer * self.length / 2 + 1];
         bins[..spectrum.len()].copy_from_slice(spectrum);
         if self.finer > 1
+            && spectrum.len() == self.bins()
             && let Some(last) = bins.get_mut(self.length / 2)
         {
             *last *= 0.5;
@@ -130,6 +131,16 @@ impl Grid {
             *bin *= scale;
         }
         bins
+    }
+
+    /// The samples `delay_s` before each sample of the grid of a spectrum at the bins of the finer samples. What is a step from one
+    /// finer sample to the next stays one: turning the spectrum would make it ring.
+    pub(super) fn late_samples_of_fine(&self, spectrum: &[Complex64], delay_s: f64) -> Vec<f64> {
+        let fine = self.fine_samples(spectrum);
+        let late = delay_s * self.rate_hz() * self.finer() as f64;
+        (0..self.count())
+            .map(|sample| catmull_rom(&fine, (sample * self.finer()) as f64 - late))
+            .collect()
     }
 
     /// The samples of the record of a spectrum of finer samples: what a sensor without a filter reads. Every `finer`-th sample
@@ -221,6 +232,18 @@ impl Stretch {
     }
 }
 
+/// A cubic through the two samples beside `place` with the slopes of their neighbours.
+pub(super) fn catmull_rom(samples: &[f64], place: f64) -> f64 {
+    let Some(last) = samples.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let index = (place.max(0.0) as usize).min(last);
+    let u = (place - index as f64).clamp(0.0, 1.0);
+    let at = |offset: isize| samples[index.saturating_add_signed(offset).min(last)];
+    let (a, b, c, d) = (at(-1), at(0), at(1), at(2));
+    b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -276,5 +299,17 @@ mod tests {
         let energy = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
         assert_eq!(parts.len(), 30);
         assert!((energy(&parts) - energy(&samples)).abs() < 1e-12 * energy(&samples));
+    }
+
+    #[test]
+    fn cubics_go_through_their_samples_and_are_exact_for_lines() {
+        let samples = [0.0, 1.0, 2.0, 3.0, 4.0];
+        for place in [0.0, 0.7, 1.5, 2.0, 2.9, 4.0] {
+            if (1.0..=3.0).contains(&place) {
+                assert!((catmull_rom(&samples, place) - place).abs() < 1e-12);
+            }
+        }
+        assert_eq!(catmull_rom(&[], 1.0), 0.0);
+        assert_eq!(catmull_rom(&samples, 9.0), 4.0);
     }
 }

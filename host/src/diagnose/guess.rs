@@ -69,6 +69,7 @@ pub(super) fn guess(scene: &Scene<'_>, regression: &mut Regression) -> Option<St
             }
         }
     }
+    regression.complete();
     let count = regression.count(Share::Fitted) as f64;
     let price =
         |left: f64, terms: usize| count * left.max(f64::MIN_POSITIVE).ln() + terms as f64 * count.ln();

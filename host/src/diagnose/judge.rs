@@ -8,22 +8,31 @@ use super::scene::{Domain, Scene};
 use super::selection::{APART, Scale, Selection, WITHIN_NOISE, names, select};
 use super::views::views;
 use super::{Options, Stage, next_test};
+use crate::recording::Recording;
 
 /// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
 /// where the noise is known by its floor, and of forces, where derivatives of the motion bring noise that is not white.
 const LEFT_OF_RESPONSE: f64 = 0.012;
 const LEFT_OF_FORCE: f64 = 0.15;
+/// By what that becomes less for each further cause of an explanation that is simulated: with two or three terms much can be
+/// imitated, but not all of it.
+const FEWER_LEFT: f64 = 0.05;
 
 /// A simulated explanation that leaves more than this share of the noise beyond chance is not all of the truth, and the
 /// confidence in it becomes this share of what it would be.
 const REJECTED: f64 = 0.03;
 const DOUBT: f64 = 0.8;
 
-pub(super) fn judge(scene: &Scene<'_>, _options: &Options, watch: &dyn Fn(Stage)) -> Diagnosis {
+pub(super) fn judge(
+    scene: &Scene<'_>,
+    recordings: &[Recording],
+    _options: &Options,
+    watch: &dyn Fn(Stage),
+) -> Diagnosis {
     watch(Stage::Library);
     let mut regression = Regression::new(scene);
     let mut library = Library::new(scene, &mut regression);
-    let scale = Scale::new(scene, &library, &regression);
+    let scale = Scale::new(scene, recordings, &library, &regression);
     let selection = select(&scale, &mut library, &mut regression, watch);
     watch(Stage::Answer);
     answer(&scale, &library, &mut regression, &selection)
@@ -62,10 +71,12 @@ fn answer(
         views: views(scene, library, selection.best.as_ref()),
     };
     let (of_noise, of_excess) = scale.excess(regression, selection.best.as_ref());
-    let allowed = if scene.all_in(Domain::Force) {
-        LEFT_OF_FORCE
-    } else {
-        LEFT_OF_RESPONSE
+    let allowed = match &selection.best {
+        _ if scene.all_in(Domain::Force) => LEFT_OF_FORCE,
+        Some(best) if best.simulated.is_some() => {
+            LEFT_OF_RESPONSE * FEWER_LEFT.powi(best.choices.len() as i32 - 1)
+        }
+        _ => LEFT_OF_RESPONSE,
     };
     if of_noise > WITHIN_NOISE {
         diagnosis.unexplained = Unexplained {

@@ -11,6 +11,7 @@ pub mod cause;
 mod causes;
 mod checks;
 pub mod chips;
+mod closed_fit;
 mod closed_loop;
 mod cubic;
 pub mod cut;
@@ -21,6 +22,7 @@ mod decay;
 mod error;
 pub mod evidence;
 mod extension;
+mod gram;
 mod grid;
 mod guess;
 mod judge;
@@ -37,6 +39,7 @@ mod receptance;
 mod record;
 mod refine;
 pub mod regression;
+mod relinearization;
 mod scene;
 mod selection;
 mod stepwise;
@@ -45,8 +48,6 @@ mod stiffness;
 mod tests;
 pub mod turning;
 mod views;
-
-use answer::Outcome;
 
 pub use answer::Diagnosis;
 pub use cutting::Cutting;
@@ -110,21 +111,5 @@ pub fn diagnose_watched(
     }
     watch(Stage::Records);
     let scene = Scene::new(case, recordings)?;
-    let diagnosis = judge::judge(&scene, options, watch);
-    if diagnosis.outcome == Outcome::None || !cutting::is_noisy(&scene) {
-        return Ok(diagnosis);
-    }
-    // A second look at a cut, along the motion that the first one explains, or that is believed.
-    watch(Stage::Records);
-    let extended = diagnosis.extended(case);
-    let better = match &extended {
-        Some(extended) => Scene::new(extended, recordings).ok(),
-        None => Some(scene),
-    };
-    let again = better
-        .and_then(|better| Scene::along(case, recordings, &better).ok())
-        .map(|scene| judge::judge(&scene, options, watch));
-    Ok(again
-        .filter(|again| again.outcome != Outcome::Unexplained)
-        .unwrap_or(diagnosis))
+    Ok(judge::judge(&scene, recordings, options, watch))
 }

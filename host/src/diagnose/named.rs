@@ -154,7 +154,7 @@ fn figure(value: f64, deviation: f64) -> Figure {
 }
 
 /// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1.
-fn covariance(
+pub(super) fn covariance(
     scene: &Scene<'_>,
     library: &Library,
     regression: &mut Regression,

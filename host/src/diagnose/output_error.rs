@@ -9,6 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::closed_fit::ClosedFit;
 use super::closed_loop::{ClosedLoop, starts_anywhere};
 use super::decay::{Decays, dot};
 use super::evidence::{Choice, Explanation, Library, Simulated};
@@ -308,42 +309,6 @@ impl<'a> OutputError<'a> {
         Some(Found { point, left, normal })
     }
 
-    /// The explanation with the parameters that simulation finds, from those of the regression on; `None` where it cannot be
-    /// simulated. It is given up where it stays behind `rival`, a χ² that a simulation has reached; its start is sought in
-    /// steps only where the regression leaves not much more than `best_left`, the least that it leaves.
-    pub(super) fn fit(
-        &self,
-        library: &mut Library,
-        regression: &mut Regression,
-        explanation: &Explanation,
-        (rival, best_left): (f64, f64),
-    ) -> Option<Explanation> {
-        let whole = self.of_share(Share::Whole);
-        let (mut problem, start) = self.problem(library, explanation)?;
-        let guess = self
-            .residuals(&problem, &whole, &start)
-            .map_or(f64::INFINITY, |left| energy(&left));
-        let mut start = start;
-        let by_regression = explanation.fit.left + regression.count(Share::Whole) as f64;
-        if guess > FAR * by_regression
-            && explanation.fit.left < FAR_BEHIND * best_left.max(regression.count(Share::Whole) as f64)
-        {
-            for parts in &self.horizons {
-                let parts: Vec<&Part> = parts.iter().collect();
-                if let Some(found) = self.search(&mut problem, &parts, start.clone(), 6, f64::INFINITY) {
-                    start = found.point;
-                }
-            }
-        }
-        let mut found = self.search(&mut problem, &whole, start, ROUNDS, rival)?;
-        if problem.least_step > LEAST_STEP && found.left > STUCK * regression.count(Share::Whole) as f64 {
-            found = self.beside(&mut problem, &whole, found, rival);
-        }
-        let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
-        let covariance = by_choice(&slots, &found);
-        self.accept(library, regression, explanation, found, covariance)
-    }
-
     /// The search once more from the best of what lies near where it ended: whether friction lets go at all is a cliff.
     fn beside(&self, problem: &mut Problem<'_>, parts: &[&Part], ended: Found, rival: f64) -> Found {
         let mut best: Option<(f64, Point)> = None;
@@ -391,6 +356,7 @@ impl<'a> OutputError<'a> {
         next.simulated = Some(Simulated {
             covariance,
             starts: found.point.starts,
+            left: None,
         });
         Some(next)
     }
@@ -453,12 +419,13 @@ impl<'a> OutputError<'a> {
             let amplitude = states
                 .iter()
                 .zip(&sizes)
-                .map(|(state, size)| (state / size).abs())
+                .filter_map(|(state, size)| Some((state / (*size)?).abs()))
                 .fold(0.0, f64::max);
             for (index, size) in sizes.iter().enumerate() {
-                problem
-                    .slots
-                    .push((Slot::Start { record, index }, 1e-3 * amplitude * size));
+                if let Some(size) = size {
+                    let slot = Slot::Start { record, index };
+                    problem.slots.push((slot, 1e-3 * amplitude * size));
+                }
             }
             *start = states;
         }
@@ -489,27 +456,60 @@ impl<'a> OutputError<'a> {
         decays.fit(&left, &sizes);
         decays.start
     }
+}
 
-    /// What is left of the held-out parts if the parameters come from the fitted ones alone.
-    pub(super) fn left_held_out(&self, library: &Library, explanation: &Explanation) -> Option<f64> {
-        let simulated = explanation.simulated.as_ref()?;
-        let (mut problem, mut point) = self.problem(library, explanation)?;
-        point.starts.clone_from(&simulated.starts);
-        let fitted = self.of_share(Share::Fitted);
-        // States of records that are held out stay where they are: the fitted parts do not feel them.
-        let found = self.search(&mut problem, &fitted, point, 4, f64::INFINITY)?;
-        let held_out = self.of_share(Share::HeldOut);
-        let only_here = |slot: &Slot| match slot {
-            Slot::Start { record, .. } => !fitted.iter().any(|part| part.record == *record),
-            Slot::Inner { .. } => false,
+impl ClosedFit for OutputError<'_> {
+    fn fit(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        explanation: &Explanation,
+        (rival, best_left): (f64, f64),
+    ) -> Option<Explanation> {
+        let whole = self.of_share(Share::Whole);
+        let (mut problem, start) = self.problem(library, explanation)?;
+        let guess = self
+            .residuals(&problem, &whole, &start)
+            .map_or(f64::INFINITY, |left| energy(&left));
+        let mut start = start;
+        let by_regression = explanation.fit.left + regression.count(Share::Whole) as f64;
+        if guess > FAR * by_regression
+            && explanation.fit.left < FAR_BEHIND * best_left.max(regression.count(Share::Whole) as f64)
+        {
+            for parts in &self.horizons {
+                let parts: Vec<&Part> = parts.iter().collect();
+                if let Some(found) = self.search(&mut problem, &parts, start.clone(), 6, f64::INFINITY) {
+                    start = found.point;
+                }
+            }
+        }
+        let mut found = self.search(&mut problem, &whole, start, ROUNDS, rival)?;
+        if problem.least_step > LEAST_STEP && found.left > STUCK * regression.count(Share::Whole) as f64 {
+            found = self.beside(&mut problem, &whole, found, rival);
+        }
+        let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
+        let covariance = by_choice(&slots, &found);
+        self.accept(library, regression, explanation, found, covariance)
+    }
+
+    fn left_by_baseline(&self, library: &Library, _: &Regression) -> Option<f64> {
+        let nothing = Explanation {
+            choices: Vec::new(),
+            fit: Fit {
+                coefficients: Vec::new(),
+                covariance: DMatrix::zeros(0, 0),
+                left: 0.0,
+            },
+            freedoms: 0,
+            simulated: None,
         };
-        problem.slots.retain(|(slot, _)| only_here(slot));
-        let found = self.search(&mut problem, &held_out, found.point, 4, f64::INFINITY)?;
+        let (mut problem, point) = self.problem(library, &nothing)?;
+        let whole = self.of_share(Share::Whole);
+        let found = self.search(&mut problem, &whole, point, 6, f64::INFINITY)?;
         Some(found.left)
     }
 
-    /// Measured less simulated, by record and channel, of an explanation that is simulated.
-    pub(super) fn left_of(&self, library: &Library, explanation: &Explanation) -> Option<Vec<Vec<Vec<f64>>>> {
+    fn left_of(&self, library: &Library, explanation: &Explanation) -> Option<Vec<Vec<Vec<f64>>>> {
         let simulated = explanation.simulated.as_ref()?;
         let (problem, point) = self.problem(library, explanation)?;
         let effects = problem.effects(self.scene, &point)?;
@@ -534,21 +534,20 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// What the case alone leaves in closed loop, in units of the noise.
-    pub(super) fn left_by_baseline(&self, library: &Library) -> Option<f64> {
-        let nothing = Explanation {
-            choices: Vec::new(),
-            fit: Fit {
-                coefficients: Vec::new(),
-                covariance: DMatrix::zeros(0, 0),
-                left: 0.0,
-            },
-            freedoms: 0,
-            simulated: None,
+    fn left_held_out(&self, library: &Library, _: &Regression, explanation: &Explanation) -> Option<f64> {
+        let simulated = explanation.simulated.as_ref()?;
+        let (mut problem, mut point) = self.problem(library, explanation)?;
+        point.starts.clone_from(&simulated.starts);
+        let fitted = self.of_share(Share::Fitted);
+        // States of records that are held out stay where they are: the fitted parts do not feel them.
+        let found = self.search(&mut problem, &fitted, point, 4, f64::INFINITY)?;
+        let held_out = self.of_share(Share::HeldOut);
+        let only_here = |slot: &Slot| match slot {
+            Slot::Start { record, .. } => !fitted.iter().any(|part| part.record == *record),
+            Slot::Inner { .. } => false,
         };
-        let (mut problem, point) = self.problem(library, &nothing)?;
-        let whole = self.of_share(Share::Whole);
-        let found = self.search(&mut problem, &whole, point, 6, f64::INFINITY)?;
+        problem.slots.retain(|(slot, _)| only_here(slot));
+        let found = self.search(&mut problem, &held_out, found.point, 4, f64::INFINITY)?;
         Some(found.left)
     }
 }

@@ -245,13 +245,24 @@ impl Record {
                 *sum += force * response;
             }
         }
+        let delay_s = self.step_delay_s(&self.channels[channel]);
         if count == 0 {
             vec![0.0; self.grid.count()]
+        } else if delay_s != 0.0 {
+            spectrum.resize(self.grid.fine_bins(), Complex64::ZERO);
+            self.grid.late_samples_of_fine(&spectrum, delay_s)
         } else if count > self.grid.bins() {
             self.grid.samples_of_fine(&spectrum)
         } else {
             self.grid.samples(&spectrum)
         }
+    }
+
+    /// The delay of a channel that reads steps, as the accelerations of a cut are: its responses are those of a channel in time.
+    fn step_delay_s(&self, channel: &Observed) -> f64 {
+        let reads_steps =
+            self.kind == Some(Kind::Cutting) && channel.pickup.quantity == Quantity::Acceleration;
+        if reads_steps { channel.pickup.delay_s } else { 0.0 }
     }
 
     /// True where some channel hears a force along `axis`.
@@ -263,6 +274,7 @@ impl Record {
         self.channels
             .iter()
             .map(|channel| {
+                let delay_s = self.step_delay_s(channel);
                 std::array::from_fn(|axis| {
                     if channel.pickup.quantity == Quantity::Force || !axes.contains(&axis) {
                         return Vec::new();
@@ -277,7 +289,8 @@ impl Record {
                                 .enumerate()
                                 .map(|(row, weight)| self.transfer[bin][(row, axis)] * *weight)
                                 .sum();
-                            read * self.factor(channel, bin)
+                            let in_time = Complex64::cis(self.grid.omega(bin) * delay_s);
+                            read * self.factor(channel, bin) * in_time
                         })
                         .collect()
                 })

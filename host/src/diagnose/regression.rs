@@ -7,20 +7,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::decay::dot;
+use super::gram::{Products, products};
 pub use super::part::Share;
 use super::part::{Part, Unknown, split};
 use super::scene::Scene;
-
-/// Products of columns.
-#[derive(Clone, Debug, Default)]
-struct Products {
-    /// Lower triangle, row by row.
-    gram: Vec<Vec<f64>>,
-    with_residual: Vec<f64>,
-    residual: f64,
-    /// Real numbers that were compared, less those that decays and offsets took.
-    count: usize,
-}
 
 /// A fit of some columns.
 #[derive(Clone, Debug)]
@@ -33,6 +23,17 @@ pub struct Fit {
     pub left: f64,
 }
 
+/// How some columns would take more of a residual.
+#[derive(Clone, Debug)]
+pub struct Refit {
+    /// The change of their coefficients.
+    pub change: Vec<f64>,
+    /// Σ residual² before, in units of the noise.
+    pub before: f64,
+    /// What the change takes of it.
+    pub taken: f64,
+}
+
 /// All columns of a scene.
 pub struct Regression {
     parts: Vec<Part>,
@@ -41,6 +42,8 @@ pub struct Regression {
     residuals: Vec<Vec<f64>>,
     /// Fitted, held out, whole.
     products: [Products; 3],
+    /// So many columns have all their products.
+    complete: usize,
 }
 
 impl Regression {
@@ -60,6 +63,7 @@ impl Regression {
             columns: Vec::new(),
             residuals,
             products: std::array::from_fn(|_| Products::default()),
+            complete: 0,
         };
         for (part, residual) in regression.parts.iter().zip(&regression.residuals) {
             let products = &mut regression.products[part.share as usize];
@@ -81,35 +85,61 @@ impl Regression {
         whole.map(of_part).sum()
     }
 
-    /// Adds a regressor, given as samples by record and channel; its number.
+    /// Adds a regressor, given as samples by record and channel; its number. Its products with others are computed as they are
+    /// asked for, until [`Self::complete`].
     pub fn add(&mut self, samples: &[Vec<Vec<f64>>]) -> usize {
         let column: Vec<Vec<f64>> = self
             .parts
             .par_iter()
             .map(|part| part.whiten(&samples[part.record]))
             .collect();
-        let number = self.columns.len();
+        let mut sums = [[0.0; 2]; 3];
+        for ((part, new), residual) in self.parts.iter().zip(&column).zip(&self.residuals) {
+            let [square, with_residual] = &mut sums[part.share as usize];
+            *square += dot(new, new);
+            *with_residual += dot(new, residual);
+        }
+        for (products, [square, with_residual]) in self.products.iter_mut().zip(sums) {
+            products.add(square, with_residual);
+        }
         self.columns.push(column);
-        let mut rows: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; number + 1]);
-        let mut right = [0.0; 3];
-        for (index, part) in self.parts.iter().enumerate() {
-            let new = &self.columns[number][index];
-            let with_residual = dot(new, &self.residuals[index]);
-            let products: Vec<f64> = self
-                .columns
-                .par_iter()
-                .map(|column| dot(&column[index], new))
-                .collect();
-            right[part.share as usize] += with_residual;
-            for (sum, product) in rows[part.share as usize].iter_mut().zip(&products) {
-                *sum += product;
-            }
+        self.columns.len() - 1
+    }
+
+    /// Computes all products that are not known yet: before many sets of columns are tried.
+    pub fn complete(&mut self) {
+        let (first, size) = (self.complete, self.columns.len());
+        if first == size {
+            return;
         }
-        for ((products, row), right) in self.products.iter_mut().zip(rows).zip(right) {
-            products.gram.push(row);
-            products.with_residual.push(right);
+        let of_parts: Vec<DMatrix<f64>> = (0..self.parts.len())
+            .into_par_iter()
+            .map(|part| {
+                let columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[part][..]).collect();
+                products(&columns, first)
+            })
+            .collect();
+        let mut sums = [(); 3].map(|()| DMatrix::zeros(size - first, size));
+        for (part, rows) in self.parts.iter().zip(of_parts) {
+            sums[part.share as usize] += rows;
         }
-        number
+        for (products, rows) in self.products.iter_mut().zip(&sums) {
+            products.complete(rows);
+        }
+        self.complete = size;
+    }
+
+    /// Product of two columns over a share.
+    fn product(&self, share: Share, i: usize, j: usize) -> f64 {
+        self.products(share).known(i, j).unwrap_or_else(|| {
+            let mine = self
+                .parts
+                .iter()
+                .enumerate()
+                .filter(|(_, part)| part.share == share);
+            mine.map(|(index, _)| dot(&self.columns[i][index], &self.columns[j][index]))
+                .sum()
+        })
     }
 
     fn products(&self, share: Share) -> &Products {
@@ -154,8 +184,7 @@ impl Regression {
 
     /// Coefficients of `columns` that fit the column `target`, and how much of its energy they take.
     pub fn fit_column(&self, share: Share, columns: &[usize], target: usize) -> Option<(Vec<f64>, f64)> {
-        let products = self.products(share);
-        let right = |column: usize| products.entry(column, target);
+        let right = |column: usize| self.product(share, column, target);
         let (solution, _) = self.normal(share, columns, 1e-13, right)?;
         let taken = solution
             .iter()
@@ -165,11 +194,63 @@ impl Regression {
         Some((solution, taken))
     }
 
+    /// The change of the coefficients of `columns` that takes most of `residuals`, given by record and channel; `None` where the
+    /// columns are one and the same, or nothing.
+    pub fn refit(&self, share: Share, columns: &[usize], residuals: &[Vec<Vec<f64>>]) -> Option<Refit> {
+        let mine = self.whitened(share, residuals);
+        let with = |column: usize| -> f64 {
+            mine.iter()
+                .map(|(part, residual)| dot(&self.columns[column][*part], residual))
+                .sum()
+        };
+        let right: Vec<f64> = columns.iter().map(|column| with(*column)).collect();
+        let place = |column| columns.iter().position(|known| *known == column);
+        let (change, _) = self.normal(share, columns, 1e-13, |column| right[place(column).unwrap_or(0)])?;
+        Some(Refit {
+            before: mine.iter().map(|(_, residual)| dot(residual, residual)).sum(),
+            taken: change
+                .iter()
+                .zip(&right)
+                .map(|(change, right)| change * right)
+                .sum(),
+            change,
+        })
+    }
+
+    /// What is left of `residuals`, given by record and channel, with given coefficients of `columns`.
+    pub fn left_with(
+        &self,
+        share: Share,
+        columns: &[usize],
+        residuals: &[Vec<Vec<f64>>],
+        coefficients: &[f64],
+    ) -> f64 {
+        let mut sum = 0.0;
+        for (part, mut residual) in self.whitened(share, residuals) {
+            for (column, coefficient) in columns.iter().zip(coefficients) {
+                for (residual, value) in residual.iter_mut().zip(&self.columns[*column][part]) {
+                    *residual -= coefficient * value;
+                }
+            }
+            sum += dot(&residual, &residual);
+        }
+        sum
+    }
+
+    fn whitened(&self, share: Share, residuals: &[Vec<Vec<f64>>]) -> Vec<(usize, Vec<f64>)> {
+        self.parts
+            .par_iter()
+            .enumerate()
+            .filter(|(_, part)| part.share == share)
+            .map(|(index, part)| (index, part.whiten(&residuals[part.record])))
+            .collect()
+    }
+
     /// What is left if all columns may explain, numerically dependent ones softened.
     pub fn left_by_all(&self) -> f64 {
         let whole = self.products(Share::Whole);
         let all: Vec<usize> = (0..self.columns.len())
-            .filter(|column| whole.gram[*column][*column] > 0.0)
+            .filter(|column| whole.square(*column) > 0.0)
             .collect();
         self.solve(Share::Whole, &all, 1e-9)
             .map_or(whole.residual, |fit| fit.left)
@@ -198,13 +279,13 @@ impl Regression {
         let size = columns.len();
         let scale: Vec<f64> = columns
             .iter()
-            .map(|column| products.gram[*column][*column].sqrt())
+            .map(|column| products.square(*column).sqrt())
             .collect();
         if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
             return None;
         }
         let mut gram = DMatrix::from_fn(size, size, |i, j| {
-            products.entry(columns[i], columns[j]) / (scale[i] * scale[j])
+            self.product(share, columns[i], columns[j]) / (scale[i] * scale[j])
         });
         for i in 0..size {
             gram[(i, i)] += ridge;
@@ -228,15 +309,9 @@ impl Regression {
         for (column, coefficient) in columns.iter().zip(coefficients) {
             left -= 2.0 * coefficient * products.with_residual[*column];
             for (other, factor) in columns.iter().zip(coefficients) {
-                left += coefficient * factor * products.entry(*column, *other);
+                left += coefficient * factor * self.product(share, *column, *other);
             }
         }
         left.max(0.0)
-    }
-}
-
-impl Products {
-    fn entry(&self, i: usize, j: usize) -> f64 {
-        self.gram[i.max(j)][i.min(j)]
     }
 }

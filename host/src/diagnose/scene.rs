@@ -142,7 +142,7 @@ impl<'a> Scene<'a> {
         Self::with(case, recordings, |_| None)
     }
 
-    /// The same with the motion as `better`, a scene of the same recordings with a case that explains them, says that it is read.
+    /// The same with the motion as `clean`, what a case that explains a record says that its channels read, where there is such.
     ///
     /// Along a measured motion every term carries the noise of that motion, which is also in the residual: the coefficient of a
     /// term is then off by about the square of noise over signal, which is more than its deviation once
@@ -150,15 +150,7 @@ impl<'a> Scene<'a> {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn along(
-        case: &'a Case,
-        recordings: &[Recording],
-        better: &Scene<'_>,
-    ) -> Result<Self, DiagnoseError> {
-        Self::with(case, recordings, |index| Some(better.records[index].predicted()))
-    }
-
-    fn with(
+    pub(super) fn with(
         case: &'a Case,
         recordings: &[Recording],
         clean: impl Fn(usize) -> Option<Clean>,

@@ -1,13 +1,16 @@
 //! Which explanation is selected: causes are added while that gains more than it costs.
 
 use super::Stage;
+use super::closed_fit::ClosedFit;
 use super::evidence::{Explanation, Library};
 use super::output_error::OutputError;
 use super::record::TRUSTED_IN_CUTS;
 use super::refine::refine;
 use super::regression::{Regression, Share};
+use super::relinearization::Relinearization;
 use super::scene::Scene;
 use super::stepwise::{distinct, extended, without};
+use crate::recording::Recording;
 
 /// What a cause must gain to be believed (twice the logarithm of the likelihood, less the price of its parameters).
 const BELIEVED: f64 = 20.0;
@@ -16,7 +19,7 @@ pub(super) const APART: f64 = 16.0;
 /// Share of the residual that a right explanation may leave for reasons of sampling alone.
 const SAMPLING: f64 = 2e-3;
 /// The same where the explanation is simulated.
-const SAMPLING_SIMULATED: f64 = 2e-4;
+const SAMPLING_SIMULATED: f64 = 5e-5;
 /// Share of the residual's energy by which interpolation between samples may mislead the comparison of explanations.
 const NUMERICS: f64 = 1e-4;
 /// What may be left beyond the noise, as a share of the noise: that of the estimate of the noise and of chance.
@@ -49,8 +52,8 @@ pub(super) struct Selection {
 /// What explanations are weighed by.
 pub(super) struct Scale<'a> {
     pub(super) scene: &'a Scene<'a>,
-    /// Simulations, where all records can be simulated.
-    pub(super) output_error: Option<OutputError<'a>>,
+    /// Fits in closed loop, where there are such.
+    closed: Option<Box<dyn ClosedFit + 'a>>,
     /// How much what the whole library leaves, and what interpolation may leave, is above the noise: along the measured motion.
     inflation: f64,
     /// What the case alone leaves, in units of the noise.
@@ -60,23 +63,31 @@ pub(super) struct Scale<'a> {
 }
 
 impl<'a> Scale<'a> {
-    pub(super) fn new(scene: &'a Scene<'a>, library: &Library, regression: &Regression) -> Self {
-        let output_error = OutputError::new(scene);
+    pub(super) fn new(
+        scene: &'a Scene<'a>,
+        recordings: &'a [Recording],
+        library: &Library,
+        regression: &Regression,
+    ) -> Self {
+        let closed: Option<Box<dyn ClosedFit + 'a>> = match OutputError::new(scene) {
+            Some(output_error) => Some(Box::new(output_error)),
+            None => Relinearization::new(scene, recordings).map(|closed| Box::new(closed) as Box<_>),
+        };
         // Simulations are free to begin elsewhere, and do not carry the noise of the measured motion: like is compared with like.
-        let closed = output_error
+        let by_baseline = closed
             .as_ref()
-            .and_then(|output_error| output_error.left_by_baseline(library));
+            .and_then(|closed| closed.left_by_baseline(library, regression));
         let is_cut = scene.records.iter().any(|record| record.cut.is_some());
         Self {
             scene,
-            output_error,
+            closed,
             coherent: if is_cut {
                 TRUSTED_IN_CUTS * TRUSTED_IN_CUTS * regression.signal(scene)
             } else {
                 0.0
             },
             inflation: inflation(regression),
-            reference: closed.unwrap_or_else(|| regression.residual(Share::Whole)),
+            reference: by_baseline.unwrap_or_else(|| regression.residual(Share::Whole)),
         }
     }
 
@@ -161,9 +172,9 @@ impl<'a> Scale<'a> {
         regression: &Regression,
         explanation: &Explanation,
     ) -> f64 {
-        self.output_error
+        self.closed
             .as_ref()
-            .and_then(|output_error| output_error.left_held_out(library, explanation))
+            .and_then(|closed| closed.left_held_out(library, regression, explanation))
             .unwrap_or_else(|| library.left_held_out(regression, explanation))
     }
 
@@ -177,12 +188,12 @@ impl<'a> Scale<'a> {
         fewer: &[Explanation],
         most: usize,
     ) -> Vec<Explanation> {
-        let Some(output_error) = &self.output_error else {
+        let Some(closed) = &self.closed else {
             return found;
         };
         let mut tried = Vec::new();
         for (base, most) in fewer.iter().zip(EXTENDED) {
-            if let Some(left) = output_error.left_of(library, base) {
+            if let Some(left) = closed.left_of(library, base) {
                 tried.extend(
                     extended(self.scene, library, regression, base, &left)
                         .into_iter()
@@ -205,7 +216,7 @@ impl<'a> Scale<'a> {
                 continue;
             }
             // What cannot be simulated stays as the regression has it.
-            let fitted = output_error
+            let fitted = closed
                 .fit(library, regression, &explanation, (rival, best_left))
                 .unwrap_or(explanation);
             if fitted.simulated.is_some() {
@@ -218,7 +229,7 @@ impl<'a> Scale<'a> {
 
     /// The explanation without causes that others have made needless.
     fn pruned(&self, library: &mut Library, regression: &mut Regression, best: Explanation) -> Explanation {
-        let Some(output_error) = self.output_error.as_ref().filter(|_| best.simulated.is_some()) else {
+        let Some(closed) = self.closed.as_ref().filter(|_| best.simulated.is_some()) else {
             return best;
         };
         let mut kept = best;
@@ -227,7 +238,7 @@ impl<'a> Scale<'a> {
             let reached = self.gain(regression, &kept, inflation);
             let needless = (0..kept.choices.len()).find_map(|place| {
                 let fewer = without(library, &kept, place);
-                output_error
+                closed
                     .fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))
                     .filter(|fewer| self.gain(regression, fewer, inflation) > reached - BELIEVED)
             });
@@ -272,13 +283,14 @@ pub(super) fn select(
             break;
         }
         watch(Stage::Causes(size));
+        regression.complete();
         let mut found = match size {
             1 => library.singles(scene, regression),
             2 => library.pairs(scene, regression),
             _ => library.triples(scene, regression, &pairs),
         };
         // Simulations of several causes begin at the shapes that were found of each alone.
-        if size == 1 || scale.output_error.is_none() {
+        if size == 1 || scale.closed.is_none() {
             refine(scene, library, regression, &mut found);
         }
         scale.sort(regression, &mut found, scale.inflation);

@@ -18,6 +18,7 @@ pub(super) fn extended(
     left: &[Vec<Vec<f64>>],
 ) -> Vec<Explanation> {
     let target = regression.add(left);
+    regression.complete();
     let mut found: Vec<Explanation> = library
         .choices()
         .into_iter()

@@ -1,12 +1,17 @@
 //! One more mode in the receptance of a direction: y gets F/(m·(ω_m² − ω² + 2iζω_m ω)), exact where the force is measured.
+//!
+//! A structure that is let go was pulled as a whole: the mode begins at rest where the static force F₀ = H(0)⁻¹ u(0) had it,
+//! and y gets F₀/(m ω_m²)·e^(−ζω_m t)·(cos ω_d t + ζω_m/ω_d · sin ω_d t), ω_d = ω_m √(1 − ζ²).
 
+use nalgebra::Vector3;
 use num_complex::Complex64;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};
-use crate::diagnose::record::Record;
-use crate::diagnose::scene::{Domain, Scene};
+use crate::diagnose::closed_loop::{holding_force_n, starts_anywhere};
+use crate::diagnose::record::{Observed, Record};
+use crate::diagnose::scene::{Domain, Scene, derivatives};
 
 pub(super) struct MissingMode;
 
@@ -31,7 +36,7 @@ impl Cause for MissingMode {
                 scene
                     .records
                     .iter()
-                    .any(|record| !record.force_n[*axis].is_empty())
+                    .any(|record| !record.force_n[*axis].is_empty() || starts_anywhere(record))
             })
             .map(Place::Axis)
             .collect()
@@ -46,14 +51,15 @@ impl Cause for MissingMode {
             return Vec::new();
         };
         let count = 160;
-        let bins = bins(scene, *axis);
+        let (bins, releases) = (bins(scene, *axis), releases(scene, *axis));
         let likeness: Vec<Vec<(f64, Vec<f64>)>> = DAMPING
             .par_iter()
             .map(|damping| {
                 (0..count)
                     .map(|index| {
                         let frequency = low * (high / low).powf(f64::from(index) / f64::from(count - 1));
-                        (likeness(&bins, frequency, *damping), vec![frequency, *damping])
+                        let alike = likeness(&bins, &releases, frequency, *damping);
+                        (alike, vec![frequency, *damping])
                     })
                     .collect()
             })
@@ -95,7 +101,7 @@ impl Cause for MissingMode {
 
     fn regressors(
         &self,
-        _: &Scene<'_>,
+        scene: &Scene<'_>,
         record: &Record,
         place: &Place,
         shape: &[f64],
@@ -103,6 +109,17 @@ impl Cause for MissingMode {
         let (Place::Axis(axis), [frequency, damping]) = (place, shape) else {
             return None;
         };
+        if starts_anywhere(record) {
+            let force_n = held_by_n(scene, record)?[*axis];
+            let count = record.grid.count();
+            let of = |channel| released(record, channel, *axis, force_n, [*frequency, *damping]);
+            let observed = record
+                .channels
+                .iter()
+                .map(|channel| of(channel).take(count).collect())
+                .collect();
+            return Some(vec![Regressor::of_channels(observed)]);
+        }
         let force = &record.force_n[*axis];
         let observed = record
             .channels
@@ -160,6 +177,48 @@ fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
     .inv()
 }
 
+/// The static force from which the baseline was let go, N.
+fn held_by_n(scene: &Scene<'_>, record: &Record) -> Option<Vector3<f64>> {
+    holding_force_n(scene, &scene.baseline.first_order, &record.decays.start)
+}
+
+/// What a channel reads of a mode of mass 1 that is let go from under a static force along `axis`, sample after sample.
+fn released<'a>(
+    record: &'a Record,
+    channel: &'a Observed,
+    axis: usize,
+    force_n: f64,
+    [frequency_hz, damping_ratio]: [f64; 2],
+) -> impl Iterator<Item = f64> + 'a {
+    let natural = TAU * frequency_hz;
+    let pole = natural * Complex64::new(-damping_ratio, (1.0 - damping_ratio * damping_ratio).sqrt());
+    // η(t) = η(0)·Re[−λ̄/(i ω_d)·e^(λt)]: one at the start, and at rest there.
+    let start = -pole.conj() / Complex64::new(0.0, pole.im) * pole.powi(derivatives(channel.pickup.quantity));
+    let size = channel.pickup.weights[axis] * force_n / (natural * natural);
+    let since = move |sample: usize| sample as f64 / record.grid.rate_hz() - channel.pickup.delay_s;
+    (0_usize..).map(move |sample| match since(sample) {
+        t if t < 0.0 => 0.0,
+        t => size * (start * (pole * t).exp()).re,
+    })
+}
+
+/// A channel that hears the axis in a record of what was let go, with the force that held it.
+type Release<'a> = (&'a Record, &'a Observed, Vec<f64>, usize, f64);
+
+fn releases<'a>(scene: &'a Scene<'_>, axis: usize) -> Vec<Release<'a>> {
+    let mut all = Vec::new();
+    for record in scene.records.iter().filter(|record| starts_anywhere(record)) {
+        let Some(force) = held_by_n(scene, record) else {
+            continue;
+        };
+        let hears = |channel: &&Observed| channel.pickup.weights[axis] != 0.0;
+        for channel in record.channels.iter().filter(hears) {
+            all.push((record, channel, channel.residual(), axis, force[axis]));
+        }
+    }
+    all
+}
+
 /// One bin of a channel: ω, the force as the channel would read it of a mode with receptance 1, and the residual; both in
 /// units of the noise.
 type Bin = (f64, Complex64, Complex64);
@@ -192,12 +251,20 @@ fn bins(scene: &Scene<'_>, axis: usize) -> Vec<Bin> {
 }
 
 /// The share of the residual's power in units of the noise that a mode takes, positive masses only.
-fn likeness(bins: &[Bin], frequency_hz: f64, damping_ratio: f64) -> f64 {
+fn likeness(bins: &[Bin], releases: &[Release<'_>], frequency_hz: f64, damping_ratio: f64) -> f64 {
     let (mut along, mut size) = (0.0, 0.0);
     for (omega, force, residual) in bins {
         let column = mode(*omega, frequency_hz, damping_ratio) * force;
         along += (column.conj() * residual).re;
         size += column.norm_sqr();
+    }
+    for (record, channel, residual, axis, force_n) in releases {
+        let column = released(record, channel, *axis, *force_n, [frequency_hz, damping_ratio]);
+        for (column, residual) in column.zip(residual) {
+            let power = channel.deviation * channel.deviation;
+            along += column * residual / power;
+            size += column * column / power;
+        }
     }
     if size > 0.0 && along > 0.0 {
         along * along / size

@@ -1,0 +1,32 @@
+//! Fits of explanations in closed loop: the extended case moves as it would, and not along the motion that was measured.
+
+use super::evidence::{Explanation, Library};
+use super::regression::Regression;
+
+/// What can fit explanations so.
+pub(super) trait ClosedFit {
+    /// The explanation with the parameters at which the extended case agrees best with the records, from those of the regression
+    /// on; `None` where that cannot be computed. It is given up where it stays behind `rival`, a χ² that another has reached;
+    /// much is spent on it only where the regression leaves not much more than `best_left`, the least that it leaves.
+    fn fit(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        explanation: &Explanation,
+        limits: (f64, f64),
+    ) -> Option<Explanation>;
+
+    /// What the case alone leaves, in units of the noise.
+    fn left_by_baseline(&self, library: &Library, regression: &Regression) -> Option<f64>;
+
+    /// Measured less computed, by record and channel, of an explanation that was fitted so.
+    fn left_of(&self, library: &Library, explanation: &Explanation) -> Option<Vec<Vec<Vec<f64>>>>;
+
+    /// What is left of the held-out parts if the parameters come from the fitted ones alone.
+    fn left_held_out(
+        &self,
+        library: &Library,
+        regression: &Regression,
+        explanation: &Explanation,
+    ) -> Option<f64>;
+}
