@@ -4,6 +4,10 @@
 //! y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large terms. A cause is then one or few regressors
 //! ([`cause`]), fits of any set of causes are linear least squares ([`regression`]), and what competes is judged by
 //! likelihood, parsimony and records that were held out ([`evidence`]).
+//!
+//! That finds the few explanations that are worth more: the extended case itself is then fitted, without the noise of the measured
+//! motion in it. Tests of structures are simulated (`output_error`), cuts are read again with the extended case
+//! (`relinearization`).
 
 pub mod answer;
 mod beginning;
@@ -47,6 +51,7 @@ mod stiffness;
 #[cfg(test)]
 mod tests;
 pub mod turning;
+mod unknowns;
 mod views;
 
 pub use answer::Diagnosis;

@@ -12,10 +12,11 @@ use rayon::prelude::*;
 use super::closed_fit::ClosedFit;
 use super::closed_loop::{ClosedLoop, starts_anywhere};
 use super::decay::{Decays, dot};
-use super::evidence::{Choice, Explanation, Library, Simulated};
+use super::evidence::{Explanation, Library, Simulated};
 use super::part::{Part, Share, Unknown, split};
 use super::regression::{Fit, Regression};
 use super::scene::Scene;
+use super::unknowns::{Found, Point, Problem, Slot, at_bounds, by_choice, predicted, stepped};
 use crate::simulate::Effects;
 
 /// Steps of the search at most.
@@ -47,81 +48,6 @@ pub(super) struct OutputError<'a> {
     /// Parts of each share, in the order of the records.
     parts: Vec<Part>,
     horizons: Vec<Vec<Part>>,
-}
-
-/// Parameters and initial states.
-#[derive(Clone, Debug)]
-struct Point {
-    /// By choice: coefficients and, behind them, the shape.
-    inner: Vec<Vec<f64>>,
-    /// By record: states at its start; empty where it starts from rest.
-    starts: Vec<Vec<f64>>,
-}
-
-/// One number of a point that may move.
-#[derive(Clone, Copy, Debug)]
-enum Slot {
-    Inner {
-        choice: usize,
-        index: usize,
-        bounds: [f64; 2],
-    },
-    Start {
-        record: usize,
-        index: usize,
-    },
-}
-
-/// What is fitted: causes, and which numbers may move, each with the step of its difference.
-struct Problem<'a> {
-    library: &'a Library,
-    choices: &'a [Choice],
-    slots: Vec<(Slot, f64)>,
-    /// Least step of a difference, as a share of its parameter.
-    least_step: f64,
-}
-
-/// Where a search ended.
-struct Found {
-    point: Point,
-    left: f64,
-    /// Jᵀ J of the slots.
-    normal: DMatrix<f64>,
-}
-
-impl Slot {
-    fn of(self, point: &mut Point) -> &mut f64 {
-        match self {
-            Self::Inner { choice, index, .. } => &mut point.inner[choice][index],
-            Self::Start { record, index } => &mut point.starts[record][index],
-        }
-    }
-
-    /// False where a record does not feel it.
-    fn is_felt_by(self, record: usize) -> bool {
-        match self {
-            Self::Inner { .. } => true,
-            Self::Start { record: own, .. } => own == record,
-        }
-    }
-}
-
-impl Problem<'_> {
-    /// The effects at a point; `None` where it is not physical.
-    fn effects(&self, scene: &Scene<'_>, point: &Point) -> Option<Effects> {
-        let mut tables = Vec::new();
-        for (choice, inner) in self.choices.iter().zip(&point.inner) {
-            let known = &self.library.candidates[choice.candidate];
-            let (shape, columns) = &known.shapes[choice.shape];
-            let (coefficients, moved) = inner.split_at(columns.len());
-            debug_assert_eq!(moved.len(), shape.len());
-            let cause = self.library.cause(choice.candidate);
-            let parameters = cause.parameters(scene, &known.place, moved, coefficients)?;
-            let parts = cause.parts(&known.place, &parameters);
-            tables.extend(parts.into_iter().map(|part| (part.name, part.extension)));
-        }
-        Effects::of_extensions(tables.iter().map(|(name, table)| (*name, table))).ok()
-    }
 }
 
 impl<'a> OutputError<'a> {
@@ -554,105 +480,4 @@ impl ClosedFit for OutputError<'_> {
 
 fn energy(residuals: &[Vec<f64>]) -> f64 {
     residuals.iter().map(|residual| dot(residual, residual)).sum()
-}
-
-/// (Jᵀ J + trust·diag) step = Jᵀ r, taken within the bounds; `None` where that has no solution.
-fn stepped(
-    problem: &Problem<'_>,
-    point: &Point,
-    normal: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    trust: f64,
-) -> Option<Point> {
-    let step = scaled(normal, 1e-12 + trust)?.solve(&gradient.component_mul(&roots(normal)));
-    let step = step.component_mul(&roots(normal));
-    let mut next = point.clone();
-    for ((slot, _), step) in problem.slots.iter().zip(step.iter()) {
-        let value = slot.of(&mut next);
-        *value += step;
-        if let Slot::Inner {
-            bounds: [low, high], ..
-        } = slot
-        {
-            *value = value.clamp(*low, *high);
-        }
-    }
-    Some(next)
-}
-
-/// What a whole step takes of χ², to first order.
-fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
-    let right = gradient.component_mul(&roots(normal));
-    scaled(normal, 1e-9).map_or(0.0, |factor| right.dot(&factor.solve(&right)))
-}
-
-/// What stands at a bound and is pushed beyond it stays there.
-fn at_bounds(problem: &Problem<'_>, point: &Point, normal: &mut DMatrix<f64>, gradient: &mut DVector<f64>) {
-    for (index, (slot, _)) in problem.slots.iter().enumerate() {
-        let Slot::Inner {
-            bounds: [low, high], ..
-        } = slot
-        else {
-            continue;
-        };
-        let value = *slot.of(&mut point.clone());
-        if (value <= *low && gradient[index] < 0.0) || (value >= *high && gradient[index] > 0.0) {
-            gradient[index] = 0.0;
-            normal.row_mut(index).fill(0.0);
-            normal.column_mut(index).fill(0.0);
-        }
-    }
-}
-
-/// One over the roots of the diagonal; zero where nothing is felt.
-fn roots(normal: &DMatrix<f64>) -> DVector<f64> {
-    normal.diagonal().map(|entry| {
-        if entry > 0.0 && entry.is_finite() {
-            entry.sqrt().recip()
-        } else {
-            0.0
-        }
-    })
-}
-
-/// The matrix with a diagonal of one and `ridge` on it, factored.
-fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
-    let roots = roots(normal);
-    let mut scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
-        normal[(i, j)] * roots[i] * roots[j]
-    });
-    for i in 0..scaled.nrows() {
-        scaled[(i, i)] = 1.0 + ridge;
-    }
-    scaled.cholesky()
-}
-
-/// Covariance for noise of deviation 1 of the numbers of each choice, initial states being unknown; zero for what did not move.
-fn by_choice(slots: &[Slot], found: &Found) -> Vec<DMatrix<f64>> {
-    let roots = roots(&found.normal);
-    let inverse = scaled(&found.normal, 1e-12).map(|factor| factor.inverse());
-    let mut all: Vec<DMatrix<f64>> = found
-        .point
-        .inner
-        .iter()
-        .map(|inner| DMatrix::zeros(inner.len(), inner.len()))
-        .collect();
-    let Some(inverse) = inverse else { return all };
-    for (i, first) in slots.iter().enumerate() {
-        for (j, second) in slots.iter().enumerate() {
-            if let (
-                Slot::Inner { choice, index, .. },
-                Slot::Inner {
-                    choice: other,
-                    index: second,
-                    ..
-                },
-            ) = (first, second)
-                && choice == other
-            {
-                all[*choice][(*index, *second)] = inverse[(i, j)] * roots[i] * roots[j];
-            }
-        }
-    }
-    all
 }

@@ -286,6 +286,26 @@ impl Record<'_> {
         })
     }
 
+    /// What a given law leaves of the force, ‖f − Σ θ·term‖/‖f‖ within `band_hz`: [`Surface::force_error`] of a law that was not
+    /// fitted here.
+    pub fn force_error(&self, law: &[(Term, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
+        let motion = self.motion([0.0, 0.5 * self.rate_hz]);
+        let left: Vec<f64> = (0..self.motion.len())
+            .map(|i| {
+                let of =
+                    |(term, theta): &(Term, f64)| theta * term.value(motion.x[i], motion.v[i], motion.a[i]);
+                self.force[i] - law.iter().map(of).sum::<f64>()
+            })
+            .collect();
+        let spectral = Spectral::new(self.motion.len(), self.rate_hz);
+        let within = |frequency: f64| f64::from(u8::from((band_hz[0]..=band_hz[1]).contains(&frequency)));
+        let size = |samples: &[f64]| {
+            let whole = spectral.weighted(samples, within);
+            DVector::from_column_slice(&whole[self.kept(trim_s)]).norm()
+        };
+        size(&left) / size(self.force)
+    }
+
     fn kept(&self, trim_s: f64) -> std::ops::Range<usize> {
         let trim = (trim_s * self.rate_hz).ceil() as usize;
         let trim = trim.min(self.motion.len() / 4);
