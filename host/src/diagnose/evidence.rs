@@ -315,7 +315,15 @@ impl Library {
         });
         let own = self.law(other);
         let alike = some.iter().filter(|choice| self.law(**choice) == own).count();
-        is_new && (own.is_none() || alike < 2)
+        is_new && (own.is_none() || alike < 2) && !some.iter().any(|choice| self.share_a_term(*choice, other))
+    }
+
+    /// True of a cubic spring beside softening and hardening, which has one: between the two nothing would be determined.
+    fn share_a_term(&self, one: Choice, other: Choice) -> bool {
+        let name = |choice: Choice| self.cause(choice.candidate).name();
+        let place = |choice: Choice| &self.candidates[choice.candidate].place;
+        let cubic = ["cubic-stiffness", "softening-hardening"];
+        cubic.contains(&name(one)) && cubic.contains(&name(other)) && place(one) == place(other)
     }
 
     /// Of what a choice is a law, and where.
