@@ -410,7 +410,8 @@ impl ClosedFit for OutputError<'_> {
             }
         }
         let mut found = self.search(&mut problem, &whole, start, ROUNDS, rival)?;
-        if problem.least_step > LEAST_STEP && found.left > STUCK * regression.count(Share::Whole) as f64 {
+        let is_stuck = found.left > STUCK * regression.count(Share::Whole) as f64;
+        if problem.least_step > LEAST_STEP && is_stuck && found.left < STUCK * rival {
             found = self.beside(&mut problem, &whole, found, rival);
         }
         let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
