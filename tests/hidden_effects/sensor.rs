@@ -28,12 +28,12 @@ impl Sensor {
     }
 }
 
-/// What was at a place of the grid; before its start all was at rest.
-fn late(series: &[[f64; 3]], place: f64) -> [f64; 3] {
-    if place < 0.0 {
-        [0.0; 3]
-    } else {
-        interpolated(series, place)
+/// What was at a place of the grid; before its start all was at rest where it was let go.
+fn late(series: &[[f64; 3]], place: f64, acceleration: bool) -> [f64; 3] {
+    match place {
+        place if place >= 0.0 => interpolated(series, place),
+        _ if acceleration => [0.0; 3],
+        _ => series[0],
     }
 }
 
@@ -75,7 +75,8 @@ pub(crate) fn read_by(
             let value = if delay == 0.0 {
                 series[k * steps]
             } else {
-                late(series, steps as f64 * (k as f64 - delay / scale.sample_s))
+                let place = steps as f64 * (k as f64 - delay / scale.sample_s);
+                late(series, place, sensor.acceleration)
             };
             let read: f64 = weights
                 .iter()

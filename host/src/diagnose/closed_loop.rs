@@ -248,11 +248,15 @@ impl ClosedLoop {
                         if t > segment.to_s() {
                             break;
                         }
+                        let motion = segment.motion(t.max(0.0), &mut room);
+                        // Before the start it is held where it is let go.
                         if t < 0.0 {
-                            samples.push(0.0);
+                            samples.push(match pickup.quantity {
+                                Quantity::Displacement => pickup.read(motion.displacement_m),
+                                _ => 0.0,
+                            });
                             continue;
                         }
-                        let motion = segment.motion(t, &mut room);
                         samples.push(pickup.read(match pickup.quantity {
                             Quantity::Velocity => motion.velocity_m_per_s,
                             Quantity::Acceleration => motion.acceleration_m_per_s2.unwrap_or([0.0; 3]),

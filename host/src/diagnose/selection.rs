@@ -36,6 +36,8 @@ const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 /// motion and still be simulated.
 const NEARLY: f64 = 1.5;
 const FAR_OFF: f64 = 6.0;
+/// How many times further off one with fewer parameters may be.
+const SIMPLER: f64 = 30.0;
 /// Explanations that are simulated because of what a simulation with one cause less left: of the best, of the second.
 const EXTENDED: [usize; 2] = [6, 3];
 
@@ -202,7 +204,7 @@ impl<'a> Scale<'a> {
             }
         }
         tried.extend(found.iter().take(most).cloned());
-        let mut rival = f64::INFINITY;
+        let (mut rival, mut freedoms) = (f64::INFINITY, 0);
         let mut simulated = Vec::new();
         let tried = distinct(tried);
         let noise = regression.count(Share::Whole) as f64;
@@ -212,15 +214,21 @@ impl<'a> Scale<'a> {
             .fold(f64::INFINITY, f64::min);
         for explanation in tried {
             // Where one explains nearly all, what is far from that along the measured motion need not be simulated.
-            if rival < NEARLY * noise && explanation.fit.left > FAR_OFF * rival.max(noise) {
+            // But a simpler one may be the truth that the other holds as a part.
+            let far_off = if explanation.freedoms < freedoms {
+                SIMPLER * FAR_OFF
+            } else {
+                FAR_OFF
+            };
+            if rival < NEARLY * noise && explanation.fit.left > far_off * rival.max(noise) {
                 continue;
             }
             // What cannot be simulated stays as the regression has it.
             let fitted = closed
                 .fit(library, regression, &explanation, (rival, best_left))
                 .unwrap_or(explanation);
-            if fitted.simulated.is_some() {
-                rival = fitted.fit.left.min(rival);
+            if fitted.simulated.is_some() && fitted.fit.left < rival {
+                (rival, freedoms) = (fitted.fit.left, fitted.freedoms);
             }
             simulated.push(fitted);
         }
