@@ -211,7 +211,11 @@ impl<'a> Judge<'a> {
                 {
                     continue;
                 }
-                for candidate in self.candidates(kind, random) {
+                for candidate in self
+                    .candidates(kind, random)
+                    .into_iter()
+                    .chain(stand_in(kind, &hidden[gone]))
+                {
                     if self.nearest(&truth, &[candidate, hidden[stays].clone()]).0 < APART {
                         return Verdict::Borderline;
                     }
