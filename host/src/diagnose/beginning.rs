@@ -5,6 +5,7 @@
 //! as of their beginnings.
 
 use super::answer::{Diagnosis, Gain, Outcome, Quality};
+use super::judge::LEFT_OF_RESPONSE;
 use super::regression::{Regression, Share};
 use super::scene::{Baseline, Scene};
 use super::selection::WITHIN_NOISE;
@@ -18,8 +19,6 @@ const SEARCHED: usize = 32_768;
 const PERIODS: f64 = 60.0;
 /// Records are shortened where that leaves less than this share of them.
 const WORTH: f64 = 0.5;
-/// Share of the residual's energy that what was found may leave of the whole records beyond their noise.
-const LEFT: f64 = 0.012;
 
 /// The beginnings of records, all of them random; `None` where they are too short to be shortened.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<Vec<Recording>> {
@@ -81,7 +80,9 @@ pub(super) fn diagnosed(
     };
     let explained = Left::of(&extended, recordings)?;
     let beyond = explained.energy - explained.count;
-    if beyond > WITHIN_NOISE * explained.count && beyond > LEFT * (believed.energy - believed.count) {
+    if beyond > WITHIN_NOISE * explained.count
+        && beyond > LEFT_OF_RESPONSE * (believed.energy - believed.count)
+    {
         return None;
     }
     if diagnosis.outcome != Outcome::None {

@@ -12,7 +12,7 @@ use crate::recording::Recording;
 
 /// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
 /// where the noise is known by its floor, and of forces, where derivatives of the motion bring noise that is not white.
-const LEFT_OF_RESPONSE: f64 = 0.012;
+pub(super) const LEFT_OF_RESPONSE: f64 = 0.012;
 const LEFT_OF_FORCE: f64 = 0.15;
 /// By what that becomes less for each further cause of an explanation that is simulated: with two or three terms much can be
 /// imitated, but not all of it.

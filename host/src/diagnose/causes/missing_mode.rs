@@ -36,7 +36,7 @@ impl Cause for MissingMode {
                 scene
                     .records
                     .iter()
-                    .any(|record| !record.force_n[*axis].is_empty() || starts_anywhere(record))
+                    .any(|record| !record.force_n[*axis].is_empty() || is_let_go(record, *axis))
             })
             .map(Place::Axis)
             .collect()
@@ -109,7 +109,7 @@ impl Cause for MissingMode {
         let (Place::Axis(axis), [frequency, damping]) = (place, shape) else {
             return None;
         };
-        if starts_anywhere(record) {
+        if is_let_go(record, *axis) {
             let force_n = held_by_n(scene, record)?[*axis];
             let count = record.grid.count();
             let of = |channel| released(record, channel, *axis, force_n, [*frequency, *damping]);
@@ -177,6 +177,11 @@ fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
     .inv()
 }
 
+/// True of a record of what was let go, where nobody measured the force along `axis`.
+fn is_let_go(record: &Record, axis: usize) -> bool {
+    starts_anywhere(record) && record.force_n[axis].is_empty()
+}
+
 /// The static force from which the baseline was let go, N.
 fn held_by_n(scene: &Scene<'_>, record: &Record) -> Option<Vector3<f64>> {
     holding_force_n(scene, &scene.baseline.first_order, &record.decays.start)
@@ -207,7 +212,7 @@ type Release<'a> = (&'a Record, &'a Observed, Vec<f64>, usize, f64);
 
 fn releases<'a>(scene: &'a Scene<'_>, axis: usize) -> Vec<Release<'a>> {
     let mut all = Vec::new();
-    for record in scene.records.iter().filter(|record| starts_anywhere(record)) {
+    for record in scene.records.iter().filter(|record| is_let_go(record, axis)) {
         let Some(force) = held_by_n(scene, record) else {
             continue;
         };
