@@ -1,8 +1,10 @@
-//! Long random records: their beginnings are searched, and what is found there is held against all of them.
+//! Long records of random forces and of cuts: their beginnings are searched, and what is found there is held against all of them.
 //!
-//! A search simulates its records hundreds of times, and a random excitation tells in its first seconds what it tells in a
-//! minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of the whole records
-//! as of their beginnings.
+//! A search computes its records hundreds of times, and a random excitation or a cut at one speed tells in its first seconds what
+//! it tells in a minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of
+//! the whole records as of their beginnings.
+
+use std::ops::Range;
 
 use super::answer::{Diagnosis, Gain, Outcome, Quality};
 use super::judge::LEFT_OF_RESPONSE;
@@ -17,34 +19,51 @@ use crate::recording::{Channel, Kind, Recording};
 const SEARCHED: usize = 32_768;
 /// Periods of the slowest mode that the beginning of each record must hold.
 const PERIODS: f64 = 60.0;
+/// Turns of the spindle that the beginning of a cut must hold.
+const TURNS: f64 = 24.0;
 /// Records are shortened where that leaves less than this share of them.
 const WORTH: f64 = 0.5;
 
-/// The beginnings of records, all of them random; `None` where they are too short to be shortened.
+/// The beginnings of records, all of them of random forces or of cuts at one speed; `None` where they are too short to be shortened.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<Vec<Recording>> {
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
     let all: usize = recordings.iter().map(Recording::len).sum();
     let shortened: Vec<Recording> = recordings
         .iter()
         .map(|recording| {
-            let least = (PERIODS / lowest_hz * recording.sample_rate_hz).ceil() as usize;
-            let count = (SEARCHED / recordings.len()).max(least).min(recording.len());
-            (recording.sidecar.kind == Some(Kind::Shaker)).then(|| beginning(recording, count))
+            let turns_s = turns_s(recording)?;
+            let samples = |seconds: f64| (seconds * recording.sample_rate_hz).ceil() as usize;
+            // What a cut left from its entry on is past after as many turns.
+            let from = samples(turns_s);
+            let least = samples((PERIODS / lowest_hz).max(turns_s));
+            let count = (SEARCHED / recordings.len()).max(least);
+            let to = (from + count).min(recording.len());
+            Some(beginning(recording, to.saturating_sub(count)..to))
         })
         .collect::<Option<_>>()?;
     let left: usize = shortened.iter().map(Recording::len).sum();
     ((left as f64) < WORTH * all as f64).then_some(shortened)
 }
 
-fn beginning(recording: &Recording, count: usize) -> Recording {
+/// How long the turns take that the beginning of a record must hold: none of a shaker; `None` of what is not shortened.
+fn turns_s(recording: &Recording) -> Option<f64> {
+    match (recording.sidecar.kind, &recording.sidecar.cut) {
+        (Some(Kind::Shaker), _) => Some(0.0),
+        (Some(Kind::Cutting), Some(cut)) if cut.last_rpm.is_none() => Some(60.0 * TURNS / cut.spindle_rpm?),
+        _ => None,
+    }
+}
+
+fn beginning(recording: &Recording, range: Range<usize>) -> Recording {
     let channels = recording.channels.iter().map(|channel| Channel {
-        samples: channel.samples[..count].to_vec(),
+        samples: channel.samples[range.clone()].to_vec(),
         ..channel.clone()
     });
     Recording {
         channels: channels.collect(),
         path: recording.path.clone(),
         sidecar: recording.sidecar.clone(),
+        start_s: recording.start_s + range.start as f64 / recording.sample_rate_hz,
         ..*recording
     }
 }
@@ -69,7 +88,7 @@ pub(super) fn diagnosed(
         .iter()
         .map(|record| record.len() as f64 / record.sample_rate_hz);
     diagnosis.warnings.push(format!(
-        "causes were sought in the first {:.1} s of each record, and what was found was held against all of them",
+        "causes were sought in {:.1} s near the start of each record, and what was found was held against all of them",
         searched_s.fold(0.0, f64::max)
     ));
     let extended = match diagnosis.outcome {

@@ -23,13 +23,17 @@ fn case(feed_mm: &str, more: &str) -> Case {
     Case::parse(Path::new("believed.toml"), &format!("{text}\n{more}")).unwrap()
 }
 
-/// Two cuts at different speeds and feeds, with two percent of noise.
+/// Two cuts of four seconds at different speeds and feeds, with two percent of noise.
 fn records(effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
+    records_of(4.0, effects, forces, seed)
+}
+
+/// The same, of so many seconds.
+fn records_of(seconds: f64, effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
     [(900.0, 0.8, "0.15"), (1230.0, 0.6, "0.09")]
         .into_iter()
         .enumerate()
         .map(|(index, (rpm, depth_mm, feed_mm))| {
-            let seconds = 4.0;
             let mut measured = vec![Quantity::Displacement];
             if forces {
                 measured.insert(0, Quantity::Force);
@@ -111,6 +115,25 @@ fn what_a_cut_hides_is_named_with_and_without_force() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn of_long_cuts_a_part_is_searched_and_all_is_checked() {
+    let recordings = records_of(30.0, &["process-damping=2e5"], false, 7);
+    let diagnosis = diagnose(&case("0.15", ""), &recordings, &Options::default()).unwrap();
+    assert_eq!(
+        diagnosis.causes[0].name,
+        "process-damping",
+        "{}",
+        told(&diagnosis)
+    );
+    let found = diagnosis.causes[0].parameters["process_damping_n_per_m"];
+    assert!((found.ci90[0]..found.ci90[1]).contains(&2e5), "{found:?}");
+    let said = &diagnosis.warnings;
+    assert!(
+        said.iter().any(|said| said.contains("8.0 s near the start")),
+        "{said:?}"
+    );
 }
 
 #[test]
