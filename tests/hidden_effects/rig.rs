@@ -348,7 +348,10 @@ impl Lab for Bench {
 
     fn places(&self, kind: Kind) -> Vec<(usize, usize)> {
         let sensors = &self.rig.sensors;
-        if kind == Kind::CommonForce || !Cause::possible(kind, &self.machine) {
+        // One sensor that is late tells of what is let go no more than a record that begins earlier.
+        let only_late =
+            kind == Kind::SensorDelay && self.rig.kind == RecordKind::FreeDecay && sensors.len() == 1;
+        if kind == Kind::CommonForce || only_late || !Cause::possible(kind, &self.machine) {
             Vec::new()
         } else if kind.of_sensor() {
             (0..sensors.len())

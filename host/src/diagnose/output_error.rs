@@ -39,6 +39,8 @@ const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
 /// χ² per number from which on a search with friction is looked at again, and how far from where it ended, as shares.
 const STUCK: f64 = 1.1;
+/// Sizes from which a search begins again, as shares of what the regression says.
+const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
 
 /// Simulations compared with records.
@@ -48,6 +50,8 @@ pub(super) struct OutputError<'a> {
     /// Parts of each share, in the order of the records.
     parts: Vec<Part>,
     horizons: Vec<Vec<Part>>,
+    /// True where every record is of a structure that is let go.
+    is_let_go: bool,
 }
 
 impl<'a> OutputError<'a> {
@@ -76,6 +80,7 @@ impl<'a> OutputError<'a> {
             closed,
             parts: split(scene, unknown),
             horizons: HORIZONS.map(horizon).into(),
+            is_let_go: scene.records.iter().all(starts_anywhere),
         })
     }
 
@@ -257,6 +262,70 @@ impl<'a> OutputError<'a> {
         again.filter(|again| again.left < ended.left).unwrap_or(ended)
     }
 
+    /// The best of searches from other sizes: where a structure is let go, the phase of all that follows hangs on them, and
+    /// between two sizes there are hills.
+    fn elsewhere(
+        &self,
+        problem: &mut Problem<'_>,
+        parts: &[&Part],
+        start: &Point,
+        ended: Found,
+        rival: f64,
+    ) -> Found {
+        let mut best = ended;
+        let sizes = problem
+            .slots
+            .iter()
+            .filter(|(slot, _)| matches!(slot, Slot::Inner { .. }))
+            .count();
+        let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
+        for _ in 0..sizes.min(2) {
+            grid = grid
+                .into_iter()
+                .flat_map(|known| SIZES.map(|size| [known.clone(), vec![size]].concat()))
+                .collect();
+        }
+        let first: Vec<&Part> = self.horizons[0].iter().collect();
+        let mut tried: Vec<(f64, Point)> = grid
+            .into_iter()
+            .filter_map(|sizes| {
+                let mut point = start.clone();
+                let inner = problem
+                    .slots
+                    .iter()
+                    .filter(|(slot, _)| matches!(slot, Slot::Inner { .. }));
+                for ((slot, _), size) in inner.zip(sizes) {
+                    let value = slot.of(&mut point);
+                    *value *= size;
+                    if let Slot::Inner {
+                        bounds: [low, high], ..
+                    } = slot
+                    {
+                        *value = value.clamp(*low, *high);
+                    }
+                }
+                let found = self.search(problem, &first, point, 4, f64::INFINITY)?;
+                Some((found.left, found.point))
+            })
+            .collect();
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, mut point) in tried.into_iter().take(3) {
+            for parts in &self.horizons {
+                let parts: Vec<&Part> = parts.iter().collect();
+                if let Some(found) = self.search(problem, &parts, point.clone(), 6, f64::INFINITY) {
+                    point = found.point;
+                }
+            }
+            let rival = rival.min(best.left);
+            if let Some(found) = self.search(problem, parts, point, ROUNDS, rival)
+                && found.left < best.left
+            {
+                best = found;
+            }
+        }
+        best
+    }
+
     fn accept(
         &self,
         library: &mut Library,
@@ -409,8 +478,12 @@ impl ClosedFit for OutputError<'_> {
                 }
             }
         }
-        let mut found = self.search(&mut problem, &whole, start, ROUNDS, rival)?;
-        let is_stuck = found.left > STUCK * regression.count(Share::Whole) as f64;
+        let mut found = self.search(&mut problem, &whole, start.clone(), ROUNDS, rival)?;
+        let stuck = STUCK * regression.count(Share::Whole) as f64;
+        if self.is_let_go && found.left > stuck && explanation.choices.len() == 1 {
+            found = self.elsewhere(&mut problem, &whole, &start, found, rival);
+        }
+        let is_stuck = found.left > stuck;
         if problem.least_step > LEAST_STEP && is_stuck && found.left < STUCK * rival {
             found = self.beside(&mut problem, &whole, found, rival);
         }
