@@ -39,6 +39,10 @@ const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
 /// χ² per number from which on a search with friction is looked at again, and how far from where it ended, as shares.
 const STUCK: f64 = 1.1;
+/// Parameters of causes whose sizes are sought so: of more there are too many places to begin.
+const FEW: usize = 2;
+/// How many of the best beginnings are followed to the end.
+const FOLLOWED: usize = 3;
 /// Sizes from which a search begins again, as shares of what the regression says.
 const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
@@ -273,13 +277,8 @@ impl<'a> OutputError<'a> {
         rival: f64,
     ) -> Found {
         let mut best = ended;
-        let sizes = problem
-            .slots
-            .iter()
-            .filter(|(slot, _)| matches!(slot, Slot::Inner { .. }))
-            .count();
         let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
-        for _ in 0..sizes.min(2) {
+        for _ in problem.inner() {
             grid = grid
                 .into_iter()
                 .flat_map(|known| SIZES.map(|size| [known.clone(), vec![size]].concat()))
@@ -290,18 +289,14 @@ impl<'a> OutputError<'a> {
             .into_iter()
             .filter_map(|sizes| {
                 let mut point = start.clone();
-                let inner = problem
-                    .slots
-                    .iter()
-                    .filter(|(slot, _)| matches!(slot, Slot::Inner { .. }));
-                for ((slot, _), size) in inner.zip(sizes) {
+                for (slot, size) in problem.inner().zip(sizes) {
                     let value = slot.of(&mut point);
                     *value *= size;
                     if let Slot::Inner {
                         bounds: [low, high], ..
                     } = slot
                     {
-                        *value = value.clamp(*low, *high);
+                        *value = value.clamp(low, high);
                     }
                 }
                 let found = self.search(problem, &first, point, 4, f64::INFINITY)?;
@@ -309,7 +304,7 @@ impl<'a> OutputError<'a> {
             })
             .collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (_, mut point) in tried.into_iter().take(3) {
+        for (_, mut point) in tried.into_iter().take(FOLLOWED) {
             for parts in &self.horizons {
                 let parts: Vec<&Part> = parts.iter().collect();
                 if let Some(found) = self.search(problem, &parts, point.clone(), 6, f64::INFINITY) {
@@ -480,7 +475,8 @@ impl ClosedFit for OutputError<'_> {
         }
         let mut found = self.search(&mut problem, &whole, start.clone(), ROUNDS, rival)?;
         let stuck = STUCK * regression.count(Share::Whole) as f64;
-        if self.is_let_go && found.left > stuck && explanation.choices.len() == 1 {
+        let is_simple = explanation.choices.len() == 1 && problem.inner().count() <= FEW;
+        if self.is_let_go && found.left > stuck && is_simple {
             found = self.elsewhere(&mut problem, &whole, &start, found, rival);
         }
         let is_stuck = found.left > stuck;

@@ -64,6 +64,12 @@ impl Slot {
 }
 
 impl Problem<'_> {
+    /// What may move besides the states at the start.
+    pub(super) fn inner(&self) -> impl Iterator<Item = Slot> {
+        let slots = self.slots.iter().map(|(slot, _)| *slot);
+        slots.filter(|slot| matches!(slot, Slot::Inner { .. }))
+    }
+
     /// The effects at a point; `None` where it is not physical.
     pub(super) fn effects(&self, scene: &Scene<'_>, point: &Point) -> Option<Effects> {
         let mut tables = Vec::new();
