@@ -359,6 +359,29 @@ impl Library {
         found
     }
 
+    /// By choice of an explanation: columns of the change of what it adds per unit of each parameter of its shape; none where the
+    /// shape is no freedom of the fit.
+    pub fn slopes_of(
+        &self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        explanation: &Explanation,
+    ) -> Vec<Vec<usize>> {
+        (0..explanation.choices.len())
+            .map(|place| {
+                let choice = explanation.choices[place];
+                let coefficients = self.coefficients(explanation, place);
+                let shape = &self.candidates[choice.candidate].shapes[choice.shape].0;
+                let cause = self.cause(choice.candidate);
+                if shape.is_empty() || cause.settled(shape, &coefficients).is_some() {
+                    return Vec::new();
+                }
+                self.slopes(scene, regression, choice, &coefficients)
+                    .unwrap_or_default()
+            })
+            .collect()
+    }
+
     /// Columns of the change of what a choice with these coefficients adds, per unit of each parameter of its shape.
     pub fn slopes(
         &self,

@@ -312,4 +312,16 @@ mod tests {
         assert_eq!(catmull_rom(&[], 1.0), 0.0);
         assert_eq!(catmull_rom(&samples, 9.0), 4.0);
     }
+
+    #[test]
+    fn a_late_step_stays_a_step() {
+        let grid = Grid::new(64, 100.0, 0.0, 8);
+        let fine: Vec<f64> = (0..64 * 8).map(|k| f64::from(u8::from(k >= 32 * 8))).collect();
+        // By 0.3 of a sample: the step is between samples 32 and 33, which are further from it than the cubic reaches.
+        let late = grid.late_samples_of_fine(&grid.spectrum_of_fine(&fine), 0.003);
+        for (sample, value) in late.iter().enumerate() {
+            let truth = f64::from(u8::from(sample > 32));
+            assert!((value - truth).abs() < 1e-9, "{sample}: {value}");
+        }
+    }
 }

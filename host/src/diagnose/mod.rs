@@ -44,6 +44,7 @@ mod record;
 mod refine;
 pub mod regression;
 mod relinearization;
+mod restarts;
 mod scene;
 mod selection;
 mod stepwise;

@@ -168,22 +168,12 @@ pub(super) fn covariance(
         places.push((from..from + coefficients.len()).collect());
         from += coefficients.len();
     }
-    for (place, rows) in places.iter_mut().enumerate() {
-        let choice = explanation.choices[place];
-        let coefficients = library.coefficients(explanation, place);
-        let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
-        if shape.is_empty()
-            || library
-                .cause(choice.candidate)
-                .settled(shape, &coefficients)
-                .is_some()
-        {
-            continue;
-        }
-        if let Some(slopes) = library.slopes(scene, regression, choice, &coefficients) {
-            rows.extend(columns.len()..columns.len() + slopes.len());
-            columns.extend(slopes);
-        }
+    for (rows, slopes) in places
+        .iter_mut()
+        .zip(library.slopes_of(scene, regression, explanation))
+    {
+        rows.extend(columns.len()..columns.len() + slopes.len());
+        columns.extend(slopes);
     }
     let whole = regression
         .fit(Share::Whole, &columns)

@@ -16,13 +16,13 @@ use super::evidence::{Explanation, Library, Simulated};
 use super::part::{Part, Share, Unknown, split};
 use super::regression::{Fit, Regression};
 use super::scene::Scene;
-use super::unknowns::{Found, Point, Problem, Slot, at_bounds, by_choice, predicted, stepped};
+use super::unknowns::{Found, Point, Problem, Slot, at_bounds, by_choice, energy, predicted, stepped};
 use crate::simulate::Effects;
 
 /// Steps of the search at most.
-const ROUNDS: usize = 15;
+pub(super) const ROUNDS: usize = 15;
 /// A step that gains less than this of χ² is the last.
-const SETTLED: f64 = 0.1;
+pub(super) const SETTLED: f64 = 0.1;
 /// Shares of a record that are fitted first where a guess is too far away for the whole.
 const HORIZONS: [f64; 2] = [0.12, 0.35];
 /// How many times what the regression leaves a guess may leave before it is too far away.
@@ -34,18 +34,8 @@ const HOPELESS: f64 = 300.0;
 
 /// Least step of a difference, as a share of its parameter: rounding of the integration. Where friction holds and lets go,
 /// accelerations jump, and a jump is before or after a sample: steps must move many of them.
-const LEAST_STEP: f64 = 1e-7;
+pub(super) const LEAST_STEP: f64 = 1e-7;
 const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
-
-/// χ² per number from which on a search with friction is looked at again, and how far from where it ended, as shares.
-const STUCK: f64 = 1.1;
-/// Parameters of causes whose sizes are sought so: of more there are too many places to begin.
-const FEW: usize = 2;
-/// How many of the best beginnings are followed to the end.
-const FOLLOWED: usize = 3;
-/// Sizes from which a search begins again, as shares of what the regression says.
-const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
-const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
 
 /// Simulations compared with records.
 pub(super) struct OutputError<'a> {
@@ -53,9 +43,9 @@ pub(super) struct OutputError<'a> {
     closed: ClosedLoop,
     /// Parts of each share, in the order of the records.
     parts: Vec<Part>,
-    horizons: Vec<Vec<Part>>,
+    pub(super) horizons: Vec<Vec<Part>>,
     /// True where every record is of a structure that is let go.
-    is_let_go: bool,
+    pub(super) is_let_go: bool,
 }
 
 impl<'a> OutputError<'a> {
@@ -107,7 +97,12 @@ impl<'a> OutputError<'a> {
         Some(mine.iter().flat_map(|part| part.whiten(&samples)).collect())
     }
 
-    fn residuals(&self, problem: &Problem<'_>, parts: &[&Part], point: &Point) -> Option<Vec<Vec<f64>>> {
+    pub(super) fn residuals(
+        &self,
+        problem: &Problem<'_>,
+        parts: &[&Part],
+        point: &Point,
+    ) -> Option<Vec<Vec<f64>>> {
         let effects = problem.effects(self.scene, point)?;
         (0..self.scene.records.len())
             .into_par_iter()
@@ -196,7 +191,7 @@ impl<'a> OutputError<'a> {
 
     /// Levenberg and Marquardt's search from `start`; `None` where the start cannot be simulated. It ends early where it stays
     /// behind `rival`, a χ² that another explanation has reached.
-    fn search(
+    pub(super) fn search(
         &self,
         problem: &mut Problem<'_>,
         parts: &[&Part],
@@ -244,81 +239,15 @@ impl<'a> OutputError<'a> {
         Some(Found { point, left, normal })
     }
 
-    /// The search once more from the best of what lies near where it ended: whether friction lets go at all is a cliff.
-    fn beside(&self, problem: &mut Problem<'_>, parts: &[&Part], ended: Found, rival: f64) -> Found {
-        let mut best: Option<(f64, Point)> = None;
-        for (slot, _) in &problem.slots {
-            if !matches!(slot, Slot::Inner { .. }) {
-                continue;
-            }
-            for share in BESIDE.into_iter().flat_map(|share| [share, -share]) {
-                let mut moved = ended.point.clone();
-                *slot.of(&mut moved) *= 1.0 + share;
-                let least = best.as_ref().map_or(ended.left, |best| best.0);
-                if let Some(left) = self.residuals(problem, parts, &moved).map(|left| energy(&left))
-                    && left < least - SETTLED
-                {
-                    best = Some((left, moved));
-                }
+    /// Where searches end in a growing part of every record, from `point` on.
+    pub(super) fn near_to_far(&self, problem: &mut Problem<'_>, mut point: Point) -> Point {
+        for parts in &self.horizons {
+            let parts: Vec<&Part> = parts.iter().collect();
+            if let Some(found) = self.search(problem, &parts, point.clone(), 6, f64::INFINITY) {
+                point = found.point;
             }
         }
-        let again = best.and_then(|(_, point)| self.search(problem, parts, point, ROUNDS, rival));
-        again.filter(|again| again.left < ended.left).unwrap_or(ended)
-    }
-
-    /// The best of searches from other sizes: where a structure is let go, the phase of all that follows hangs on them, and
-    /// between two sizes there are hills.
-    fn elsewhere(
-        &self,
-        problem: &mut Problem<'_>,
-        parts: &[&Part],
-        start: &Point,
-        ended: Found,
-        rival: f64,
-    ) -> Found {
-        let mut best = ended;
-        let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
-        for _ in problem.inner() {
-            grid = grid
-                .into_iter()
-                .flat_map(|known| SIZES.map(|size| [known.clone(), vec![size]].concat()))
-                .collect();
-        }
-        let first: Vec<&Part> = self.horizons[0].iter().collect();
-        let mut tried: Vec<(f64, Point)> = grid
-            .into_iter()
-            .filter_map(|sizes| {
-                let mut point = start.clone();
-                for (slot, size) in problem.inner().zip(sizes) {
-                    let value = slot.of(&mut point);
-                    *value *= size;
-                    if let Slot::Inner {
-                        bounds: [low, high], ..
-                    } = slot
-                    {
-                        *value = value.clamp(low, high);
-                    }
-                }
-                let found = self.search(problem, &first, point, 4, f64::INFINITY)?;
-                Some((found.left, found.point))
-            })
-            .collect();
-        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (_, mut point) in tried.into_iter().take(FOLLOWED) {
-            for parts in &self.horizons {
-                let parts: Vec<&Part> = parts.iter().collect();
-                if let Some(found) = self.search(problem, &parts, point.clone(), 6, f64::INFINITY) {
-                    point = found.point;
-                }
-            }
-            let rival = rival.min(best.left);
-            if let Some(found) = self.search(problem, parts, point, ROUNDS, rival)
-                && found.left < best.left
-            {
-                best = found;
-            }
-        }
-        best
+        point
     }
 
     fn accept(
@@ -466,23 +395,11 @@ impl ClosedFit for OutputError<'_> {
         if guess > FAR * by_regression
             && explanation.fit.left < FAR_BEHIND * best_left.max(regression.count(Share::Whole) as f64)
         {
-            for parts in &self.horizons {
-                let parts: Vec<&Part> = parts.iter().collect();
-                if let Some(found) = self.search(&mut problem, &parts, start.clone(), 6, f64::INFINITY) {
-                    start = found.point;
-                }
-            }
+            start = self.near_to_far(&mut problem, start);
         }
-        let mut found = self.search(&mut problem, &whole, start.clone(), ROUNDS, rival)?;
-        let stuck = STUCK * regression.count(Share::Whole) as f64;
-        let is_simple = explanation.choices.len() == 1 && problem.inner().count() <= FEW;
-        if self.is_let_go && found.left > stuck && is_simple {
-            found = self.elsewhere(&mut problem, &whole, &start, found, rival);
-        }
-        let is_stuck = found.left > stuck;
-        if problem.least_step > LEAST_STEP && is_stuck && found.left < STUCK * rival {
-            found = self.beside(&mut problem, &whole, found, rival);
-        }
+        let found = self.search(&mut problem, &whole, start.clone(), ROUNDS, rival)?;
+        let count = regression.count(Share::Whole);
+        let found = self.looked_at_again(&mut problem, &whole, &start, found, (rival, count));
         let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
         let covariance = by_choice(&slots, &found);
         self.accept(library, regression, explanation, found, covariance)
@@ -546,8 +463,4 @@ impl ClosedFit for OutputError<'_> {
         let found = self.search(&mut problem, &held_out, found.point, 4, f64::INFINITY)?;
         Some(found.left)
     }
-}
-
-fn energy(residuals: &[Vec<f64>]) -> f64 {
-    residuals.iter().map(|residual| dot(residual, residual)).sum()
 }

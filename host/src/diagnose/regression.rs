@@ -184,13 +184,12 @@ impl Regression {
 
     /// Coefficients of `columns` that fit the column `target`, and how much of its energy they take.
     pub fn fit_column(&self, share: Share, columns: &[usize], target: usize) -> Option<(Vec<f64>, f64)> {
-        let right = |column: usize| self.product(share, column, target);
-        let (solution, _) = self.normal(share, columns, 1e-13, right)?;
-        let taken = solution
+        let right: Vec<f64> = columns
             .iter()
-            .zip(columns)
-            .map(|(solution, column)| solution * right(*column))
-            .sum();
+            .map(|column| self.product(share, *column, target))
+            .collect();
+        let (solution, _) = self.normal(share, columns, 1e-13, &right)?;
+        let taken = solution.iter().zip(&right).map(|(x, right)| x * right).sum();
         Some((solution, taken))
     }
 
@@ -204,8 +203,7 @@ impl Regression {
                 .sum()
         };
         let right: Vec<f64> = columns.iter().map(|column| with(*column)).collect();
-        let place = |column| columns.iter().position(|known| *known == column);
-        let (change, _) = self.normal(share, columns, 1e-13, |column| right[place(column).unwrap_or(0)])?;
+        let (change, _) = self.normal(share, columns, 1e-13, &right)?;
         Some(Refit {
             before: mine.iter().map(|(_, residual)| dot(residual, residual)).sum(),
             taken: change
@@ -258,8 +256,11 @@ impl Regression {
 
     fn solve(&self, share: Share, columns: &[usize], ridge: f64) -> Option<Fit> {
         let products = self.products(share);
-        let right = |column: usize| products.with_residual[column];
-        let (coefficients, covariance) = self.normal(share, columns, ridge, right)?;
+        let right: Vec<f64> = columns
+            .iter()
+            .map(|column| products.with_residual[*column])
+            .collect();
+        let (coefficients, covariance) = self.normal(share, columns, ridge, &right)?;
         Some(Fit {
             left: self.left(share, columns, &coefficients),
             coefficients,
@@ -267,13 +268,13 @@ impl Regression {
         })
     }
 
-    /// Solution and inverse of the normal equations; `None` where columns are one and the same, or nothing.
+    /// Solution and inverse of the normal equations, `right` in the order of the columns; `None` where columns are one and the same, or nothing.
     fn normal(
         &self,
         share: Share,
         columns: &[usize],
         ridge: f64,
-        right: impl Fn(usize) -> f64,
+        right: &[f64],
     ) -> Option<(Vec<f64>, DMatrix<f64>)> {
         let products = self.products(share);
         let size = columns.len();
@@ -290,7 +291,7 @@ impl Regression {
         for i in 0..size {
             gram[(i, i)] += ridge;
         }
-        let right = DVector::from_fn(size, |i, _| right(columns[i]) / scale[i]);
+        let right = DVector::from_fn(size, |i, _| right[i] / scale[i]);
         let factor = gram.cholesky()?;
         let solution = factor.solve(&right);
         let mut covariance = factor.inverse();

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::closed_fit::ClosedFit;
 use super::evidence::{Choice, Explanation, Library, Simulated};
 use super::named::covariance;
-use super::record::Clean;
+use super::record::{Clean, Record};
 use super::regression::{Regression, Share};
 use super::scene::Scene;
 use crate::recording::Recording;
@@ -75,11 +75,7 @@ impl<'a> Relinearization<'a> {
             .flatten()
             .all(|sample| sample.is_finite());
         finite.then(|| Reading {
-            predicted: read
-                .records
-                .iter()
-                .map(super::record::Record::predicted)
-                .collect(),
+            predicted: read.records.iter().map(Record::predicted).collect(),
             residuals,
         })
     }
@@ -121,32 +117,6 @@ impl<'a> Relinearization<'a> {
         }
         library.parameters(self.scene, &next).map(|_| next)
     }
-
-    /// Columns of the slopes of the shapes that do not settle by themselves, choice by choice.
-    fn slopes(
-        &self,
-        library: &Library,
-        regression: &mut Regression,
-        explanation: &Explanation,
-    ) -> Vec<Vec<usize>> {
-        (0..explanation.choices.len())
-            .map(|place| {
-                let choice = explanation.choices[place];
-                let coefficients = library.coefficients(explanation, place);
-                let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
-                let settles = library
-                    .cause(choice.candidate)
-                    .settled(shape, &coefficients)
-                    .is_some();
-                if shape.is_empty() || settles {
-                    return Vec::new();
-                }
-                library
-                    .slopes(self.scene, regression, choice, &coefficients)
-                    .unwrap_or_default()
-            })
-            .collect()
-    }
 }
 
 impl ClosedFit for Relinearization<'_> {
@@ -157,7 +127,7 @@ impl ClosedFit for Relinearization<'_> {
         explanation: &Explanation,
         (rival, _): (f64, f64),
     ) -> Option<Explanation> {
-        let slopes = self.slopes(library, regression, explanation);
+        let slopes = library.slopes_of(self.scene, regression, explanation);
         let mut columns = library.columns_of(explanation);
         columns.extend(slopes.iter().flatten());
         let mut at = explanation.clone();
@@ -195,12 +165,7 @@ impl ClosedFit for Relinearization<'_> {
     }
 
     fn left_by_baseline(&self, _: &Library, regression: &Regression) -> Option<f64> {
-        let known: Vec<Clean> = self
-            .scene
-            .records
-            .iter()
-            .map(super::record::Record::predicted)
-            .collect();
+        let known: Vec<Clean> = self.scene.records.iter().map(Record::predicted).collect();
         let reading = self.read(&[], Some(&known))?;
         Some(regression.refit(Share::Whole, &[], &reading.residuals)?.before)
     }

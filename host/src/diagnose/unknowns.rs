@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::decay::dot;
 use super::evidence::{Choice, Library};
 use super::scene::Scene;
 use crate::simulate::Effects;
@@ -72,19 +73,25 @@ impl Problem<'_> {
 
     /// The effects at a point; `None` where it is not physical.
     pub(super) fn effects(&self, scene: &Scene<'_>, point: &Point) -> Option<Effects> {
+        let Self { library, choices, .. } = self;
         let mut tables = Vec::new();
-        for (choice, inner) in self.choices.iter().zip(&point.inner) {
-            let known = &self.library.candidates[choice.candidate];
+        for (choice, inner) in choices.iter().zip(&point.inner) {
+            let known = &library.candidates[choice.candidate];
             let (shape, columns) = &known.shapes[choice.shape];
             let (coefficients, moved) = inner.split_at(columns.len());
             debug_assert_eq!(moved.len(), shape.len());
-            let cause = self.library.cause(choice.candidate);
+            let cause = library.cause(choice.candidate);
             let parameters = cause.parameters(scene, &known.place, moved, coefficients)?;
             let parts = cause.parts(&known.place, &parameters);
             tables.extend(parts.into_iter().map(|part| (part.name, part.extension)));
         }
         Effects::of_extensions(tables.iter().map(|(name, table)| (*name, table))).ok()
     }
+}
+
+/// Σ r² over all records.
+pub(super) fn energy(residuals: &[Vec<f64>]) -> f64 {
+    residuals.iter().map(|residual| dot(residual, residual)).sum()
 }
 
 /// (Jᵀ J + trust·diag) step = Jᵀ r, taken within the bounds; `None` where that has no solution.
