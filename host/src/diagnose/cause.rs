@@ -200,6 +200,11 @@ pub trait Cause: Send + Sync {
         vec![Vec::new()]
     }
 
+    /// Further shapes that are worth a look for what other causes have left, by record and channel.
+    fn shapes_beside(&self, _scene: &Scene<'_>, _place: &Place, _left: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
     /// Bounds of the parameters of a shape: lowest and highest.
     fn bounds(&self, _scene: &Scene<'_>, _place: &Place) -> Vec<[f64; 2]> {
         Vec::new()

@@ -43,11 +43,20 @@ impl Drive for Measured {
         let place = t * self.rate_hz;
         self.force_n.each_ref().map(|force| catmull_rom(force, place))
     }
+
+    /// From sample to sample of the record.
+    fn longest_step_s(&self) -> f64 {
+        FINER as f64 / self.rate_hz
+    }
 }
 
 impl Drive for Shared {
     fn force_n(&self, t: f64) -> [f64; 3] {
         self.0.force_n(t)
+    }
+
+    fn longest_step_s(&self) -> f64 {
+        self.0.longest_step_s()
     }
 }
 

@@ -451,6 +451,16 @@ impl Library {
         Some((at(best), best))
     }
 
+    /// Adds the shapes that are worth a look for what an explanation leaves.
+    pub fn add_shapes_beside(&mut self, scene: &Scene<'_>, regression: &mut Regression, left: &[Vec<Vec<f64>>]) {
+        for candidate in 0..self.candidates.len() {
+            let place = &self.candidates[candidate].place;
+            for shape in self.cause(candidate).shapes_beside(scene, place, left) {
+                self.add_shape(scene, regression, candidate, shape);
+            }
+        }
+    }
+
     /// Adds a shape to a candidate; `None` where it has no columns.
     pub fn add_shape(
         &mut self,

@@ -149,6 +149,34 @@ impl<'a> Scale<'a> {
             || (best.is_some() && of_excess < sampling)
     }
 
+    /// True where what the best simulation of `found` leaves is like a cause more, although `best` leaves hardly more than noise.
+    fn asks_for_more(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        best: &Explanation,
+        found: &[Explanation],
+    ) -> bool {
+        let base = if best.simulated.is_some() {
+            Some(best)
+        } else {
+            found.iter().find(|other| other.simulated.is_some())
+        };
+        let closed = self.closed.as_ref();
+        let Some((base, left)) = base
+            .zip(closed)
+            .and_then(|(base, closed)| Some((base, closed.left_of(library, base)?)))
+        else {
+            return false;
+        };
+        let inflation = self.inflation(regression, Some(base));
+        let price = (regression.count(Share::Whole).max(2) as f64).ln();
+        let cost = |of: &Explanation| of.fit.left / inflation + of.freedoms as f64 * price;
+        extended(self.scene, library, regression, base, &left)
+            .first()
+            .is_some_and(|more| cost(best) - cost(more) > BELIEVED + PLAIN * self.coherent)
+    }
+
     /// True where `more` takes enough of what `fewer` leave beyond the noise.
     fn takes_its_share(
         &self,
@@ -287,8 +315,15 @@ pub(super) fn select(
         let size = index + 1;
         // Less than half of what the sensors' noise is at least: nothing is there to be explained.
         let silent = regression.residual(Share::Whole) < 0.5 * regression.count(Share::Whole) as f64;
-        if silent || (size > 1 && scale.is_enough(regression, selection.best.as_ref())) {
+        if silent {
             break;
+        }
+        if size > 1 && scale.is_enough(regression, selection.best.as_ref()) {
+            let best = selection.best.clone();
+            let asked = best.is_some_and(|best| scale.asks_for_more(library, regression, &best, &fewer));
+            if !asked {
+                break;
+            }
         }
         watch(Stage::Causes(size));
         regression.complete();

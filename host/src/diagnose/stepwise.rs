@@ -12,13 +12,15 @@ use super::scene::Scene;
 /// The best explanations of `base` and one cause more, best first; `left` is what is left of it, by record and channel.
 pub(super) fn extended(
     scene: &Scene<'_>,
-    library: &Library,
+    library: &mut Library,
     regression: &mut Regression,
     base: &Explanation,
     left: &[Vec<Vec<f64>>],
 ) -> Vec<Explanation> {
     let target = regression.add(left);
+    library.add_shapes_beside(scene, regression, left);
     regression.complete();
+    let library = &*library;
     let mut found: Vec<Explanation> = library
         .choices()
         .into_iter()

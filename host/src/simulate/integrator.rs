@@ -483,11 +483,15 @@ impl<'a> Integrator<'a> {
         contact.min(drive).min(end_s)
     }
 
-    /// Half the time from tooth to tooth: the surface in front must be there, and changes of contact be seen.
+    /// Half the time from tooth to tooth, so that the surface in front is there and changes of contact are seen; and what the
+    /// drive allows.
     fn longest_step(&self, end_s: f64) -> f64 {
-        self.contact
+        let contact = self
+            .contact
             .as_ref()
-            .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s())
+            .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s());
+        let drive = self.model.drive.as_ref();
+        drive.map_or(contact, |drive| contact.min(drive.longest_step_s()))
     }
 
     /// The step that leaves no stub before `stop_s`.

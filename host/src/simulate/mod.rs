@@ -102,6 +102,11 @@ pub trait Drive: Send + Sync {
     fn next_knot_s(&self, _t: f64) -> f64 {
         f64::INFINITY
     }
+
+    /// The longest step in which the force is not missed: nothing else shortens steps while friction holds the tool.
+    fn longest_step_s(&self) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// How exactly to integrate.

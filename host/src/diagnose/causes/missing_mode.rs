@@ -42,8 +42,17 @@ impl Cause for MissingMode {
             .collect()
     }
 
-    /// The few frequencies at which such a mode would look most like the residual, at three dampings each.
     fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
+        let residual: Vec<Vec<Vec<f64>>> = scene
+            .records
+            .iter()
+            .map(|record| record.channels.iter().map(Observed::residual).collect())
+            .collect();
+        self.shapes_beside(scene, place, &residual)
+    }
+
+    /// The few frequencies at which such a mode would look most like the residual, at three dampings each.
+    fn shapes_beside(&self, scene: &Scene<'_>, place: &Place, left: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
         let Place::Axis(axis) = place else {
             return Vec::new();
         };
@@ -51,7 +60,7 @@ impl Cause for MissingMode {
             return Vec::new();
         };
         let count = 160;
-        let (bins, releases) = (bins(scene, *axis), releases(scene, *axis));
+        let (bins, releases) = (bins(scene, *axis, left), releases(scene, *axis, left));
         let likeness: Vec<Vec<(f64, Vec<f64>)>> = DAMPING
             .par_iter()
             .map(|damping| {
@@ -208,17 +217,17 @@ fn released<'a>(
 }
 
 /// A channel that hears the axis in a record of what was let go, with the force that held it.
-type Release<'a> = (&'a Record, &'a Observed, Vec<f64>, usize, f64);
+type Release<'a> = (&'a Record, &'a Observed, &'a [f64], usize, f64);
 
-fn releases<'a>(scene: &'a Scene<'_>, axis: usize) -> Vec<Release<'a>> {
+fn releases<'a>(scene: &'a Scene<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<Release<'a>> {
     let mut all = Vec::new();
-    for record in scene.records.iter().filter(|record| is_let_go(record, axis)) {
-        let Some(force) = held_by_n(scene, record) else {
+    for (record, left) in scene.records.iter().zip(left) {
+        let Some(force) = held_by_n(scene, record).filter(|_| is_let_go(record, axis)) else {
             continue;
         };
-        let hears = |channel: &&Observed| channel.pickup.weights[axis] != 0.0;
-        for channel in record.channels.iter().filter(hears) {
-            all.push((record, channel, channel.residual(), axis, force[axis]));
+        let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
+        for (channel, left) in record.channels.iter().zip(left).filter(hears) {
+            all.push((record, channel, &left[..], axis, force[axis]));
         }
     }
     all
@@ -228,20 +237,14 @@ fn releases<'a>(scene: &'a Scene<'_>, axis: usize) -> Vec<Release<'a>> {
 /// units of the noise.
 type Bin = (f64, Complex64, Complex64);
 
-fn bins(scene: &Scene<'_>, axis: usize) -> Vec<Bin> {
+fn bins(scene: &Scene<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
     let mut all = Vec::new();
-    for record in scene
-        .records
-        .iter()
-        .filter(|record| !record.force_n[axis].is_empty())
-    {
+    let forced = |(record, _): &(&Record, _)| !record.force_n[axis].is_empty();
+    for (record, left) in scene.records.iter().zip(left).filter(forced) {
         let force = record.grid.spectrum(&record.force_n[axis]);
-        for channel in record
-            .channels
-            .iter()
-            .filter(|channel| channel.pickup.weights[axis] != 0.0)
-        {
-            let residual = record.grid.spectrum(&channel.residual());
+        let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
+        for (channel, left) in record.channels.iter().zip(left).filter(hears) {
+            let residual = record.grid.spectrum(left);
             for bin in 1..record.grid.bins() {
                 let omega = record.grid.omega(bin);
                 if omega > TAU * record.band_hz {
@@ -265,7 +268,7 @@ fn likeness(bins: &[Bin], releases: &[Release<'_>], frequency_hz: f64, damping_r
     }
     for (record, channel, residual, axis, force_n) in releases {
         let column = released(record, channel, *axis, *force_n, [frequency_hz, damping_ratio]);
-        for (column, residual) in column.zip(residual) {
+        for (column, residual) in column.zip(residual.iter()) {
             let power = channel.deviation * channel.deviation;
             along += column * residual / power;
             size += column * column / power;

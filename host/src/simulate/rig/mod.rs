@@ -57,6 +57,10 @@ impl Drive for Driven {
     fn next_knot_s(&self, t: f64) -> f64 {
         self.signal.next_knot_s(t)
     }
+
+    fn longest_step_s(&self) -> f64 {
+        self.signal.longest_step_s()
+    }
 }
 
 impl Rig {
