@@ -452,7 +452,12 @@ impl Library {
     }
 
     /// Adds the shapes that are worth a look for what an explanation leaves.
-    pub fn add_shapes_beside(&mut self, scene: &Scene<'_>, regression: &mut Regression, left: &[Vec<Vec<f64>>]) {
+    pub fn add_shapes_beside(
+        &mut self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        left: &[Vec<Vec<f64>>],
+    ) {
         for candidate in 0..self.candidates.len() {
             let place = &self.candidates[candidate].place;
             for shape in self.cause(candidate).shapes_beside(scene, place, left) {

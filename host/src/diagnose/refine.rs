@@ -100,6 +100,9 @@ fn settle(
     explanation
 }
 
+/// Most steps along the slopes: where two lengths of one joint can take each other's place, the way is narrow and bent.
+const SLOPES_FOLLOWED: usize = 12;
+
 /// Steps along each parameter, shorter where they do not help; then where the slopes point.
 fn search(
     scene: &Scene<'_>,
@@ -143,7 +146,7 @@ fn search(
             }
         }
     }
-    for _ in 0..3 {
+    for _ in 0..SLOPES_FOLLOWED {
         let Some(better) = along_slopes(scene, library, regression, &explanation, place, &bounds) else {
             break;
         };

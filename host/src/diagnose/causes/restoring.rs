@@ -25,6 +25,7 @@ pub(super) fn all() -> Vec<Box<dyn Cause>> {
         coulomb_friction::ALIKE,
         coulomb_friction::EACH_WAY,
         coulomb_friction::BEHIND_PLAY,
+        coulomb_friction::BEHIND_CLEARANCE,
         backlash::CAUSE,
         hysteresis::CAUSE,
         mode_coupling::QUARTIC,
@@ -151,18 +152,25 @@ impl Cause for Restoring {
     }
 
     fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
-        let of_play = |(key, _): &&Parameter| *key == "play_mm";
+        let of_play = |(key, _): &&Parameter| self.behind_play && self.shape.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
         let mut parts = vec![Part {
             name: self.name,
             extension: self.extension(place, &own),
             parameters: own,
         }];
-        if let Some((_, play_mm)) = parameters.iter().find(of_play) {
-            let gap = vec![("gap_mm", *play_mm)];
+        if self.behind_play {
+            let of_gap = |(key, value): &Parameter| match *key {
+                "play_mm" => ("gap_mm", *value),
+                key => (key, *value),
+            };
+            let gap: Vec<Parameter> = parameters.iter().filter(of_play).map(of_gap).collect();
             let mut extension = toml::Table::new();
-            extension.insert("gap_mm".into(), (*play_mm).into());
             extension.insert("before".into(), self.name.into());
+            extension.extend(
+                gap.iter()
+                    .map(|(key, value)| ((*key).to_owned(), (*value).into())),
+            );
             parts.push(Part {
                 name: "backlash",
                 parameters: gap,

@@ -10,7 +10,7 @@ use crate::structure::{Direction, Structure};
 
 pub(super) const KIND: Kind = Kind {
     name: "backlash",
-    keys: "gap_mm, stiffness_fraction and direction, or gap_mm and before",
+    keys: "gap_mm, stiffness_fraction and direction, or gap_mm, contact_mm and before",
     build: |parameters| {
         let gap_mm = parameters.main("gap_mm")?;
         if gap_mm < 0.0 {

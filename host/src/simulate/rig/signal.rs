@@ -198,11 +198,15 @@ impl Signal {
     /// A quarter of the shortest period, s; knots say where pulses are.
     pub fn longest_step_s(&self) -> f64 {
         let highest_hz = match self {
-            Self::Tones { tones, .. } => tones.iter().fold(0.0, |most: f64, (tone_hz, _)| most.max(*tone_hz)),
+            Self::Tones { tones, .. } => tones
+                .iter()
+                .fold(0.0, |most: f64, (tone_hz, _)| most.max(*tone_hz)),
             Self::StepSine { steps, .. } => steps
                 .iter()
                 .fold(0.0, |most: f64, step| most.max(step.frequency_hz)),
-            Self::Sweep { first_hz, last_hz, .. } => first_hz.max(*last_hz),
+            Self::Sweep {
+                first_hz, last_hz, ..
+            } => first_hz.max(*last_hz),
             Self::Impacts { .. } | Self::Release { .. } => 0.0,
         };
         0.25 / highest_hz

@@ -118,6 +118,61 @@ fn dry_friction_takes_the_same_from_every_half_swing_and_then_holds() {
 }
 
 #[test]
+fn what_friction_holds_is_let_go_at_the_first_peak_that_is_high_enough() {
+    // Nothing but the drive shortens steps until then.
+    let tone = Signal::tones(&[17.2], [0.0, 30.0], 20.0, 1);
+    let instant = |index: u32| f64::from(index) * 1e-5;
+    let wanted = (0..2_000_000)
+        .map(instant)
+        .find(|t| tone.force_n(*t).abs() > 20.0)
+        .unwrap();
+    let effects = ["coulomb-friction=20"];
+    let (recording, _) = rig(tone, &effects).record(&linear(), Path::new("a.csv")).unwrap();
+    let y = samples(&recording, "y");
+    // Held is held to rounding.
+    let first = y.iter().position(|y| y.abs() > 1e-15).unwrap();
+    // One sample lies between.
+    let late = first as f64 / 500.0 - wanted;
+    assert!((0.0..=2e-3).contains(&late), "{late} after {wanted}");
+}
+
+#[test]
+fn friction_behind_a_clearance_closes_by_hertz() {
+    let effects = [
+        "coulomb-friction=30",
+        "coulomb-friction.fc_minus_n=20",
+        "backlash=0.05",
+        "backlash.contact_mm=0.02",
+        "backlash.before=coulomb-friction",
+    ];
+    let tones = Signal::tones(&[16.0, 17.4], [150.0, 150.0], 2.0, 4);
+    let (recording, _) = Rig {
+        sample_rate_hz: 20_000.0,
+        ..rig(tones, &effects)
+    }
+    .record(&linear(), Path::new("a.csv"))
+    .unwrap();
+    let (m, c, k) = (188.0, 305.0, 2.26e6);
+    let [y, v, a, force] = ["y", "vy", "ay", "fy"].map(|name| samples(&recording, name));
+    let (mut slider, mut seen) = (0.0_f64, [false; 3]);
+    for i in 0..y.len() {
+        slider = slider.clamp(y[i] - 45e-6, y[i] + 45e-6);
+        let ahead = y[i] - slider;
+        let pressed = ((ahead.abs() - 25e-6) / 20e-6).clamp(0.0, 1.0);
+        let wanted = if ahead > 0.0 { 30.0 } else { -20.0 } * pressed.powf(1.5);
+        seen[if pressed == 0.0 {
+            0
+        } else {
+            1 + usize::from(pressed > 0.999)
+        }] = true;
+        let found = force[i] - m * a[i] - c * v[i] - k * y[i];
+        // Between samples the slider may go on by half a millionth of the motion.
+        assert!((found - wanted).abs() < 0.02, "{i}: {found} {wanted}");
+    }
+    assert_eq!(seen, [true; 3]);
+}
+
+#[test]
 fn play_has_its_period() {
     // Free of damping a mass with play a and amplitude X swings in 4·(√(m/k)·(π/2) + a/(ω·(X − a))).
     let effects = ["damping=-0.99999999", "backlash=0.1"];

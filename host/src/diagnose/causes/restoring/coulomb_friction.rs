@@ -2,6 +2,7 @@
 //! amplitude.
 
 use super::{Restoring, largest_m, plain};
+use crate::diagnose::scene::Domain;
 
 pub(super) const ALIKE: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc > 0.0),
@@ -26,4 +27,25 @@ pub(super) const BEHIND_PLAY: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc >= 0.0) && fc.iter().any(|fc| *fc > 0.0),
     behind_play: true,
     ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
+};
+
+/// The same where the joint that has the play closes softly. Where a structure moves freely a loop of Bouc and Wen takes its place:
+/// it is sought where the motion is imposed, and the force of every instant is seen.
+pub(super) const BEHIND_CLEARANCE: Restoring = Restoring {
+    shape: &["play_mm", "contact_mm"],
+    shapes: |scene, axis| {
+        if !scene.all_in(Domain::Force) {
+            return Vec::new();
+        }
+        let most = 2e3 * largest_m(scene, axis);
+        [0.02, 0.04, 0.08, 0.16, 0.32]
+            .into_iter()
+            .flat_map(|play| [0.02, 0.06].map(|contact| vec![play * most, contact * most]))
+            .collect()
+    },
+    bounds: |scene, axis| {
+        let largest_m = largest_m(scene, axis);
+        vec![[largest_m, 1.9e3 * largest_m], [largest_m, 1e3 * largest_m]]
+    },
+    ..BEHIND_PLAY
 };
