@@ -130,6 +130,9 @@ impl Event {
     }
 }
 
+/// Error of a step, as a share of what is allowed, below which nothing moves.
+const AT_REST: f64 = 1e-6;
+
 /// Changes of contact in a row without a step between them before a run is given up.
 const STUCK: u32 = 3;
 
@@ -327,6 +330,10 @@ impl<'a> Integrator<'a> {
     /// Length 0: the event is here and now.
     fn step_towards(&mut self, stop_s: f64) -> Result<(f64, Option<Event>), SimulateError> {
         let mut h = self.next_h;
+        let is_held = self.is_held();
+        if is_held {
+            h = h.min(self.longest_step_at_rest());
+        }
         loop {
             h = self.fitted(h, stop_s);
             let error = self.attempt(h);
@@ -339,6 +346,9 @@ impl<'a> Integrator<'a> {
                     grown
                 };
                 self.next_h = self.next_h.min(self.longest_step(f64::INFINITY));
+                if is_held || error < AT_REST {
+                    self.next_h = self.next_h.min(self.longest_step_at_rest());
+                }
                 break;
             }
             self.statistics.rejected += 1;
@@ -483,15 +493,23 @@ impl<'a> Integrator<'a> {
         contact.min(drive).min(end_s)
     }
 
-    /// Half the time from tooth to tooth, so that the surface in front is there and changes of contact are seen; and what the
-    /// drive allows.
+    /// Half the time from tooth to tooth: the surface in front must be there, and changes of contact be seen.
     fn longest_step(&self, end_s: f64) -> f64 {
-        let contact = self
-            .contact
+        self.contact
             .as_ref()
-            .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s());
+            .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s())
+    }
+
+    /// The longest step while nothing moves, or friction holds an axis: the force alone then says when that ends, and no error of the
+    /// motion shortens steps.
+    fn longest_step_at_rest(&self) -> f64 {
         let drive = self.model.drive.as_ref();
-        drive.map_or(contact, |drive| contact.min(drive.longest_step_s()))
+        drive.map_or(f64::INFINITY, |drive| drive.longest_step_s())
+    }
+
+    fn is_held(&self) -> bool {
+        let mut branches = self.model.terms.iter().zip(&self.branches);
+        branches.any(|(term, branch)| term.locked(*branch))
     }
 
     /// The step that leaves no stub before `stop_s`.

@@ -1,0 +1,156 @@
+//! What a diagnosis of four long records costs: 60 s at 2 kHz each. By one command, which prints the seconds:
+//! `cargo test --release -p quietcut-tests --test long_diagnosis -- --ignored --nocapture`.
+#![allow(clippy::expect_used)]
+
+use std::path::Path;
+use std::time::Instant;
+
+use quietcut_tests::command::{folder, quietcut};
+
+/// Longer than anyone waits, on two cores that do nothing else.
+const LONGEST_S: f64 = 30.0;
+
+const MACHINE: &str = "name = \"long\"
+[structure]
+kind = \"matrices\"
+directions = [\"x\", \"y\"]
+mass = [[180.0, 0.0], [0.0, 220.0]]
+damping = [[900.0, 0.0], [0.0, 1300.0]]
+stiffness = [[2.2e6, 1e5], [1e5, 3.1e6]]
+[tool]
+teeth = 2
+edge_angle_deg = 90.0
+diameter_mm = 16.0
+[material]
+ktc_mpa = 700.0
+krc_mpa = 200.0
+kte_n_per_mm = 5.0
+kre_n_per_mm = 4.0
+kac_mpa = 0.0
+kae_n_per_mm = 0.0
+[cut]
+start_deg = 90.0
+exit_deg = 180.0
+feed_per_tooth_mm = 0.1
+";
+
+/// Makes four records by `simulate`, one for each of `differing`, and diagnoses them; the answer must be `cause`.
+fn diagnose(common: &[&str], differing: [&[&str]; 4], cause: &str) {
+    let folder = folder();
+    let folder: &Path = folder.path();
+    std::fs::write(folder.join("case.toml"), MACHINE).expect("written");
+    let records: Vec<String> = (0..4).map(|index| format!("{index}.csv")).collect();
+    for (record, own) in records.iter().zip(differing) {
+        let mut arguments = vec![
+            "simulate",
+            "case.toml",
+            "--sample-rate-hz",
+            "2000",
+            "--out",
+            record,
+        ];
+        arguments.extend(["--noise-percent", "1", "--measure", "displacement"]);
+        arguments.extend(common.iter().chain(own));
+        let made = quietcut(folder, &arguments);
+        assert_eq!(made.status, Some(0), "{made:?}");
+    }
+    let mut arguments = vec!["diagnose", "case.toml", "--json"];
+    arguments.extend(records.iter().map(String::as_str));
+    let began = Instant::now();
+    let answer = quietcut(folder, &arguments).json();
+    let seconds = began.elapsed().as_secs_f64();
+    let named: Vec<&str> = answer["causes"]
+        .as_array()
+        .expect("causes")
+        .iter()
+        .filter_map(|cause| cause["name"].as_str())
+        .collect();
+    println!("{cause}: {seconds:.1} s for four records of 60 s at 2 kHz: {named:?}");
+    assert_eq!(named, [cause]);
+    assert!(seconds < LONGEST_S, "{seconds}");
+}
+
+#[test]
+#[ignore = "a measurement on a machine that does nothing else"]
+fn of_cuts() {
+    let common = [
+        "--depth-mm",
+        "0.4",
+        "--seconds",
+        "60",
+        "--entry",
+        "none",
+        "--ideal",
+        "--effect",
+        "runout=15",
+    ];
+    let rpm: [&[&str]; 4] = [
+        &["--rpm", "520"],
+        &["--rpm", "600"],
+        &["--rpm", "700"],
+        &["--rpm", "810"],
+    ];
+    diagnose(&common, rpm, "runout");
+}
+
+const LEVELS_N: [&[&str]; 4] = [
+    &["--force-n", "20"],
+    &["--force-n", "40"],
+    &["--force-n", "60"],
+    &["--force-n", "80"],
+];
+
+#[test]
+#[ignore = "a measurement on a machine that does nothing else"]
+fn of_a_shaker() {
+    let tones = [
+        "--experiment",
+        "shaker",
+        "--frequency-hz",
+        "8.03:29.97:20",
+        "--seconds",
+        "60",
+    ];
+    let hidden = [
+        "--effect",
+        "cubic-stiffness=2e11",
+        "--effect",
+        "cubic-stiffness.direction=x",
+    ];
+    diagnose(&[tones.as_slice(), &hidden].concat(), LEVELS_N, "cubic-stiffness");
+}
+
+#[test]
+#[ignore = "a measurement on a machine that does nothing else"]
+fn of_a_shaker_while_the_machine_drifts() {
+    let tones = [
+        "--experiment",
+        "shaker",
+        "--frequency-hz",
+        "8.03:29.97:20",
+        "--seconds",
+        "60",
+    ];
+    let hidden = ["--effect", "drift.relative_rate_per_s=5e-4"];
+    diagnose(&[tones.as_slice(), &hidden].concat(), LEVELS_N, "drift");
+}
+
+#[test]
+#[ignore = "a measurement on a machine that does nothing else"]
+fn of_sweeps() {
+    let sweep = [
+        "--experiment",
+        "sweep",
+        "--frequency-hz",
+        "8:30:2",
+        "--hz-per-min",
+        "22",
+    ];
+    let hidden = [
+        "--effect",
+        "cubic-stiffness=2e11",
+        "--effect",
+        "cubic-stiffness.direction=x",
+    ];
+    diagnose(&[sweep.as_slice(), &hidden].concat(), LEVELS_N, "cubic-stiffness");
+}
