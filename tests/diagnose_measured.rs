@@ -284,6 +284,8 @@ fn the_banded_damper_has_friction_behind_a_play() {
             some.len()
         );
         assert!(removed > 0.95, "{removed}");
+        // The loop is there to be looked at.
+        assert!(found.views.iter().all(|view| view.missing.is_some()));
         gaps_in.push(gap_in);
         not_again(&believed, &found, some);
     }

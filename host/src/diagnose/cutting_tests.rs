@@ -113,6 +113,16 @@ fn what_a_cut_hides_is_named_with_and_without_force() {
         if diagnosis.causes.first().map(|cause| cause.name) != Some(name) {
             wrong.push((name, forces, told(&diagnosis)));
         }
+        // What people are shown as left is noise too: nothing of a start that nobody knows.
+        for view in &diagnosis.views {
+            let [_, _, left] = view.sizes();
+            assert!(
+                left < 1.2 * view.deviation,
+                "{name}, {}: {left} of {}",
+                view.channel,
+                view.deviation
+            );
+        }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
 }

@@ -65,7 +65,9 @@ impl MissingForce {
             Domain::Response => response_over(record, channel, axis, residual),
         };
         let at_rest = baseline.receptance.at(0.0)[(axis, axis)].re;
-        let stretch_s = PERIODS / baseline.lowest_hz()?;
+        // Where nothing oscillates by itself, a record has twenty stretches.
+        let duration_s = residual.len() as f64 / record.grid.rate_hz();
+        let stretch_s = baseline.lowest_hz().map_or(0.05 * duration_s, |hz| PERIODS / hz);
         Some(Self {
             x,
             v,

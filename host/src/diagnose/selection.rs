@@ -318,7 +318,8 @@ pub(super) fn select(
         if silent {
             break;
         }
-        if size > 1 && scale.is_enough(regression, selection.best.as_ref()) {
+        let enough = size > 1 && scale.is_enough(regression, selection.best.as_ref());
+        if enough {
             let best = selection.best.clone();
             let asked = best.is_some_and(|best| scale.asks_for_more(library, regression, &best, &fewer));
             if !asked {
@@ -341,6 +342,8 @@ pub(super) fn select(
             pairs.clone_from(&found);
         }
         let mut found = scale.simulated(library, regression, found, &fewer, most);
+        // What hardly shows is believed only of a simulation.
+        found.retain(|explanation| !enough || explanation.simulated.is_some());
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = scale.inflation(regression, found.first());
         scale.sort(regression, &mut found, inflation);

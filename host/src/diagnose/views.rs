@@ -10,7 +10,7 @@ use super::grid::Grid;
 use super::missing_force::MissingForce;
 use super::noise::rms;
 use super::record::Record;
-use super::scene::Scene;
+use super::scene::{Domain, Scene};
 
 /// One channel of one record: what was measured, what the case misses of it, and what the extended case misses.
 #[derive(Clone, Debug)]
@@ -82,16 +82,12 @@ impl View {
 pub(super) fn views(scene: &Scene<'_>, library: &Library, best: Option<&Explanation>) -> Vec<View> {
     let mut all = Vec::new();
     for record in &scene.records {
-        let explained: Option<Vec<Vec<f64>>> = best.map(|best| library.explained(scene, record, best));
+        let left_by_best = best.map(|best| left_by(scene, library, record, best));
         for (index, channel) in record.channels.iter().enumerate() {
             let residual = channel.residual();
-            let left = explained.as_ref().map_or_else(Vec::new, |explained| {
-                residual
-                    .iter()
-                    .zip(&explained[index])
-                    .map(|(a, b)| a - b)
-                    .collect()
-            });
+            let left = left_by_best
+                .as_ref()
+                .map_or_else(Vec::new, |left| left[index].clone());
             let turning = record.cut.as_ref().map(|cutting| {
                 let passes = passes(record, &cutting.cut);
                 let at = |samples: &[f64]| strobe(&passes, samples);
@@ -118,6 +114,30 @@ pub(super) fn views(scene: &Scene<'_>, library: &Library, best: Option<&Explanat
         }
     }
     all
+}
+
+/// What an explanation leaves of each channel, once the free decay that it leaves has been taken out.
+fn left_by(scene: &Scene<'_>, library: &Library, record: &Record, best: &Explanation) -> Vec<Vec<f64>> {
+    let explained = library.explained(scene, record, best);
+    let left: Vec<Vec<f64>> = record
+        .channels
+        .iter()
+        .zip(&explained)
+        .map(|(channel, explained)| {
+            let residual = channel.residual();
+            residual.iter().zip(explained).map(|(a, b)| a - b).collect()
+        })
+        .collect();
+    if record.domain == Domain::Force {
+        return left;
+    }
+    let sizes: Vec<f64> = record.channels.iter().map(|channel| channel.deviation).collect();
+    let mut decays = record.decays.clone();
+    decays.fit(&left, &sizes);
+    left.iter()
+        .enumerate()
+        .map(|(index, left)| decays.without(index, left))
+        .collect()
 }
 
 /// Where teeth pass, in samples, with the numbers of the passes.
