@@ -100,57 +100,44 @@ const LEVELS_N: [&[&str]; 4] = [
     &["--force-n", "80"],
 ];
 
+const TONES: [&str; 6] = [
+    "--experiment",
+    "shaker",
+    "--frequency-hz",
+    "8.03:29.97:20",
+    "--seconds",
+    "60",
+];
+const SWEEP: [&str; 6] = [
+    "--experiment",
+    "sweep",
+    "--frequency-hz",
+    "8:30:2",
+    "--hz-per-min",
+    "22",
+];
+const CUBIC: [&str; 4] = [
+    "--effect",
+    "cubic-stiffness=2e11",
+    "--effect",
+    "cubic-stiffness.direction=x",
+];
+
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
 fn of_a_shaker() {
-    let tones = [
-        "--experiment",
-        "shaker",
-        "--frequency-hz",
-        "8.03:29.97:20",
-        "--seconds",
-        "60",
-    ];
-    let hidden = [
-        "--effect",
-        "cubic-stiffness=2e11",
-        "--effect",
-        "cubic-stiffness.direction=x",
-    ];
-    diagnose(&[tones.as_slice(), &hidden].concat(), LEVELS_N, "cubic-stiffness");
+    diagnose(&[&TONES[..], &CUBIC].concat(), LEVELS_N, "cubic-stiffness");
 }
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
 fn of_a_shaker_while_the_machine_drifts() {
-    let tones = [
-        "--experiment",
-        "shaker",
-        "--frequency-hz",
-        "8.03:29.97:20",
-        "--seconds",
-        "60",
-    ];
-    let hidden = ["--effect", "drift.relative_rate_per_s=5e-4"];
-    diagnose(&[tones.as_slice(), &hidden].concat(), LEVELS_N, "drift");
+    let drift = ["--effect", "drift.relative_rate_per_s=5e-4"];
+    diagnose(&[&TONES[..], &drift].concat(), LEVELS_N, "drift");
 }
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
 fn of_sweeps() {
-    let sweep = [
-        "--experiment",
-        "sweep",
-        "--frequency-hz",
-        "8:30:2",
-        "--hz-per-min",
-        "22",
-    ];
-    let hidden = [
-        "--effect",
-        "cubic-stiffness=2e11",
-        "--effect",
-        "cubic-stiffness.direction=x",
-    ];
-    diagnose(&[sweep.as_slice(), &hidden].concat(), LEVELS_N, "cubic-stiffness");
+    diagnose(&[&SWEEP[..], &CUBIC].concat(), LEVELS_N, "cubic-stiffness");
 }
