@@ -19,6 +19,8 @@ pub enum Place {
     Everywhere,
     /// Along one of the machine's axes (0, 1, 2).
     Axis(usize),
+    /// Along each of these, by a law of its own.
+    EachOf(Vec<usize>),
     /// Between two of them.
     Axes(usize, usize),
     /// In a channel.
@@ -66,6 +68,10 @@ impl fmt::Display for Place {
         match self {
             Self::Everywhere => f.write_str("everywhere"),
             Self::Axis(axis) => write!(f, "{}", direction_of(*axis)),
+            Self::EachOf(axes) => {
+                let names: Vec<String> = axes.iter().map(|axis| direction_of(*axis).to_string()).collect();
+                f.write_str(&names.join(" and "))
+            }
             Self::Axes(a, b) => write!(f, "{}-{}", direction_of(*a), direction_of(*b)),
             Self::Channel(name) => f.write_str(name),
             Self::ChannelFrom(name, axis) => write!(f, "{name} from {}", direction_of(*axis)),
@@ -173,6 +179,8 @@ pub type Parameter = (&'static str, f64);
 pub struct Part {
     /// The name, as in `[extension.NAME]`.
     pub name: &'static str,
+    /// Where this part acts.
+    pub place: Place,
     /// Its parameters.
     pub parameters: Vec<Parameter>,
     /// The extension that makes it part of a case.
@@ -247,6 +255,7 @@ pub trait Cause: Send + Sync {
     fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
         vec![Part {
             name: self.name(),
+            place: place.clone(),
             parameters: parameters.to_vec(),
             extension: self.extension(place, parameters),
         }]

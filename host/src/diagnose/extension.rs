@@ -2,19 +2,59 @@
 
 use std::fmt::Write as _;
 
-use super::answer::{Diagnosis, Outcome};
+use toml::{Table, Value};
+
+use super::answer::{Diagnosis, Figure, NamedCause, Outcome};
 use crate::case::Case;
 
+/// Tables `[extension.NAME]`, in their order, each name once: a cause that acts along several directions has a list of them, and
+/// of each parameter a list that is as long.
+pub(super) fn joined<'a>(parts: impl IntoIterator<Item = (&'a str, &'a Table)>) -> Vec<(String, Table)> {
+    let mut all: Vec<(String, Table)> = Vec::new();
+    for (name, table) in parts {
+        match all.iter_mut().find(|(known, _)| known == name) {
+            None => all.push((name.to_owned(), table.clone())),
+            Some((_, known)) => {
+                for (key, value) in table {
+                    match known.get_mut(key) {
+                        Some(Value::Array(list)) => list.push(value.clone()),
+                        Some(one) => *one = Value::Array(vec![one.clone(), value.clone()]),
+                        None => {
+                            known.insert(key.clone(), value.clone());
+                        }
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+/// What is said of a key behind its value: the intervals of the causes that have it.
+fn intervals(causes: &[&NamedCause], key: &str) -> String {
+    let of = |cause: &&NamedCause| {
+        let Figure { ci90: [from, to], .. } = cause.parameters.get(key)?;
+        Some(format!("{from:.6e} to {to:.6e}"))
+    };
+    let said: Vec<String> = causes.iter().filter_map(of).collect();
+    if said.is_empty() {
+        String::new()
+    } else {
+        format!(" # 90 % interval {}", said.join(", "))
+    }
+}
+
 impl Diagnosis {
+    fn found(&self) -> impl Iterator<Item = (&str, &Table)> {
+        let found = self.causes.iter().take(self.acting);
+        found.map(|cause| (cause.name, &cause.extension))
+    }
+
     /// The extended case; `None` where nothing was found.
     pub fn extended(&self, case: &Case) -> Option<Case> {
-        let found = &self.causes[..self.acting];
-        (!found.is_empty()).then(|| {
+        (self.acting > 0).then(|| {
             let mut extended = case.clone();
-            let tables = found
-                .iter()
-                .map(|cause| (cause.name.to_owned(), cause.extension.clone()));
-            extended.extensions.extend(tables);
+            extended.extensions.extend(joined(self.found()));
             extended
         })
     }
@@ -29,20 +69,13 @@ impl Diagnosis {
         }
         let mut text = case_text.trim_end().to_owned();
         text.push('\n');
-        for cause in self.causes.iter().take(self.acting) {
+        let found = &self.causes[..self.acting];
+        for (name, table) in joined(self.found()) {
+            let causes: Vec<&NamedCause> = found.iter().filter(|cause| cause.name == name).collect();
             // Writing to a string cannot fail.
-            let _ = write!(text, "\n[extension.{}]\n", cause.name);
-            for (key, value) in &cause.extension {
-                let interval = cause
-                    .parameters
-                    .get(key.as_str())
-                    .map_or_else(String::new, |figure| {
-                        format!(
-                            " # 90 % interval {:.6e} to {:.6e}",
-                            figure.ci90[0], figure.ci90[1]
-                        )
-                    });
-                let _ = writeln!(text, "{key} = {value}{interval}");
+            let _ = write!(text, "\n[extension.{name}]\n");
+            for (key, value) in &table {
+                let _ = writeln!(text, "{key} = {value}{}", intervals(&causes, key));
             }
         }
         Some(text)

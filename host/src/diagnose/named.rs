@@ -70,7 +70,7 @@ pub(super) fn named(
                         )
                     })
                     .collect(),
-                ..empty(part.name, &candidate.place, confidence, part.extension)
+                ..empty(part.name, &part.place, confidence, part.extension)
             });
         }
     }

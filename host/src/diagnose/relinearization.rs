@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use super::closed_fit::ClosedFit;
 use super::evidence::{Choice, Explanation, Library, Simulated};
+use super::extension::joined;
 use super::named::covariance;
 use super::record::{Clean, Record};
 use super::regression::{Regression, Share};
@@ -52,9 +53,8 @@ impl<'a> Relinearization<'a> {
         predicted: Option<&[Clean]>,
     ) -> Option<Reading> {
         let mut case = self.scene.baseline.case.clone();
-        let tables = extensions.iter().cloned();
-        case.extensions
-            .extend(tables.map(|(name, table)| (name.to_owned(), table)));
+        let tables = extensions.iter().map(|(name, table)| (*name, table));
+        case.extensions.extend(joined(tables));
         let clean = |index: usize| predicted.map(|predicted| predicted[index].clone());
         let read = Scene::with(&case, self.recordings, clean).ok()?;
         let residuals: Residuals = read

@@ -26,6 +26,9 @@ const NUMERICS: f64 = 1e-4;
 pub(super) const WITHIN_NOISE: f64 = 0.15;
 /// What further causes must take of what is left beyond the noise: less is how one wrong equation mends another.
 const SHARE: f64 = 0.2;
+/// The same of what is beyond noise and chance where hardly anything is left: what else a weak companion would leave is how a model
+/// is wrong that nobody knows, such as the noise of the force.
+const MOST_OF_LITTLE: f64 = 2.0 / 3.0;
 /// How many times what errors of the computation may be is plainly something else: twice their amplitude.
 const PLAIN: f64 = 4.0;
 /// Most causes that act together.
@@ -177,14 +180,24 @@ impl<'a> Scale<'a> {
             .is_some_and(|more| cost(best) - cost(more) > BELIEVED + PLAIN * self.coherent)
     }
 
-    /// True where `more` takes enough of what `fewer` leave beyond the noise.
+    /// True where `more` takes enough of what `fewer` leave beyond the noise, which is hardly anything where they are `enough`; what
+    /// has fewer parameters need not.
     fn takes_its_share(
         &self,
         regression: &Regression,
         fewer: Option<&Explanation>,
         more: &Explanation,
+        enough: bool,
     ) -> bool {
+        if fewer.is_some_and(|fewer| more.freedoms < fewer.freedoms) {
+            return true;
+        }
         let noise = regression.count(Share::Whole) as f64;
+        let (share, chance) = if enough {
+            (MOST_OF_LITTLE, (2.0 * noise).sqrt())
+        } else {
+            (SHARE, 0.0)
+        };
         let before = fewer.map_or_else(
             || match more.simulated {
                 Some(_) => self.reference,
@@ -192,7 +205,7 @@ impl<'a> Scale<'a> {
             },
             |fewer| fewer.fit.left,
         );
-        before - more.fit.left > SHARE * (before - noise).max(0.0)
+        before - more.fit.left > share * (before - noise - chance).max(0.0)
     }
 
     /// What is left of the held-out parts if the parameters come from the fitted ones alone.
@@ -209,7 +222,7 @@ impl<'a> Scale<'a> {
     }
 
     /// The first of `found` as simulation has them, where it can; else all as they are. `fewer` are the best with one cause
-    /// less.
+    /// less; what stays behind `rival` is given up.
     fn simulated(
         &self,
         library: &mut Library,
@@ -217,6 +230,7 @@ impl<'a> Scale<'a> {
         found: Vec<Explanation>,
         fewer: &[Explanation],
         most: usize,
+        rival: Option<&Explanation>,
     ) -> Vec<Explanation> {
         let Some(closed) = &self.closed else {
             return found;
@@ -232,7 +246,8 @@ impl<'a> Scale<'a> {
             }
         }
         tried.extend(found.iter().take(most).cloned());
-        let (mut rival, mut freedoms) = (f64::INFINITY, 0);
+        let (mut rival, mut freedoms) =
+            rival.map_or((f64::INFINITY, 0), |rival| (rival.fit.left, rival.freedoms));
         let mut simulated = Vec::new();
         let tried = distinct(tried);
         let noise = regression.count(Share::Whole) as f64;
@@ -319,10 +334,13 @@ pub(super) fn select(
             break;
         }
         let enough = size > 1 && scale.is_enough(regression, selection.best.as_ref());
-        if enough {
-            let best = selection.best.clone();
-            let asked = best.is_some_and(|best| scale.asks_for_more(library, regression, &best, &fewer));
-            if !asked {
+        // Two causes with one parameter each may be what one with many imitates.
+        let mut imitated = None;
+        if enough && let Some(best) = &selection.best {
+            let asked = scale.asks_for_more(library, regression, best, &fewer);
+            imitated = (!asked && size == 2 && best.freedoms > size && best.simulated.is_some())
+                .then(|| best.clone());
+            if !asked && imitated.is_none() {
                 break;
             }
         }
@@ -341,7 +359,11 @@ pub(super) fn select(
         if size == 2 {
             pairs.clone_from(&found);
         }
-        let mut found = scale.simulated(library, regression, found, &fewer, most);
+        if let Some(imitated) = &imitated {
+            found.retain(|explanation| explanation.freedoms < imitated.freedoms);
+        }
+        let extended = if imitated.is_some() { &[] } else { &fewer[..] };
+        let mut found = scale.simulated(library, regression, found, extended, most, imitated.as_ref());
         // What hardly shows is believed only of a simulation.
         found.retain(|explanation| !enough || explanation.simulated.is_some());
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
@@ -360,7 +382,7 @@ pub(super) fn select(
         let held_out = scale.left_held_out(library, regression, best);
         // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
         let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
-        let takes_its_share = scale.takes_its_share(regression, selection.best.as_ref(), best);
+        let takes_its_share = scale.takes_its_share(regression, selection.best.as_ref(), best, enough);
         // Where two more take little, a third would mend what the others get wrong.
         if size > 1 && !takes_its_share {
             break;

@@ -175,6 +175,11 @@ pub fn after(case: &Case, after_s: f64) -> Result<Case, StabilityError> {
                 "extension.drift beside extension.stiffness: put the stiffness into the structure, so that drift starts from it",
             ));
         }
+        if drift.values().any(toml::Value::is_array) {
+            return Err(not_covered(
+                "extension.drift in several directions: give the stiffness of that moment in extension.stiffness instead",
+            ));
+        }
         let change = match (
             number(&drift, "relative_change"),
             number(&drift, "time_constant_s"),

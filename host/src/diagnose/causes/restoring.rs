@@ -49,6 +49,8 @@ struct Restoring {
     axes: usize,
     /// Whether it may also act along all axes at once, by one law.
     everywhere: bool,
+    /// Whether it may also act along each of them by a law of its own, as in joints of one kind; it has no shape then.
+    each: bool,
     /// A grid of shapes for what moves as it does in the scene.
     shapes: fn(&Scene<'_>, usize) -> Vec<Vec<f64>>,
     /// Bounds of the shape.
@@ -67,6 +69,7 @@ const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring
         shape: &[],
         axes: 1,
         everywhere: false,
+        each: false,
         shapes: |_, _| vec![Vec::new()],
         bounds: |_, _| Vec::new(),
         behind_play: false,
@@ -109,6 +112,14 @@ fn first_axis(place: &Place) -> usize {
     }
 }
 
+/// The places where a law is to be said: one, unless it is another along each axis.
+fn single_places(place: &Place) -> Vec<Place> {
+    match place {
+        Place::EachOf(axes) => axes.iter().map(|axis| Place::Axis(*axis)).collect(),
+        one => vec![one.clone()],
+    }
+}
+
 /// `count` values from `first` to `last`, evenly in their logarithm.
 fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
     (0..count)
@@ -136,26 +147,13 @@ impl Restoring {
         }
         table
     }
-}
 
-impl Cause for Restoring {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn names(&self) -> Vec<&'static str> {
-        if self.behind_play {
-            vec![self.name, "backlash"]
-        } else {
-            vec![self.name]
-        }
-    }
-
-    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
+    fn parts_of_one(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
         let of_play = |(key, _): &&Parameter| self.behind_play && self.shape.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
         let mut parts = vec![Part {
             name: self.name,
+            place: place.clone(),
             extension: self.extension(place, &own),
             parameters: own,
         }];
@@ -173,11 +171,62 @@ impl Cause for Restoring {
             );
             parts.push(Part {
                 name: "backlash",
+                place: place.clone(),
                 parameters: gap,
                 extension,
             });
         }
         parts
+    }
+
+    /// What one of its coefficients, 1, adds along the motion of a record; `None` where it cannot act there.
+    fn along(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        shape: &[f64],
+        index: usize,
+    ) -> Option<Regressor> {
+        let unit: Vec<f64> = (0..self.linear.len())
+            .map(|i| f64::from(u8::from(i == index)))
+            .collect();
+        let effects = Effects::of_extension(self.name, &self.table(place, shape, &unit)).ok()?;
+        let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
+        for term in terms_of(&effects, scene.baseline.structure).ok()? {
+            for (sum, force) in sum.iter_mut().zip(restoring_along(&*term, &record.motion)) {
+                if sum.is_empty() {
+                    *sum = force;
+                } else {
+                    sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+                }
+            }
+        }
+        Some(Regressor::of_force(sum))
+    }
+}
+
+impl Cause for Restoring {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn names(&self) -> Vec<&'static str> {
+        if self.behind_play {
+            vec![self.name, "backlash"]
+        } else {
+            vec![self.name]
+        }
+    }
+
+    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
+        let places = single_places(place);
+        let of_one = parameters.len() / places.len();
+        places
+            .iter()
+            .zip(parameters.chunks(of_one))
+            .flat_map(|(place, parameters)| self.parts_of_one(place, parameters))
+            .collect()
     }
 
     fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
@@ -187,8 +236,11 @@ impl Cause for Restoring {
         let axes = scene.driven_axes();
         match self.axes {
             1 => {
-                let together = (self.everywhere && axes.len() > 1).then_some(Place::Everywhere);
-                axes.into_iter().map(Place::Axis).chain(together).collect()
+                let several = axes.len() > 1;
+                let together = (several && self.everywhere).then_some(Place::Everywhere);
+                let each = (several && self.each).then(|| Place::EachOf(axes.clone()));
+                let single = axes.into_iter().map(Place::Axis);
+                single.chain(together).chain(each).collect()
             }
             _ => axes
                 .iter()
@@ -216,24 +268,10 @@ impl Cause for Restoring {
         place: &Place,
         shape: &[f64],
     ) -> Option<Vec<Regressor>> {
-        (0..self.linear.len())
-            .map(|index| {
-                let unit: Vec<f64> = (0..self.linear.len())
-                    .map(|i| f64::from(u8::from(i == index)))
-                    .collect();
-                let effects = Effects::of_extension(self.name, &self.table(place, shape, &unit)).ok()?;
-                let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
-                for term in terms_of(&effects, scene.baseline.structure).ok()? {
-                    for (sum, force) in sum.iter_mut().zip(restoring_along(&*term, &record.motion)) {
-                        if sum.is_empty() {
-                            *sum = force;
-                        } else {
-                            sum.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
-                        }
-                    }
-                }
-                Some(Regressor::of_force(sum))
-            })
+        single_places(place)
+            .iter()
+            .flat_map(|place| (0..self.linear.len()).map(move |index| (place, index)))
+            .map(|(place, index)| self.along(scene, record, place, shape, index))
             .collect()
     }
 
@@ -244,11 +282,10 @@ impl Cause for Restoring {
         shape: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        (self.physical)(coefficients).then(|| {
-            self.linear
-                .iter()
-                .zip(coefficients)
-                .chain(self.shape.iter().zip(shape))
+        let mut laws = coefficients.chunks(self.linear.len());
+        laws.clone().all(self.physical).then(|| {
+            laws.by_ref()
+                .flat_map(|law| self.linear.iter().zip(law).chain(self.shape.iter().zip(shape)))
                 .map(|(key, value)| (*key, *value))
                 .collect()
         })

@@ -212,7 +212,7 @@ impl Effects {
         Self::build(all)
     }
 
-    /// The effects that a case has as extensions. A tool's runout is part of the tool and not among them.
+    /// The effects that a case has as extensions: one for each direction where `direction` is a list. A tool's runout is part of the tool and not among them.
     ///
     /// # Errors
     /// An extension that cannot be simulated, or a key or value that it cannot have.
@@ -248,7 +248,13 @@ impl Effects {
 
     fn build(mut all: Vec<Parameters>) -> Result<Self, EffectError> {
         coulomb_friction::take_play(&mut all)?;
-        all.into_iter()
+        let by_direction: Vec<Vec<Parameters>> = all
+            .into_iter()
+            .map(Parameters::by_direction)
+            .collect::<Result<_, _>>()?;
+        by_direction
+            .into_iter()
+            .flatten()
             .map(|mut parameters| {
                 let kind = kind(parameters.effect())?;
                 let effect = (kind.build)(&mut parameters)?;
@@ -331,7 +337,7 @@ fn extension(name: &str, table: &toml::Table) -> Result<Parameters, EffectError>
         let value = Value::of_toml(value).ok_or_else(|| EffectError::Value {
             effect: format!("{name}.{key}"),
             found: value.to_string(),
-            needed: "a number, a text or true or false",
+            needed: "a number, a text, true or false, or a list of one kind of these",
         })?;
         parameters.put(if key == "on" { "" } else { key }, value);
     }

@@ -1,6 +1,6 @@
 //! The parameters of an effect, from the command line or from a case.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::EffectError;
 use crate::structure::Direction;
@@ -14,33 +14,46 @@ pub enum Value {
     Text(String),
     /// Several words.
     List(Vec<String>),
+    /// Several numbers, one for each direction.
+    Numbers(Vec<f64>),
 }
 
 impl Value {
-    /// A number where the text is one, several words where it has commas.
+    /// A number where the text is one, several numbers or words where it has commas.
     pub fn of_text(text: &str) -> Self {
         let text = text.trim();
-        match text.parse() {
-            Ok(number) => Self::Number(number),
-            Err(_) if text.contains(',') => {
-                Self::List(text.split(',').map(|word| word.trim().into()).collect())
-            }
-            Err(_) => Self::Text(text.into()),
+        if let Ok(number) = text.parse() {
+            return Self::Number(number);
+        }
+        if !text.contains(',') {
+            return Self::Text(text.into());
+        }
+        let parts = || text.split(',').map(str::trim);
+        match parts().map(str::parse).collect() {
+            Ok(numbers) => Self::Numbers(numbers),
+            Err(_) => Self::List(parts().map(String::from).collect()),
         }
     }
 
-    /// `None` for tables, dates and lists of anything but words.
+    /// `None` for tables, dates and lists of anything but words alone or numbers alone.
     pub fn of_toml(value: &toml::Value) -> Option<Self> {
         match value {
             toml::Value::Boolean(on) => Some(Self::Number(f64::from(u8::from(*on)))),
             toml::Value::Integer(number) => Some(Self::Number(*number as f64)),
             toml::Value::Float(number) => Some(Self::Number(*number)),
             toml::Value::String(text) => Some(Self::Text(text.clone())),
-            toml::Value::Array(list) => list
-                .iter()
-                .map(|word| word.as_str().map(String::from))
-                .collect::<Option<_>>()
-                .map(Self::List),
+            toml::Value::Array(list) => {
+                let number = |value: &toml::Value| {
+                    value
+                        .as_float()
+                        .or_else(|| value.as_integer().map(|whole| whole as f64))
+                };
+                let words: Option<Vec<String>> =
+                    list.iter().map(|word| word.as_str().map(String::from)).collect();
+                words
+                    .map(Self::List)
+                    .or_else(|| list.iter().map(number).collect::<Option<_>>().map(Self::Numbers))
+            }
             _ => None,
         }
     }
@@ -50,6 +63,10 @@ impl Value {
             Self::Number(number) => number.to_string(),
             Self::Text(text) => text.clone(),
             Self::List(words) => words.join(","),
+            Self::Numbers(numbers) => {
+                let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
+                numbers.join(",")
+            }
         }
     }
 }
@@ -102,6 +119,40 @@ impl Parameters {
             Some(Value::Number(number)) if number.is_finite() && allowed(number) => Ok(Some(number)),
             Some(other) => Err(self.wrong(key, &other, needed)),
         }
+    }
+
+    /// One set of parameters for each direction, where `direction` names several: what has several numbers has one for each, what
+    /// has one has the same for all.
+    ///
+    /// # Errors
+    /// Numbers that are not as many as the directions.
+    pub(super) fn by_direction(self) -> Result<Vec<Self>, EffectError> {
+        let Some(Value::List(directions)) = self.values.get("direction").cloned() else {
+            return Ok(vec![self]);
+        };
+        let distinct: BTreeSet<&String> = directions.iter().collect();
+        if directions.is_empty() || distinct.len() < directions.len() {
+            let found = Value::List(directions);
+            return Err(self.wrong("direction", &found, "one direction, or several that differ"));
+        }
+        let uneven = self
+            .values
+            .iter()
+            .find(|(_, value)| matches!(value, Value::Numbers(numbers) if numbers.len() != directions.len()));
+        if let Some((key, value)) = uneven {
+            return Err(self.wrong(key, value, "one number, or one for each of its directions"));
+        }
+        let of = |(index, direction): (usize, &String)| {
+            let mut own = self.clone();
+            for value in own.values.values_mut() {
+                if let Value::Numbers(numbers) = value {
+                    *value = Value::Number(numbers[index]);
+                }
+            }
+            own.put("direction", Value::Text(direction.clone()));
+            own
+        };
+        Ok(directions.iter().enumerate().map(of).collect())
     }
 
     /// Any finite number.

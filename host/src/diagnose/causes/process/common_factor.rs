@@ -102,6 +102,7 @@ impl Cause for CommonFactor {
             .zip(parameters.chunks(3))
             .map(|(name, parameters)| Part {
                 name,
+                place: place.clone(),
                 parameters: parameters.to_vec(),
                 extension: self.extension(place, parameters),
             })

@@ -2,4 +2,7 @@
 
 use super::{Restoring, plain};
 
-pub(super) const CAUSE: Restoring = plain("cubic-damping", &["c3_ns3_per_m3"]);
+pub(super) const CAUSE: Restoring = Restoring {
+    each: true,
+    ..plain("cubic-damping", &["c3_ns3_per_m3"])
+};
