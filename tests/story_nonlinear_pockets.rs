@@ -3,7 +3,8 @@
 //! The thesis's own campaign, on a virtual robot with the cubic terms of Table 6.2. A hammer sees its linear part, and the
 //! lobes of that are believed. Ten speeds from 480 to 620 rev/min by eight depths are cut at half immersion; each cut is
 //! judged by its own vibration once per tooth. Circles, crosses and squares are set against the lobes, before and after the
-//! cubic terms are identified.
+//! cubic terms are identified. Then `diagnose` is given what is believed, shaker records and the cuts: it names the cubic terms,
+//! and says how it would have called the cuts.
 //!
 //! To see the tables, and pictures in a folder: `QUIETCUT_STORY=DIR cargo test --release -p quietcut-tests --test
 //! story_nonlinear_pockets -- --nocapture`
@@ -250,6 +251,90 @@ fn identified(folder: &Path) -> Case {
     Case::parse(&folder.join("found.toml"), &found).expect("a case")
 }
 
+/// What `diagnose` makes of the belief, of a short step-sine test in each direction and of the cuts.
+fn diagnosed(folder: &Path, cuts: &[(TestCut, Judged)]) -> serde_json::Value {
+    let [truth, belief] = [TRUTH, BELIEF].map(|name| cases().join(format!("{name}.toml")));
+    for (direction, frequencies, forces, seed) in [
+        ("x", "19.2:20.6:3", "3,9,15", 1),
+        ("y", "16.6:17.9:3", "1.8,5.8,9.5", 2),
+    ] {
+        done(
+            folder,
+            &format!(
+                "simulate {} --experiment step-sine --direction {direction} --frequency-hz {frequencies} --force-n {forces} \
+                 --dwell-s 4 --pause-s 1 --sample-rate-hz 128 --measure displacement --noise-percent 0.5 --seed {seed} \
+                 --out short-{direction}.csv",
+                truth.display()
+            ),
+        );
+    }
+    let mut table = String::from("rpm [rev/min],depth [mm],outcome\n");
+    for (cut, _) in cuts {
+        let outcome = serde_json::to_value(cut.outcome).expect("a word");
+        let outcome = outcome.as_str().expect("a word");
+        table.push_str(&format!("{},{},{outcome}\n", cut.rpm, cut.depth_mm));
+    }
+    std::fs::write(folder.join("cuts.csv"), table).expect("the folder is there");
+    let belief = belief.display().to_string();
+    let arguments = [
+        "diagnose",
+        &belief,
+        "short-x.csv",
+        "short-y.csv",
+        "--cuts",
+        "cuts.csv",
+        "--out",
+        "diagnosis",
+        "--json",
+    ];
+    quietcut(folder, &arguments).json()
+}
+
+/// Both cubic terms along both directions, each with its number; and the cuts that were called wrong are called right.
+fn check_diagnosis(answer: &serde_json::Value, truth: &Case, wrong_before: usize) {
+    assert_eq!(answer["outcome"], "cause", "{answer}");
+    let parts = matrices(truth);
+    let mut named = Vec::new();
+    for cause in answer["causes"].as_array().expect("causes") {
+        let [name, direction] = ["name", "direction"].map(|key| cause[key].as_str().expect("a word"));
+        let (key, matrix) = match name {
+            "cubic-stiffness" => ("k3_n_per_m3", &parts.cubic_stiffness),
+            "cubic-damping" => ("c3_ns3_per_m3", &parts.cubic_damping),
+            other => panic!("{other} does not act here"),
+        };
+        let axis = usize::from(direction == "y");
+        let there = matrix.as_ref().expect("cubic terms")[(axis, axis)];
+        let found = cause["parameters"][key]["value"].as_f64().expect("a number");
+        println!(
+            "{name} {direction}: {found:.4e}, {:+.2} %",
+            100.0 * (found / there - 1.0)
+        );
+        // Half a percent of noise, and cubic terms between the directions that no cause has.
+        assert!((found / there - 1.0).abs() < 0.01, "{name} {direction}: {found}");
+        named.push((name, direction));
+    }
+    named.sort_unstable();
+    let all = [
+        ("cubic-damping", "x"),
+        ("cubic-damping", "y"),
+        ("cubic-stiffness", "x"),
+        ("cubic-stiffness", "y"),
+    ];
+    assert_eq!(named, all);
+    let wrong = |when: &str| {
+        answer["lobes"]["calls"][when]["wrong"]
+            .as_u64()
+            .expect("a number")
+    };
+    println!(
+        "diagnose: {} cuts called wrong before, {} after",
+        wrong("before"),
+        wrong("after")
+    );
+    assert_eq!(wrong("before"), wrong_before as u64);
+    assert_eq!(wrong("after"), 0);
+}
+
 /// Frequency in Hz and damping ratio of a mode that moves by A cos ωt: stiffness k + ¾k₃A², damping c + ¾c₃ω²A².
 fn equivalent(case: &Case, amplitude_m: f64) -> (f64, f64) {
     let parts = matrices(case);
@@ -390,6 +475,12 @@ fn lobes_of_the_linear_part_call_cuts_in_the_pockets_wrong_and_those_with_cubic_
     );
     assert_eq!(calls[2].wrong, 0);
     assert!(calls[3].undecided <= 4, "{calls:?}");
+    let answer = diagnosed(folder.path(), &cuts);
+    check_diagnosis(&answer, &truth, calls[1].wrong);
+    if let Some(pictures) = pictures() {
+        let report = folder.path().join("diagnosis/report.html");
+        std::fs::copy(report, pictures.join("report.html")).expect("the folder is there");
+    }
 }
 
 #[test]

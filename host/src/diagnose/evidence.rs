@@ -62,13 +62,6 @@ pub struct Library {
     pub candidates: Vec<Candidate>,
 }
 
-/// What the force of a cause is a function of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Law {
-    OfDisplacement,
-    OfVelocity,
-}
-
 /// How many of the best pairs are tried with a third cause.
 const PAIRS_KEPT: usize = 24;
 
@@ -87,6 +80,10 @@ impl Library {
                 })
             })
             .collect();
+        // Along each of several axes it adds what it adds along one after the other.
+        let (each, placed): (Vec<_>, Vec<_>) = placed
+            .into_iter()
+            .partition(|(_, place, _)| matches!(place, Place::EachOf(_)));
         let computed: Vec<_> = placed
             .into_par_iter()
             .filter_map(|(cause, place, shape)| {
@@ -100,21 +97,44 @@ impl Library {
         };
         for (cause, place, shape, columns) in computed {
             let numbers = columns.iter().map(|column| regression.add(column)).collect();
-            let known = library
-                .candidates
-                .iter_mut()
-                .find(|candidate| candidate.cause == cause && candidate.place == place);
-            match known {
-                Some(candidate) => candidate.shapes.push((shape, numbers)),
-                None => library.candidates.push(Candidate {
-                    cause,
-                    place,
-                    shapes: vec![(shape, numbers)],
-                }),
+            library.put(cause, place, shape, numbers);
+        }
+        for (cause, place, shape) in each {
+            if let Some(numbers) = library.columns_along_each(cause, &place, &shape) {
+                library.put(cause, place, shape, numbers);
             }
         }
         regression.complete();
         library
+    }
+
+    fn find(&self, cause: usize, place: &Place) -> Option<usize> {
+        self.candidates
+            .iter()
+            .position(|candidate| candidate.cause == cause && candidate.place == *place)
+    }
+
+    fn put(&mut self, cause: usize, place: Place, shape: Vec<f64>, columns: Vec<usize>) {
+        match self.find(cause, &place) {
+            Some(known) => self.candidates[known].shapes.push((shape, columns)),
+            None => self.candidates.push(Candidate {
+                cause,
+                place,
+                shapes: vec![(shape, columns)],
+            }),
+        }
+    }
+
+    /// The columns of a cause along each of several axes: those along one after the other; `None` where one of them is not known.
+    fn columns_along_each(&self, cause: usize, place: &Place, shape: &[f64]) -> Option<Vec<usize>> {
+        let Place::EachOf(axes) = place else { return None };
+        let mut columns = Vec::new();
+        for axis in axes {
+            let known = &self.candidates[self.find(cause, &Place::Axis(*axis))?];
+            let (_, own) = known.shapes.iter().find(|(known, _)| known == shape)?;
+            columns.extend_from_slice(own);
+        }
+        Some(columns)
     }
 
     /// The cause of a candidate.
@@ -300,45 +320,6 @@ impl Library {
             })
             .collect();
         self.best_of_each(found)
-    }
-
-    /// A case holds one extension of a name: the same cause does not act twice. And three terms of one law, of the displacement or
-    /// of the velocity along one axis, are the series of a law that nobody knows, and no causes: a spring that changes with time
-    /// counts as a spring, and a loop, which is what friction is before it slips, as friction.
-    pub fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
-        let new = self.cause(other.candidate).names();
-        let is_new = some.iter().all(|choice| {
-            self.cause(choice.candidate)
-                .names()
-                .iter()
-                .all(|name| !new.contains(name))
-        });
-        let own = self.law(other);
-        let alike = some.iter().filter(|choice| self.law(**choice) == own).count();
-        is_new && (own.is_none() || alike < 2) && !some.iter().any(|choice| self.share_a_term(*choice, other))
-    }
-
-    /// True of a cubic spring beside softening and hardening, which has one: between the two nothing would be determined.
-    fn share_a_term(&self, one: Choice, other: Choice) -> bool {
-        let name = |choice: Choice| self.cause(choice.candidate).name();
-        let place = |choice: Choice| &self.candidates[choice.candidate].place;
-        let cubic = ["cubic-stiffness", "softening-hardening"];
-        cubic.contains(&name(one)) && cubic.contains(&name(other)) && place(one) == place(other)
-    }
-
-    /// Of what a choice is a law, and where.
-    fn law(&self, choice: Choice) -> Option<(Law, &Place)> {
-        let law = match self.cause(choice.candidate).name() {
-            "stiffness"
-            | "drift"
-            | "quadratic-stiffness"
-            | "cubic-stiffness"
-            | "softening-hardening"
-            | "backlash" => Law::OfDisplacement,
-            "damping" | "cubic-damping" | "coulomb-friction" | "hysteresis" => Law::OfVelocity,
-            _ => return None,
-        };
-        Some((law, &self.candidates[choice.candidate].place))
     }
 
     fn best_of_each(&self, mut found: Vec<Explanation>) -> Vec<Explanation> {

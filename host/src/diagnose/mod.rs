@@ -51,6 +51,7 @@ mod stepwise;
 mod stiffness;
 #[cfg(test)]
 mod tests;
+mod together;
 pub mod turning;
 mod unknowns;
 mod views;

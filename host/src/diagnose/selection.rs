@@ -26,9 +26,6 @@ const NUMERICS: f64 = 1e-4;
 pub(super) const WITHIN_NOISE: f64 = 0.15;
 /// What further causes must take of what is left beyond the noise: less is how one wrong equation mends another.
 const SHARE: f64 = 0.2;
-/// The same of what is beyond noise and chance where hardly anything is left: what else a weak companion would leave is how a model
-/// is wrong that nobody knows, such as the noise of the force.
-const MOST_OF_LITTLE: f64 = 2.0 / 3.0;
 /// How many times what errors of the computation may be is plainly something else: twice their amplitude.
 const PLAIN: f64 = 4.0;
 /// Most causes that act together.
@@ -180,24 +177,17 @@ impl<'a> Scale<'a> {
             .is_some_and(|more| cost(best) - cost(more) > BELIEVED + PLAIN * self.coherent)
     }
 
-    /// True where `more` takes enough of what `fewer` leave beyond the noise, which is hardly anything where they are `enough`; what
-    /// has fewer parameters need not.
+    /// True where `more` takes enough of what `fewer` leave beyond the noise; what has fewer parameters need not.
     fn takes_its_share(
         &self,
         regression: &Regression,
         fewer: Option<&Explanation>,
         more: &Explanation,
-        enough: bool,
     ) -> bool {
         if fewer.is_some_and(|fewer| more.freedoms < fewer.freedoms) {
             return true;
         }
         let noise = regression.count(Share::Whole) as f64;
-        let (share, chance) = if enough {
-            (MOST_OF_LITTLE, (2.0 * noise).sqrt())
-        } else {
-            (SHARE, 0.0)
-        };
         let before = fewer.map_or_else(
             || match more.simulated {
                 Some(_) => self.reference,
@@ -205,7 +195,7 @@ impl<'a> Scale<'a> {
             },
             |fewer| fewer.fit.left,
         );
-        before - more.fit.left > share * (before - noise - chance).max(0.0)
+        before - more.fit.left > SHARE * (before - noise).max(0.0)
     }
 
     /// What is left of the held-out parts if the parameters come from the fitted ones alone.
@@ -248,6 +238,8 @@ impl<'a> Scale<'a> {
         tried.extend(found.iter().take(most).cloned());
         let (mut rival, mut freedoms) =
             rival.map_or((f64::INFINITY, 0), |rival| (rival.fit.left, rival.freedoms));
+        // The same causes along more axes are simulated only where more axes gain something.
+        let mut leading: Option<Explanation> = None;
         let mut simulated = Vec::new();
         let tried = distinct(tried);
         let noise = regression.count(Share::Whole) as f64;
@@ -266,12 +258,20 @@ impl<'a> Scale<'a> {
             if rival < NEARLY * noise && explanation.fit.left > far_off * rival.max(noise) {
                 continue;
             }
+            if leading.as_ref().is_some_and(|leading| {
+                library.are_same_causes(leading, &explanation)
+                    && leading.freedoms < explanation.freedoms
+                    && self.gain(regression, leading, 1.0) > self.gain(regression, &explanation, 1.0)
+            }) {
+                continue;
+            }
             // What cannot be simulated stays as the regression has it.
             let fitted = closed
                 .fit(library, regression, &explanation, (rival, best_left))
-                .unwrap_or(explanation);
+                .unwrap_or_else(|| explanation.clone());
             if fitted.simulated.is_some() && fitted.fit.left < rival {
                 (rival, freedoms) = (fitted.fit.left, fitted.freedoms);
+                leading = Some(explanation);
             }
             simulated.push(fitted);
         }
@@ -382,7 +382,7 @@ pub(super) fn select(
         let held_out = scale.left_held_out(library, regression, best);
         // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
         let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
-        let takes_its_share = scale.takes_its_share(regression, selection.best.as_ref(), best, enough);
+        let takes_its_share = scale.takes_its_share(regression, selection.best.as_ref(), best);
         // Where two more take little, a third would mend what the others get wrong.
         if size > 1 && !takes_its_share {
             break;

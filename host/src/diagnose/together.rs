@@ -1,0 +1,66 @@
+//! Which causes may act together.
+
+use super::cause::Place;
+use super::evidence::{Choice, Explanation, Library};
+
+/// What the force of a cause is a function of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Law {
+    OfDisplacement,
+    OfVelocity,
+}
+
+impl Library {
+    /// A case holds one extension of a name: the same cause does not act twice. And three terms of one law, of the displacement or
+    /// of the velocity along one axis, are the series of a law that nobody knows, and no causes: a spring that changes with time
+    /// counts as a spring, and a loop, which is what friction is before it slips, as friction.
+    pub fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
+        let new = self.cause(other.candidate).names();
+        let is_new = some.iter().all(|choice| {
+            self.cause(choice.candidate)
+                .names()
+                .iter()
+                .all(|name| !new.contains(name))
+        });
+        let own = self.law(other);
+        let alike = some.iter().filter(|choice| self.law(**choice) == own).count();
+        is_new && (own.is_none() || alike < 2) && !some.iter().any(|choice| self.share_a_term(*choice, other))
+    }
+
+    /// True of explanations by the same causes, wherever these act.
+    pub fn are_same_causes(&self, one: &Explanation, other: &Explanation) -> bool {
+        let causes = |of: &Explanation| {
+            let mut causes: Vec<usize> = of
+                .choices
+                .iter()
+                .map(|choice| self.candidates[choice.candidate].cause)
+                .collect();
+            causes.sort_unstable();
+            causes
+        };
+        causes(one) == causes(other)
+    }
+
+    /// True of a cubic spring beside softening and hardening, which has one: between the two nothing would be determined.
+    fn share_a_term(&self, one: Choice, other: Choice) -> bool {
+        let name = |choice: Choice| self.cause(choice.candidate).name();
+        let place = |choice: Choice| &self.candidates[choice.candidate].place;
+        let cubic = ["cubic-stiffness", "softening-hardening"];
+        cubic.contains(&name(one)) && cubic.contains(&name(other)) && place(one) == place(other)
+    }
+
+    /// Of what a choice is a law, and where.
+    fn law(&self, choice: Choice) -> Option<(Law, &Place)> {
+        let law = match self.cause(choice.candidate).name() {
+            "stiffness"
+            | "drift"
+            | "quadratic-stiffness"
+            | "cubic-stiffness"
+            | "softening-hardening"
+            | "backlash" => Law::OfDisplacement,
+            "damping" | "cubic-damping" | "coulomb-friction" | "hysteresis" => Law::OfVelocity,
+            _ => return None,
+        };
+        Some((law, &self.candidates[choice.candidate].place))
+    }
+}
