@@ -100,8 +100,8 @@ fn settle(
     explanation
 }
 
-/// Most steps along the slopes: where two lengths of one joint can take each other's place, the way is narrow and bent.
-const SLOPES_FOLLOWED: usize = 12;
+/// Most steps along the slopes.
+const SLOPES_FOLLOWED: usize = 3;
 
 /// Steps along each parameter, shorter where they do not help; then where the slopes point.
 fn search(

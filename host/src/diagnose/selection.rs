@@ -338,8 +338,8 @@ pub(super) fn select(
         let mut imitated = None;
         if enough && let Some(best) = &selection.best {
             let asked = scale.asks_for_more(library, regression, best, &fewer);
-            imitated = (!asked && size == 2 && best.freedoms > size && best.simulated.is_some())
-                .then(|| best.clone());
+            imitated =
+                (!asked && size == 2 && best.freedoms > size && scale.closed.is_some()).then(|| best.clone());
             if !asked && imitated.is_none() {
                 break;
             }
