@@ -480,3 +480,46 @@ fn a_table_states_its_error_its_directions_and_its_derivatives() {
     )
     .refused(&["kuka-kr90-half-cubic.toml", "cubic terms"]);
 }
+
+#[test]
+fn an_extension_that_acts_along_several_directions_is_as_the_structure_with_its_terms() {
+    let folder = folder();
+    let read = |name: &str| std::fs::read_to_string(case(name)).expect("the case is there");
+    // Cubic matrices without the terms between the directions, and the same as extensions of the linear part.
+    let whole = read("kuka-kr90-half-cubic");
+    let [k3, c3] = [["-2.4e12", "-5.05e12"], ["4.6e5", "2.5e6"]];
+    let matrix = |[x, y]: [&str; 2]| format!("[[{x}, 0.0], [0.0, {y}]]");
+    let (before, rest) = whole.split_once("# act on").expect("cubic matrices");
+    let (_, rest) = rest.split_once("[tool]").expect("a tool");
+    let of_structure = format!(
+        "{before}cubic_damping = {}\ncubic_stiffness = {}\n[tool]{rest}",
+        matrix(c3),
+        matrix(k3)
+    );
+    let list = |[x, y]: [&str; 2]| format!("[{x}, {y}]");
+    let of_extensions = format!(
+        "{}\n[extension.cubic-stiffness]\ndirection = [\"x\", \"y\"]\nk3_n_per_m3 = {}\n\
+         [extension.cubic-damping]\ndirection = [\"x\", \"y\"]\nc3_ns3_per_m3 = {}\n",
+        read("kuka-kr90-half"),
+        list(k3),
+        list(c3)
+    );
+    let point = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).expect("written");
+        let answer = quietcut(folder.path(), &["lobes", name, "--at", "559,10", "--json"]).json();
+        let point = answer["points"][0].clone();
+        [0, 1].map(|part| point["multiplier"][part].as_f64().expect("a number"))
+    };
+    let [a, b] = [
+        point("structure.toml", &of_structure),
+        point("extensions.toml", &of_extensions),
+    ];
+    // Each states an error of 1e-7.
+    assert!(
+        (a[0] - b[0]).abs() < 2e-7 && (a[1] - b[1]).abs() < 2e-7,
+        "{a:?} {b:?}"
+    );
+    let linear = json(&["lobes", &case("kuka-kr90-half"), "--at", "559,10", "--json"]);
+    let linear = linear["points"][0]["multiplier_abs"].as_f64().expect("a number");
+    assert!((a[0].hypot(a[1]) - linear).abs() > 0.01);
+}

@@ -11,6 +11,30 @@ fn a_value_and_its_keys_are_one_effect() {
 }
 
 #[test]
+fn a_list_of_directions_is_an_effect_along_each() {
+    let of = |text: &str| Effects::of_extension("cubic-stiffness", &text.parse().unwrap());
+    let both = of("direction = [\"x\", \"y\"]\nk3_n_per_m3 = [1.0, 2]\n").unwrap();
+    let apart = ["x", "y"]
+        .into_iter()
+        .zip([1.0, 2.0])
+        .map(|(direction, k3)| format!("direction = \"{direction}\"\nk3_n_per_m3 = {k3}\n"))
+        .map(|text| format!("{:?}", of(&text).unwrap().0[0]));
+    let both: Vec<String> = both.0.iter().map(|effect| format!("{effect:?}")).collect();
+    assert_eq!(both, apart.collect::<Vec<_>>());
+    let alike = Effects::parse(["cubic-stiffness=3", "cubic-stiffness.direction=x,z"]).unwrap();
+    assert_eq!(alike.0.len(), 2);
+    for wrong in [
+        "direction = [\"x\", \"y\"]\nk3_n_per_m3 = [1.0]\n",
+        "direction = [\"x\", \"x\"]\nk3_n_per_m3 = 1.0\n",
+        "direction = []\nk3_n_per_m3 = 1.0\n",
+        "direction = \"x\"\nk3_n_per_m3 = [1.0, 2.0]\n",
+        "direction = [\"x\", \"w\"]\nk3_n_per_m3 = 1.0\n",
+    ] {
+        assert!(matches!(of(wrong), Err(EffectError::Value { .. })), "{wrong}");
+    }
+}
+
+#[test]
 fn what_cannot_be_is_told_apart() {
     let error = |text| Effects::parse([text]).unwrap_err();
     assert!(matches!(error("runout"), EffectError::Form(_)));
