@@ -336,7 +336,8 @@ pub(super) fn select(
         let enough = size > 1 && scale.is_enough(regression, selection.best.as_ref());
         // Two causes with one parameter each may be what one with many imitates.
         let mut imitated = None;
-        if enough && let Some(best) = &selection.best {
+        if enough {
+            let Some(best) = &selection.best else { break };
             let asked = scale.asks_for_more(library, regression, best, &fewer);
             imitated =
                 (!asked && size == 2 && best.freedoms > size && scale.closed.is_some()).then(|| best.clone());

@@ -156,6 +156,7 @@ fn step(term: &dyn Term, branch: Branch, (from, to): (&At, &At), step_s: f64, ow
         for ((own, first), second) in own.iter_mut().zip(&first).zip(&second) {
             *own += 0.5 * half * (first + second);
         }
+        term.confine(own);
     }
 }
 

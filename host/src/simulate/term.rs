@@ -46,6 +46,9 @@ pub trait Term: Debug + Send + Sync {
         false
     }
 
+    /// Brings states that a long step has carried beyond where they can be back to there.
+    fn confine(&self, _own: &mut [f64]) {}
+
     /// Puts its own states to what they are where a motion is found going on; a simulation begins with zeros.
     fn begin(&self, _at: &At, _own: &mut [f64]) {}
 

@@ -91,6 +91,11 @@ impl Term for BoucWen {
         rate[0] = at.v[self.axis] * (1.0 - power * shape);
     }
 
+    /// With γ + β = 1 no z beyond ±z_y is reached.
+    fn confine(&self, own: &mut [f64]) {
+        own[0] = own[0].clamp(-self.effect.yield_m, self.effect.yield_m);
+    }
+
     fn margin(&self, branch: Branch, at: &At, own: &[f64], _: f64) -> f64 {
         let (of_velocity, of_z) = Self::signs(branch);
         // Both as shares of something of their size; only the signs count.
