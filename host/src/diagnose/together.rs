@@ -22,9 +22,11 @@ impl Library {
                 .iter()
                 .all(|name| !new.contains(name))
         });
-        let own = self.law(other);
-        let alike = some.iter().filter(|choice| self.law(**choice) == own).count();
-        is_new && (own.is_none() || alike < 2) && !some.iter().any(|choice| self.share_a_term(*choice, other))
+        let alike = some
+            .iter()
+            .filter(|choice| self.are_alike(**choice, other))
+            .count();
+        is_new && alike < 2 && !some.iter().any(|choice| self.share_a_term(*choice, other))
     }
 
     /// True of explanations by the same causes, wherever these act.
@@ -46,7 +48,17 @@ impl Library {
         let name = |choice: Choice| self.cause(choice.candidate).name();
         let place = |choice: Choice| &self.candidates[choice.candidate].place;
         let cubic = ["cubic-stiffness", "softening-hardening"];
-        cubic.contains(&name(one)) && cubic.contains(&name(other)) && place(one) == place(other)
+        cubic.contains(&name(one)) && cubic.contains(&name(other)) && meet(place(one), place(other))
+    }
+
+    /// True of terms of one law along one axis.
+    fn are_alike(&self, one: Choice, other: Choice) -> bool {
+        match (self.law(one), self.law(other)) {
+            (Some((law, place)), Some((other_law, other_place))) => {
+                law == other_law && meet(place, other_place)
+            }
+            _ => false,
+        }
     }
 
     /// Of what a choice is a law, and where.
@@ -62,5 +74,16 @@ impl Library {
             _ => return None,
         };
         Some((law, &self.candidates[choice.candidate].place))
+    }
+}
+
+/// True of places that are the same, or have an axis in common.
+fn meet(one: &Place, other: &Place) -> bool {
+    match (one, other) {
+        (Place::EachOf(axes), Place::Axis(axis)) | (Place::Axis(axis), Place::EachOf(axes)) => {
+            axes.contains(axis)
+        }
+        (Place::EachOf(axes), Place::EachOf(others)) => axes.iter().any(|axis| others.contains(axis)),
+        _ => one == other,
     }
 }
