@@ -124,3 +124,16 @@ pub struct Diagnosis {
     #[serde(skip)]
     pub views: Vec<View>,
 }
+
+impl Diagnosis {
+    /// The names of the causes, each once: a cause that acts along several directions stands in the answer once for each.
+    pub fn names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for cause in &self.causes {
+            if !names.contains(&cause.name) {
+                names.push(cause.name);
+            }
+        }
+        names
+    }
+}

@@ -135,9 +135,8 @@ fn answer(
             })
             .collect();
         let group: Vec<&'static str> = diagnosis
-            .causes
-            .iter()
-            .map(|cause| cause.name)
+            .names()
+            .into_iter()
             .filter(|name| !shared.contains(name))
             .collect();
         let share = 1.0 / group.len().max(1) as f64;

@@ -62,7 +62,7 @@ pub fn diagnosis_page(
 }
 
 fn verdict(case_name: &str, diagnosis: &Diagnosis) -> Markup {
-    let names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name).collect();
+    let names = diagnosis.names();
     let sure = diagnosis.causes.first().map_or(0.0, |cause| cause.confidence);
     html! {
         "The model " b { (case_name) } " "
