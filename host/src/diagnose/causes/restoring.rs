@@ -148,6 +148,7 @@ impl Restoring {
         table
     }
 
+    /// What the answer says of the law along one axis.
     fn parts_of_one(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
         let of_play = |(key, _): &&Parameter| self.behind_play && self.shape.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
@@ -221,7 +222,7 @@ impl Cause for Restoring {
 
     fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
         let places = single_places(place);
-        let of_one = parameters.len() / places.len();
+        let of_one = (parameters.len() / places.len()).max(1);
         places
             .iter()
             .zip(parameters.chunks(of_one))
