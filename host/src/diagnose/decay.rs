@@ -66,13 +66,9 @@ impl Decays {
         &self.columns[channel][state]
     }
 
-    /// The state that explains most of `residuals`, each channel measured by its `sizes`; none where nothing decays.
+    /// The state that explains most of `residuals`, each channel measured by its `sizes`.
     pub(super) fn fit(&mut self, residuals: &[Vec<f64>], sizes: &[f64]) {
-        let order = if self.columns.is_empty() {
-            0
-        } else {
-            self.start.len()
-        };
+        let order = self.start.len();
         let mut gram = DMatrix::<f64>::zeros(order, order);
         let mut right = DVector::<f64>::zeros(order);
         for (channel, (residual, size)) in residuals.iter().zip(sizes).enumerate() {
@@ -107,7 +103,7 @@ impl Decays {
 
     /// The decays of a channel at the samples that are compared.
     fn compared(&self, channel: usize) -> Cow<'_, [Vec<f64>]> {
-        let mut columns = Cow::Borrowed(self.columns.get(channel).map_or(&[][..], |columns| &columns[..]));
+        let mut columns = Cow::Borrowed(&self.columns[channel][..]);
         if !self.skipped[channel].is_empty() {
             for column in columns.to_mut() {
                 for &sample in &self.skipped[channel] {

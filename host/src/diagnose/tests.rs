@@ -307,6 +307,55 @@ fn one_law_along_two_directions_is_one_cause_with_a_number_for_each() {
 }
 
 #[test]
+fn where_the_motion_is_imposed_the_force_is_what_is_explained() {
+    use rand::SeedableRng;
+    use rand_distr::Distribution;
+    let rate_hz = 256.0;
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+    let (mut moved, mut force) = (Vec::new(), Vec::new());
+    for n in 0..4096 {
+        let t = f64::from(n) / rate_hz;
+        // Two tones of whole periods: position, velocity, acceleration.
+        let (mut x, mut v, mut a) = (0.0, 0.0, 0.0);
+        for (size, hz) in [(2e-3, 1.0), (1e-3, 2.75)] {
+            let omega = std::f64::consts::TAU * hz;
+            x += size * (omega * t).sin();
+            v += size * omega * (omega * t).cos();
+            a -= size * omega * omega * (omega * t).sin();
+        }
+        let noise: f64 = rand_distr::StandardNormal.sample(&mut random);
+        moved.push(x);
+        force.push(188.0 * a + 305.0 * v + 2.26e6 * x + 150.0 * v.signum() + 5.0 * noise);
+    }
+    let channel = |name: &str, quantity, samples| Channel {
+        name: name.into(),
+        quantity,
+        samples,
+    };
+    let mut record = recorded(
+        Signal::Release {
+            force_n: 1.0,
+            pull_s: 1.0,
+            seconds: 1.0,
+        },
+        rate_hz,
+        &[],
+        1,
+    );
+    record.channels = vec![
+        channel("x", Quantity::Displacement, moved),
+        channel("fx", Quantity::Force, force),
+    ];
+    record.sidecar.kind = Some(Kind::Shaker);
+    record.sidecar.input = Some(vec!["x".into()]);
+    let answer = diagnose(&believed(), &[record], &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
+    assert_eq!(answer.causes[0].name, "coulomb-friction");
+    let found = value(&answer, "coulomb-friction", "fc_n");
+    assert!((found / 150.0 - 1.0).abs() < 0.02, "{found} {:?}", answer.causes);
+}
+
+#[test]
 fn what_was_found_is_not_found_again() {
     let records = records(&["cubic-stiffness=-2e11"]);
     let first = diagnose(&believed(), &records, &Options::default()).unwrap();

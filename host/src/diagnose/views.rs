@@ -10,7 +10,7 @@ use super::grid::Grid;
 use super::missing_force::MissingForce;
 use super::noise::rms;
 use super::record::Record;
-use super::scene::Scene;
+use super::scene::{Domain, Scene};
 
 /// One channel of one record: what was measured, what the case misses of it, and what the extended case misses.
 #[derive(Clone, Debug)]
@@ -128,6 +128,9 @@ fn left_by(scene: &Scene<'_>, library: &Library, record: &Record, best: &Explana
             residual.iter().zip(explained).map(|(a, b)| a - b).collect()
         })
         .collect();
+    if record.domain == Domain::Force {
+        return left;
+    }
     let sizes: Vec<f64> = record.channels.iter().map(|channel| channel.deviation).collect();
     let mut decays = record.decays.clone();
     decays.fit(&left, &sizes);
