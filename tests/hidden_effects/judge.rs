@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind};
+use super::noise::Whitening;
 use super::rig::Output;
 
 /// Squared distances (those of a χ²) below which nothing can be told, and above which a good judge tells nearly always:
@@ -46,6 +47,11 @@ pub(crate) trait Lab {
     /// Motions that the records may hold because the state at their start is not known, run by run and sensor by sensor;
     /// in units of `sigma`, one column each, not yet orthonormal.
     fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64>;
+
+    /// What the noise of the forces from which motion is predicted adds to `sigma`, where it adds any.
+    fn whitening(&self, _sigma: &[f64]) -> Option<Whitening> {
+        None
+    }
 }
 
 /// The judge of one set of records.
@@ -55,12 +61,19 @@ pub(crate) struct Judge<'a> {
     sigma: &'a [f64],
     /// What the records cannot say of the state at the start: orthonormal columns.
     nuisance: DMatrix<f64>,
+    whitening: Option<Whitening>,
 }
 
 impl<'a> Judge<'a> {
     /// A judge; `sigma` is the noise of each sensor.
     pub(crate) fn new(lab: &'a dyn Lab, sigma: &'a [f64]) -> Self {
         let mut nuisance = lab.nuisance(sigma);
+        let whitening = lab.whitening(sigma);
+        if let Some(whitening) = &whitening {
+            for mut column in nuisance.column_iter_mut() {
+                whitening.apply(column.as_mut_slice());
+            }
+        }
         if nuisance.ncols() > 0 {
             for mut column in nuisance.column_iter_mut() {
                 let norm = column.norm();
@@ -68,17 +81,39 @@ impl<'a> Judge<'a> {
             }
             nuisance = nuisance.qr().q();
         }
-        Self { lab, sigma, nuisance }
+        Self {
+            lab,
+            sigma,
+            nuisance,
+            whitening,
+        }
     }
 
-    /// One column, in units of the noise.
+    /// One column, in units of the noise, which is white in it.
     fn whitened(&self, output: &Output) -> DVector<f64> {
         let values = output.iter().flat_map(|run| {
             run.iter()
                 .zip(self.sigma)
                 .flat_map(|(samples, sigma)| samples.iter().map(move |value| value / sigma))
         });
-        DVector::from_iterator(output.iter().flatten().map(Vec::len).sum(), values)
+        let mut all = DVector::from_iterator(output.iter().flatten().map(Vec::len).sum(), values);
+        if let Some(whitening) = &self.whitening {
+            whitening.apply(all.as_mut_slice());
+        }
+        all
+    }
+
+    /// Root mean square of all noise in what each sensor says beyond what is predicted.
+    pub(crate) fn noise(&self) -> Vec<f64> {
+        match &self.whitening {
+            Some(whitening) => self
+                .sigma
+                .iter()
+                .zip(&whitening.growth)
+                .map(|(s, g)| s * g)
+                .collect(),
+            None => self.sigma.to_vec(),
+        }
     }
 
     /// What is seen while `causes` act.

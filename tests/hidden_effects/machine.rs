@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -110,6 +110,21 @@ impl Machine {
         1.0 / (0..self.tip.len())
             .map(|i| self.tip[i][axis].powi(2) / self.stiffness[(i, i)])
             .sum::<f64>()
+    }
+
+    /// Motion of the tool over the force on it, m/N, x, y, z × x, y, z: B (K − ω²M + iωC)⁻¹ Bᵀ.
+    pub(crate) fn receptance(&self, omega: f64) -> DMatrix<Complex<f64>> {
+        let dynamic = DMatrix::from_fn(self.tip.len(), self.tip.len(), |i, j| {
+            Complex::new(
+                self.stiffness[(i, j)] - omega * omega * self.mass[(i, j)],
+                omega * self.damping[(i, j)],
+            )
+        });
+        let tip = DMatrix::from_fn(3, self.tip.len(), |axis, i| Complex::from(self.tip[i][axis]));
+        let inverse = dynamic
+            .try_inverse()
+            .expect("a damped machine has no pole at a frequency");
+        &tip * inverse * tip.transpose()
     }
 
     /// The case file's `[structure]`.

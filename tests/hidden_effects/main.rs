@@ -22,6 +22,7 @@ mod judge;
 mod law;
 mod machine;
 mod motion;
+mod noise;
 mod process;
 mod puzzle;
 mod rig;

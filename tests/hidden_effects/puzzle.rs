@@ -153,7 +153,7 @@ impl Puzzle {
             return None;
         }
         let output = lab.output(&hidden);
-        let ratio = largest_ratio(&output, &lab.output(&[]), &sigma);
+        let ratio = largest_ratio(&output, &lab.output(&[]), &judge.noise());
         let name = format!("{}-{seed}", family.name());
         let (machine, scale) = bench.machine();
         let describe = |cause: &Cause| Hidden {

@@ -3,15 +3,16 @@
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use quietcut::recording::{Channel, Kind as RecordKind, Quantity, RecordedChannel, Recording, Sidecar};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind, STRUCTURAL, Scale};
 use super::judge::Lab;
-use super::machine::Machine;
+use super::machine::{Machine, between};
 use super::motion::{Path, System, first_order, interpolated};
+use super::noise::Whitening;
 use super::sensor::{Sensor, letter, noisy, read_by, sensors};
 use super::signal::signal;
 
@@ -49,8 +50,22 @@ pub(crate) struct Rig {
     /// Steps of the integration per sample.
     steps: usize,
     pub(crate) scale: Scale,
+    /// Noise of every force sensor, N.
+    force_noise_n: f64,
     /// The motions of the machine that is believed: what sensors do to them needs no other.
     plain: OnceLock<Vec<Path>>,
+}
+
+/// Noise of a force sensor, as a share of the largest force that it measures, root mean square: of load cells from good to bad.
+const FORCE_NOISE: [f64; 2] = [1e-4, 5e-3];
+
+impl Run {
+    /// Root mean square of the force along the direction in which it is largest, N.
+    fn force_rms_n(&self) -> f64 {
+        let along = |axis: usize| self.force_n.iter().map(|force| force[axis].powi(2)).sum::<f64>();
+        let most = (0..3).map(along).fold(0.0, f64::max);
+        (most / self.force_n.len().max(1) as f64).sqrt()
+    }
 }
 
 /// By run and sensor: samples.
@@ -77,6 +92,7 @@ impl Rig {
                 sample_s: 1.0 / rate_hz,
                 cut: None,
             },
+            force_noise_n: 0.0,
             plain: OnceLock::new(),
         };
         let variant = random.random::<f64>();
@@ -104,6 +120,8 @@ impl Rig {
                 rig.runs.push(rig.scaled(run, machine, *level));
             }
         }
+        let largest = rig.runs.iter().map(Run::force_rms_n).fold(0.0, f64::max);
+        rig.force_noise_n = largest * between(random, FORCE_NOISE[0], FORCE_NOISE[1]);
         rig
     }
 
@@ -145,6 +163,7 @@ impl Rig {
                 sample_s: 1.0 / rate_hz,
                 cut: None,
             },
+            force_noise_n: 0.0,
             plain: OnceLock::new(),
         }
     }
@@ -275,7 +294,14 @@ impl Rig {
         )
     }
 
-    /// Recordings of an output with white noise of `sigma` per sensor.
+    /// The force of a run along an axis at the samples of its record.
+    fn force_of(&self, run: &Run, axis: usize) -> Vec<f64> {
+        (0..self.samples)
+            .map(|k| run.force_n[2 * k * self.steps][axis])
+            .collect()
+    }
+
+    /// Recordings of an output with white noise of `sigma` per sensor, and that of the force.
     pub(crate) fn recordings(
         &self,
         output: &Output,
@@ -294,9 +320,7 @@ impl Rig {
                         channels.push(Channel {
                             name: format!("f{}", letter(axis)),
                             quantity: Quantity::Force,
-                            samples: (0..self.samples)
-                                .map(|k| run.force_n[2 * k * self.steps][axis])
-                                .collect(),
+                            samples: noisy(&self.force_of(run, axis), self.force_noise_n, random),
                         });
                     }
                 }
@@ -407,5 +431,29 @@ impl Lab for Bench {
             power = &one * power;
         }
         columns
+    }
+
+    /// The noise of the force sensors through the receptances of the believed machine.
+    fn whitening(&self, sigma: &[f64]) -> Option<Whitening> {
+        let rig = &self.rig;
+        if rig.force_noise_n == 0.0 {
+            return None;
+        }
+        let seen = |run: usize, bin: usize| {
+            let omega = TAU * bin as f64 * rig.rate_hz / rig.samples as f64;
+            let receptance = self.machine.receptance(omega);
+            let driven = &rig.runs[run].driven;
+            DMatrix::from_fn(rig.sensors.len(), driven.len(), |s, force| {
+                let sensor = rig.sensors[s];
+                let rate = if sensor.acceleration { -omega * omega } else { 1.0 };
+                receptance[(sensor.axis, driven[force])] * Complex::from(rate * rig.force_noise_n / sigma[s])
+            })
+        };
+        Some(Whitening::new(
+            rig.runs.len(),
+            rig.sensors.len(),
+            rig.samples,
+            seen,
+        ))
     }
 }

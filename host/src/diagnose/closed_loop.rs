@@ -66,6 +66,10 @@ struct Shared(Arc<Measured>);
 /// Error allowed per step as a share of the amplitude: a thousandth of the noise of the best sensor.
 const STEP_ERROR: f64 = 1e-7;
 
+/// Error allowed per step as a share of the largest amplitude of the record, where that of the moment is small: thousands of steps
+/// add up to less than the noise of the best sensor.
+const STEP_ERROR_AT_REST: f64 = 1e-9;
+
 /// Largest displacement of a simulation over that of the record.
 const AWAY: f64 = 100.0;
 
@@ -232,6 +236,7 @@ impl ClosedLoop {
         let mut room = Room::new(&model);
         let settings = Settings {
             relative: STEP_ERROR,
+            absolute_m: STEP_ERROR_AT_REST * largest_m(record),
             // Records may be in other units than meters: what is far beyond the measured motion has run away.
             largest_m: AWAY * largest_m(record),
             steps_max: STEPS_PER_SAMPLE * count as u64,

@@ -6,7 +6,7 @@ use super::answer::{Figure, NamedCause};
 use super::cause::{Part, Place};
 use super::evidence::{Explanation, Library};
 use super::regression::{Regression, Share};
-use super::scene::{Scene, direction_of};
+use super::scene::{Domain, Scene, direction_of};
 use super::selection::APART;
 
 /// A normal deviate is within this many deviations with 90 %.
@@ -23,7 +23,7 @@ pub(super) fn named(
 ) -> Vec<NamedCause> {
     let covariance = match &explanation.simulated {
         Some(simulated) => simulated.covariance.clone(),
-        None => covariance(scene, library, regression, explanation),
+        None => covariance(scene, library, regression, explanation, inflation),
     };
     let mut all = Vec::new();
     for (place, covariance) in covariance.iter().enumerate() {
@@ -153,12 +153,15 @@ fn figure(value: f64, deviation: f64) -> Figure {
     }
 }
 
-/// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1.
+/// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1, of which
+/// there is so many times the power. What is left of forces is no noise: errors of the motion's derivatives and of the equations,
+/// of which the covariance is taken as they are.
 pub(super) fn covariance(
     scene: &Scene<'_>,
     library: &Library,
     regression: &mut Regression,
     explanation: &Explanation,
+    inflation: f64,
 ) -> Vec<DMatrix<f64>> {
     let mut columns = library.columns_of(explanation);
     let mut places: Vec<Vec<usize>> = Vec::new();
@@ -175,9 +178,13 @@ pub(super) fn covariance(
         rows.extend(columns.len()..columns.len() + slopes.len());
         columns.extend(slopes);
     }
-    let whole = regression
-        .fit(Share::Whole, &columns)
-        .map_or_else(|| explanation.fit.covariance.clone(), |fit| fit.covariance);
+    let whole = match regression.fit(Share::Whole, &columns) {
+        Some(fit) if scene.all_in(Domain::Force) => {
+            regression.covariance_by_residual(Share::Whole, &columns, &fit) / inflation
+        }
+        Some(fit) => fit.covariance,
+        None => explanation.fit.covariance.clone(),
+    };
     places
         .iter()
         .map(|rows| {

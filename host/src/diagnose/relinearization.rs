@@ -157,7 +157,7 @@ impl ClosedFit for Relinearization<'_> {
         }
         let (mut found, residuals) = best?;
         found.simulated = Some(Simulated {
-            covariance: covariance(self.scene, library, regression, &found),
+            covariance: covariance(self.scene, library, regression, &found, 1.0),
             starts: Vec::new(),
             left: Some(Arc::new(residuals)),
         });
