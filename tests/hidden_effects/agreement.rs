@@ -21,11 +21,15 @@ use super::sensor::Sensor;
 /// `--effect` of a cause.
 fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
     let name = cause.kind.name();
-    let mut texts: Vec<String> = cause
-        .values(machine, &rig.scale)
-        .iter()
-        .map(|(key, value)| format!("{name}.{key}={value:e}"))
-        .collect();
+    let values = cause.values(machine, &rig.scale);
+    let mut texts: Vec<String> = if cause.kind == Kind::SensorOffsetByMode {
+        vec![format!("{name}.ratio={:e},{:e}", values[0].1, values[1].1)]
+    } else {
+        values
+            .iter()
+            .map(|(key, value)| format!("{name}.{key}={value:e}"))
+            .collect()
+    };
     if cause.kind.of_sensor() {
         texts.push(format!("{name}.channel={}", rig.sensors[cause.sensor].name()));
         if cause.kind == Kind::CrossAxis {
@@ -39,12 +43,12 @@ fn texts(cause: &Cause, machine: &Machine, rig: &Rig) -> Vec<String> {
 
 #[test]
 fn every_structural_effect_means_what_it_means_in_the_simulation() {
-    for kind in STRUCTURAL {
+    for kind in STRUCTURAL.into_iter().chain([Kind::SensorOffsetByMode]) {
         let mut compared = 0;
-        for seed in 0..12 {
+        for seed in 0..40 {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let machine = Machine::draw(&mut random, 1 + seed as usize % 2);
-            if !Cause::possible(kind, &machine) {
+            if compared == 12 || !Cause::possible(kind, &machine) {
                 continue;
             }
             let sensors: Vec<Sensor> = machine

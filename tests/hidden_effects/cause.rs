@@ -30,6 +30,8 @@ pub(crate) enum Kind {
     SensorDelay,
     CrossAxis,
     SensorOffset,
+    /// The same with a ratio for each mode of a structure of modes.
+    SensorOffsetByMode,
     ForceCoefficients,
     /// All force coefficients, edges included, by one factor: what a gain of all channels looks like.
     CommonForce,
@@ -138,7 +140,7 @@ impl Kind {
             Self::SensorGain => &["sensor-gain"],
             Self::SensorDelay => &["sensor-delay"],
             Self::CrossAxis => &["cross-axis"],
-            Self::SensorOffset => &["sensor-offset-from-tool-tip"],
+            Self::SensorOffset | Self::SensorOffsetByMode => &["sensor-offset-from-tool-tip"],
             Self::ForceCoefficients => &["force-coefficients"],
             Self::CommonForce => &["force-coefficients", "edge-force"],
             Self::EdgeForce => &["edge-force"],
@@ -166,7 +168,7 @@ impl Kind {
     pub(crate) fn parameters(self) -> usize {
         match self {
             Self::MissingMode | Self::SpeedFluctuation => 3,
-            Self::SofteningHardening | Self::Backlash | Self::Hysteresis => 2,
+            Self::SofteningHardening | Self::Backlash | Self::Hysteresis | Self::SensorOffsetByMode => 2,
             Self::ForceCoefficients | Self::EdgeForce | Self::ForceExponent | Self::Runout => 2,
             _ => 1,
         }
@@ -180,6 +182,7 @@ impl Kind {
                 | Self::SensorDelay
                 | Self::CrossAxis
                 | Self::SensorOffset
+                | Self::SensorOffsetByMode
                 | Self::SensorSaturation
                 | Self::SensorSquare
         )
@@ -226,6 +229,7 @@ impl Kind {
             Self::ForceExponent => vec![between(random, 0.15, 1.0), random.random_range(0.5..1.5)],
             Self::Runout => vec![size, random.random_range(0.0..6.0)],
             Self::AxialDepthModulation => vec![1.0],
+            Self::SensorOffsetByMode => vec![size, between(random, 0.1, 1.5)],
             Self::SpeedFluctuation => vec![
                 size,
                 random.random_range(0.05..0.25),
@@ -250,6 +254,7 @@ impl Kind {
             Self::Runout => vec![vec![0.1, 1.0], vec![0.1, 4.0]],
             Self::SpeedFluctuation => vec![vec![0.1, 0.1, 1.0]],
             Self::AxialDepthModulation => vec![vec![0.5]],
+            Self::SensorOffsetByMode => vec![vec![0.02, 0.05]],
             _ => vec![vec![0.02 * either(random)]],
         }
     }
@@ -261,6 +266,7 @@ impl Cause {
         match kind {
             Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::CommonFactor | Kind::Drift => !machine.modal,
             Kind::ModeCoupling | Kind::CrossAxis => machine.axes.len() >= 2,
+            Kind::SensorOffsetByMode => machine.modal,
             _ => true,
         }
     }
@@ -312,6 +318,7 @@ impl Cause {
             Kind::SensorDelay => vec![("delay_s", 0.5 * s[0] * scale.sample_s)],
             Kind::CrossAxis => vec![("fraction", 0.1 * s[0])],
             Kind::SensorOffset => vec![("ratio", 1.0 - 0.1 * s[0])],
+            Kind::SensorOffsetByMode => vec![("ratio_1", 1.0 - 0.1 * s[0]), ("ratio_2", 1.0 - 0.1 * s[1])],
             Kind::PulsatingStiffness => vec![("stiffness", 0.1 * s[0] * k)],
             Kind::Stop => vec![("stiffness", 0.5 * s[0] * k)],
             Kind::Stribeck => vec![("kinetic", 0.5 * s[0] * c * speed)],

@@ -349,6 +349,7 @@ impl Cause {
             Kind::Hysteresis => s[1] > 0.01 && s[0].abs() < 0.9,
             Kind::ForceExponent => (0.0..2.0).contains(&s[0]) && (0.05..20.0).contains(&s[1]),
             Kind::SpeedFluctuation => s[1] > 0.01 && s[1] < 1.0,
+            Kind::SensorOffsetByMode => s.iter().all(|share| share.abs() < 4.0),
             _ => s[0].abs() < 4.0,
         }
     }

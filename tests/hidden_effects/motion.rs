@@ -38,6 +38,8 @@ pub(crate) struct Path {
     pub(crate) u: Vec<[f64; 3]>,
     pub(crate) v: Vec<[f64; 3]>,
     pub(crate) a: Vec<[f64; 3]>,
+    /// The first two degrees of freedom, and their accelerations.
+    pub(crate) freedoms: Vec<[[f64; 2]; 2]>,
 }
 
 impl System {
@@ -443,6 +445,9 @@ impl System {
         path.u.push(self.of_tip(&y[..n]));
         path.v.push(self.of_tip(&y[n..2 * n]));
         path.a.push(self.of_tip(&rate[n..2 * n]));
+        if n > 1 {
+            path.freedoms.push([[y[0], y[1]], [rate[n], rate[n + 1]]]);
+        }
     }
 }
 

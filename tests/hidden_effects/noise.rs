@@ -35,8 +35,8 @@ impl Whitening {
                 for (sensor, growth) in growth.iter_mut().enumerate() {
                     *growth += power[(sensor, sensor)].re / (bins * runs) as f64;
                 }
-                let factor = power.cholesky().expect("I + a·aᴴ is positive definite");
-                factor.l().try_inverse().expect("its diagonal is at least one")
+                let factor = power.cholesky().unwrap();
+                factor.l().try_inverse().unwrap()
             };
             inverse.push((0..bins).map(of_bin).collect());
         }
@@ -61,9 +61,7 @@ impl Whitening {
                 .chunks_exact_mut(self.samples)
                 .map(|samples| {
                     let mut spectrum = forward.make_output_vec();
-                    forward
-                        .process(samples, &mut spectrum)
-                        .expect("sizes of the plan");
+                    forward.process(samples, &mut spectrum).unwrap();
                     spectrum
                 })
                 .collect();
@@ -79,7 +77,7 @@ impl Whitening {
                 if self.samples.is_multiple_of(2) {
                     spectrum[self.samples / 2].im = 0.0;
                 }
-                back.process(spectrum, samples).expect("sizes of the plan");
+                back.process(spectrum, samples).unwrap();
                 samples.iter_mut().for_each(|value| *value /= self.samples as f64);
             }
         }

@@ -241,8 +241,8 @@ impl Rig {
         let count = self.samples * self.steps;
         let mut path = Path {
             u: Vec::with_capacity(count + 1),
-            v: Vec::new(),
             a: Vec::with_capacity(count + 1),
+            ..Path::default()
         };
         let mut y = system.pulled(run.pull_n);
         let mut branches = system.branches(0.0, &mut y, &force);
@@ -278,17 +278,28 @@ impl Rig {
     /// One sensor's samples.
     fn read(&self, index: usize, machine: &Machine, causes: &[Cause], path: &Path) -> Vec<f64> {
         let sensor = self.sensors[index];
-        let series = if sensor.acceleration { &path.a } else { &path.u };
+        let tip = if sensor.acceleration { &path.a } else { &path.u };
         let about: Vec<&Cause> = causes
             .iter()
             .filter(|cause| cause.kind.of_sensor() && cause.sensor == index)
             .collect();
+        let by_mode = about.iter().find(|cause| cause.kind == Kind::SensorOffsetByMode);
+        let elsewhere = by_mode.map(|cause| {
+            let [first, second] = [0, 1].map(|mode| cause.values(machine, &self.scale)[mode].1 - 1.0);
+            let moved = |(tip, freedoms): (&[f64; 3], &[[f64; 2]; 2])| {
+                let [q1, q2] = freedoms[usize::from(sensor.acceleration)];
+                let mut moved = *tip;
+                moved[sensor.axis] += first * q1 + second * q2;
+                moved
+            };
+            tip.iter().zip(&path.freedoms).map(moved).collect::<Vec<_>>()
+        });
         read_by(
             machine,
             &self.scale,
             sensor,
             &about,
-            series,
+            elsewhere.as_ref().unwrap_or(tip),
             self.steps,
             self.samples,
         )
@@ -379,7 +390,10 @@ impl Lab for Bench {
             Vec::new()
         } else if kind.of_sensor() {
             (0..sensors.len())
-                .filter(|sensor| kind != Kind::SensorOffset || sensors[*sensor].at_housing)
+                .filter(|sensor| {
+                    let of_place = matches!(kind, Kind::SensorOffset | Kind::SensorOffsetByMode);
+                    !of_place || sensors[*sensor].at_housing
+                })
                 .map(|sensor| (sensors[sensor].axis, sensor))
                 .collect()
         } else if matches!(kind, Kind::ModeCoupling | Kind::Drift) {
@@ -390,7 +404,11 @@ impl Lab for Bench {
     }
 
     fn kinds(&self) -> Vec<Kind> {
-        STRUCTURAL.to_vec()
+        let of_machine = |kind| match kind {
+            Kind::SensorOffset if self.machine.modal => Kind::SensorOffsetByMode,
+            kind => kind,
+        };
+        STRUCTURAL.map(of_machine).to_vec()
     }
 
     /// The free motions of the believed machine, each run's by itself.

@@ -58,6 +58,8 @@ pub(crate) fn read_by(
         let value = cause.values(machine, scale)[0].1;
         match cause.kind {
             Kind::SensorGain | Kind::SensorOffset => weights = weights.map(|weight| weight * value),
+            // It is in the series.
+            Kind::SensorOffsetByMode => {}
             Kind::SensorDelay => delay = value,
             Kind::CrossAxis => weights[usize::from(sensor.axis == 0)] += value,
             Kind::SensorSquare => second = value,

@@ -63,11 +63,11 @@ impl Drive for Shared {
 /// A drive that many simulations use.
 struct Shared(Arc<Measured>);
 
-/// Error allowed per step as a share of the amplitude: a thousandth of the noise of the best sensor.
+/// Error allowed per step as a share of the amplitude: thousands of steps add up to less than the noise of the best sensor, 90 dB
+/// below what it reads.
 const STEP_ERROR: f64 = 1e-7;
 
-/// Error allowed per step as a share of the largest amplitude of the record, where that of the moment is small: thousands of steps
-/// add up to less than the noise of the best sensor.
+/// Error allowed per step as a share of the largest amplitude of the record, where that of the moment is small.
 const STEP_ERROR_AT_REST: f64 = 1e-9;
 
 /// Largest displacement of a simulation over that of the record.
@@ -233,14 +233,16 @@ impl ClosedLoop {
             .map(|channel| effects.pickup(channel.pickup.clone()))
             .collect();
         let mut samples: Vec<Vec<f64>> = vec![Vec::with_capacity(count); pickups.len()];
-        let mut room = Room::new(&model);
+        let mut rooms: Vec<Room> = pickups
+            .iter()
+            .map(|pickup| Room::seeing(&model, &pickup.modes))
+            .collect();
         let settings = Settings {
             relative: STEP_ERROR,
             absolute_m: STEP_ERROR_AT_REST * largest_m(record),
             // Records may be in other units than meters: what is far beyond the measured motion has run away.
             largest_m: AWAY * largest_m(record),
             steps_max: STEPS_PER_SAMPLE * count as u64,
-            ..Settings::default()
         };
         let rate_hz = record.grid.rate_hz();
         let mut states = start.to_vec();
@@ -256,13 +258,13 @@ impl ClosedLoop {
         let end_s = (length.max(2) - 1) as f64 / rate_hz;
         model
             .run_from(states, end_s, settings, |segment| {
-                for (pickup, samples) in pickups.iter().zip(&mut samples) {
+                for ((pickup, room), samples) in pickups.iter().zip(&mut rooms).zip(&mut samples) {
                     while samples.len() < length {
                         let t = samples.len() as f64 / rate_hz - pickup.delay_s;
                         if t > segment.to_s() {
                             break;
                         }
-                        let motion = segment.motion(t.max(0.0), &mut room);
+                        let motion = segment.motion(t.max(0.0), room);
                         // Before the start it is held where it is let go.
                         if t < 0.0 {
                             samples.push(match pickup.quantity {

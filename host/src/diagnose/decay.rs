@@ -33,8 +33,9 @@ impl Decays {
                 if channel.pickup.quantity == Quantity::Force {
                     return vec![vec![0.0; count]; order];
                 }
+                let seen = first_order.seen(&channel.pickup.modes);
                 for (axis, weight) in channel.pickup.weights.iter().enumerate() {
-                    row += first_order.c.row(axis) * *weight;
+                    row += seen.c.row(axis) * *weight;
                 }
                 for _ in 0..derivatives(channel.pickup.quantity) {
                     row = &row * &first_order.a;

@@ -112,14 +112,14 @@ fn response_over(record: &Record, channel: &Observed, axis: usize, residual: &[f
     let spectrum = grid.spectrum(residual);
     let power: Vec<f64> = spectrum.iter().map(|bin| bin.norm_sqr()).collect();
     let noise = channel.deviation.powi(2) * residual.len() as f64;
+    let transfer = record.seen_by(channel);
     let force: Vec<Complex64> = (0..spectrum.len())
         .map(|bin| {
             let omega = grid.omega(bin);
             let near = &power[bin.saturating_sub(SMOOTHED / 2)..(bin + SMOOTHED / 2 + 1).min(power.len())];
             let mean = near.iter().sum::<f64>() / near.len() as f64;
             let weight = 1.0 - ABOVE * noise / mean.max(f64::MIN_POSITIVE);
-            let response =
-                record.transfer[bin][(axis, axis)] * channel.factor(omega) * channel.pickup.weights[axis];
+            let response = transfer[bin][(axis, axis)] * channel.factor(omega) * channel.pickup.weights[axis];
             let within = bin > 0 && omega <= std::f64::consts::TAU * record.band_hz;
             if within && weight > 0.0 && response.norm() > 0.0 {
                 -spectrum[bin] / response * weight

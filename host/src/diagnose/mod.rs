@@ -55,6 +55,7 @@ mod together;
 pub mod turning;
 mod unknowns;
 mod views;
+mod whitening;
 
 pub use answer::Diagnosis;
 pub use cutting::Cutting;

@@ -7,8 +7,8 @@ use super::grid::Stretch;
 
 /// Bands into which a spectrum is cut.
 const BANDS: usize = 32;
-/// Nothing recorded is trusted beyond this share of its size: 100 dB, the best of sixteen bits and of our numerics.
-const TRUSTED: f64 = 1e-5;
+/// Nothing recorded is trusted beyond this share of its size: 90 dB, where errors of simulations add up to what is seen.
+const TRUSTED: f64 = 3e-5;
 
 /// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel itself.
 ///

@@ -8,6 +8,7 @@ use super::decay::dot;
 use super::grid::Stretch;
 use super::record::Record;
 use super::scene::{Domain, Scene};
+use super::whitening::Whitening;
 use crate::recording::Kind;
 
 /// A part of a record.
@@ -18,8 +19,7 @@ pub(super) struct Part {
     pub(super) share: Share,
     bins: usize,
     stretch: Stretch,
-    /// By channel: one over the deviation of each transformed number.
-    weights: Vec<Vec<f64>>,
+    whitening: Whitening,
     /// By channel: samples, counted from the start of the part, that are not compared.
     skipped: Vec<Vec<usize>>,
     /// Orthonormal: what decays and offsets can be.
@@ -109,10 +109,10 @@ impl Part {
             stretch: Stretch::new(range.len()),
             range,
             share,
-            weights: Vec::new(),
+            whitening: Whitening::default(),
             nuisance: Vec::new(),
         };
-        part.weights = weights(record, &part);
+        part.whitening = Whitening::of(record, part.range.len(), part.bins);
         part.nuisance = nuisance(record, &part, unknown);
         part
     }
@@ -143,52 +143,15 @@ fn bins_of(record: &Record, length: usize) -> usize {
 
 fn raw(part: &Part, samples: &[Vec<f64>]) -> Vec<f64> {
     let mut column = Vec::with_capacity(2 * part.bins * samples.len());
-    for ((samples, weights), skipped) in samples.iter().zip(&part.weights).zip(&part.skipped) {
-        let from = column.len();
+    for (samples, skipped) in samples.iter().zip(&part.skipped) {
         let mut samples = Cow::Borrowed(&samples[part.range.clone()]);
         for &sample in skipped {
             samples.to_mut()[sample] = 0.0;
         }
         part.stretch.parts(&samples, part.bins, &mut column);
-        for (value, weight) in column[from..].iter_mut().zip(weights) {
-            *value *= weight;
-        }
     }
+    part.whitening.apply(&mut column);
     column
-}
-
-/// One over the deviation of each transformed number, by channel: of the sensor, and of what the channel reads of the response
-/// to the noise of the force sensors and to what sampling hides of the forces, both taken as the floor of their spectra.
-fn weights(record: &Record, part: &Part) -> Vec<Vec<f64>> {
-    let length = part.range.len();
-    let step = record.grid.omega(1);
-    record
-        .channels
-        .iter()
-        .map(|channel| {
-            (0..part.bins)
-                .flat_map(|bin| {
-                    let omega = std::f64::consts::TAU * record.grid.rate_hz() * bin as f64 / length as f64;
-                    let near = ((omega / step).round() as usize).min(record.transfer.len() - 1);
-                    let mut variance = channel.deviation * channel.deviation;
-                    if record.domain == Domain::Response {
-                        for (from, force_deviation) in record.force_deviation_n.iter().enumerate() {
-                            let response: num_complex::Complex64 = (0..3)
-                                .map(|axis| {
-                                    record.transfer[near][(axis, from)] * channel.pickup.weights[axis]
-                                })
-                                .sum();
-                            variance += (response * channel.factor(omega)).norm_sqr()
-                                * force_deviation
-                                * force_deviation;
-                        }
-                    }
-                    let parts = if bin == 0 || 2 * bin == length { 1 } else { 2 };
-                    std::iter::repeat_n(1.0 / variance.sqrt(), parts)
-                })
-                .collect()
-        })
-        .collect()
 }
 
 /// An orthonormal basis of decays and offsets in a part; where forces are compared there is neither.

@@ -14,6 +14,7 @@ use super::decay::Decays;
 use super::grid::Grid;
 use super::motion;
 use super::noise::{floor_between_lines, rms, white_floor};
+use super::receptance::Receptance;
 use super::scene::{Baseline, Domain, derivatives};
 use crate::recording::{Kind, Quantity, Recording};
 use crate::simulate::effect::Pickup;
@@ -37,7 +38,12 @@ pub struct Observed {
     pub predicted: Vec<f64>,
     /// Standard deviation of its white noise.
     pub deviation: f64,
+    /// The receptance of its sensor's place, where the baseline knows the modes there: see [`Record::seen_by`].
+    seen: Option<Vec<Matrix3<Complex64>>>,
 }
+
+/// By axis of force: what a channel reads per newton at the bins of the finer samples; empty where it hears nothing of that axis.
+pub(super) type Responses = [Vec<Complex64>; 3];
 
 /// What the channels of a record read without their noise, as a better model has it.
 #[derive(Clone, Debug)]
@@ -82,9 +88,8 @@ pub struct Record {
     /// H(iω) of the baseline at the bins of the finer samples, m/N; in the domain of force the dynamic stiffness at the bins
     /// of the samples, N/m.
     pub transfer: Vec<Matrix3<Complex64>>,
-    /// By channel of motion and axis of force: what the channel reads per newton at the bins of the finer samples; empty where
-    /// it hears nothing of that axis.
-    responses: Vec<[Vec<Complex64>; 3]>,
+    /// Those of each channel.
+    responses: Vec<Responses>,
     /// The samples that are compared: those before are only the past of what follows, and at the end of a cut the motion is known
     /// less well, where its sensors derive from it.
     pub compared: Range<usize>,
@@ -134,7 +139,7 @@ impl Record {
         } else {
             forces(baseline, recording)
         };
-        let channels = channels(baseline, recording, domain);
+        let mut channels = channels(baseline, recording, domain);
         checks::record(baseline, recording, &channels)?;
         let highest_hz = highest_hz(recording);
         let rate_hz = recording.sample_rate_hz;
@@ -147,9 +152,16 @@ impl Record {
         let room_s = decays * baseline.slowest_decay_s();
         let grid = Grid::new(recording.len(), rate_hz, room_s, finer);
         let transfer = match domain {
-            Domain::Response => response(baseline, &grid),
+            Domain::Response => response(&baseline.receptance, &grid),
             Domain::Force => dynamic_stiffness(baseline, &grid),
         };
+        for channel in channels
+            .iter_mut()
+            .filter(|channel| !channel.pickup.modes.is_empty())
+        {
+            let seen = baseline.first_order.seen(&channel.pickup.modes);
+            channel.seen = Some(response(&Receptance::new(&seen), &grid));
+        }
         let count = channels.len();
         let mut record = Self {
             index,
@@ -181,7 +193,8 @@ impl Record {
         };
         match domain {
             Domain::Response => {
-                record.responses = record.channel_responses(&baseline.axes);
+                let of = |channel| record.responses_by(channel, record.seen_by(channel), &baseline.axes);
+                record.responses = record.channels.iter().map(of).collect();
                 if is_cut {
                     record.compare_cut(baseline, recording)?;
                 } else {
@@ -238,9 +251,19 @@ impl Record {
     /// Samples that a channel reads of the response to forces in the machine's axes, given as spectra of the samples or of
     /// finer ones.
     pub fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: usize) -> Vec<f64> {
+        self.read_by(force, &self.responses[channel], channel)
+    }
+
+    /// The same by other responses than those of the channel.
+    pub(super) fn read_by(
+        &self,
+        force: &[Option<Vec<Complex64>>; 3],
+        responses: &Responses,
+        channel: usize,
+    ) -> Vec<f64> {
         let count = force.iter().flatten().map(Vec::len).max().unwrap_or(0);
         let mut spectrum = vec![Complex64::ZERO; count];
-        for (force, response) in force.iter().zip(&self.responses[channel]) {
+        for (force, response) in force.iter().zip(responses) {
             for ((sum, force), response) in spectrum.iter_mut().zip(force.iter().flatten()).zip(response) {
                 *sum += force * response;
             }
@@ -270,32 +293,36 @@ impl Record {
         self.responses.iter().any(|response| !response[axis].is_empty())
     }
 
-    fn channel_responses(&self, axes: &[usize]) -> Vec<[Vec<Complex64>; 3]> {
-        self.channels
-            .iter()
-            .map(|channel| {
-                let delay_s = self.step_delay_s(channel);
-                std::array::from_fn(|axis| {
-                    if channel.pickup.quantity == Quantity::Force || !axes.contains(&axis) {
-                        return Vec::new();
-                    }
-                    (0..self.transfer.len())
-                        .into_par_iter()
-                        .map(|bin| {
-                            let read: Complex64 = channel
-                                .pickup
-                                .weights
-                                .iter()
-                                .enumerate()
-                                .map(|(row, weight)| self.transfer[bin][(row, axis)] * *weight)
-                                .sum();
-                            let in_time = Complex64::cis(self.grid.omega(bin) * delay_s);
-                            read * self.factor(channel, bin) * in_time
-                        })
-                        .collect()
+    /// What a channel reads per newton where its sensor moves by `transfer`, m/N at the bins of the finer samples.
+    pub(super) fn responses_by(
+        &self,
+        channel: &Observed,
+        transfer: &[Matrix3<Complex64>],
+        axes: &[usize],
+    ) -> Responses {
+        let delay_s = self.step_delay_s(channel);
+        std::array::from_fn(|axis| {
+            if channel.pickup.quantity == Quantity::Force || !axes.contains(&axis) {
+                return Vec::new();
+            }
+            (0..transfer.len())
+                .into_par_iter()
+                .map(|bin| {
+                    let weights = channel.pickup.weights.iter().enumerate();
+                    let read: Complex64 = weights
+                        .map(|(row, weight)| transfer[bin][(row, axis)] * *weight)
+                        .sum();
+                    let in_time = Complex64::cis(self.grid.omega(bin) * delay_s);
+                    read * self.factor(channel, bin) * in_time
                 })
-            })
-            .collect()
+                .collect()
+        })
+    }
+
+    /// The receptance of the place of a channel's sensor at the bins of the finer samples, m/N: that of the tool, unless the baseline
+    /// knows its modes there.
+    pub(super) fn seen_by<'a>(&'a self, channel: &'a Observed) -> &'a [Matrix3<Complex64>] {
+        channel.seen.as_deref().unwrap_or(&self.transfer)
     }
 
     /// [`Observed::factor`] at a bin; zero at the last one of the finer samples, where it would not be real.
@@ -474,6 +501,7 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
                 measured: channel.samples.clone(),
                 predicted: Vec::new(),
                 deviation: 0.0,
+                seen: None,
             })
         })
         .collect()
@@ -513,10 +541,11 @@ fn highest_hz(recording: &Recording) -> f64 {
         .fold(least, f64::max)
 }
 
-fn response(baseline: &Baseline<'_>, grid: &Grid) -> Vec<Matrix3<Complex64>> {
+/// A receptance at the bins of the finer samples.
+pub(super) fn response(receptance: &Receptance, grid: &Grid) -> Vec<Matrix3<Complex64>> {
     (0..grid.fine_bins())
         .into_par_iter()
-        .map(|bin| baseline.receptance.at(grid.omega(bin)))
+        .map(|bin| receptance.at(grid.omega(bin)))
         .collect()
 }
 

@@ -356,6 +356,49 @@ fn where_the_motion_is_imposed_the_force_is_what_is_explained() {
 }
 
 #[test]
+fn simulations_are_as_exact_as_the_smallest_motion_is_measured() {
+    // A spindle let go from some micrometers, with the noise of an interferometer: motion by the formula of a damped mass.
+    let (mass, damping, stiffness) = (0.048, 1.78, 2.2e5);
+    let case = BELIEVED
+        .replace("188.0", &format!("{mass:?}"))
+        .replace("305.0", &format!("{damping:?}"))
+        .replace("2260000.0", &format!("{stiffness:?}"));
+    let case = Case::parse(Path::new("spindle.toml"), &case).unwrap();
+    let (decay, rate_hz): (f64, f64) = (damping / (2.0 * mass), 12_450.0);
+    let omega = (stiffness / mass - decay * decay).sqrt();
+    let records: Vec<Recording> = [(1, 3e-6), (2, 1.2e-5)]
+        .into_iter()
+        .map(|(seed, start_m)| {
+            let mut record = recorded(
+                Signal::Release {
+                    force_n: 1.0,
+                    pull_s: 1.0,
+                    seconds: 1.0,
+                },
+                rate_hz,
+                &[],
+                seed,
+            );
+            let samples = (0..3400).map(|n| {
+                let t = f64::from(n) / rate_hz;
+                start_m * (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin())
+            });
+            record.channels.retain(|channel| channel.name == "x");
+            record.channels[0].samples = samples.collect();
+            record.sidecar.input = None;
+            let noise = Noise {
+                absolute: [("x".into(), 4e-11)].into(),
+                ..Noise::default()
+            };
+            noise.add(&mut record, seed);
+            record
+        })
+        .collect();
+    let answer = diagnose(&case, &records, &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::None, "{:?}", answer.causes);
+}
+
+#[test]
 fn what_was_found_is_not_found_again() {
     let records = records(&["cubic-stiffness=-2e11"]);
     let first = diagnose(&believed(), &records, &Options::default()).unwrap();

@@ -43,12 +43,17 @@ impl Library {
         causes(one) == causes(other)
     }
 
-    /// True of a cubic spring beside softening and hardening, which has one: between the two nothing would be determined.
+    /// True of a cubic spring beside softening and hardening, which has one, and of a gain beside a ratio for each mode of the same
+    /// channel: between the two nothing would be determined.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
         let name = |choice: Choice| self.cause(choice.candidate).name();
         let place = |choice: Choice| &self.candidates[choice.candidate].place;
         let cubic = ["cubic-stiffness", "softening-hardening"];
-        cubic.contains(&name(one)) && cubic.contains(&name(other)) && meet(place(one), place(other))
+        let reading = ["sensor-gain", "sensor-offset-from-tool-tip"];
+        let is_by_mode = |choice: Choice| self.candidates[choice.candidate].shapes[choice.shape].1.len() > 1;
+        let are_both = |names: [&str; 2]| names.contains(&name(one)) && names.contains(&name(other));
+        are_both(cubic) && meet(place(one), place(other))
+            || are_both(reading) && place(one) == place(other) && (is_by_mode(one) || is_by_mode(other))
     }
 
     /// True of terms of one law along one axis.

@@ -114,6 +114,20 @@ impl Dynamics {
         self.note_products();
     }
 
+    /// The motion of something else than the tool, as [`FirstOrder::seen`] has it; to be looked at: a force on it is not one on the tool.
+    #[must_use]
+    pub fn seen(&self, modes: &[f64]) -> Self {
+        let FirstOrder { a, c, .. } = self.first_order().seen(modes);
+        let ca = &c * &a;
+        let mut seen = self.clone();
+        for axis in 0..3 {
+            seen.c[axis] = c.row(axis).iter().copied().collect();
+            seen.ca[axis] = ca.row(axis).iter().copied().collect();
+        }
+        seen.note_products();
+        seen
+    }
+
     /// The linear part, without cubic terms.
     pub fn first_order(&self) -> FirstOrder {
         FirstOrder {

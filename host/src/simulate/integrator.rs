@@ -4,7 +4,7 @@ use super::contact::{Change, Contact};
 use super::crossing::first_below_zero;
 use super::dormand_prince::{DormandPrince, Quartic, at};
 use super::term::{self, At, Branch, Branches};
-use super::{Model, Settings, SimulateError, Stretch};
+use super::{Dynamics, Model, Settings, SimulateError, Stretch};
 
 /// What a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,6 +47,8 @@ pub struct Motion {
 pub struct Room {
     state: Vec<f64>,
     rate: Vec<f64>,
+    /// The equations as they are seen from where the modes have other shapes than at the tool.
+    seen: Option<Dynamics>,
 }
 
 impl Room {
@@ -56,6 +58,16 @@ impl Room {
         Self {
             state: room.clone(),
             rate: room,
+            seen: None,
+        }
+    }
+
+    /// Room for the motion that a sensor sees, where each mode of `model`'s structure has so many times its shape at the tool; with no
+    /// modes said, the tool's.
+    pub fn seeing(model: &Model, modes: &[f64]) -> Self {
+        Self {
+            seen: (!modes.is_empty()).then(|| model.dynamics.seen(modes)),
+            ..Self::new(model)
         }
     }
 }
@@ -78,12 +90,15 @@ impl Segment<'_> {
             *state = at(quartic, u);
         }
         let displacement_m = std::array::from_fn(|axis| at(&self.displacement[axis], u));
-        let dynamics = &self.model.dynamics;
         let force_n = self
             .model
             .rate(self.stretch, (t, displacement_m), &room.state, &mut room.rate);
+        let dynamics = room.seen.as_ref().unwrap_or(&self.model.dynamics);
         Motion {
-            displacement_m,
+            displacement_m: match &room.seen {
+                Some(seen) => seen.displacement(&room.state),
+                None => displacement_m,
+            },
             velocity_m_per_s: dynamics.velocity(&room.rate),
             acceleration_m_per_s2: dynamics.acceleration(&room.rate),
             force_n,
@@ -401,7 +416,7 @@ impl<'a> Integrator<'a> {
         let room = std::cell::RefCell::new(room);
         let margin = |u: f64| {
             let mut room = room.borrow_mut();
-            let Room { state, rate } = &mut **room;
+            let Room { state, rate, .. } = &mut **room;
             for (state, quartic) in state.iter_mut().zip(&self.quartics) {
                 *state = at(quartic, u);
             }

@@ -220,10 +220,16 @@ impl VirtualCut {
     }
 }
 
-/// The accelerometers of a recording, one for each delay of its channels.
+/// The accelerometers of a recording, one for each delay and place of its channels.
 struct Sensors {
     accelerometer: Option<(Accelerometer, u64)>,
-    samplers: Vec<(f64, Sampler)>,
+    /// Beside a channel that each of them is for.
+    samplers: Vec<(Pickup, Sampler)>,
+}
+
+/// True where one accelerometer has what both channels read.
+fn is_one_sensor(a: &Pickup, b: &Pickup) -> bool {
+    a.quantity == b.quantity && a.delay_s == b.delay_s && a.modes == b.modes
 }
 
 impl Sensors {
@@ -234,14 +240,16 @@ impl Sensors {
                 samplers: Vec::new(),
             };
         };
-        let mut samplers: Vec<(f64, Sampler)> = Vec::new();
+        let mut samplers: Vec<(Pickup, Sampler)> = Vec::new();
         for pickup in pickups
             .iter()
             .filter(|pickup| pickup.quantity == Quantity::Acceleration)
         {
-            if !samplers.iter().any(|(delay_s, _)| *delay_s == pickup.delay_s) {
-                let sampler = Sampler::new(model, accelerometer).late_by(pickup.delay_s);
-                samplers.push((pickup.delay_s, sampler));
+            if !samplers.iter().any(|(known, _)| is_one_sensor(known, pickup)) {
+                let sampler = Sampler::new(model, accelerometer)
+                    .seeing(model, &pickup.modes)
+                    .late_by(pickup.delay_s);
+                samplers.push((pickup.clone(), sampler));
             }
         }
         Self {
@@ -254,7 +262,7 @@ impl Sensors {
     fn tail_s(&self) -> f64 {
         self.samplers
             .iter()
-            .map(|(delay_s, sampler)| sampler.tail_s() - delay_s)
+            .map(|(pickup, sampler)| sampler.tail_s() - pickup.delay_s)
             .fold(0.0, f64::max)
     }
 
@@ -270,7 +278,7 @@ impl Sensors {
         let (_, sampler) = self
             .samplers
             .iter()
-            .find(|(delay_s, _)| pickup.quantity == Quantity::Acceleration && *delay_s == pickup.delay_s)?;
+            .find(|(known, _)| is_one_sensor(known, pickup))?;
         let count = f64::from(accelerometer.sensor().meters_per_second2_per_count);
         let blocks = sampler.blocks(seed);
         let counts = blocks.iter().flat_map(|block| &block.counts);
@@ -288,10 +296,9 @@ impl Sensors {
 struct Truth {
     rate_hz: f64,
     samples: usize,
-    room: Room,
     velocity_jumps: bool,
     /// Samples of each channel; where accelerations are means, its velocities half a sample before.
-    channels: Vec<(Pickup, Vec<f64>)>,
+    channels: Vec<(Pickup, Room, Vec<f64>)>,
 }
 
 impl Truth {
@@ -299,17 +306,19 @@ impl Truth {
         Self {
             rate_hz,
             samples,
-            room: Room::new(model),
             velocity_jumps: model.dynamics.velocity_jumps(),
             channels: pickups
                 .into_iter()
-                .map(|pickup| (pickup, Vec::with_capacity(samples + 1)))
+                .map(|pickup| {
+                    let room = Room::seeing(model, &pickup.modes);
+                    (pickup, room, Vec::with_capacity(samples + 1))
+                })
                 .collect(),
         }
     }
 
     fn observe(&mut self, segment: &Segment<'_>) {
-        for (pickup, values) in &mut self.channels {
+        for (pickup, room, values) in &mut self.channels {
             let mean = self.velocity_jumps && pickup.quantity == Quantity::Acceleration;
             let (early, count) = if mean {
                 (0.5, self.samples + 1)
@@ -325,7 +334,7 @@ impl Truth {
                     values.push(0.0);
                     continue;
                 }
-                let motion = segment.motion(t, &mut self.room);
+                let motion = segment.motion(t, room);
                 values.push(pickup.read(match pickup.quantity {
                     Quantity::Force => motion.force_n,
                     Quantity::Displacement => motion.displacement_m,
@@ -338,7 +347,7 @@ impl Truth {
 
     fn channels(self) -> impl Iterator<Item = Vec<f64>> {
         let (rate_hz, velocity_jumps) = (self.rate_hz, self.velocity_jumps);
-        self.channels.into_iter().map(move |(pickup, values)| {
+        self.channels.into_iter().map(move |(pickup, _, values)| {
             if velocity_jumps && pickup.quantity == Quantity::Acceleration {
                 values
                     .windows(2)

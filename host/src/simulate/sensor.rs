@@ -110,6 +110,15 @@ impl Sampler {
         }
     }
 
+    /// The same from where the modes have so many times their shapes at the tool: see [`Room::seeing`].
+    #[must_use]
+    pub fn seeing(self, model: &Model, modes: &[f64]) -> Self {
+        Self {
+            room: Room::seeing(model, modes),
+            ..self
+        }
+    }
+
     /// The same with samples that are late by so much, s.
     #[must_use]
     pub fn late_by(self, delay_s: f64) -> Self {

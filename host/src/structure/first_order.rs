@@ -60,6 +60,18 @@ impl FirstOrder {
         }
     }
 
+    /// What is looked at instead of the tool, where each mode moves it by so many times what it moves the tool; modes that are not
+    /// among them move it as the tool. Of a structure of modes, whose two states each stand side by side.
+    #[must_use]
+    pub fn seen(&self, modes: &[f64]) -> Self {
+        let mut seen = self.clone();
+        for (mode, factor) in modes.iter().enumerate().take(self.order() / 2) {
+            let mut shape = seen.c.columns_mut(2 * mode, 2);
+            shape *= *factor;
+        }
+        seen
+    }
+
     /// Poles of the structure, rad/s, sorted by imaginary part.
     pub fn poles(&self) -> Vec<Complex64> {
         let mut poles = eigenvalues(self.a.clone())

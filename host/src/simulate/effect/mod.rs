@@ -97,6 +97,9 @@ pub struct Pickup {
     pub quantity: Quantity,
     /// How much of the machine's x, y and z it reads.
     pub weights: [f64; 3],
+    /// By mode of a structure of modes: how many times what the mode moves the tool it moves the sensor. Empty where the sensor moves
+    /// as the tool.
+    pub modes: Vec<f64>,
     /// How late it is, s.
     pub delay_s: f64,
 }
@@ -116,6 +119,7 @@ impl Pickup {
             name: format!("{prefix}{}", ["x", "y", "z"][axis]),
             quantity,
             weights,
+            modes: Vec::new(),
             delay_s: 0.0,
         }
     }

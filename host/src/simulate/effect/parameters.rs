@@ -14,7 +14,7 @@ pub enum Value {
     Text(String),
     /// Several words.
     List(Vec<String>),
-    /// Several numbers, one for each direction.
+    /// Several numbers, one for each direction or mode.
     Numbers(Vec<f64>),
 }
 
@@ -170,6 +170,22 @@ impl Parameters {
         match self.finite("")? {
             Some(number) => Ok(number),
             None => self.needed(key),
+        }
+    }
+
+    /// The quantity that the effect is named for, of which there may be several, by its own key or without one.
+    pub(super) fn main_numbers(&mut self, key: &'static str) -> Result<Vec<f64>, EffectError> {
+        let given = if self.values.contains_key("") { "" } else { key };
+        match self.values.remove(given) {
+            Some(Value::Number(number)) if number.is_finite() => Ok(vec![number]),
+            Some(Value::Numbers(numbers)) if !numbers.is_empty() && numbers.iter().all(|x| x.is_finite()) => {
+                Ok(numbers)
+            }
+            Some(other) => Err(self.wrong(given, &other, "a number, or several")),
+            None => Err(EffectError::Missing {
+                name: self.effect.clone(),
+                key,
+            }),
         }
     }
 

@@ -144,8 +144,7 @@ impl Rig {
 struct Recorder {
     rate_hz: f64,
     count: usize,
-    pickups: Vec<(Pickup, Vec<f64>)>,
-    room: Room,
+    pickups: Vec<(Pickup, Room, Vec<f64>)>,
 }
 
 impl Recorder {
@@ -156,14 +155,16 @@ impl Recorder {
             count,
             pickups: pickups
                 .into_iter()
-                .map(|pickup| (pickup, Vec::with_capacity(count)))
+                .map(|pickup| {
+                    let room = Room::seeing(model, &pickup.modes);
+                    (pickup, room, Vec::with_capacity(count))
+                })
                 .collect(),
-            room: Room::new(model),
         }
     }
 
     fn observe(&mut self, segment: &Segment<'_>) {
-        for (pickup, samples) in &mut self.pickups {
+        for (pickup, room, samples) in &mut self.pickups {
             while samples.len() < self.count {
                 let t = samples.len() as f64 / self.rate_hz - pickup.delay_s;
                 if t > segment.to_s() {
@@ -174,7 +175,7 @@ impl Recorder {
                     samples.push(0.0);
                     continue;
                 }
-                let motion = segment.motion(t, &mut self.room);
+                let motion = segment.motion(t, room);
                 samples.push(pickup.read(match pickup.quantity {
                     Quantity::Force => motion.force_n,
                     Quantity::Velocity => motion.velocity_m_per_s,
@@ -189,12 +190,12 @@ impl Recorder {
         let shortest = self
             .pickups
             .iter()
-            .map(|(_, samples)| samples.len())
+            .map(|(_, _, samples)| samples.len())
             .min()
             .unwrap_or(0);
         self.pickups
             .into_iter()
-            .map(|(pickup, mut samples)| {
+            .map(|(pickup, _, mut samples)| {
                 samples.truncate(shortest);
                 Channel {
                     name: pickup.name,
