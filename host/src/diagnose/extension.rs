@@ -30,13 +30,20 @@ pub(super) fn joined<'a>(parts: impl IntoIterator<Item = (&'a str, &'a Table)>) 
     all
 }
 
-/// What is said of a key behind its value: the intervals of the causes that have it.
+/// What is said of a key behind its value: the intervals of the causes that have it, or have it by number (`ratio_1`, `ratio_2` …).
 fn intervals(causes: &[&NamedCause], key: &str) -> String {
-    let of = |cause: &&NamedCause| {
-        let Figure { ci90: [from, to], .. } = cause.parameters.get(key)?;
-        Some(format!("{from:.6e} to {to:.6e}"))
+    let is_of_key = |known: &str| {
+        let behind = known
+            .strip_prefix(key)
+            .map(|rest| rest.strip_prefix('_').unwrap_or(rest));
+        behind.is_some_and(|number| number.chars().all(|digit| digit.is_ascii_digit()))
     };
-    let said: Vec<String> = causes.iter().filter_map(of).collect();
+    let said: Vec<String> = causes
+        .iter()
+        .flat_map(|cause| &cause.parameters)
+        .filter(|(known, _)| is_of_key(known))
+        .map(|(_, Figure { ci90: [from, to], .. })| format!("{from:.6e} to {to:.6e}"))
+        .collect();
     if said.is_empty() {
         String::new()
     } else {

@@ -47,6 +47,8 @@ mod relinearization;
 mod restarts;
 mod scene;
 mod selection;
+#[cfg(test)]
+mod sensor_tests;
 mod stepwise;
 mod stiffness;
 #[cfg(test)]

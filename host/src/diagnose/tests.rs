@@ -31,7 +31,7 @@ fn recorded(signal: Signal, rate_hz: f64, effects: &[&str], seed: u64) -> Record
 }
 
 /// The same of another machine, driven along `direction`.
-fn recorded_of(
+pub(super) fn recorded_of(
     case: &Case,
     direction: Direction,
     signal: Signal,

@@ -16,9 +16,8 @@ use crate::structure::Form;
 pub(super) struct Offset;
 
 /// The ratio of each mode, in the order of the case; of structures with more modes there is one for all.
-const RATIOS: [&str; 12] = [
+const RATIOS: [&str; 9] = [
     "ratio_1", "ratio_2", "ratio_3", "ratio_4", "ratio_5", "ratio_6", "ratio_7", "ratio_8", "ratio_9",
-    "ratio_10", "ratio_11", "ratio_12",
 ];
 
 /// A mode that moves an axis by less than this share of what the largest does is not seen there.

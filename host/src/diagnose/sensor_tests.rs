@@ -1,0 +1,114 @@
+//! Sensors away from the tool: of each mode they read a share of their own.
+
+use std::path::Path;
+
+use super::answer::Outcome;
+use super::tests::recorded_of;
+use super::{Diagnosis, Options, diagnose};
+use crate::case::Case;
+use crate::recording::{RecordedChannel, Recording};
+use crate::simulate::rig::Signal;
+use crate::structure::Direction;
+
+/// Two modes along x, 100 kg at 20 Hz and 120 kg at 34 Hz: left = −1/(2 m ω_d).
+const BELIEVED: &str = r#"
+[structure]
+kind = "modes"
+directions = ["x"]
+[[structure.mode]]
+frequency_hz = 20.0
+damping_ratio = 0.02
+left = [[0.0, -3.979669e-5]]
+right = [[1.0, 0.0]]
+[[structure.mode]]
+frequency_hz = 34.0
+damping_ratio = 0.03
+left = [[0.0, -1.951294e-5]]
+right = [[1.0, 0.0]]
+"#;
+
+/// Sweeps at two levels, x read at the spindle housing, with these effects beside a share of 0.9 and 0.55 of the two modes.
+fn records(case: &Case, effects: &[&str]) -> Vec<Recording> {
+    let place = [
+        "sensor-offset-from-tool-tip.ratio=0.9,0.55",
+        "sensor-offset-from-tool-tip.channel=x",
+    ];
+    let all: Vec<&str> = effects.iter().copied().chain(place).collect();
+    let sweep = |(seed, amplitude_n)| {
+        let signal = Signal::Sweep {
+            first_hz: 12.0,
+            last_hz: 45.0,
+            amplitude_n,
+            seconds: 10.0,
+        };
+        let mut record = recorded_of(case, Direction::X, signal, 512.0, &all, seed);
+        let housing = RecordedChannel {
+            at: Some("spindle-housing".into()),
+            ..RecordedChannel::default()
+        };
+        record.sidecar.channels.insert("x".into(), housing);
+        record
+    };
+    [(11, 5.0), (12, 15.0)].map(sweep).into()
+}
+
+fn ratios(answer: &Diagnosis) -> [f64; 2] {
+    let offset = answer
+        .causes
+        .iter()
+        .find(|cause| cause.name == "sensor-offset-from-tool-tip");
+    ["ratio_1", "ratio_2"].map(|key| offset.unwrap().parameters[key].value)
+}
+
+fn assert_are_found(answer: &Diagnosis) {
+    let [first, second] = ratios(answer);
+    // 10 000 samples with 1 % of noise.
+    assert!(
+        (first - 0.9).abs() < 2e-3 && (second - 0.55).abs() < 2e-3,
+        "{first} {second}"
+    );
+}
+
+#[test]
+fn a_sensor_away_from_the_tool_has_a_ratio_for_each_mode() {
+    let case = Case::parse(Path::new("believed.toml"), BELIEVED).unwrap();
+    let records = records(&case, &[]);
+    let answer = diagnose(&case, &records, &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
+    assert_eq!(answer.names(), ["sensor-offset-from-tool-tip"]);
+    assert_are_found(&answer);
+    let extended = answer.extended_case(BELIEVED).unwrap();
+    let extended = Case::parse(Path::new("extended.toml"), &extended).unwrap();
+    let again = diagnose(&extended, &records, &Options::default()).unwrap();
+    assert_eq!(again.outcome, Outcome::None, "{:?}", again.causes);
+}
+
+#[test]
+fn a_spring_at_the_tool_is_found_by_a_sensor_elsewhere() {
+    let case = Case::parse(Path::new("believed.toml"), BELIEVED).unwrap();
+    let records = records(&case, &["cubic-stiffness=3e12"]);
+    let answer = diagnose(&case, &records, &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
+    assert_eq!(answer.names(), ["cubic-stiffness", "sensor-offset-from-tool-tip"]);
+    assert_are_found(&answer);
+    let k3 = answer.causes[0].parameters["k3_n_per_m3"].value;
+    assert!((k3 / 3e12 - 1.0).abs() < 0.01, "{k3}");
+}
+
+#[test]
+fn where_the_structure_is_not_given_by_modes_one_ratio_is_possible() {
+    let text = r#"
+[structure]
+kind = "matrices"
+directions = ["x"]
+mass = [[188.0]]
+damping = [[305.0]]
+stiffness = [[2260000.0]]
+[extension.sensor-offset-from-tool-tip]
+ratio = [0.9, 0.8]
+"#;
+    let case = Case::parse(Path::new("believed.toml"), text).unwrap();
+    let modes = Case::parse(Path::new("modes.toml"), BELIEVED).unwrap();
+    let error = diagnose(&case, &records(&modes, &[]), &Options::default()).unwrap_err();
+    assert!(error.to_string().contains("one is needed"), "{error}");
+}
