@@ -6,7 +6,9 @@
 use super::grid::Stretch;
 
 /// Bands into which a spectrum is cut.
-const BANDS: usize = 32;
+pub(super) const BANDS: usize = 32;
+/// White noise below this share of all noise in a band cannot be told from chance.
+const TOLD: f64 = 0.05;
 /// Nothing recorded is trusted beyond this share of its size: 90 dB, where errors of simulations add up to what is seen.
 const TRUSTED: f64 = 3e-5;
 
@@ -15,13 +17,20 @@ const TRUSTED: f64 = 3e-5;
 /// The mean of the periodogram in each of 32 bands, the lower quartile of these, and then the mean of all bands that are
 /// within three deviations of it: with nothing but noise, all of them.
 pub fn white_floor(residual: &[f64], size: f64) -> f64 {
-    floor(residual, size, mean, 1.0)
+    white_floor_beside(residual, size, &[0.0; BANDS])
+}
+
+/// [`white_floor`] of a residual in which there is other noise besides, of this power in each of the [`BANDS`] from zero to half the
+/// sample rate.
+pub(super) fn white_floor_beside(residual: &[f64], size: f64, other: &[f64; BANDS]) -> f64 {
+    floor(residual, size, mean, 1.0, other)
 }
 
 /// [`white_floor`] of a residual that has lines in every band, as that of a cut: by the median of each band, which lines, being few
 /// of its bins, do not move.
 pub fn floor_between_lines(residual: &[f64], size: f64) -> f64 {
-    floor(residual, size, |squares| median(squares) / MEDIAN, MEDIAN_SPREAD)
+    let of_band = |squares: &mut [f64]| median(squares) / MEDIAN;
+    floor(residual, size, of_band, MEDIAN_SPREAD, &[0.0; BANDS])
 }
 
 /// The median of the square of a normal deviate, and by how much a mean that is taken from it scatters more than the mean itself.
@@ -40,28 +49,41 @@ fn median(squares: &mut [f64]) -> f64 {
     *squares.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-fn floor(residual: &[f64], size: f64, of_band: fn(&mut [f64]) -> f64, scatter: f64) -> f64 {
+fn floor(
+    residual: &[f64],
+    size: f64,
+    of_band: fn(&mut [f64]) -> f64,
+    scatter: f64,
+    other: &[f64; BANDS],
+) -> f64 {
     let least = (TRUSTED * size).max(f64::MIN_POSITIVE);
     let count = residual.len();
     if count < 4 * BANDS {
         return rms(residual).max(least);
     }
-    let mut means = band_means(residual, of_band);
-    means.sort_by(f64::total_cmp);
+    // All noise, and how much of it is white as far as can be told.
+    let white = |all: f64, other: f64| (all - other).max(TOLD * all);
+    let bands: Vec<(f64, f64)> = band_means(residual, of_band).into_iter().zip(*other).collect();
+    let mut sorted: Vec<f64> = bands.iter().map(|(all, other)| white(*all, *other)).collect();
+    sorted.sort_by(f64::total_cmp);
     let per_band = (count / (2 * BANDS)) as f64;
     // Hann's window makes neighbouring bins alike: a third of them count.
     let spread = 3.0 * scatter * (3.0 / per_band).sqrt();
-    let mut level = means[BANDS / 4];
+    let mut level = sorted[BANDS / 4];
     for _ in 0..8 {
-        let near: Vec<f64> = means
+        let near: Vec<(f64, f64)> = bands
             .iter()
             .copied()
-            .filter(|mean| *mean <= level * (1.0 + spread) && *mean >= level / (1.0 + spread))
+            .filter(|(all, other)| {
+                let expected = level + other;
+                *all <= expected * (1.0 + spread) && *all >= expected / (1.0 + spread)
+            })
             .collect();
         if near.is_empty() {
             break;
         }
-        let next = near.iter().sum::<f64>() / near.len() as f64;
+        let mean = |of: fn(&(f64, f64)) -> f64| near.iter().map(of).sum::<f64>() / near.len() as f64;
+        let next = white(mean(|band| band.0), mean(|band| band.1));
         if (next - level).abs() <= 1e-9 * level {
             break;
         }
@@ -131,6 +153,30 @@ mod tests {
         // amplitude; 5.5 % is three deviations of the median of 3 000 powers of which every second is independent.
         assert!((0.945..1.16).contains(&floor), "{floor}");
         assert!(white_floor(&residual, size) > 1.5);
+    }
+
+    #[test]
+    fn the_floor_is_that_of_the_sensor_beside_other_noise_that_is_known() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+        // Differences of noise of twice the size have the power 4·|1 − e^(−iω)|²: nothing at zero, sixteen at half the sample rate.
+        let mut last = 0.0;
+        let residual: Vec<f64> = (0..6000)
+            .map(|_| {
+                let next = 2.0 * draw();
+                let difference = next - last;
+                last = next;
+                draw() + difference
+            })
+            .collect();
+        let power = |band: usize| {
+            4.0 * (2.0 - 2.0 * (std::f64::consts::PI * (band as f64 + 0.5) / BANDS as f64).cos())
+        };
+        let size = rms(&residual);
+        let floor = white_floor_beside(&residual, size, &std::array::from_fn(power));
+        // Three deviations are 6 % where nothing else is; with up to sixteen times as much besides it is known half as well.
+        assert!((floor - 1.0).abs() < 0.12, "{floor}");
+        assert!(white_floor(&residual, size) > 1.3);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::cutting::Cutting;
 use super::decay::Decays;
 use super::grid::Grid;
 use super::motion;
-use super::noise::{floor_between_lines, rms, white_floor};
+use super::noise::{BANDS, floor_between_lines, rms, white_floor, white_floor_beside};
 use super::receptance::Receptance;
 use super::scene::{Baseline, Domain, derivatives};
 use crate::recording::{Kind, Quantity, Recording};
@@ -240,6 +240,25 @@ impl Record {
         2.0 * one_sided * self.grid.count() as f64 / bins
     }
 
+    /// Power of what a channel reads of the response to the noise of the force sensors, in bands up to half the sample rate: the mean
+    /// of σ² |H|² in each.
+    fn power_by_force_noise(&self, channel: usize) -> [f64; BANDS] {
+        let per_band = std::f64::consts::PI * self.grid.rate_hz() / BANDS as f64 / self.grid.omega(1);
+        let from = |band: usize| (band as f64 * per_band).round() as usize;
+        std::array::from_fn(|band| {
+            let bins = from(band)..from(band + 1).max(from(band) + 1);
+            let count = bins.len() as f64;
+            let forces = self.force_deviation_n.iter().zip(&self.responses[channel]);
+            forces
+                .filter(|(deviation_n, _)| **deviation_n > 0.0)
+                .map(|(deviation_n, response)| {
+                    let heard = response.get(bins.clone()).unwrap_or_default();
+                    deviation_n * deviation_n * heard.iter().map(|bin| bin.norm_sqr()).sum::<f64>() / count
+                })
+                .sum()
+        })
+    }
+
     /// True where the motion along `axis` is more than what could be noise.
     pub fn moves(&self, axis: usize) -> bool {
         !self.motion.x[axis].is_empty()
@@ -405,6 +424,9 @@ impl Record {
             .map(|channel| rms(&channel.measured))
             .collect();
         self.decays.fit(&residuals, &sizes);
+        let of_forces: Vec<[f64; BANDS]> = (0..self.channels.len())
+            .map(|channel| self.power_by_force_noise(channel))
+            .collect();
         for (index, channel) in self.channels.iter_mut().enumerate() {
             self.decays.add_to(index, &mut channel.predicted);
             let (residual, size) = (channel.residual(), rms(&channel.measured));
@@ -413,7 +435,7 @@ impl Record {
                 None if self.kind == Some(Kind::Cutting) => {
                     floor_between_lines(&residual, size).hypot(TRUSTED_IN_CUTS * size)
                 }
-                None => white_floor(&residual, size),
+                None => white_floor_beside(&residual, size, &of_forces[index]),
             };
         }
     }
