@@ -264,6 +264,9 @@ fn plateau_in(record: &Recording, share: f64) -> f64 {
     widths[widths.len() / 2]
 }
 
+/// The play of the damper, in.
+const PUBLISHED_IN: f64 = 0.125;
+
 #[test]
 fn the_banded_damper_has_friction_behind_a_play() {
     let Some(folder) = folder("friction_backlash") else {
@@ -277,20 +280,28 @@ fn the_banded_damper_has_friction_behind_a_play() {
     for some in [&records[..1], &records[1..2], &records[2..], &records[..]] {
         let found = ask(&believed, some);
         assert_eq!(names(&found), ["coulomb-friction", "backlash"]);
-        let gap_in = 1e-3 * found.causes[1].parameters["gap_mm"].value / INCH_M;
+        let gap = &found.causes[1].parameters["gap_mm"];
+        let [gap_in, from_in, to_in] = [gap.value, gap.ci90[0], gap.ci90[1]].map(|mm| 1e-3 * mm / INCH_M);
         let removed = found.gain.unwrap().residual_energy_removed;
         println!(
-            "{} records: gap {gap_in:.4} in, energy removed {removed:.3}",
+            "{} records: gap {gap_in:.4} in, 90 % {from_in:.3} to {to_in:.3}, energy removed {removed:.3}",
             some.len()
         );
         assert!(removed > 0.95, "{removed}");
         // The loop is there to be looked at.
         assert!(found.views.iter().all(|view| view.missing.is_some()));
-        gaps_in.push(gap_in);
+        gaps_in.push([gap_in, from_in, to_in]);
         not_again(&believed, &found, some);
     }
-    // Published is a play of 0.125 in. Where nothing is said of how little force counts as none, it is not a number: the friction takes
-    // hold gradually.
+    // Published is a play of 0.125 in. All records together say it within 10 %, and their interval holds it. Of one record alone it is
+    // less sure: where nothing is said of how little force counts as none it is not a number, since friction takes hold gradually.
+    let all = gaps_in.len() - 1;
+    let [gap_in, from_in, to_in] = gaps_in[all];
+    assert!((gap_in / PUBLISHED_IN - 1.0).abs() < 0.1, "{gap_in}");
+    assert!((from_in..to_in).contains(&PUBLISHED_IN), "{from_in} to {to_in}");
+    for [gap_in, ..] in &gaps_in[..all] {
+        assert!((0.06..0.145).contains(gap_in), "{gap_in}");
+    }
     for record in &records {
         let widths = [0.03, 0.05, 0.10, 0.15].map(|share| plateau_in(record, share));
         println!(
@@ -298,8 +309,5 @@ fn the_banded_damper_has_friction_behind_a_play() {
             record.path.display()
         );
         assert!(widths[3] - widths[0] > 0.05, "{widths:?}");
-    }
-    for gap_in in gaps_in {
-        assert!((0.06..0.145).contains(&gap_in), "{gap_in}");
     }
 }

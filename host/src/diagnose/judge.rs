@@ -32,6 +32,9 @@ pub(super) fn judge(
     watch(Stage::Library);
     let mut regression = Regression::new(scene);
     let mut library = Library::new(scene, &mut regression);
+    if scene.all_in(Domain::Force) && scene.records.len() > 1 {
+        regression.level_records();
+    }
     let scale = Scale::new(scene, recordings, &library, &regression);
     let selection = select(&scale, &mut library, &mut regression, watch);
     watch(Stage::Answer);

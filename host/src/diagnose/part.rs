@@ -17,6 +17,8 @@ pub(super) struct Part {
     pub(super) record: usize,
     pub(super) range: Range<usize>,
     pub(super) share: Share,
+    /// One over how many times the noise of its record is taken for what it is.
+    pub(super) weight: f64,
     bins: usize,
     stretch: Stretch,
     whitening: Whitening,
@@ -109,6 +111,7 @@ impl Part {
             stretch: Stretch::new(range.len()),
             range,
             share,
+            weight: 1.0,
             whitening: Whitening::default(),
             nuisance: Vec::new(),
         };
@@ -126,6 +129,9 @@ impl Part {
             for (value, nuisance) in column.iter_mut().zip(nuisance) {
                 *value -= along * nuisance;
             }
+        }
+        if self.weight != 1.0 {
+            column.iter_mut().for_each(|value| *value *= self.weight);
         }
         column
     }

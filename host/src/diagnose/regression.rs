@@ -12,6 +12,9 @@ pub use super::part::Share;
 use super::part::{Part, Unknown, split};
 use super::scene::Scene;
 
+/// What is added to the squares of columns, as a share, where all columns of the library are fitted at once.
+const SOFTENED: f64 = 1e-9;
+
 /// A fit of some columns.
 #[derive(Clone, Debug)]
 pub struct Fit {
@@ -65,12 +68,88 @@ impl Regression {
             products: std::array::from_fn(|_| Products::default()),
             complete: 0,
         };
-        for (part, residual) in regression.parts.iter().zip(&regression.residuals) {
-            let products = &mut regression.products[part.share as usize];
+        regression.sum();
+        regression
+    }
+
+    /// Products of all that is there, but for those of different columns.
+    fn sum(&mut self) {
+        self.products = std::array::from_fn(|_| Products::default());
+        self.complete = 0;
+        for (part, residual) in self.parts.iter().zip(&self.residuals) {
+            let products = &mut self.products[part.share as usize];
             products.residual += dot(residual, residual);
             products.count += residual.len() - part.taken();
         }
-        regression
+        for column in 0..self.columns.len() {
+            self.sum_column(column);
+        }
+    }
+
+    fn sum_column(&mut self, column: usize) {
+        let mut sums = [[0.0; 2]; 3];
+        let values = self.columns[column].iter().zip(&self.residuals);
+        for (part, (values, residual)) in self.parts.iter().zip(values) {
+            let [square, with_residual] = &mut sums[part.share as usize];
+            *square += dot(values, values);
+            *with_residual += dot(values, residual);
+        }
+        for (products, [square, with_residual]) in self.products.iter_mut().zip(sums) {
+            products.add(square, with_residual);
+        }
+    }
+
+    /// Takes the noise of each record for so many times what it is that all columns together leave as much of one as of another.
+    ///
+    /// What is left of forces is no noise but what the equations get wrong, and that is larger in one record than in another: least
+    /// squares in units of the noise would listen to the record that is described worst (weights by estimated variances, as in
+    /// feasible generalized least squares).
+    pub fn level_records(&mut self) {
+        let records = self.parts.iter().map(|part| part.record + 1).max().unwrap_or(0);
+        let mut left = vec![1.0; records];
+        for (index, part) in self.parts.iter().enumerate() {
+            if part.share == Share::Whole {
+                let free = self.residuals[index]
+                    .len()
+                    .saturating_sub(self.columns.len())
+                    .max(1);
+                left[part.record] = self.left_of_part(index) / free as f64;
+            }
+        }
+        let least = left.iter().copied().fold(f64::INFINITY, f64::min).max(1.0);
+        for (index, part) in self.parts.iter_mut().enumerate() {
+            part.weight = (least / left[part.record].max(least)).sqrt();
+            let values = self.columns.iter_mut().flat_map(|column| &mut column[index]);
+            for value in values.chain(&mut self.residuals[index]) {
+                *value *= part.weight;
+            }
+        }
+        self.sum();
+    }
+
+    /// What all columns leave of one part.
+    fn left_of_part(&self, part: usize) -> f64 {
+        let residual = &self.residuals[part];
+        let mut columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[part][..]).collect();
+        columns.retain(|column| column.iter().any(|value| *value != 0.0));
+        let size = columns.len();
+        columns.push(residual);
+        let mut gram = products(&columns, 0);
+        let whole = gram[(size, size)];
+        let right = gram.view((0, size), (size, 1)).clone_owned();
+        let scale = DVector::from_fn(size, |i, _| gram[(i, i)].sqrt());
+        let mut gram = gram.view_mut((0, 0), (size, size)).clone_owned();
+        for i in 0..size {
+            for j in 0..size {
+                gram[(i, j)] /= scale[i] * scale[j];
+            }
+            gram[(i, i)] += SOFTENED;
+        }
+        let right = right.column(0).component_div(&scale);
+        match gram.cholesky() {
+            Some(factor) => (whole - factor.solve(&right).dot(&right)).max(0.0),
+            None => whole,
+        }
     }
 
     /// Σ y² of what was measured in the whole records, in units of the noise.
@@ -93,16 +172,8 @@ impl Regression {
             .par_iter()
             .map(|part| part.whiten(&samples[part.record]))
             .collect();
-        let mut sums = [[0.0; 2]; 3];
-        for ((part, new), residual) in self.parts.iter().zip(&column).zip(&self.residuals) {
-            let [square, with_residual] = &mut sums[part.share as usize];
-            *square += dot(new, new);
-            *with_residual += dot(new, residual);
-        }
-        for (products, [square, with_residual]) in self.products.iter_mut().zip(sums) {
-            products.add(square, with_residual);
-        }
         self.columns.push(column);
+        self.sum_column(self.columns.len() - 1);
         self.columns.len() - 1
     }
 
@@ -276,7 +347,7 @@ impl Regression {
         let all: Vec<usize> = (0..self.columns.len())
             .filter(|column| whole.square(*column) > 0.0)
             .collect();
-        self.solve(Share::Whole, &all, 1e-9)
+        self.solve(Share::Whole, &all, SOFTENED)
             .map_or(whole.residual, |fit| fit.left)
     }
 

@@ -23,6 +23,8 @@ const ROUNDS: usize = 5;
 const SETTLED: f64 = 0.5;
 /// χ² by which an explanation may stay behind another, to first order, before it is given up.
 const HOPELESS: f64 = 300.0;
+/// By which share more the first reading may leave: it follows the measured motion, with the noise in it.
+const FIRST: f64 = 0.1;
 
 /// Residuals by record and channel.
 type Residuals = Vec<Vec<Vec<f64>>>;
@@ -145,7 +147,8 @@ impl ClosedFit for Relinearization<'_> {
                 best = Some((at.clone(), reading.residuals));
             }
             let promised = refit.before - refit.taken;
-            let hopeless = promised - rival > HOPELESS && promised > 0.5 * refit.before;
+            let first = if round == 0 { FIRST * rival } else { 0.0 };
+            let hopeless = promised - rival > HOPELESS + first && promised > 0.5 * refit.before;
             if !is_better || hopeless || (round > 0 && refit.taken < SETTLED) {
                 break;
             }
