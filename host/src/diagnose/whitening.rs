@@ -66,9 +66,9 @@ impl Whitening {
         };
         let mut at = 0;
         for (bin, numbers) in self.numbers.iter().enumerate() {
-            let weights = &self.weights[bin * self.channels..];
+            let weights = &self.weights[bin * self.channels..(bin + 1) * self.channels];
             let mut common = self.common[bin * rows..].iter();
-            for i in 0..self.channels {
+            for (i, weight) in weights.iter().enumerate() {
                 let place = i * per_channel + at;
                 for (j, shared) in (0..i).zip(&mut common) {
                     let known = j * per_channel + at;
@@ -80,7 +80,7 @@ impl Whitening {
                     }
                 }
                 for value in &mut column[place..place + numbers] {
-                    *value *= weights[i];
+                    *value *= weight;
                 }
             }
             at += numbers;
