@@ -110,10 +110,12 @@ fn answer(
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
     // Errors of the computation go along with the signal: where they are like a cause, they are not averaged away.
     let uncertain = inflation + scale.coherent;
-    diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
+    let with = scale.with_covariance(library, best, uncertain);
+    diagnosis.causes = named(scene, library, regression, &with, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
     for other in &selection.others {
-        for cause in named(scene, library, regression, other, uncertain, confidence) {
+        let with = scale.with_covariance(library, other, uncertain);
+        for cause in named(scene, library, regression, &with, uncertain, confidence) {
             if !diagnosis.causes.iter().any(|known| known.name == cause.name) {
                 diagnosis.causes.push(cause);
             }

@@ -45,6 +45,7 @@ mod refine;
 pub mod regression;
 mod relinearization;
 mod restarts;
+mod robust;
 mod scene;
 mod selection;
 #[cfg(test)]
