@@ -1,7 +1,5 @@
 //! Fits of explanations in closed loop: the extended case moves as it would, and not along the motion that was measured.
 
-use nalgebra::DMatrix;
-
 use super::evidence::{Explanation, Library};
 use super::regression::Regression;
 
@@ -23,11 +21,6 @@ pub(super) trait ClosedFit {
 
     /// Measured less computed, by record and channel, of an explanation that was fitted so.
     fn left_of(&self, library: &Library, explanation: &Explanation) -> Option<Vec<Vec<Vec<f64>>>>;
-
-    /// By choice, the covariance of its numbers by what an explanation leaves; `None` where only that by the noise is known.
-    fn covariance_by_residual(&self, _: &Library, _: &Explanation) -> Option<Vec<DMatrix<f64>>> {
-        None
-    }
 
     /// What is left of the held-out parts if the parameters come from the fitted ones alone.
     fn left_held_out(

@@ -110,12 +110,10 @@ fn answer(
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
     // Errors of the computation go along with the signal: where they are like a cause, they are not averaged away.
     let uncertain = inflation + scale.coherent;
-    let with = scale.with_covariance(library, best, uncertain);
-    diagnosis.causes = named(scene, library, regression, &with, uncertain, confidence);
+    diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
     for other in &selection.others {
-        let with = scale.with_covariance(library, other, uncertain);
-        for cause in named(scene, library, regression, &with, uncertain, confidence) {
+        for cause in named(scene, library, regression, other, uncertain, confidence) {
             if !diagnosis.causes.iter().any(|known| known.name == cause.name) {
                 diagnosis.causes.push(cause);
             }

@@ -45,7 +45,6 @@ mod refine;
 pub mod regression;
 mod relinearization;
 mod restarts;
-mod robust;
 mod scene;
 mod selection;
 #[cfg(test)]

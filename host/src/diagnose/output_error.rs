@@ -15,11 +15,8 @@ use super::decay::{Decays, dot};
 use super::evidence::{Explanation, Library, Simulated};
 use super::part::{Part, Share, Unknown, split};
 use super::regression::{Fit, Regression};
-use super::robust::middle;
 use super::scene::Scene;
-use super::unknowns::{
-    Found, Point, Problem, Slot, at_bounds, by_choice, energy, inverse, predicted, stepped,
-};
+use super::unknowns::{Found, Point, Problem, Slot, at_bounds, by_choice, energy, predicted, stepped};
 use crate::simulate::Effects;
 
 /// Steps of the search at most.
@@ -113,45 +110,7 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// J = ∂y_simulated/∂slot by differences: by record, slot by slot those that it feels.
-    fn slopes(
-        &self,
-        problem: &Problem<'_>,
-        parts: &[&Part],
-        point: &Point,
-        left: &[Vec<f64>],
-    ) -> Option<Vec<(usize, usize, Vec<f64>)>> {
-        let effects: Vec<Option<(Effects, Point, f64)>> = problem
-            .slots
-            .iter()
-            .map(|(slot, step)| {
-                // Where a step leaves what is physical, the other way is taken.
-                [*step, -step].into_iter().find_map(|step| {
-                    let mut moved = point.clone();
-                    *slot.of(&mut moved) += step;
-                    let effects = problem.effects(self.scene, &moved)?;
-                    Some((effects, moved, step))
-                })
-            })
-            .collect();
-        let tasks: Vec<(usize, usize)> = (0..left.len())
-            .flat_map(|record| (0..problem.slots.len()).map(move |slot| (record, slot)))
-            .filter(|(record, slot)| problem.slots[*slot].0.is_felt_by(*record))
-            .collect();
-        tasks
-            .into_par_iter()
-            .map(|(record, slot)| {
-                let (effects, moved, step) = effects[slot].as_ref()?;
-                let mut column = self.residual(record, parts, effects, &moved.starts[record])?;
-                for (column, left) in column.iter_mut().zip(&left[record]) {
-                    *column = (left - *column) / step;
-                }
-                Some((record, slot, column))
-            })
-            .collect()
-    }
-
-    /// Jᵀ J and Jᵀ r; steps become such that each moves χ² by about one.
+    /// Jᵀ J and Jᵀ r, J = ∂y_simulated/∂slot by differences; steps become such that each moves χ² by about one.
     fn normal(
         &self,
         problem: &mut Problem<'_>,
@@ -160,7 +119,37 @@ impl<'a> OutputError<'a> {
         left: &[Vec<f64>],
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let size = problem.slots.len();
-        let columns = self.slopes(problem, parts, point, left)?;
+        let columns: Vec<(usize, usize, Vec<f64>)> = {
+            let problem = &*problem;
+            let effects: Vec<Option<(Effects, Point, f64)>> = problem
+                .slots
+                .iter()
+                .map(|(slot, step)| {
+                    // Where a step leaves what is physical, the other way is taken.
+                    [*step, -step].into_iter().find_map(|step| {
+                        let mut moved = point.clone();
+                        *slot.of(&mut moved) += step;
+                        let effects = problem.effects(self.scene, &moved)?;
+                        Some((effects, moved, step))
+                    })
+                })
+                .collect();
+            let tasks: Vec<(usize, usize)> = (0..left.len())
+                .flat_map(|record| (0..size).map(move |slot| (record, slot)))
+                .filter(|(record, slot)| problem.slots[*slot].0.is_felt_by(*record))
+                .collect();
+            tasks
+                .into_par_iter()
+                .map(|(record, slot)| {
+                    let (effects, moved, step) = effects[slot].as_ref()?;
+                    let mut column = self.residual(record, parts, effects, &moved.starts[record])?;
+                    for (column, left) in column.iter_mut().zip(&left[record]) {
+                        *column = (left - *column) / step;
+                    }
+                    Some((record, slot, column))
+                })
+                .collect::<Option<_>>()?
+        };
         let mut normal = DMatrix::<f64>::zeros(size, size);
         let mut gradient = DVector::<f64>::zeros(size);
         for (index, (record, slot, column)) in columns.iter().enumerate() {
@@ -412,7 +401,7 @@ impl ClosedFit for OutputError<'_> {
         let count = regression.count(Share::Whole);
         let found = self.looked_at_again(&mut problem, &whole, &start, found, (rival, count));
         let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
-        let covariance = by_choice(&slots, &found.point, inverse(&found.normal).as_ref());
+        let covariance = by_choice(&slots, &found);
         self.accept(library, regression, explanation, found, covariance)
     }
 
@@ -456,39 +445,6 @@ impl ClosedFit for OutputError<'_> {
                 Some(left.collect())
             })
             .collect()
-    }
-
-    fn covariance_by_residual(
-        &self,
-        library: &Library,
-        explanation: &Explanation,
-    ) -> Option<Vec<DMatrix<f64>>> {
-        let simulated = explanation.simulated.as_ref()?;
-        let (mut problem, mut point) = self.problem(library, explanation)?;
-        point.starts.clone_from(&simulated.starts);
-        let whole = self.of_share(Share::Whole);
-        let left = self.residuals(&problem, &whole, &point)?;
-        // Once for steps of the right size, and once more.
-        self.normal(&mut problem, &whole, &point, &left)?;
-        let (mut normal, mut gradient) = self.normal(&mut problem, &whole, &point, &left)?;
-        at_bounds(&problem, &point, &mut normal, &mut gradient);
-        let covariance = inverse(&normal)?;
-        let size = problem.slots.len();
-        let slopes = self.slopes(&problem, &whole, &point, &left)?;
-        let mut sum = DMatrix::zeros(size, size);
-        for (record, left) in left.iter().enumerate() {
-            let mut x = DMatrix::zeros(left.len(), size);
-            for (_, slot, column) in slopes.iter().filter(|slope| slope.0 == record) {
-                x.column_mut(*slot).copy_from_slice(column);
-            }
-            sum += middle(x, &DVector::from_column_slice(left), &covariance);
-        }
-        let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
-        Some(by_choice(
-            &slots,
-            &point,
-            Some(&(&covariance * sum * &covariance)),
-        ))
     }
 
     fn left_held_out(&self, library: &Library, _: &Regression, explanation: &Explanation) -> Option<f64> {

@@ -10,7 +10,6 @@ use super::decay::dot;
 use super::gram::{Products, products};
 pub use super::part::Share;
 use super::part::{Part, Unknown, split};
-use super::robust::middle;
 use super::scene::Scene;
 
 /// What is added to the squares of columns, as a share, where all columns of the library are fitted at once.
@@ -307,9 +306,11 @@ impl Regression {
         sum
     }
 
-    /// The covariance of a fit to a share by what it leaves: see [`middle`].
+    /// The covariance of a fit to a share whose residual is no noise of deviation 1 but an error of the equations, which has a
+    /// spectrum of its own: (XᵀX)⁻¹ Xᵀ diag(r²/(1 − h)²) X (XᵀX)⁻¹ with h = diag(X (XᵀX)⁻¹ Xᵀ), one number of the spectrum
+    /// independent of the next (HC3 of MacKinnon and White, 1985).
     pub fn covariance_by_residual(&self, share: Share, columns: &[usize], fit: &Fit) -> DMatrix<f64> {
-        let mut sum = DMatrix::zeros(columns.len(), columns.len());
+        let mut middle = DMatrix::zeros(columns.len(), columns.len());
         let mine = self
             .parts
             .iter()
@@ -317,14 +318,18 @@ impl Regression {
             .filter(|(_, part)| part.share == share);
         for (part, _) in mine {
             let residual = &self.residuals[part];
-            let x = DMatrix::from_fn(residual.len(), columns.len(), |row, column| {
+            let mut x = DMatrix::from_fn(residual.len(), columns.len(), |row, column| {
                 self.columns[columns[column]][part][row]
             });
             let left =
                 DVector::from_column_slice(residual) - &x * DVector::from_column_slice(&fit.coefficients);
-            sum += middle(x, &left, &fit.covariance);
+            let leverage = (&x * &fit.covariance).component_mul(&x).column_sum();
+            for (mut row, (left, leverage)) in x.row_iter_mut().zip(left.iter().zip(leverage.iter())) {
+                row *= left / (1.0 - leverage.min(1.0 - f64::EPSILON));
+            }
+            middle += x.tr_mul(&x);
         }
-        &fit.covariance * sum * &fit.covariance
+        &fit.covariance * middle * &fit.covariance
     }
 
     fn whitened(&self, share: Share, residuals: &[Vec<Vec<f64>>]) -> Vec<(usize, Vec<f64>)> {

@@ -211,23 +211,6 @@ impl<'a> Scale<'a> {
             .unwrap_or_else(|| library.left_held_out(regression, explanation))
     }
 
-    /// The explanation with the covariance of its numbers by what it leaves, as that of noise which is so many times what it is taken
-    /// for: where resonances are not where the case has them, the noise of the forces is not where it is weighed.
-    pub(super) fn with_covariance(
-        &self,
-        library: &Library,
-        explanation: &Explanation,
-        inflation: f64,
-    ) -> Explanation {
-        let mut with = explanation.clone();
-        let closed = self.closed.as_ref();
-        let by_residual = closed.and_then(|closed| closed.covariance_by_residual(library, explanation));
-        if let Some((simulated, covariance)) = with.simulated.as_mut().zip(by_residual) {
-            simulated.covariance = covariance.into_iter().map(|matrix| matrix / inflation).collect();
-        }
-        with
-    }
-
     /// The first of `found` as simulation has them, where it can; else all as they are. `fewer` are the best with one cause
     /// less; what stays behind `rival` is given up.
     fn simulated(

@@ -170,20 +170,17 @@ fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, n
     scaled.cholesky()
 }
 
-/// (JᵀJ)⁻¹: the covariance of the slots for noise of deviation 1; zero for what did not move. `None` where slots are one and the same.
-pub(super) fn inverse(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let roots = DMatrix::from_diagonal(&roots(normal));
-    Some(&roots * scaled(normal, 1e-12)?.inverse() * &roots)
-}
-
-/// The covariance of the numbers of each choice from that of all slots, initial states being unknown; zero where that is not known.
-pub(super) fn by_choice(slots: &[Slot], point: &Point, whole: Option<&DMatrix<f64>>) -> Vec<DMatrix<f64>> {
-    let mut all: Vec<DMatrix<f64>> = point
+/// Covariance for noise of deviation 1 of the numbers of each choice, initial states being unknown; zero for what did not move.
+pub(super) fn by_choice(slots: &[Slot], found: &Found) -> Vec<DMatrix<f64>> {
+    let roots = roots(&found.normal);
+    let inverse = scaled(&found.normal, 1e-12).map(|factor| factor.inverse());
+    let mut all: Vec<DMatrix<f64>> = found
+        .point
         .inner
         .iter()
         .map(|inner| DMatrix::zeros(inner.len(), inner.len()))
         .collect();
-    let Some(whole) = whole else { return all };
+    let Some(inverse) = inverse else { return all };
     for (i, first) in slots.iter().enumerate() {
         for (j, second) in slots.iter().enumerate() {
             if let (
@@ -196,7 +193,7 @@ pub(super) fn by_choice(slots: &[Slot], point: &Point, whole: Option<&DMatrix<f6
             ) = (first, second)
                 && choice == other
             {
-                all[*choice][(*index, *second)] = whole[(i, j)];
+                all[*choice][(*index, *second)] = inverse[(i, j)] * roots[i] * roots[j];
             }
         }
     }
