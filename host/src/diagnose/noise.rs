@@ -82,7 +82,12 @@ fn floor(
         if near.is_empty() {
             break;
         }
-        let mean = |of: fn(&(f64, f64)) -> f64| near.iter().map(of).sum::<f64>() / near.len() as f64;
+        // The power of a band scatters as it is large: where there is much of the other noise little is told of the white one.
+        let weight = |other: f64| (level / (level + other)).powi(2);
+        let whole: f64 = near.iter().map(|(_, other)| weight(*other)).sum();
+        let mean = |of: fn(&(f64, f64)) -> f64| {
+            near.iter().map(|band| weight(band.1) * of(band)).sum::<f64>() / whole
+        };
         let next = white(mean(|band| band.0), mean(|band| band.1));
         if (next - level).abs() <= 1e-9 * level {
             break;
