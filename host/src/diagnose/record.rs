@@ -222,22 +222,10 @@ impl Record {
         Ok(record)
     }
 
-    /// Σ y² of what a channel reads of the response to the noise of the force sensors: σ² (N/N′) Σ |H|² over the N′ bins.
+    /// Σ y² of what a channel reads of the response to the noise of the force sensors, over the samples of the record.
     fn energy_by_force_noise(&self, channel: usize) -> f64 {
-        let nyquist = std::f64::consts::PI * self.grid.rate_hz();
-        let bins = 2.0 * nyquist / self.grid.omega(1);
-        let of_axis = |(deviation_n, response): (&f64, &Vec<Complex64>)| {
-            let below = response.iter().enumerate();
-            let below = below.take_while(|(bin, _)| self.grid.omega(*bin) <= nyquist);
-            deviation_n * deviation_n * below.map(|(_, response)| response.norm_sqr()).sum::<f64>()
-        };
-        let one_sided: f64 = self
-            .force_deviation_n
-            .iter()
-            .zip(&self.responses[channel])
-            .map(of_axis)
-            .sum();
-        2.0 * one_sided * self.grid.count() as f64 / bins
+        let power = self.power_by_force_noise(channel);
+        power.iter().sum::<f64>() / BANDS as f64 * self.grid.count() as f64
     }
 
     /// Power of what a channel reads of the response to the noise of the force sensors, in bands up to half the sample rate: the mean

@@ -53,6 +53,16 @@ pub(super) fn recorded_of(
     recording
 }
 
+/// A recording of one second and more that a test fills with samples of its own.
+fn to_be_filled(rate_hz: f64, seed: u64) -> Recording {
+    let signal = Signal::Release {
+        force_n: 1.0,
+        pull_s: 1.0,
+        seconds: 1.0,
+    };
+    recorded(signal, rate_hz, &[], seed)
+}
+
 /// Sweeps through the mode at three levels.
 fn records(effects: &[&str]) -> Vec<Recording> {
     let sweep = |(seed, amplitude_n)| {
@@ -337,16 +347,7 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
         quantity,
         samples,
     };
-    let mut record = recorded(
-        Signal::Release {
-            force_n: 1.0,
-            pull_s: 1.0,
-            seconds: 1.0,
-        },
-        rate_hz,
-        &[],
-        1,
-    );
+    let mut record = to_be_filled(rate_hz, seed);
     record.channels = vec![
         channel("x", Quantity::Displacement, moved),
         channel("fx", Quantity::Force, force),
@@ -389,16 +390,7 @@ fn simulations_are_as_exact_as_the_smallest_motion_is_measured() {
     let records: Vec<Recording> = [(1, 3e-6), (2, 1.2e-5)]
         .into_iter()
         .map(|(seed, start_m)| {
-            let mut record = recorded(
-                Signal::Release {
-                    force_n: 1.0,
-                    pull_s: 1.0,
-                    seconds: 1.0,
-                },
-                rate_hz,
-                &[],
-                seed,
-            );
+            let mut record = to_be_filled(rate_hz, seed);
             let samples = (0..3400).map(|n| {
                 let t = f64::from(n) / rate_hz;
                 start_m * (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin())
