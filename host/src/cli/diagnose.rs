@@ -185,7 +185,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     lines.extend(diagnosis.unexplained.guess.clone());
     lines.extend(diagnosis.lobes.iter().flat_map(sentences));
     if let Some(test) = &diagnosis.next_test {
-        lines.push(format!("next test: {}: {}", test.kind, test.why));
+        lines.push(format!("next test: {}: it {}", test.what(), test.why));
     }
     lines.join("\n")
 }

@@ -85,8 +85,66 @@ pub struct Unexplained {
 pub struct NextTest {
     /// What kind of recording.
     pub kind: &'static str,
+    /// The direction of the force, of a test of the structure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<&'static str>,
+    /// Amplitudes of the force, one after the other, N; of a blow its peak.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub force_n: Vec<f64>,
+    /// Where a sweep begins and ends, or the frequency of a step twice, Hz.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub band_hz: Option<[f64; 2]>,
+    /// Of a cut: spindle speed, rev/min.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spindle_rpm: Option<f64>,
+    /// Of a cut: axial depth, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axial_depth_mm: Option<f64>,
+    /// Of a cut: feed per tooth, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feed_per_tooth_mm: Option<f64>,
+    /// How long it is recorded, s.
+    pub seconds: f64,
+    /// What must be measured besides the channels of the records.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measure: Option<&'static str>,
+    /// How far apart the explanations would be that it separates least, in standard deviations: about 8 tell nearly always.
+    pub distance: f64,
     /// What it separates, and how.
     pub why: String,
+}
+
+impl NextTest {
+    /// What to do, in a sentence without its end.
+    pub fn what(&self) -> String {
+        let list = |values: &[f64]| {
+            let values: Vec<String> = values.iter().map(|value| format!("{value:.3}")).collect();
+            values.join(", ")
+        };
+        let mut said = self.kind.to_owned();
+        if let Some(direction) = self.direction {
+            said += &format!(" along {direction}");
+        }
+        if !self.force_n.is_empty() {
+            said += &format!(", {} N", list(&self.force_n));
+        }
+        match self.band_hz {
+            Some([from, to]) if from == to => said += &format!(" at {from:.2} Hz"),
+            Some([from, to]) => said += &format!(" from {from:.2} to {to:.2} Hz"),
+            None => {}
+        }
+        if let (Some(rpm), Some(depth_mm)) = (self.spindle_rpm, self.axial_depth_mm) {
+            said += &format!(" at {rpm:.0} rev/min, {depth_mm:.2} mm deep");
+        }
+        if let Some(feed) = self.feed_per_tooth_mm {
+            said += &format!(", {feed:.3} mm per tooth");
+        }
+        said += &format!(", {:.1} s", self.seconds);
+        if let Some(measure) = self.measure {
+            said += &format!(", measuring also {measure}");
+        }
+        said
+    }
 }
 
 /// The answer.
@@ -117,6 +175,9 @@ pub struct Diagnosis {
     pub next_test: Option<NextTest>,
     /// What should be known about the records.
     pub warnings: Vec<String>,
+    /// The explanations that are left, each with its causes: more than one where the answer is `Confounded`.
+    #[serde(skip)]
+    pub explanations: Vec<Vec<NamedCause>>,
     /// How many of `causes`, from the first, act together in the extended case.
     #[serde(skip)]
     pub acting: usize,
@@ -126,6 +187,29 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Adds causes that explain the records together, unless an explanation by the same is there.
+    pub(super) fn add_explanation(&mut self, causes: Vec<NamedCause>) {
+        let who = |causes: &[NamedCause]| {
+            let mut who: Vec<_> = causes
+                .iter()
+                .map(|cause| {
+                    (
+                        cause.name,
+                        cause.direction,
+                        cause.directions,
+                        cause.channel.clone(),
+                    )
+                })
+                .collect();
+            who.sort_unstable();
+            who
+        };
+        let is_new = self.explanations.iter().all(|known| who(known) != who(&causes));
+        if is_new && !causes.is_empty() {
+            self.explanations.push(causes);
+        }
+    }
+
     /// The names of the causes, each once: a cause that acts along several directions stands in the answer once for each.
     pub fn names(&self) -> Vec<&'static str> {
         let mut names = Vec::new();

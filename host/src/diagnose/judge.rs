@@ -7,7 +7,7 @@ use super::regression::{Regression, Share};
 use super::scene::{Domain, Scene};
 use super::selection::{APART, Scale, Selection, WITHIN_NOISE, names, select};
 use super::views::views;
-use super::{Options, Stage, next_test};
+use super::{Options, Stage};
 use crate::recording::Recording;
 
 /// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
@@ -70,6 +70,7 @@ fn answer(
         lobes: None,
         next_test: None,
         warnings: Vec::new(),
+        explanations: Vec::new(),
         acting: 0,
         views: views(scene, library, selection.best.as_ref()),
     };
@@ -112,14 +113,19 @@ fn answer(
     let uncertain = inflation + scale.coherent;
     diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
+    diagnosis.explanations = vec![diagnosis.causes.clone()];
     for other in &selection.others {
-        for cause in named(scene, library, regression, other, uncertain, confidence) {
+        let causes = named(scene, library, regression, other, uncertain, confidence);
+        diagnosis.add_explanation(causes.clone());
+        for cause in causes {
             if !diagnosis.causes.iter().any(|known| known.name == cause.name) {
                 diagnosis.causes.push(cause);
             }
         }
     }
-    for cause in by_common_factor(scene, library, regression, best, inflation) {
+    let by_factor = by_common_factor(scene, library, regression, best, inflation);
+    diagnosis.add_explanation(by_factor.clone());
+    for cause in by_factor {
         if !diagnosis.causes.iter().any(|known| known.name == cause.name) {
             diagnosis.causes.push(cause);
         }
@@ -148,7 +154,6 @@ fn answer(
                 cause.confidence = cause.confidence.min(share);
             }
         }
-        diagnosis.next_test = Some(next_test::for_group(&group));
         diagnosis.equivalent = vec![group];
     }
     diagnosis.extended = Some(quality(left_held_out));

@@ -116,10 +116,14 @@ pub fn diagnose_watched(
     watch: &dyn Fn(Stage),
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
-    if let Some(diagnosis) = beginning::diagnosed(case, recordings, options, watch) {
-        return Ok(diagnosis);
-    }
-    watch(Stage::Records);
-    let scene = Scene::new(case, recordings)?;
-    Ok(judge::judge(&scene, recordings, options, watch))
+    let mut diagnosis = match beginning::diagnosed(case, recordings, options, watch) {
+        Some(diagnosis) => diagnosis,
+        None => {
+            watch(Stage::Records);
+            let scene = Scene::new(case, recordings)?;
+            judge::judge(&scene, recordings, options, watch)
+        }
+    };
+    diagnosis.next_test = next_test::next_test(case, recordings, &diagnosis);
+    Ok(diagnosis)
 }

@@ -36,7 +36,7 @@ pub fn diagnosis_page(
         }
         @if let Some(test) = &diagnosis.next_test {
             h2 { "The next test" }
-            p { b { (test.kind) } ": " (test.why) "." }
+            p { b { (test.what()) } ": " (test.why) "." }
         }
         h2 { "What is left" }
         p {
