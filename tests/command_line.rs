@@ -4,8 +4,9 @@
 
 use quietcut_tests::command::{cases, folder, quietcut};
 
-const VERBS: [&str; 11] = [
-    "demo", "identify", "simulate", "frf", "lobes", "table", "upload", "info", "work", "monitor", "replay",
+const VERBS: [&str; 13] = [
+    "demo", "identify", "diagnose", "plan", "simulate", "frf", "lobes", "table", "upload", "info", "work",
+    "monitor", "replay",
 ];
 
 /// The commands under "Example:" in the help of a verb.

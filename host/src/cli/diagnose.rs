@@ -34,7 +34,7 @@ pub struct Args {
     /// and the extended case call them.
     #[arg(long, value_name = "FILE")]
     cuts: Option<PathBuf>,
-    /// Seed of whatever is drawn.
+    /// Seed of whatever is drawn; nothing is at present, and the answer does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -97,8 +97,8 @@ fn compare_limits(
     }
 }
 
-/// Stages of a diagnosis, with that of the limits.
-const STAGES: u64 = 7;
+/// Stages of a diagnosis, with that of the limits; those of records are seen a second time where a part of them was searched first.
+const STAGES: u64 = 9;
 
 fn progress_bar() -> ProgressBar {
     let target = if std::io::stderr().is_terminal() {
@@ -153,8 +153,9 @@ fn text(diagnosis: &Diagnosis) -> String {
     for cause in &diagnosis.causes {
         let place = cause
             .channel
-            .as_deref()
-            .or(cause.direction)
+            .clone()
+            .or_else(|| cause.direction.map(String::from))
+            .or_else(|| cause.directions.map(|[one, other]| format!("{one} and {other}")))
             .map_or_else(String::new, |place| format!(" ({place})"));
         lines.push(format!(
             "  {}{place}, confidence {:.2}",
@@ -170,9 +171,11 @@ fn text(diagnosis: &Diagnosis) -> String {
     }
     if let (Some(extended), Some(gain)) = (diagnosis.extended, diagnosis.gain) {
         lines.push(format!(
-            "with it {:.3} % is missed: {:.2} % of the residual's energy is gone",
+            "with it {:.3} % is missed: {:.2} % of the residual's energy is gone, 90 % interval {:.2} to {:.2} %",
             100.0 * extended.nrmse_heldout,
-            100.0 * gain.residual_energy_removed
+            100.0 * gain.residual_energy_removed,
+            100.0 * gain.ci90[0],
+            100.0 * gain.ci90[1]
         ));
     }
     if diagnosis.unexplained.fraction > 0.0 {

@@ -10,6 +10,7 @@ use super::{Error, Output, Range};
 use crate::case::Case;
 use crate::file;
 use crate::lobe_table::{TableRequest, build_table};
+use crate::stability::after;
 
 /// Builds a lobe table for the device from cases, or shows one.
 #[derive(Debug, clap::Args)]
@@ -48,6 +49,9 @@ pub struct Args {
     /// describe, instead of its own; takes minutes.
     #[arg(long, value_name = "P", value_parser = percent, requires = "cases")]
     percentile: Option<f64>,
+    /// The limits after so many seconds of work, of cases that drift or wear.
+    #[arg(long, value_name = "T", value_parser = super::non_negative, allow_negative_numbers = true, requires = "cases")]
+    after_s: Option<f64>,
     /// A table to read back.
     #[arg(long, value_name = "FILE.qct", conflicts_with_all = ["cases", "out"])]
     show: Option<PathBuf>,
@@ -128,12 +132,17 @@ pub fn run(args: Args) -> Result<(), Error> {
     let Some(out) = &args.out else {
         return Err(Error::input("--out FILE.qct says where the table goes"));
     };
-    let cases = args
+    let mut cases = args
         .cases
         .iter()
         .map(Case::read)
         .collect::<Result<Vec<_>, _>>()
         .map_err(Error::input)?;
+    if let Some(after_s) = args.after_s {
+        for case in &mut cases {
+            *case = after(case, after_s)?;
+        }
+    }
     let request = TableRequest {
         rpm: args
             .rpm

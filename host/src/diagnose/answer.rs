@@ -7,6 +7,9 @@ use serde::Serialize;
 use super::lobes::Lobes;
 use super::views::View;
 
+/// A normal deviate is within this many deviations with 90 %.
+pub(super) const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
+
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -63,8 +66,32 @@ pub struct Quality {
 /// What the extension gains.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gain {
-    /// Share of the held-out residual's energy beyond that of the noise that the extension removes.
+    /// Share of the held-out residual's energy beyond that of the noise that the extension removes: 1 − (E_after − n)/(E_before − n), with
+    /// energies in units of the noise and n numbers that are compared.
     pub residual_energy_removed: f64,
+    /// Its 90 % interval: of the same machine, with the noise drawn anew.
+    pub ci90: [f64; 2],
+}
+
+impl Gain {
+    /// Of what the case and the extended case leave of `count` numbers, in units of the noise.
+    ///
+    /// Each energy is that of a signal s² in noise: a non-central χ² with variance 2n + 4s². The noise of both is the same; they are
+    /// taken as independent, which makes the interval wider where both leave much.
+    pub(super) fn new(before: f64, after: f64, count: f64) -> Self {
+        let there = (before - count).max(1e-9 * before);
+        let left = (after - count) / there;
+        let variance = |energy: f64| 2.0 * count + 4.0 * (energy - count).max(0.0);
+        let deviation = (variance(after) + left * left * variance(before)).sqrt() / there;
+        let removed = (1.0 - left).min(1.0);
+        Self {
+            residual_energy_removed: removed,
+            ci90: [
+                removed - NINETY_PERCENT * deviation,
+                (removed + NINETY_PERCENT * deviation).min(1.0),
+            ],
+        }
+    }
 }
 
 /// What is left.

@@ -2,7 +2,7 @@
 //!
 //! A search computes its records hundreds of times, and a random excitation or a cut at one speed tells in its first seconds what
 //! it tells in a minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of
-//! the whole records as of their beginnings.
+//! the whole records as of their beginnings; and what it gains is told of the rest alone, which nothing was fitted to.
 
 use std::ops::Range;
 
@@ -24,11 +24,12 @@ const TURNS: f64 = 24.0;
 /// Records are shortened where that leaves less than this share of them.
 const WORTH: f64 = 0.5;
 
-/// The beginnings of records, all of them of random forces or of cuts at one speed; `None` where they are too short to be shortened.
-fn beginnings(case: &Case, recordings: &[Recording]) -> Option<Vec<Recording>> {
+/// The beginnings of records, all of them of random forces or of cuts at one speed, and what comes after them; `None` where they are
+/// too short to be shortened.
+fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
     let all: usize = recordings.iter().map(Recording::len).sum();
-    let shortened: Vec<Recording> = recordings
+    let (shortened, rest): (Vec<Recording>, Vec<Recording>) = recordings
         .iter()
         .map(|recording| {
             let turns_s = turns_s(recording)?;
@@ -38,11 +39,12 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<Vec<Recording>> {
             let least = samples((PERIODS / lowest_hz).max(turns_s));
             let count = (SEARCHED / recordings.len()).max(least);
             let to = (from + count).min(recording.len());
-            Some(beginning(recording, to.saturating_sub(count)..to))
+            let from = to.saturating_sub(count);
+            Some((part(recording, from..to), part(recording, to..recording.len())))
         })
         .collect::<Option<_>>()?;
     let left: usize = shortened.iter().map(Recording::len).sum();
-    ((left as f64) < WORTH * all as f64).then_some(shortened)
+    ((left as f64) < WORTH * all as f64).then_some([shortened, rest])
 }
 
 /// How long the turns take that the beginning of a record must hold: none of a shaker; `None` of what is not shortened.
@@ -54,7 +56,7 @@ fn turns_s(recording: &Recording) -> Option<f64> {
     }
 }
 
-fn beginning(recording: &Recording, range: Range<usize>) -> Recording {
+fn part(recording: &Recording, range: Range<usize>) -> Recording {
     let channels = recording.channels.iter().map(|channel| Channel {
         samples: channel.samples[range.clone()].to_vec(),
         ..channel.clone()
@@ -75,15 +77,12 @@ pub(super) fn diagnosed(
     options: &Options,
     watch: &dyn Fn(Stage),
 ) -> Option<Diagnosis> {
-    let beginnings = beginnings(case, recordings)?;
+    let [beginnings, rest] = beginnings(case, recordings)?;
     let scene = Scene::new(case, &beginnings).ok()?;
     let mut diagnosis = judge::judge(&scene, &beginnings, options, watch);
     drop(scene);
     watch(Stage::Records);
     let believed = Left::of(case, recordings)?;
-    diagnosis.baseline = Quality {
-        nrmse_heldout: believed.missed,
-    };
     let searched_s = beginnings
         .iter()
         .map(|record| record.len() as f64 / record.sample_rate_hz);
@@ -104,14 +103,16 @@ pub(super) fn diagnosed(
     {
         return None;
     }
+    let unseen = Left::of(case, &rest)?;
+    diagnosis.baseline = Quality {
+        nrmse_heldout: unseen.missed,
+    };
     if diagnosis.outcome != Outcome::None {
+        let left = Left::of(&extended, &rest)?;
         diagnosis.extended = Some(Quality {
-            nrmse_heldout: explained.missed,
+            nrmse_heldout: left.missed,
         });
-        let there = (believed.energy - believed.count).max(1e-9 * believed.energy);
-        diagnosis.gain = Some(Gain {
-            residual_energy_removed: (1.0 - beyond / there).min(1.0),
-        });
+        diagnosis.gain = Some(Gain::new(unseen.energy, left.energy, left.count));
     }
     Some(diagnosis)
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::case::CaseError;
 use crate::recording::RecordingError;
-use crate::simulate::{EffectError, SimulateError};
+use crate::simulate::SimulateError;
 
 /// What is wrong with case or recordings.
 #[derive(Debug, thiserror::Error)]
@@ -47,15 +47,6 @@ impl DiagnoseError {
     pub(super) fn simulate(path: &std::path::Path, error: impl Into<SimulateError>) -> Self {
         Self::Simulate {
             path: path.into(),
-            error: error.into(),
-        }
-    }
-}
-
-impl From<EffectError> for DiagnoseError {
-    fn from(error: EffectError) -> Self {
-        Self::Simulate {
-            path: PathBuf::new(),
             error: error.into(),
         }
     }

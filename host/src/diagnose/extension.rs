@@ -67,7 +67,7 @@ impl Diagnosis {
     }
 
     /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each cause that acts, and
-    /// standard deviations of its parameters as comments. `None` where nothing was found.
+    /// the 90 % intervals of its parameters as comments. `None` where nothing was found.
     ///
     /// Where causes are confounded, those named first are taken.
     pub fn extended_case(&self, case_text: &str) -> Option<String> {

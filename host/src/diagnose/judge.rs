@@ -83,11 +83,7 @@ fn answer(
         _ => LEFT_OF_RESPONSE,
     };
     if of_noise > WITHIN_NOISE {
-        diagnosis.unexplained = Unexplained {
-            fraction: of_excess,
-            place: super::leftover::describe(scene),
-            guess: None,
-        };
+        diagnosis.unexplained.fraction = of_excess;
     }
     let Some(best) = selection
         .best
@@ -95,11 +91,17 @@ fn answer(
         .filter(|_| of_noise <= WITHIN_NOISE || of_excess <= allowed)
     else {
         if of_noise > WITHIN_NOISE {
+            // What was tried and is not believed takes nothing off.
+            diagnosis.views = views(scene, library, None);
+            diagnosis.unexplained.place = super::leftover::describe(&diagnosis.views);
             diagnosis.outcome = Outcome::Unexplained;
             diagnosis.unexplained.guess = super::guess::guess(scene, regression);
         }
         return diagnosis;
     };
+    if of_noise > WITHIN_NOISE {
+        diagnosis.unexplained.place = super::leftover::describe(&diagnosis.views);
+    }
     let left_held_out = scale.left_held_out(library, regression, best);
     diagnosis.outcome = Outcome::Cause;
     let chance = 5.0 * (2.0 / regression.count(Share::Whole).max(1) as f64).sqrt() + REJECTED;
@@ -157,10 +159,7 @@ fn answer(
         diagnosis.equivalent = vec![group];
     }
     diagnosis.extended = Some(quality(left_held_out));
-    let there = (held_out - count).max(1e-9 * held_out);
-    diagnosis.gain = Some(Gain {
-        residual_energy_removed: (1.0 - (left_held_out - count) / there).min(1.0),
-    });
+    diagnosis.gain = Some(Gain::new(held_out, left_held_out, count));
     diagnosis
 }
 

@@ -2,15 +2,12 @@
 
 use nalgebra::DMatrix;
 
-use super::answer::{Figure, NamedCause};
+use super::answer::{Figure, NINETY_PERCENT, NamedCause};
 use super::cause::{Part, Place};
 use super::evidence::{Explanation, Library};
 use super::regression::{Regression, Share};
 use super::scene::{Domain, Scene, direction_of};
 use super::selection::APART;
-
-/// A normal deviate is within this many deviations with 90 %.
-const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
 
 /// The causes of an explanation.
 pub(super) fn named(

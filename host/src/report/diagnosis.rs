@@ -55,7 +55,7 @@ pub fn diagnosis_page(
             ul { @for warning in &diagnosis.warnings { li { (warning) } } }
         }
         footer {
-            "Residuals are taken along the measured motion; free decays and offsets of sensors are fitted and taken out; noise is taken to be white, at the floor of what the model leaves. Intervals are 90 %."
+            "Residuals are taken along the measured motion; free decays and offsets of sensors are fitted and taken out; noise of sensors is taken to be white, at the floor of what the model leaves, that of measured forces goes through the receptance. Intervals are 90 %."
         }
     };
     Ok(page("Diagnosis", &body))
@@ -81,8 +81,9 @@ fn verdict(case_name: &str, diagnosis: &Diagnosis) -> Markup {
         }
         @if let (Some(extended), Some(gain)) = (diagnosis.extended, diagnosis.gain) {
             (format!(
-                " On what was held out it misses {}; with the extension {}: {:.1} % of the residual's energy beyond the noise is gone.",
-                percent(diagnosis.baseline.nrmse_heldout), percent(extended.nrmse_heldout), 100.0 * gain.residual_energy_removed
+                " On what was held out it misses {}; with the extension {}: {:.1} % of the residual's energy beyond the noise is gone (90 % interval {:.1} to {:.1} %).",
+                percent(diagnosis.baseline.nrmse_heldout), percent(extended.nrmse_heldout), 100.0 * gain.residual_energy_removed,
+                100.0 * gain.ci90[0], 100.0 * gain.ci90[1]
             ))
         } @else {
             (format!(" On what was held out it misses {}.", percent(diagnosis.baseline.nrmse_heldout)))

@@ -1,5 +1,9 @@
 //! Mass, stiffness and damping that differ from the case.
 //!
+//! Shows: a receptance that differs and does not depend on amplitude: above resonance for mass, below it for stiffness, at it for
+//! damping. Does not show: harmonics, or lines where nothing drives. All three by one factor are a gain of the only channel.
+//! Fit: linear in the relative change. Source: the output-error equation of Pintelon and Schoukens, System Identification (2012).
+//!
 //! With H the receptance and θ the relative change of the parameter, x = H(θ) F, and where Z = H⁻¹ is linear in θ (every
 //! structure of mass, damping and stiffness) the residual along the *measured* motion is exact for changes of any size:
 //! x − H F = −θ H (∂Z/∂θ) x = θ (∂H/∂θ) F_eff with F_eff = H⁻¹ x. Where H nearly vanishes (between two modes) F_eff would be

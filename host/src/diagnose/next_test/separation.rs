@@ -4,11 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::experiment::{Bench, Experiment, Reading, Sensors};
 use crate::case::Case;
-use crate::diagnose::answer::{Figure, NamedCause};
+use crate::diagnose::answer::{Figure, NINETY_PERCENT, NamedCause};
 use crate::diagnose::extension::joined;
 
-/// Half a 90 % interval over its standard deviation.
-const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
 /// The least step of a parameter by which readings are differenced, as a share of it: the simulation is exact to 1e-9.
 const LEAST_STEP: f64 = 1e-4;
 

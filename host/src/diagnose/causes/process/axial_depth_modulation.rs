@@ -1,4 +1,7 @@
-//! The depth of cut follows the axial vibration, b = b₀ − z (thesis eq. 3.5): it does, or it does not.
+//! The depth of cut follows the axial vibration, b = b₀ − z: it does, or it does not.
+//!
+//! Shows: forces in the rhythm of z, with edges that are not at 90°. Does not show: anything where z is stiff or the edge angle is 90°.
+//! Fit: no parameter; the coefficient of the change must come out near 1. Source: thesis, eq. 3.5.
 
 use super::{changed, everywhere, has_axial};
 use crate::diagnose::cause::{Cause, Parameter, Place, Regressor};

@@ -1,6 +1,9 @@
 //! The force is not in proportion to the chip: F = K·b·h₀·(h/h₀)^p.
 //!
-//! With a chip h* to measure by, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*): the coefficients are p − 1 and q, and
+//! Shows: at two feeds, or over the chips of one tooth pass, a force that grows less than the chip. Does not show: anything but other
+//! coefficients at one chip. Source: Kienzle, VDI-Z 94 (1952).
+//!
+//! Fit: with a chip h* to measure by, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*): the coefficients are p − 1 and q, and
 //! their regressors are exact at the shape (p, q) that they are made for.
 
 use super::{added, changed, cutter, everywhere, step};

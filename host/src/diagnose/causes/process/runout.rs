@@ -1,4 +1,8 @@
-//! Runout: tooth j on the radius R + e·cos(ψ + 2πj/N), with the coefficients e cos ψ and −e sin ψ.
+//! Runout: tooth j on the radius R + e·cos(ψ + 2πj/N).
+//!
+//! Shows: lines at the spindle order 1 and its multiples between those of the teeth, from the first tooth on. Does not show: growth, or
+//! lines that are not of the spindle. A flip of an even number of teeth has the same lines once it no longer grows.
+//! Fit: linear in e cos ψ and −e sin ψ. Source: Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983).
 
 use std::f64::consts::TAU;
 

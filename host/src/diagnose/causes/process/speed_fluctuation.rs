@@ -1,6 +1,9 @@
 //! The spindle does not turn steadily: Ω = Ω₀(1 + δ·sin(2πf_m t + ψ)).
 //!
-//! The tachometer says how: the swing that comes nearest to its edges is looked for up to half a swing per turn. The force
+//! Shows: in the tachometer, and as side lines of the tooth lines at ± f_m. Does not show: anything in records without a tachometer that
+//! drift of the structure could not. Source: Sexton, Milne and Stone (1977); Insperger and Stépán, J. Vib. Control 10 (2004).
+//!
+//! Fit: the tachometer says how: the swing that comes nearest to its edges is looked for up to half a swing per turn. The force
 //! with that swing less the one at steady speed then has the coefficient 1: that it is near 1 is what the record confirms; how
 //! large the swing is, the tachometer knows better.
 

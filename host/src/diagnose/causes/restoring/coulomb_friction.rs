@@ -1,5 +1,10 @@
-//! f_r += fc·sign(v), alike for both ways or another force for each. Seen at low levels: sticking, and damping that falls with
-//! amplitude.
+//! f_r += fc·sign(v), alike for both ways or another force for each; sticking included.
+//!
+//! Shows: damping that falls as 1/amplitude, rest between moves at low levels, odd harmonics that fall slowly with their order. Does
+//! not show: a frequency that moves while it slips, or anything at large amplitudes. A Bouc-Wen loop with very stiff pre-slip is the
+//! same.
+//! Fit: linear in fc along the motion, sticking in the simulation. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica
+//! 30 (1994).
 
 use super::{Restoring, largest_m, plain};
 use crate::diagnose::scene::Domain;

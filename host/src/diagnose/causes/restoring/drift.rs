@@ -1,4 +1,8 @@
-//! Stiffness that moves with time: K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))). Seen in long records.
+//! Stiffness that moves with time: K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))).
+//!
+//! Shows: frequencies that move along the record at one amplitude, all by the same share. Does not show: harmonics, or a dependence on
+//! amplitude where levels come in any order. Levels that only rise or fall with time imitate it.
+//! Fit: linear in r or a, T as a shape. Source: structures with parameters of time as in Poulimenos and Fassois, MSSP 20 (2006).
 
 use super::{Restoring, logarithmic, longest_s, plain};
 

@@ -1,4 +1,8 @@
-//! Bouc–Wen: f_r += k_h·(z − x), ż = v·(1 − |z/z_y|ⁿ(γ·sgn(vz) + β)). Seen as loops that do not depend on speed.
+//! Bouc–Wen: f_r += k_h·(z − x), ż = v·(1 − |z/z_y|ⁿ(γ·sgn(vz) + β)).
+//!
+//! Shows: loops of force over displacement that do not depend on speed; stiffness that falls and damping that rises and falls again
+//! with amplitude. Does not show: even harmonics. At large slip it is friction and less stiffness.
+//! Fit: linear in k_h for each shape (z_y, n, γ). Source: Wen, J. Eng. Mech. Div. ASCE 102 (1976).
 
 use super::{Restoring, largest_m, logarithmic, plain, smallest_m};
 

@@ -1,4 +1,8 @@
-//! A potential shared by two directions: ½·k_xxyy·x²y² or k_xxy·x²y. Seen where both move.
+//! A potential shared by two directions: ½·k_xxyy·x²y² or k_xxy·x²y; each direction gets its derivative.
+//!
+//! Shows: only where both directions move; sums and differences of their frequencies, a stiffness of one that moves with the
+//! amplitude of the other. Does not show: anything where one of them rests.
+//! Fit: linear. Source: Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 6.
 
 use super::{Restoring, plain};
 

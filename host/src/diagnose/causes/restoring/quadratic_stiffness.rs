@@ -1,4 +1,8 @@
-//! f_r += k2·x². Seen as a second harmonic and an offset.
+//! f_r += k2·x².
+//!
+//! Shows: a second harmonic and an offset, both as x². Does not show: a frequency that moves to first order, or odd harmonics. A cubic
+//! spring under a static load has the same term.
+//! Fit: linear in k2. Source: Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2.
 
 use super::{Restoring, plain};
 

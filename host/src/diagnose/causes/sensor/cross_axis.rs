@@ -1,4 +1,8 @@
 //! A channel that sees another direction too: y = y_t + p·(the other direction).
+//!
+//! Shows: what the other direction does, at once and without a phase, also where only that is driven. Does not show: anything where the
+//! other direction rests. A cross receptance would be reciprocal.
+//! Fit: linear in p. Source: transverse sensitivity as in McConnell and Varoto, Vibration Testing (2008).
 
 use num_complex::Complex64;
 

@@ -1,4 +1,8 @@
 //! A channel that is late: y(t) = y_t(t − τ), so that y − ŷ = y(t) − y(t + τ), which is −τ·ẏ while the delay is short.
+//!
+//! Shows: a phase in proportion to frequency over a band. Does not show: a change of amplitude; in a narrow band it is damping. Without a
+//! force or another channel to be late against it cannot be seen.
+//! Fit: τ as a shape, exact for delays of any length. Source: McConnell and Varoto, Vibration Testing (2008).
 
 use num_complex::Complex64;
 
