@@ -264,7 +264,7 @@ impl Cause {
     /// True where a machine and a rig can have it at all.
     pub(crate) fn possible(kind: Kind, machine: &Machine) -> bool {
         match kind {
-            Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::CommonFactor | Kind::Drift => !machine.modal,
+            Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::Drift => !machine.modal,
             Kind::ModeCoupling | Kind::CrossAxis => machine.axes.len() >= 2,
             Kind::SensorOffsetByMode => machine.modal,
             _ => true,
@@ -348,6 +348,12 @@ impl Cause {
             Kind::Mass => machine.mass[(a, a)] = value,
             Kind::Stiffness => machine.stiffness[(a, a)] = value,
             Kind::Damping => machine.damping[(a, a)] = value,
+            // Modes are of all directions: so is their factor.
+            Kind::CommonFactor if machine.modal => {
+                machine.mass *= value;
+                machine.damping *= value;
+                machine.stiffness *= value;
+            }
             Kind::CommonFactor => {
                 machine.mass[(a, a)] *= value;
                 machine.damping[(a, a)] *= value;

@@ -65,6 +65,42 @@ fn a_gain_cannot_be_seen_in_the_decay_of_a_linear_machine() {
 }
 
 #[test]
+fn a_gain_of_one_of_two_sensors_is_one_of_the_other_where_nobody_knows_the_start() {
+    let (mut tried, mut seed) = (0, 0);
+    while tried < 2 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        seed += 1;
+        let machine = Machine::draw(&mut random, 1);
+        let rig = Rig::draw(&mut random, Test::FreeDecay, &machine);
+        if rig.sensors.len() != 2 {
+            continue;
+        }
+        tried += 1;
+        let bench = Bench { machine, rig };
+        let sigma = percent(&bench, None);
+        let expected = BTreeSet::from(["sensor-gain"]);
+        assert_eq!(verdict(&bench, &sigma, &gain(0)), Verdict::Equivalent(expected));
+    }
+}
+
+#[test]
+fn a_gain_of_the_only_channel_of_modes_is_one_factor_too() {
+    for seed in 0.. {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let machine = Machine::draw(&mut random, 1);
+        let rig = Rig::draw(&mut random, Test::Shaker, &machine);
+        if !machine.modal || rig.sensors.len() != 1 || rig.sensors[0].at_housing {
+            continue;
+        }
+        let bench = Bench { machine, rig };
+        let sigma = percent(&bench, None);
+        let expected = BTreeSet::from(["sensor-gain", "mass", "stiffness", "damping"]);
+        assert_eq!(verdict(&bench, &sigma, &gain(0)), Verdict::Equivalent(expected));
+        return;
+    }
+}
+
+#[test]
 fn a_common_gain_of_a_steady_cut_without_force_is_a_factor_of_the_force() {
     for seed in [0, 2] {
         let bench = CutBench::draw(&mut ChaCha8Rng::seed_from_u64(seed), false);

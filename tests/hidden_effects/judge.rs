@@ -20,7 +20,7 @@ const APART: f64 = 60.0;
 pub(crate) enum Verdict {
     /// The hidden cause is like no other.
     Separable,
-    /// These names and no others explain the records equally well.
+    /// These names and no others explain the records equally well; one name alone, at several places.
     Equivalent(BTreeSet<&'static str>),
     /// Nobody can see the effect.
     Invisible,
@@ -271,6 +271,8 @@ impl<'a> Judge<'a> {
         }
         let truth = self.of(std::slice::from_ref(hidden));
         let mut same: BTreeSet<&'static str> = hidden.kind.names().iter().copied().collect();
+        // The same kind in another direction or sensor.
+        let mut elsewhere = false;
         let mut kinds = self.lab.kinds();
         if matches!(hidden.kind, Kind::SensorGain | Kind::SensorOffset) {
             kinds.extend([Kind::CommonFactor, Kind::CommonForce]);
@@ -293,13 +295,14 @@ impl<'a> Judge<'a> {
                     return Verdict::Borderline;
                 }
                 if left < SAME {
+                    elsewhere |= kind == hidden.kind;
                     same.extend(self.lab.names(kind));
                 } else if left < APART {
                     return Verdict::Borderline;
                 }
             }
         }
-        if same.len() == hidden.kind.names().len() {
+        if same.len() == hidden.kind.names().len() && !elsewhere {
             Verdict::Separable
         } else {
             Verdict::Equivalent(same)

@@ -151,12 +151,10 @@ fn text(diagnosis: &Diagnosis) -> String {
         .into(),
     );
     for cause in &diagnosis.causes {
-        let place = cause
-            .channel
-            .clone()
-            .or_else(|| cause.direction.map(String::from))
-            .or_else(|| cause.directions.map(|[one, other]| format!("{one} and {other}")))
-            .map_or_else(String::new, |place| format!(" ({place})"));
+        let place = match cause.place() {
+            place if place.is_empty() => place,
+            place => format!(" ({place})"),
+        };
         lines.push(format!(
             "  {}{place}, confidence {:.2}",
             cause.name, cause.confidence

@@ -56,6 +56,18 @@ pub struct NamedCause {
     pub extension: toml::Table,
 }
 
+impl NamedCause {
+    /// Its direction, directions or channel, as far as it has them.
+    pub fn place(&self) -> String {
+        let directions = self.directions.map(|[one, other]| format!("{one} and {other}"));
+        let channel = self.channel.clone();
+        channel
+            .or(self.direction.map(String::from))
+            .or(directions)
+            .unwrap_or_default()
+    }
+}
+
 /// How well a model predicts what it was not fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
@@ -214,20 +226,21 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Adds causes that explain the records together, unless an explanation by the same is there.
-    pub(super) fn add_explanation(&mut self, causes: Vec<NamedCause>) {
+    /// Adds causes that explain the records together as well as those that act: each name once, or where it is the same names at
+    /// `other_places`, each place once.
+    pub(super) fn add_rival(&mut self, causes: Vec<NamedCause>, other_places: bool) {
+        for cause in &causes {
+            let is_known = self.causes.iter().any(|known| {
+                let same_place = known.place() == cause.place();
+                known.name == cause.name && (same_place || !other_places)
+            });
+            if !is_known {
+                self.causes.push(cause.clone());
+            }
+        }
         let who = |causes: &[NamedCause]| {
-            let mut who: Vec<_> = causes
-                .iter()
-                .map(|cause| {
-                    (
-                        cause.name,
-                        cause.direction,
-                        cause.directions,
-                        cause.channel.clone(),
-                    )
-                })
-                .collect();
+            let who = causes.iter().map(|cause| (cause.name, cause.place()));
+            let mut who: Vec<_> = who.collect();
             who.sort_unstable();
             who
         };

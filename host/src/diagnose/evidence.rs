@@ -408,16 +408,14 @@ impl Library {
             .collect()
     }
 
-    /// What is left if one factor on mass, stiffness and damping along `axis` stands for everything, and that factor less one.
-    pub fn common_factor(&self, regression: &Regression, axis: usize) -> Option<(f64, f64)> {
+    /// What is left if one factor on mass, stiffness and damping at `place` stands for everything, and that factor less one.
+    pub fn common_factor(&self, regression: &Regression, place: &Place) -> Option<(f64, f64)> {
         let columns: Vec<usize> = ["mass", "stiffness", "damping"]
             .iter()
             .map(|name| {
                 self.candidates
                     .iter()
-                    .position(|known| {
-                        self.causes[known.cause].name() == *name && known.place == Place::Axis(axis)
-                    })
+                    .position(|known| self.causes[known.cause].name() == *name && known.place == *place)
                     .map(|index| self.candidates[index].shapes[0].1[0])
             })
             .collect::<Option<_>>()?;

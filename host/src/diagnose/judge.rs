@@ -116,27 +116,16 @@ fn answer(
     diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
     diagnosis.explanations = vec![diagnosis.causes.clone()];
+    let who = names(library, best);
     for other in &selection.others {
         let causes = named(scene, library, regression, other, uncertain, confidence);
-        diagnosis.add_explanation(causes.clone());
-        for cause in causes {
-            if !diagnosis.causes.iter().any(|known| known.name == cause.name) {
-                diagnosis.causes.push(cause);
-            }
-        }
+        diagnosis.add_rival(causes, names(library, other) == who);
     }
     let by_factor = by_common_factor(scene, library, regression, best, inflation);
-    diagnosis.add_explanation(by_factor.clone());
-    for cause in by_factor {
-        if !diagnosis.causes.iter().any(|known| known.name == cause.name) {
-            diagnosis.causes.push(cause);
-        }
-    }
+    diagnosis.add_rival(by_factor, false);
     if diagnosis.causes.len() > diagnosis.acting {
-        diagnosis.outcome = Outcome::Confounded;
-        let shared: Vec<&str> = diagnosis.causes[..diagnosis.acting]
-            .iter()
-            .map(|cause| cause.name)
+        let shared: Vec<&'static str> = who
+            .into_iter()
             .filter(|name| {
                 !selection.others.is_empty()
                     && selection
@@ -145,22 +134,31 @@ fn answer(
                         .all(|other| names(library, other).contains(name))
             })
             .collect();
-        let group: Vec<&'static str> = diagnosis
-            .names()
-            .into_iter()
-            .filter(|name| !shared.contains(name))
-            .collect();
-        let share = 1.0 / group.len().max(1) as f64;
-        for cause in &mut diagnosis.causes {
-            if group.contains(&cause.name) {
-                cause.confidence = cause.confidence.min(share);
-            }
-        }
-        diagnosis.equivalent = vec![group];
+        confound(&mut diagnosis, &shared);
     }
     diagnosis.extended = Some(quality(left_held_out));
     diagnosis.gain = Some(Gain::new(held_out, left_held_out, count));
     diagnosis
+}
+
+/// Makes the names that not all explanations have one group, of which none is surer than the others; where all have the same names at
+/// other places, those that are at other places.
+fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
+    diagnosis.outcome = Outcome::Confounded;
+    let mut group = diagnosis.names();
+    group.retain(|name| !shared.contains(name));
+    if group.is_empty() {
+        let elsewhere = &diagnosis.causes[diagnosis.acting..];
+        group = diagnosis.names();
+        group.retain(|name| elsewhere.iter().any(|cause| cause.name == *name));
+    }
+    let share = 1.0 / group.len().max(diagnosis.explanations.len()) as f64;
+    for cause in &mut diagnosis.causes {
+        if group.contains(&cause.name) {
+            cause.confidence = cause.confidence.min(share);
+        }
+    }
+    diagnosis.equivalent = vec![group];
 }
 
 /// From the distance to the next explanation, and from what is left as a share of what is allowed.

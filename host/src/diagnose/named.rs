@@ -93,8 +93,13 @@ pub(super) fn by_common_factor(
         Some(fit) => fit.left,
         None => best.fit.left,
     };
-    for axis in scene.driven_axes() {
-        let Some((left, change)) = library.common_factor(regression, axis) else {
+    let places: Vec<Place> = if scene.has_modes() {
+        vec![Place::Everywhere]
+    } else {
+        scene.driven_axes().into_iter().map(Place::Axis).collect()
+    };
+    for place in places {
+        let Some((left, change)) = library.common_factor(regression, &place) else {
             continue;
         };
         if (left - along) / inflation > APART {
@@ -105,15 +110,18 @@ pub(super) fn by_common_factor(
         return library
             .candidates
             .iter()
-            .filter(|known| known.place == Place::Axis(axis))
+            .filter(|known| known.place == place)
             .filter_map(|known| {
                 let cause = &*library.causes[known.cause];
                 if !["mass", "stiffness", "damping"].contains(&cause.name()) {
                     return None;
                 }
-                let parameters = cause.parameters(scene, &known.place, &[], &[change])?;
+                let of = |change: f64| cause.parameters(scene, &known.place, &[], &[change]);
+                let parameters = of(change)?;
                 let (key, value) = *parameters.first()?;
-                let scale = value / (1.0 + change);
+                // Linear in the change.
+                let (_, beyond) = *of(change + 1.0)?.first()?;
+                let scale = beyond - value;
                 let extension = cause.extension(&known.place, &parameters);
                 Some(NamedCause {
                     parameters: [(key, figure(value, scale * deviation))].into(),

@@ -394,11 +394,10 @@ pub(super) fn select(
         {
             continue;
         }
-        let who = names(library, best);
         let rivals: Vec<&Explanation> = found
             .iter()
             .chain(&earlier)
-            .filter(|other| other.freedoms <= best.freedoms && names(library, other) != who)
+            .filter(|other| is_rival(library, best, other))
             .collect();
         let behind = |other: &Explanation| gained - scale.gain(regression, other, inflation);
         selection.gained = gained - reached;
@@ -414,6 +413,15 @@ pub(super) fn select(
         selection.best = Some(best.clone());
     }
     selection
+}
+
+/// True of an explanation by other causes that has no more parameters than `best`, or by the same causes at other places that has as
+/// many.
+fn is_rival(library: &Library, best: &Explanation, other: &Explanation) -> bool {
+    if names(library, other) != names(library, best) {
+        return other.freedoms <= best.freedoms;
+    }
+    other.freedoms == best.freedoms && !library.are_at_same_places(best, other)
 }
 
 fn tell(

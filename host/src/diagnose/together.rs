@@ -43,6 +43,18 @@ impl Library {
         causes(one) == causes(other)
     }
 
+    /// True of explanations by the same causes at the same places.
+    pub fn are_at_same_places(&self, one: &Explanation, other: &Explanation) -> bool {
+        let is_in = |choice: &Choice, of: &Explanation| {
+            let known = &self.candidates[choice.candidate];
+            of.choices.iter().any(|other| {
+                let other = &self.candidates[other.candidate];
+                other.cause == known.cause && other.place == known.place
+            })
+        };
+        one.choices.len() == other.choices.len() && one.choices.iter().all(|choice| is_in(choice, other))
+    }
+
     /// True of a cubic spring beside softening and hardening, which has one, and of a gain beside a ratio for each mode of the same
     /// channel: between the two nothing would be determined.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
