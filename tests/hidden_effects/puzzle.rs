@@ -111,7 +111,7 @@ impl Puzzle {
         let cutting = match family {
             Family::CuttingWithForce => Some(true),
             Family::CuttingWithoutForce => Some(false),
-            Family::Nothing if random.random::<f64>() < 0.4 => Some(random.random()),
+            Family::Nothing | Family::TwoEffects if random.random::<f64>() < 0.4 => Some(random.random()),
             _ => None,
         };
         let bench = match cutting {
@@ -121,8 +121,7 @@ impl Puzzle {
                     Family::Shaker => Test::Shaker,
                     Family::Sweep => Test::Sweep,
                     Family::FreeDecay => Test::FreeDecay,
-                    Family::Nothing => *[Test::Shaker, Test::Sweep, Test::FreeDecay].choose(random)?,
-                    _ => *[Test::Shaker, Test::Sweep].choose(random)?,
+                    _ => *[Test::Shaker, Test::Sweep, Test::FreeDecay].choose(random)?,
                 };
                 // Two directions cost the judge several times as much; a third of the machines have them.
                 let directions = if random.random::<f64>() < 0.35 { 2 } else { 1 };
