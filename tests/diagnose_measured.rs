@@ -110,6 +110,16 @@ fn the_silverbox_has_a_cubic_spring() {
     let k3 = found.causes[0].parameters["k3_n_per_m3"].value;
     assert!((k3 / 3.99 - 1.0).abs() < 0.02, "{k3}");
     not_again(&believed, &found, std::slice::from_ref(&train));
+    // As an extension it may not be named a second time; as a term of the structure it could be.
+    let inside = ask(
+        &format!("{believed}cubic_stiffness = [[{k3:e}]]\n"),
+        std::slice::from_ref(&train),
+    );
+    assert!(
+        !names(&inside).contains(&"cubic-stiffness"),
+        "{:?}",
+        names(&inside)
+    );
 
     // The arrow is not part of the record above.
     let arrow = 40_585;
