@@ -114,8 +114,13 @@ fn requirements(reports: &[Report]) -> Vec<Wanted> {
 fn a_part_of_the_campaign() {
     let part = [
         (Family::Shaker, 0..4),
+        (Family::Sweep, 0..2),
+        (Family::FreeDecay, 0..2),
+        (Family::CuttingWithForce, 0..1),
+        (Family::CuttingWithoutForce, 0..1),
         (Family::Nothing, 0..3),
         (Family::NotInLibrary, 0..1),
+        (Family::TwoEffects, 0..1),
     ];
     for (family, seeds) in part {
         let report = Report::run(family, seeds, &ask);

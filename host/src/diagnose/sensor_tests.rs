@@ -1,13 +1,14 @@
-//! Sensors away from the tool: of each mode they read a share of their own.
+//! Sensors away from the tool, of each mode of which they read a share of their own; and gains that cannot be told from something else.
 
 use std::path::Path;
 
 use super::answer::Outcome;
-use super::tests::recorded_of;
+use super::tests::{believed, recorded_of};
 use super::{Diagnosis, Options, diagnose};
 use crate::case::Case;
-use crate::recording::{RecordedChannel, Recording};
-use crate::simulate::rig::Signal;
+use crate::recording::{Quantity, RecordedChannel, Recording};
+use crate::simulate::Effects;
+use crate::simulate::rig::{Noise, Rig, Signal};
 use crate::structure::Direction;
 
 /// Two modes along x, 100 kg at 20 Hz and 120 kg at 34 Hz: left = −1/(2 m ω_d).
@@ -111,4 +112,68 @@ ratio = [0.9, 0.8]
     let modes = Case::parse(Path::new("modes.toml"), BELIEVED).unwrap();
     let error = diagnose(&case, &records(&modes, &[]), &Options::default()).unwrap_err();
     assert!(error.to_string().contains("one is needed"), "{error}");
+}
+
+#[test]
+fn a_gain_of_the_only_channel_of_modes_is_one_factor_of_them() {
+    let case = Case::parse(Path::new("believed.toml"), BELIEVED).unwrap();
+    let signal = Signal::Sweep {
+        first_hz: 12.0,
+        last_hz: 45.0,
+        amplitude_n: 10.0,
+        seconds: 10.0,
+    };
+    let record = recorded_of(&case, Direction::X, signal, 512.0, &["sensor-gain=1.1"], 3);
+    let answer = diagnose(&case, &[record], &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Confounded, "{:?}", answer.names());
+    let mut group = answer.equivalent[0].clone();
+    group.sort_unstable();
+    assert_eq!(group, ["damping", "mass", "sensor-gain", "stiffness"]);
+    let mass = answer.causes.iter().find(|cause| cause.name == "mass").unwrap();
+    let change = mass.parameters["relative_change"];
+    // x/1.1 = H·F.
+    assert!((change.value - (1.0 / 1.1 - 1.0)).abs() < 2e-3, "{change:?}");
+}
+
+#[test]
+fn of_two_sensors_that_disagree_nobody_knows_which_is_wrong() {
+    let case = believed();
+    let pull_s = 2.5;
+    let signal = Signal::Release {
+        force_n: 300.0,
+        pull_s,
+        seconds: 8.0,
+    };
+    let rig = Rig {
+        measured: vec![Quantity::Displacement, Quantity::Acceleration],
+        effects: Effects::parse(["sensor-gain=1.2", "sensor-gain.channel=x"]).unwrap(),
+        ..Rig::new(Direction::X, signal, 256.0)
+    };
+    let (mut record, _) = rig
+        .record(case.structure().unwrap(), Path::new("decay.csv"))
+        .unwrap();
+    let noise = Noise {
+        relative: 0.01,
+        ..Noise::default()
+    };
+    noise.add(&mut record, 5);
+    record.channels.retain(|channel| channel.name != "fx");
+    // At the release itself the acceleration jumps: the record begins after it.
+    for channel in &mut record.channels {
+        channel.samples.drain(..=(1.2 * pull_s * 256.0) as usize);
+    }
+    record.sidecar.input = None;
+    let answer = diagnose(&case, &[record], &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Confounded, "{:?}", answer.causes);
+    assert_eq!(answer.equivalent, [["sensor-gain"]]);
+    let gain_of = |channel: &str| {
+        let of = |cause: &&crate::diagnose::answer::NamedCause| cause.channel.as_deref() == Some(channel);
+        answer.causes.iter().find(of).unwrap().parameters["gain"].value
+    };
+    assert!((gain_of("x") - 1.2).abs() < 0.01, "{}", gain_of("x"));
+    assert!((gain_of("ax") - 1.0 / 1.2).abs() < 0.01, "{}", gain_of("ax"));
+    assert!(answer.causes.iter().all(|cause| cause.confidence <= 0.5));
+    let test = answer.next_test.unwrap();
+    assert_eq!((test.kind, test.measure), ("hammer", None), "{test:?}");
+    assert!(test.distance > 60.0_f64.sqrt(), "{test:?}");
 }

@@ -21,7 +21,7 @@ damping = [[305.0]]
 stiffness = [[2260000.0]]
 "#;
 
-fn believed() -> Case {
+pub(super) fn believed() -> Case {
     Case::parse(Path::new("believed.toml"), BELIEVED).unwrap()
 }
 

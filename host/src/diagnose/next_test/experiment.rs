@@ -1,40 +1,22 @@
 //! Experiments that a machine could make, and what their sensors would say.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use nalgebra::Matrix3;
-use num_complex::Complex64;
-
+use super::bench::Bench;
 use super::separation::Difference;
 use crate::case::Case;
 use crate::diagnose::answer::NextTest;
-use crate::diagnose::noise::rms;
-use crate::diagnose::scene::Baseline;
-use crate::diagnose::views::View;
 use crate::milling::Cut;
-use crate::recording::{Kind, Quantity, Recording};
+use crate::recording::{Quantity, Recording};
 use crate::simulate::rig::{Impact, Rig, Signal, Step};
 use crate::simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
 use crate::structure::Direction;
 
-/// Most samples that are simulated of one test.
-const SAMPLES: f64 = 8192.0;
-/// Periods of the slowest mode that a test of the structure lasts where no record says how long they are.
-const PERIODS: f64 = 60.0;
-/// Samples per period of the fastest mode.
-const SAMPLES_PER_PERIOD: f64 = 24.0;
-/// Noise that is assumed of a sensor that has not been heard yet, as a share of what it says.
-const NOISE: f64 = 0.01;
 /// A cut whose motion is so many times that of the records is none that anyone would try.
 const TOO_LARGE: f64 = 10.0;
 /// The smallest blow of a hammer, N.
 const LEAST_BLOW_N: f64 = 1.0;
-/// Longest time constants of the structure after which a cut has settled: records are of tools in full cut.
-const SETTLED: f64 = 12.0;
-/// The longest that is waited for that, in lengths of the record.
-const WAITED: f64 = 4.0;
-
 /// Which sensors are heard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sensors {
@@ -56,7 +38,7 @@ enum Of {
 
 /// What one sensor says.
 pub(super) struct Reading {
-    name: String,
+    pub(super) name: String,
     of: Of,
     pub(super) samples: Vec<f64>,
 }
@@ -82,22 +64,6 @@ pub(super) struct Experiment {
     rate_hz: f64,
     /// How much more work it is than another.
     pub(super) effort: f64,
-}
-
-/// A machine and its sensors, as the records show them.
-pub(super) struct Bench<'a> {
-    pub(super) case: &'a Case,
-    baseline: Baseline<'a>,
-    /// Of every channel of motion that was heard: name, quantity, deviation of its noise.
-    channels: Vec<(String, Quantity, f64)>,
-    has_force: bool,
-    /// Peak force of the tests of the structure, N; what moves it as far as the records where none was measured.
-    force_n: f64,
-    largest_m: f64,
-    seconds: f64,
-    rate_hz: f64,
-    /// The first recorded cut: speed, depth and the cut, as the file says it beside the case.
-    cut: Option<(f64, f64, Cut)>,
 }
 
 impl Sensors {
@@ -135,208 +101,94 @@ impl Reading {
     }
 }
 
-fn motion(quantity: Quantity) -> bool {
-    matches!(
-        quantity,
-        Quantity::Displacement | Quantity::Velocity | Quantity::Acceleration
-    )
+/// Everything that is thought of, with what each costs.
+pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
+    let mut all = Vec::new();
+    for direction in &bench.baseline.structure.directions {
+        all.extend(of_structure(bench, *direction));
+    }
+    all.extend(of_cuts(bench));
+    all
 }
 
-impl<'a> Bench<'a> {
-    /// `None` where the machine cannot be simulated, or does not vibrate.
-    pub(super) fn new(case: &'a Case, recordings: &[Recording], views: &[View]) -> Option<Self> {
-        let baseline = Baseline::new(case).ok()?;
-        let lowest_hz = baseline.lowest_hz()?;
-        let mut channels: Vec<(String, Quantity, f64)> = Vec::new();
-        for channel in recordings.iter().flat_map(|recording| &recording.channels) {
-            let known = channels.iter().any(|(name, ..)| *name == channel.name);
-            if motion(channel.quantity) && !known && baseline.pickup(&channel.name).is_some() {
-                channels.push((
-                    channel.name.clone(),
-                    channel.quantity,
-                    deviation(views, &channel.name),
-                ));
-            }
-        }
-        let highest_hz = highest_hz(&baseline)?;
-        let rate_hz = (SAMPLES_PER_PERIOD * highest_hz).max(2.0 * lowest_hz);
-        let longest_s = recordings
-            .iter()
-            .map(|recording| recording.len() as f64 / recording.sample_rate_hz)
-            .fold(0.0, f64::max);
-        let seconds = longest_s.clamp(PERIODS / 3.0 / lowest_hz, PERIODS / lowest_hz);
-        let seconds = seconds.min(SAMPLES / rate_hz);
-        let peak = |samples: &[f64]| samples.iter().fold(0.0, |most: f64, value| value.abs().max(most));
-        let is_cut = |recording: &&Recording| recording.sidecar.kind == Some(Kind::Cutting);
-        let of_rigs = recordings.iter().filter(|recording| !is_cut(recording));
-        let forces = of_rigs.flat_map(|recording| recording.channels.iter());
-        let measured_n = forces
-            .filter(|channel| channel.quantity == Quantity::Force)
-            .map(|channel| peak(&channel.samples))
-            .fold(0.0, f64::max);
-        let largest_m = recordings
-            .iter()
-            .flat_map(|recording| &recording.channels)
-            .filter_map(|channel| {
-                let derivatives = crate::diagnose::scene::derivatives(channel.quantity);
-                motion(channel.quantity).then(|| peak(&channel.samples) / (TAU * lowest_hz).powi(derivatives))
-            })
-            .fold(0.0, f64::max);
-        let compliance = compliance(&baseline, lowest_hz);
-        let force_n = if measured_n > 0.0 {
-            measured_n
-        } else {
-            largest_m / compliance
+/// A blow, a sweep at three levels and over a longer time, and three levels at the lowest resonance.
+fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
+    let [lowest_hz, highest_hz] = bench.modes_hz;
+    let experiment = |signal: Signal, effort: f64| Experiment {
+        doing: Doing::Rig { direction, signal },
+        rate_hz: bench.rate_hz,
+        effort,
+    };
+    let sweep = |level: f64, longer: f64| Signal::Sweep {
+        first_hz: 0.5 * lowest_hz,
+        last_hz: 1.5 * highest_hz,
+        amplitude_n: level * bench.force_n,
+        seconds: longer * bench.seconds,
+    };
+    let levels = [1.0 / 3.0, 1.0, 3.0].map(|level| Step {
+        frequency_hz: lowest_hz,
+        amplitude_n: level * bench.force_n,
+    });
+    let step_sine = Signal::StepSine {
+        steps: levels.to_vec(),
+        dwell_s: bench.seconds / 8.0,
+        pause_s: bench.seconds / 8.0,
+    };
+    let mut all = vec![
+        experiment(sweep(1.0, 1.0), 1.0),
+        experiment(sweep(1.0 / 3.0, 1.0), 1.1),
+        experiment(step_sine, 1.2),
+        experiment(sweep(3.0, 1.0), 1.3),
+        experiment(sweep(1.0, 4.0), 1.5),
+    ];
+    // Up to the highest mode a half sine of this length excites without a gap: its first zero is at 1.5/pulse. It moves the
+    // structure as far as the records have it: x = ω·impulse/k.
+    let pulse_s = 0.75 / highest_hz;
+    let impulse_ns = bench.largest_m / (TAU * lowest_hz * bench.static_compliance());
+    let peak_n = (impulse_ns / (2.0 / PI * pulse_s)).max(LEAST_BLOW_N);
+    if peak_n.is_finite() {
+        let blow = Impact {
+            start_s: 0.05 * bench.seconds,
+            peak_n,
+            pulse_s,
         };
-        let cut = recordings.iter().find(is_cut).and_then(|recording| {
-            let (said, believed) = (recording.sidecar.cut?, case.cut().ok()?);
-            let cut = Cut {
-                start_deg: said.start_deg.unwrap_or(believed.start_deg),
-                exit_deg: said.exit_deg.unwrap_or(believed.exit_deg),
-                feed_per_tooth_mm: said.feed_per_tooth_mm.unwrap_or(believed.feed_per_tooth_mm),
-                feed_direction_deg: believed.feed_direction_deg,
-            };
-            Some((said.spindle_rpm?, said.axial_depth_mm?, cut))
-        });
-        let has_force = recordings
-            .iter()
-            .filter(is_cut)
-            .flat_map(|recording| &recording.channels)
-            .any(|channel| channel.quantity == Quantity::Force);
-        let usable = force_n.is_finite() && force_n > 0.0 && !channels.is_empty();
-        usable.then_some(Self {
-            case,
-            baseline,
-            channels,
-            has_force,
-            force_n,
-            largest_m,
-            seconds,
-            rate_hz,
-            cut,
+        let signal = Signal::Impacts {
+            impacts: vec![blow],
+            seconds: bench.seconds,
+        };
+        all.push(experiment(signal, 0.9));
+    }
+    all
+}
+
+/// The recorded cut again, at other speeds, depths and feeds, and for longer.
+fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
+    let Some(so_far) = &bench.cut else {
+        return Vec::new();
+    };
+    // Speed, depth, feed and length, each over what it was.
+    let some = [
+        (1.0, 1.0, 1.0, 1.0),
+        (0.8, 1.0, 1.0, 1.0),
+        (1.25, 1.0, 1.0, 1.0),
+        (1.0, 0.5, 1.0, 1.0),
+        (1.0, 1.5, 1.0, 1.0),
+        (1.0, 1.0, 0.5, 1.0),
+        (1.0, 1.0, 2.0, 1.0),
+        (1.0, 1.0, 1.0, 4.0),
+    ];
+    some.into_iter()
+        .map(|(by_rpm, by_depth, by_feed, longer)| Experiment {
+            doing: Doing::Cut {
+                rpm: by_rpm * so_far.rpm,
+                depth_mm: by_depth * so_far.depth_mm,
+                feed_per_tooth_mm: by_feed * so_far.cut.feed_per_tooth_mm,
+                seconds: longer * bench.seconds,
+            },
+            rate_hz: bench.rate_hz,
+            effort: if longer > 1.0 { 1.0 } else { 0.8 },
         })
-    }
-
-    /// Everything that is thought of, with what each costs.
-    pub(super) fn experiments(&self) -> Vec<Experiment> {
-        let mut all = Vec::new();
-        for direction in &self.baseline.structure.directions {
-            all.extend(self.of_structure(*direction));
-        }
-        all.extend(self.of_cuts());
-        all
-    }
-
-    /// Blows, a sweep at three levels and over a longer time, and three levels at the resonances.
-    fn of_structure(&self, direction: Direction) -> Vec<Experiment> {
-        let (Some(lowest_hz), Some(highest_hz)) = (self.baseline.lowest_hz(), highest_hz(&self.baseline))
-        else {
-            return Vec::new();
-        };
-        let experiment = |signal: Signal, effort: f64| Experiment {
-            doing: Doing::Rig { direction, signal },
-            rate_hz: self.rate_hz,
-            effort,
-        };
-        let sweep = |level: f64, longer: f64| Signal::Sweep {
-            first_hz: 0.5 * lowest_hz,
-            last_hz: 1.5 * highest_hz,
-            amplitude_n: level * self.force_n,
-            seconds: longer * self.seconds,
-        };
-        let dwell_s = self.seconds / 8.0;
-        let levels = [1.0 / 3.0, 1.0, 3.0].map(|level| Step {
-            frequency_hz: lowest_hz,
-            amplitude_n: level * self.force_n,
-        });
-        let step_sine = Signal::StepSine {
-            steps: levels.to_vec(),
-            dwell_s,
-            pause_s: dwell_s,
-        };
-        let mut all = vec![
-            experiment(sweep(1.0, 1.0), 1.0),
-            experiment(sweep(1.0 / 3.0, 1.0), 1.1),
-            experiment(step_sine, 1.2),
-            experiment(sweep(3.0, 1.0), 1.3),
-            experiment(sweep(1.0, 4.0), 1.5),
-        ];
-        // Up to the highest mode a half sine of this length excites without a gap: its first zero is at 1.5/pulse. It moves the
-        // structure as far as the records have it.
-        let pulse_s = 0.75 / highest_hz;
-        let impulse_ns = self.largest_m / (TAU * lowest_hz * compliance(&self.baseline, 0.0));
-        let peak_n = (impulse_ns / (2.0 / std::f64::consts::PI * pulse_s)).max(LEAST_BLOW_N);
-        if peak_n.is_finite() {
-            let impacts = vec![Impact {
-                start_s: 0.05 * self.seconds,
-                peak_n,
-                pulse_s,
-            }];
-            let blow = Signal::Impacts {
-                impacts,
-                seconds: self.seconds,
-            };
-            all.push(experiment(blow, 0.9));
-        }
-        all
-    }
-
-    /// Cuts at other speeds, depths and feeds than the recorded one, and that one for longer.
-    fn of_cuts(&self) -> Vec<Experiment> {
-        let Some((rpm, depth_mm, cut)) = &self.cut else {
-            return Vec::new();
-        };
-        let feed = cut.feed_per_tooth_mm;
-        let some = [
-            (1.0, 1.0, 1.0, 1.0),
-            (0.8, 1.0, 1.0, 1.0),
-            (1.25, 1.0, 1.0, 1.0),
-            (1.0, 0.5, 1.0, 1.0),
-            (1.0, 1.5, 1.0, 1.0),
-            (1.0, 1.0, 0.5, 1.0),
-            (1.0, 1.0, 2.0, 1.0),
-            (1.0, 1.0, 1.0, 4.0),
-        ];
-        some.into_iter()
-            .map(|(by_rpm, by_depth, by_feed, longer)| Experiment {
-                doing: Doing::Cut {
-                    rpm: by_rpm * rpm,
-                    depth_mm: by_depth * depth_mm,
-                    feed_per_tooth_mm: by_feed * feed,
-                    seconds: longer * self.seconds,
-                },
-                rate_hz: self.rate_hz,
-                effort: if longer > 1.0 { 1.0 } else { 0.8 },
-            })
-            .collect()
-    }
-
-    /// The noise of each reading.
-    pub(super) fn deviations(&self, readings: &[Reading]) -> Vec<f64> {
-        let of = |reading: &Reading| {
-            let heard = self.channels.iter().find(|(name, ..)| *name == reading.name);
-            let known = heard
-                .map(|(.., deviation)| *deviation)
-                .filter(|deviation| *deviation > 0.0);
-            known.unwrap_or_else(|| (NOISE * rms(&reading.samples)).max(f64::MIN_POSITIVE))
-        };
-        readings.iter().map(of).collect()
-    }
-
-    /// How long a cut takes until nothing is left of its beginning, s.
-    fn settled_s(&self) -> f64 {
-        (SETTLED * self.baseline.slowest_decay_s()).min(WAITED * self.seconds)
-    }
-
-    fn quantities(&self) -> Vec<Quantity> {
-        let mut all: Vec<Quantity> = Vec::new();
-        for (_, quantity, _) in &self.channels {
-            if !all.contains(quantity) {
-                all.push(*quantity);
-            }
-        }
-        all
-    }
+        .collect()
 }
 
 impl Experiment {
@@ -359,9 +211,12 @@ impl Experiment {
         let second = self.recording(bench, &faultless)?;
         let mut all = Vec::new();
         for (recording, of) in [(&mounted, Of::Mounted), (&second, Of::Second)] {
-            for (name, ..) in &bench.channels {
-                let channel = recording.channels.iter().find(|channel| channel.name == *name)?;
-                all.push((name.clone(), of, channel.samples.clone()));
+            for heard in &bench.channels {
+                let channel = recording
+                    .channels
+                    .iter()
+                    .find(|channel| channel.name == heard.name)?;
+                all.push((heard.name.clone(), of, channel.samples.clone()));
             }
         }
         if let Doing::Cut { .. } = self.doing {
@@ -404,9 +259,9 @@ impl Experiment {
                 seconds,
             } => {
                 let mut case = case.clone();
-                case.cut = bench.cut.as_ref().map(|(.., cut)| Cut {
+                case.cut = bench.cut.as_ref().map(|so_far| Cut {
                     feed_per_tooth_mm: *feed_per_tooth_mm,
-                    ..*cut
+                    ..so_far.cut
                 });
                 let mut measured = bench.quantities();
                 measured.push(Quantity::Force);
@@ -498,27 +353,4 @@ impl Experiment {
             },
         }
     }
-}
-
-/// The noise of a channel, the mean over the records; 0 where it is not known.
-fn deviation(views: &[View], name: &str) -> f64 {
-    let known: Vec<f64> = views
-        .iter()
-        .filter(|view| view.channel == name)
-        .map(|view| view.deviation)
-        .collect();
-    rms(&known)
-}
-
-fn highest_hz(baseline: &Baseline<'_>) -> Option<f64> {
-    let poles = baseline.first_order.poles();
-    let modes = poles.iter().filter(|pole| pole.im > 0.0);
-    modes.map(|pole| pole.norm() / TAU).max_by(f64::total_cmp)
-}
-
-/// The largest compliance along an axis at a frequency, m/N.
-fn compliance(baseline: &Baseline<'_>, frequency_hz: f64) -> f64 {
-    let receptance: Matrix3<Complex64> = baseline.receptance.at(TAU * frequency_hz);
-    let along = baseline.axes.iter().map(|axis| receptance[(*axis, *axis)].norm());
-    along.fold(0.0, f64::max)
 }

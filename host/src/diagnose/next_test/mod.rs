@@ -5,6 +5,7 @@
 //! ([`separation`]). The least effort that separates all of them plainly is proposed: A. C. Atkinson and V. V. Fedorov, The design of
 //! experiments for discriminating between two rival models, Biometrika 62 (1975), T-optimality.
 
+mod bench;
 mod experiment;
 mod separation;
 #[cfg(test)]
@@ -12,7 +13,8 @@ mod tests;
 
 use rayon::prelude::*;
 
-use self::experiment::{Bench, Experiment, Sensors};
+use self::bench::Bench;
+use self::experiment::{Experiment, Sensors, experiments};
 use self::separation::{Difference, Rival};
 use super::answer::{Diagnosis, NamedCause, NextTest};
 use crate::case::Case;
@@ -38,7 +40,7 @@ pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagn
         return None;
     }
     let bench = Bench::new(case, recordings, &diagnosis.views)?;
-    let experiments = bench.experiments();
+    let experiments = experiments(&bench);
     let rivals: Vec<Rival<'_>> = explanations.iter().map(|causes| Rival { causes }).collect();
     let proposals: Vec<Proposal<'_>> = experiments
         .par_iter()

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::experiment::{Bench, Experiment, Reading, Sensors};
+use super::bench::Bench;
+use super::experiment::{Experiment, Reading, Sensors};
 use crate::case::Case;
 use crate::diagnose::answer::{Figure, NINETY_PERCENT, NamedCause};
 use crate::diagnose::extension::joined;
@@ -152,7 +153,8 @@ fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sen
         .iter()
         .map(|(moved, _)| stacked(moved, &model.readings))
         .collect();
-    let (left, squared) = least(&apart, &columns, &model.moved);
+    let steps: Vec<f64> = model.moved.iter().map(|(_, step)| *step).collect();
+    let (left, squared) = least(&apart, &columns, &steps);
     let mut from = 0;
     let sizes = heard.iter().map(|&index| {
         let count = truth.readings[index].samples.len();
@@ -172,16 +174,12 @@ fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sen
 }
 
 /// What is left of `apart`, and the least of ‖apart − Jδ‖² + Σ (step δ)².
-fn least(
-    apart: &DVector<f64>,
-    columns: &[DVector<f64>],
-    moved: &[(Vec<Reading>, f64)],
-) -> (DVector<f64>, f64) {
+pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64]) -> (DVector<f64>, f64) {
     if columns.is_empty() {
         return (apart.clone(), apart.norm_squared());
     }
     let jacobian = DMatrix::from_columns(columns);
-    let known = DVector::from_iterator(moved.len(), moved.iter().map(|(_, step)| step * step));
+    let known = DVector::from_iterator(steps.len(), steps.iter().map(|step| step * step));
     let normal = jacobian.tr_mul(&jacobian) + DMatrix::from_diagonal(&known);
     let Some(step) = normal
         .cholesky()

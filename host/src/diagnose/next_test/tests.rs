@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::separation::least;
 use crate::case::Case;
 use crate::diagnose::answer::{Diagnosis, Outcome};
 use crate::diagnose::{Options, diagnose};
@@ -54,6 +55,27 @@ fn cuts(case: &Case, effects: &Effects) -> Vec<Recording> {
 
 fn names(diagnosis: &Diagnosis) -> Vec<&'static str> {
     diagnosis.names()
+}
+
+#[test]
+fn parameters_take_what_they_can_within_what_is_known_of_them() {
+    use nalgebra::DVector;
+    let apart = DVector::from_vec(vec![3.0, -1.0, 2.0, 0.5]);
+    let column = DVector::from_vec(vec![1.0, 0.0, 1.0, -1.0]);
+    for step in [0.1, 1.0, 30.0] {
+        let (_, squared) = least(&apart, std::slice::from_ref(&column), &[step]);
+        // By trying out.
+        let brute = (-4000..=4000)
+            .map(|n| 1e-3 * f64::from(n))
+            .map(|delta| (&apart - &column * delta).norm_squared() + (step * delta).powi(2))
+            .fold(f64::INFINITY, f64::min);
+        // A grid of 1e-3 misses the least of a parabola of this curvature by at most (3 + 900)·2.5e-7.
+        assert!(
+            (0.0..2.5e-4).contains(&(brute - squared)),
+            "{step}: {squared} {brute}"
+        );
+    }
+    assert_eq!(least(&apart, &[], &[]).1, apart.norm_squared());
 }
 
 #[test]
