@@ -1,8 +1,8 @@
-//! Long records of random forces and of cuts: their beginnings are searched, and what is found there is held against all of them.
+//! Long records of random forces and of cuts: their beginnings are searched, and what is found there is held against the rest.
 //!
 //! A search computes its records hundreds of times, and a random excitation or a cut at one speed tells in its first seconds what
 //! it tells in a minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of
-//! the whole records as of their beginnings; and what it gains is told of the rest alone, which nothing was fitted to.
+//! the rest as of the beginnings; and what it gains is told of the rest alone, which nothing was fitted to.
 
 use std::ops::Range;
 
@@ -82,12 +82,12 @@ pub(super) fn diagnosed(
     let mut diagnosis = judge::judge(&scene, &beginnings, options, watch);
     drop(scene);
     watch(Stage::Records);
-    let believed = Left::of(case, recordings)?;
+    let believed = Left::of(case, &rest)?;
     let searched_s = beginnings
         .iter()
         .map(|record| record.len() as f64 / record.sample_rate_hz);
     diagnosis.warnings.push(format!(
-        "causes were sought in {:.1} s near the start of each record, and what was found was held against all of them",
+        "causes were sought in {:.1} s near the start of each record, and what was found was held against the rest",
         searched_s.fold(0.0, f64::max)
     ));
     let extended = match diagnosis.outcome {
@@ -96,23 +96,21 @@ pub(super) fn diagnosed(
         Outcome::None => case.clone(),
         _ => diagnosis.extended(case)?,
     };
-    let explained = Left::of(&extended, recordings)?;
+    let explained = Left::of(&extended, &rest)?;
     let beyond = explained.energy - explained.count;
     if beyond > WITHIN_NOISE * explained.count
         && beyond > LEFT_OF_RESPONSE * (believed.energy - believed.count)
     {
         return None;
     }
-    let unseen = Left::of(case, &rest)?;
     diagnosis.baseline = Quality {
-        nrmse_heldout: unseen.missed,
+        nrmse_heldout: believed.missed,
     };
     if diagnosis.outcome != Outcome::None {
-        let left = Left::of(&extended, &rest)?;
         diagnosis.extended = Some(Quality {
-            nrmse_heldout: left.missed,
+            nrmse_heldout: explained.missed,
         });
-        diagnosis.gain = Some(Gain::new(unseen.energy, left.energy, left.count));
+        diagnosis.gain = Some(Gain::new(believed.energy, explained.energy, explained.count));
     }
     Some(diagnosis)
 }
