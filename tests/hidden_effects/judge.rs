@@ -202,6 +202,15 @@ impl<'a> Judge<'a> {
         all
     }
 
+    /// The kinds that may look like a hidden one: those of the library, and of gains what they are exactly the same as.
+    fn rivals_of(&self, hidden: &Cause) -> Vec<Kind> {
+        let mut kinds = self.lab.kinds();
+        if matches!(hidden.kind, Kind::SensorGain | Kind::SensorOffset) {
+            kinds.extend([Kind::CommonFactor, Kind::CommonForce]);
+        }
+        kinds
+    }
+
     /// χ² of what is hidden.
     pub(crate) fn effect(&self, hidden: &[Cause]) -> f64 {
         self.without_nuisance(self.of(hidden) - self.of(&[]))
@@ -239,11 +248,8 @@ impl<'a> Judge<'a> {
             if alone < APART {
                 return Verdict::Borderline;
             }
-            for kind in self.lab.kinds() {
-                if kind == hidden[gone].kind
-                    || kind == hidden[stays].kind
-                    || kind.parameters() > hidden[gone].kind.parameters()
-                {
+            for kind in self.rivals_of(&hidden[gone]) {
+                if kind == hidden[stays].kind || kind.parameters() > hidden[gone].kind.parameters() {
                     continue;
                 }
                 for candidate in self
@@ -251,6 +257,9 @@ impl<'a> Judge<'a> {
                     .into_iter()
                     .chain(stand_in(kind, &hidden[gone]))
                 {
+                    if candidate.is_where(&hidden[gone]) {
+                        continue;
+                    }
                     if self.nearest(&truth, &[candidate, hidden[stays].clone()]).0 < APART {
                         return Verdict::Borderline;
                     }
@@ -273,11 +282,7 @@ impl<'a> Judge<'a> {
         let mut same: BTreeSet<&'static str> = hidden.kind.names().iter().copied().collect();
         // The same kind in another direction or sensor.
         let mut elsewhere = false;
-        let mut kinds = self.lab.kinds();
-        if matches!(hidden.kind, Kind::SensorGain | Kind::SensorOffset) {
-            kinds.extend([Kind::CommonFactor, Kind::CommonForce]);
-        }
-        for kind in kinds {
+        for kind in self.rivals_of(hidden) {
             if kind.parameters() > hidden.kind.parameters() {
                 continue;
             }
@@ -286,7 +291,7 @@ impl<'a> Judge<'a> {
                 .into_iter()
                 .chain(stand_in(kind, hidden))
             {
-                if kind == hidden.kind && candidate.axis == hidden.axis && candidate.sensor == hidden.sensor {
+                if candidate.is_where(hidden) {
                     continue;
                 }
                 let (left, _) = self.nearest(&truth, &[candidate]);
@@ -341,6 +346,11 @@ fn jacobian(
 }
 
 impl Cause {
+    /// True of the same kind in the same direction and at the same sensor.
+    fn is_where(&self, other: &Self) -> bool {
+        self.kind == other.kind && self.axis == other.axis && self.sensor == other.sensor
+    }
+
     /// False where a fit has left what a machine can have.
     fn sensible(&self) -> bool {
         let s = &self.shares;

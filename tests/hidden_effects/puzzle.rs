@@ -152,6 +152,10 @@ impl Puzzle {
             return None;
         }
         let output = lab.output(&hidden);
+        if !output.iter().flatten().flatten().all(|value| value.is_finite()) {
+            // A machine that runs away under what is hidden.
+            return None;
+        }
         let ratio = largest_ratio(&output, &lab.output(&[]), &judge.noise());
         let name = format!("{}-{seed}", family.name());
         let (machine, scale) = bench.machine();
