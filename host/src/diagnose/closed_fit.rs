@@ -1,7 +1,17 @@
 //! Fits of explanations in closed loop: the extended case moves as it would, and not along the motion that was measured.
 
 use super::evidence::{Explanation, Library};
+use super::record::Clean;
 use super::regression::Regression;
+
+/// Records with an extended case.
+#[derive(Debug)]
+pub struct Reading {
+    /// By record and channel: measured less computed.
+    pub residuals: Vec<Vec<Vec<f64>>>,
+    /// What the channels read without their noise.
+    pub predicted: Vec<Clean>,
+}
 
 /// What can fit explanations so.
 pub(super) trait ClosedFit {
@@ -15,6 +25,17 @@ pub(super) trait ClosedFit {
         explanation: &Explanation,
         limits: (f64, f64),
     ) -> Option<Explanation>;
+
+    /// The same explanation once more with the slopes that the extended case itself has, where `fit` used those of the baseline;
+    /// `None` where there is nothing to gain.
+    fn polished(
+        &self,
+        _library: &mut Library,
+        _regression: &mut Regression,
+        _explanation: &Explanation,
+    ) -> Option<Explanation> {
+        None
+    }
 
     /// What the case alone leaves, in units of the noise.
     fn left_by_baseline(&self, library: &Library, regression: &Regression) -> Option<f64>;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::cause::{Cause, Parameter, Place};
 use super::causes;
+use super::closed_fit::Reading;
 use super::record::Record;
 use super::regression::{Fit, Regression, Share};
 use super::scene::Scene;
@@ -50,8 +51,8 @@ pub struct Simulated {
     pub covariance: Vec<DMatrix<f64>>,
     /// By record: states at its start; empty where it starts from rest.
     pub starts: Vec<Vec<f64>>,
-    /// By record and channel: what is left, where that is kept.
-    pub left: Option<Arc<Vec<Vec<Vec<f64>>>>>,
+    /// The records with the extended case, where that is kept.
+    pub reading: Option<Arc<Reading>>,
 }
 
 /// The library on a scene.

@@ -38,6 +38,7 @@ mod named;
 mod next_test;
 pub mod noise;
 mod output_error;
+mod own_slopes;
 mod part;
 mod receptance;
 mod record;

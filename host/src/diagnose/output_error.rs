@@ -275,7 +275,7 @@ impl<'a> OutputError<'a> {
         next.simulated = Some(Simulated {
             covariance,
             starts: found.point.starts,
-            left: None,
+            reading: None,
         });
         Some(next)
     }

@@ -200,6 +200,11 @@ impl Regression {
         self.complete = size;
     }
 
+    /// Length of a column over a share, per unit of its coefficient.
+    pub fn length(&self, share: Share, column: usize) -> f64 {
+        self.products(share).square(column).sqrt()
+    }
+
     /// Product of two columns over a share.
     fn product(&self, share: Share, i: usize, j: usize) -> f64 {
         self.products(share).known(i, j).unwrap_or_else(|| {
@@ -332,7 +337,7 @@ impl Regression {
         &fit.covariance * middle * &fit.covariance
     }
 
-    fn whitened(&self, share: Share, residuals: &[Vec<Vec<f64>>]) -> Vec<(usize, Vec<f64>)> {
+    pub(super) fn whitened(&self, share: Share, residuals: &[Vec<Vec<f64>>]) -> Vec<(usize, Vec<f64>)> {
         self.parts
             .par_iter()
             .enumerate()

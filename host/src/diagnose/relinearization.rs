@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use super::closed_fit::ClosedFit;
+use super::closed_fit::{ClosedFit, Reading};
 use super::evidence::{Choice, Explanation, Library, Simulated};
 use super::extension::joined;
 use super::named::covariance;
@@ -31,14 +31,8 @@ type Residuals = Vec<Vec<Vec<f64>>>;
 
 /// The recordings, to be read again with extended cases.
 pub(super) struct Relinearization<'a> {
-    scene: &'a Scene<'a>,
+    pub(super) scene: &'a Scene<'a>,
     recordings: &'a [Recording],
-}
-
-/// The records with an extended case.
-struct Reading {
-    residuals: Residuals,
-    predicted: Vec<Clean>,
 }
 
 impl<'a> Relinearization<'a> {
@@ -49,7 +43,7 @@ impl<'a> Relinearization<'a> {
     }
 
     /// Reads the recordings with `extensions` more in the case, along the motion that was `predicted` before if there is one.
-    fn read(
+    pub(super) fn read(
         &self,
         extensions: &[(&'static str, toml::Table)],
         predicted: Option<&[Clean]>,
@@ -84,7 +78,7 @@ impl<'a> Relinearization<'a> {
 
     /// The explanation with coefficients, and the shapes that settle by themselves with them, moved by `change`; behind the
     /// coefficients of all choices those of the shapes in `slopes`. `None` where that is not physical.
-    fn moved(
+    pub(super) fn moved(
         &self,
         library: &mut Library,
         regression: &mut Regression,
@@ -133,39 +127,66 @@ impl ClosedFit for Relinearization<'_> {
         let mut columns = library.columns_of(explanation);
         columns.extend(slopes.iter().flatten());
         let mut at = explanation.clone();
-        let mut predicted: Option<Vec<Clean>> = None;
-        let mut best: Option<(Explanation, Residuals)> = None;
+        let mut predicted: Option<Arc<Reading>> = None;
+        let mut best: Option<(Explanation, Arc<Reading>)> = None;
         for round in 0..ROUNDS {
-            let Some(reading) = self.read(&library.extensions(self.scene, &at)?, predicted.as_deref()) else {
+            let Some(reading) = self.read(
+                &library.extensions(self.scene, &at)?,
+                predicted.as_ref().map(|reading| &reading.predicted[..]),
+            ) else {
                 break;
             };
             let refit = regression.refit(Share::Whole, &columns, &reading.residuals)?;
             at.fit.left = refit.before;
             // The first one follows the measured motion still: it is compared with none.
             let is_better = round <= 1 || best.as_ref().is_none_or(|(best, _)| at.fit.left < best.fit.left);
+            let reading = Arc::new(reading);
             if is_better {
-                best = Some((at.clone(), reading.residuals));
+                best = Some((at.clone(), reading.clone()));
             }
             let promised = refit.before - refit.taken;
-            if std::env::var("QC_TRACE").is_ok() { eprintln!("   round {round} names {:?} before {:.4e} promised {:.4e} rival {:.3e} change {:?} coeff {:?} shapes {:?}", crate::diagnose::selection::names(library, &at), refit.before, promised, rival, refit.change, at.fit.coefficients, at.choices.iter().map(|c| library.candidates[c.candidate].shapes[c.shape].0.clone()).collect::<Vec<_>>()); }
+            if std::env::var("QC_TRACE").is_ok() {
+                eprintln!(
+                    "   round {round} names {:?} before {:.4e} promised {:.4e} rival {:.3e} change {:?} coeff {:?} shapes {:?}",
+                    crate::diagnose::selection::names(library, &at),
+                    refit.before,
+                    promised,
+                    rival,
+                    refit.change,
+                    at.fit.coefficients,
+                    at.choices
+                        .iter()
+                        .map(|c| library.candidates[c.candidate].shapes[c.shape].0.clone())
+                        .collect::<Vec<_>>()
+                );
+            }
             let first = if round == 0 { FIRST * rival } else { 0.0 };
             let hopeless = promised - rival > HOPELESS + first && promised > 0.5 * refit.before;
             if !is_better || hopeless || (round > 0 && refit.taken < SETTLED) {
                 break;
             }
-            predicted = Some(reading.predicted);
+            predicted = Some(reading);
             match self.moved(library, regression, &at, &slopes, &refit.change) {
                 Some(next) => at = next,
                 None => break,
             }
         }
-        let (mut found, residuals) = best?;
+        let (mut found, reading) = best?;
         found.simulated = Some(Simulated {
             covariance: covariance(self.scene, library, regression, &found, 1.0),
             starts: Vec::new(),
-            left: Some(Arc::new(residuals)),
+            reading: Some(reading),
         });
         Some(found)
+    }
+
+    fn polished(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        explanation: &Explanation,
+    ) -> Option<Explanation> {
+        self.by_own_slopes(library, regression, explanation)
     }
 
     fn left_by_baseline(&self, _: &Library, regression: &Regression) -> Option<f64> {
@@ -175,8 +196,8 @@ impl ClosedFit for Relinearization<'_> {
     }
 
     fn left_of(&self, _: &Library, explanation: &Explanation) -> Option<Residuals> {
-        let left = explanation.simulated.as_ref()?.left.as_ref()?;
-        Some(left.to_vec())
+        let reading = explanation.simulated.as_ref()?.reading.as_ref()?;
+        Some(reading.residuals.clone())
     }
 
     fn left_held_out(
@@ -185,7 +206,7 @@ impl ClosedFit for Relinearization<'_> {
         regression: &Regression,
         explanation: &Explanation,
     ) -> Option<f64> {
-        let left = explanation.simulated.as_ref()?.left.as_ref()?;
+        let left = &explanation.simulated.as_ref()?.reading.as_ref()?.residuals;
         let columns = library.columns_of(explanation);
         let change = regression.refit(Share::Fitted, &columns, left)?.change;
         Some(regression.left_with(Share::HeldOut, &columns, left, &change))

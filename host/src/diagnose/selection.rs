@@ -38,6 +38,8 @@ const NEARLY: f64 = 1.5;
 const FAR_OFF: f64 = 6.0;
 /// How many times further off one with fewer parameters may be.
 const SIMPLER: f64 = 30.0;
+/// Of how many the parameters are sought to the end where that asks for more readings.
+const POLISHED: usize = 4;
 /// Explanations that are simulated because of what a simulation with one cause less left: of the best, of the second.
 const EXTENDED: [usize; 2] = [6, 3];
 
@@ -107,6 +109,11 @@ impl<'a> Scale<'a> {
         }
     }
 
+    /// What a cause must gain to be believed beside what errors of the computation may give it.
+    fn least_gain(&self) -> f64 {
+        BELIEVED + PLAIN * self.coherent
+    }
+
     /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
     fn gain(&self, regression: &Regression, explanation: &Explanation, inflation: f64) -> f64 {
         let count = regression.count(Share::Whole).max(2) as f64;
@@ -174,7 +181,7 @@ impl<'a> Scale<'a> {
         let cost = |of: &Explanation| of.fit.left / inflation + of.freedoms as f64 * price;
         extended(self.scene, library, regression, base, &left)
             .first()
-            .is_some_and(|more| cost(best) - cost(more) > BELIEVED + PLAIN * self.coherent)
+            .is_some_and(|more| cost(best) - cost(more) > self.least_gain())
     }
 
     /// True where `more` takes enough of what `fewer` leave beyond the noise; what has fewer parameters need not.
@@ -278,6 +285,35 @@ impl<'a> Scale<'a> {
         if simulated.is_empty() { found } else { simulated }
     }
 
+    /// The best of `found`, and what may come up to it, at the parameters where their own slopes end; sorted anew.
+    fn polish(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        found: &mut [Explanation],
+        inflation: f64,
+    ) {
+        let Some(closed) = &self.closed else { return };
+        let before: Vec<f64> = found
+            .iter()
+            .map(|explanation| self.gain(regression, explanation, inflation))
+            .collect();
+        let mut gained = 0.0;
+        for place in 0..found.len().min(POLISHED) {
+            // What was behind by more than twice what the best gained will not come up to it.
+            if place > 0 && before[0] - before[place] > APART + 2.0 * gained {
+                break;
+            }
+            if let Some(polished) = closed.polished(library, regression, &found[place]) {
+                if place == 0 {
+                    gained = (self.gain(regression, &polished, inflation) - before[0]).max(0.0);
+                }
+                found[place] = polished;
+            }
+        }
+        self.sort(regression, found, inflation);
+    }
+
     /// The explanation without causes that others have made needless.
     fn pruned(&self, library: &mut Library, regression: &mut Regression, best: Explanation) -> Explanation {
         let Some(closed) = self.closed.as_ref().filter(|_| best.simulated.is_some()) else {
@@ -289,9 +325,16 @@ impl<'a> Scale<'a> {
             let reached = self.gain(regression, &kept, inflation);
             let needless = (0..kept.choices.len()).find_map(|place| {
                 let fewer = without(library, &kept, place);
+                let fewer = closed.fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))?;
+                let enough = |regression: &Regression, fewer: &Explanation| {
+                    self.gain(regression, fewer, inflation) > reached - self.least_gain()
+                };
+                if enough(regression, &fewer) {
+                    return Some(fewer);
+                }
                 closed
-                    .fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))
-                    .filter(|fewer| self.gain(regression, fewer, inflation) > reached - BELIEVED)
+                    .polished(library, regression, &fewer)
+                    .filter(|fewer| enough(regression, fewer))
             });
             match needless {
                 Some(fewer) => kept = fewer,
@@ -370,6 +413,8 @@ pub(super) fn select(
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = scale.inflation(regression, found.first());
         scale.sort(regression, &mut found, inflation);
+        scale.polish(library, regression, &mut found, inflation);
+        let inflation = scale.inflation(regression, found.first());
         tell(scale, library, regression, &found, inflation);
         let Some(best) = found.first() else { break };
         let best = simplest(scale, regression, &found, best);
@@ -388,7 +433,7 @@ pub(super) fn select(
         if size > 1 && !takes_its_share {
             break;
         }
-        if gained < reached + BELIEVED + PLAIN * scale.coherent
+        if gained < reached + scale.least_gain()
             || !takes_its_share
             || held_out > regression.residual(Share::HeldOut) + chance
         {
