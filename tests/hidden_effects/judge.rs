@@ -252,15 +252,14 @@ impl<'a> Judge<'a> {
                 if kind == hidden[stays].kind || kind.parameters() > hidden[gone].kind.parameters() {
                     continue;
                 }
-                for candidate in self
+                let starts = self
                     .candidates(kind, random)
                     .into_iter()
                     .chain(stand_in(kind, &hidden[gone]))
-                {
-                    if candidate.is_where(&hidden[gone]) {
-                        continue;
-                    }
-                    if self.nearest(&truth, &[candidate, hidden[stays].clone()]).0 < APART {
+                    .filter(|candidate| !candidate.is_where(&hidden[gone]))
+                    .map(|candidate| [candidate, hidden[stays].clone()]);
+                for start in starts.chain(by_common_factor(kind, &hidden[gone], &hidden[stays])) {
+                    if self.nearest(&truth, &start).0 < APART {
                         return Verdict::Borderline;
                     }
                 }
@@ -322,6 +321,29 @@ fn stand_in(kind: Kind, hidden: &Cause) -> Option<Cause> {
         shares: vec![-10.0 * hidden.shares[1]],
         ..hidden.clone()
     })
+}
+
+/// Two of mass, stiffness and damping, the one of them `kind`, that are one factor away from two others in the same direction: what
+/// is let go moves the same.
+fn by_common_factor(kind: Kind, gone: &Cause, stays: &Cause) -> Option<[Cause; 2]> {
+    let size = |kind: Kind| match kind {
+        Kind::Mass | Kind::Stiffness => Some(0.1),
+        Kind::Damping => Some(0.3),
+        _ => None,
+    };
+    if gone.axis != stays.axis || kind == gone.kind || kind == stays.kind {
+        return None;
+    }
+    let factor = 1.0 / (1.0 + size(gone.kind)? * gone.shares[0]);
+    let with = |kind: Kind, value: f64| {
+        Some(Cause {
+            kind,
+            shares: vec![(value - 1.0) / size(kind)?],
+            ..gone.clone()
+        })
+    };
+    let stayed = 1.0 + size(stays.kind)? * stays.shares[0];
+    Some([with(kind, factor)?, with(stays.kind, factor * stayed)?])
 }
 
 /// ∂residual/∂shares by differences.
