@@ -477,10 +477,9 @@ impl Lab for CutBench {
                 .map(|sensor| (self.motion[sensor - first].axis, sensor))
                 .collect(),
             Kind::AxialDepthModulation if self.machine.axes.len() < 3 => Vec::new(),
-            Kind::Mass | Kind::Stiffness | Kind::Damping => {
+            Kind::Mass | Kind::Stiffness | Kind::Damping | Kind::CommonFactor => {
                 self.machine.axes.iter().map(|axis| (*axis, 0)).collect()
             }
-            Kind::CommonFactor => Vec::new(),
             _ => vec![(0, 0)],
         }
     }

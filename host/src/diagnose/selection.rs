@@ -1,5 +1,7 @@
 //! Which explanation is selected: causes are added while that gains more than it costs.
 
+use std::collections::VecDeque;
+
 use super::Stage;
 use super::closed_fit::ClosedFit;
 use super::evidence::{Explanation, Library};
@@ -233,7 +235,8 @@ impl<'a> Scale<'a> {
             return found;
         };
         let mut tried = Vec::new();
-        for (base, most) in fewer.iter().zip(EXTENDED) {
+        let bases = fewer.iter().filter(|base| base.simulated.is_some());
+        for (base, most) in bases.zip(EXTENDED) {
             if let Some(left) = closed.left_of(library, base) {
                 tried.extend(
                     extended(self.scene, library, regression, base, &left)
@@ -242,19 +245,22 @@ impl<'a> Scale<'a> {
                 );
             }
         }
-        tried.extend(found.iter().take(most).cloned());
+        let extended = tried.len();
+        tried.extend(found.iter().take(2 * most).cloned());
+        let mut tried = distinct(tried);
+        let mut spare = tried.split_off((extended + most).min(tried.len())).into_iter();
+        let mut tried = VecDeque::from(tried);
         let (mut rival, mut freedoms) =
             rival.map_or((f64::INFINITY, 0), |rival| (rival.fit.left, rival.freedoms));
         // The same causes along more axes are simulated only where more axes gain something.
         let mut leading: Option<Explanation> = None;
         let mut simulated = Vec::new();
-        let tried = distinct(tried);
         let noise = regression.count(Share::Whole) as f64;
         let best_left = tried
             .iter()
             .map(|explanation| explanation.fit.left)
             .fold(f64::INFINITY, f64::min);
-        for explanation in tried {
+        while let Some(explanation) = tried.pop_front() {
             // Where one explains nearly all, what is far from that along the measured motion need not be simulated.
             // But a simpler one may be the truth that the other holds as a part.
             let far_off = if explanation.freedoms < freedoms {
@@ -272,11 +278,13 @@ impl<'a> Scale<'a> {
             }) {
                 continue;
             }
-            // What cannot be simulated stays as the regression has it.
-            let fitted = closed
-                .fit(library, regression, &explanation, (rival, best_left))
-                .unwrap_or_else(|| explanation.clone());
-            if fitted.simulated.is_some() && fitted.fit.left < rival {
+            let Some(fitted) = closed.fit(library, regression, &explanation, (rival, best_left)) else {
+                // What cannot be simulated stays as the regression has it, and the next has its turn.
+                simulated.push(explanation);
+                tried.extend(spare.next());
+                continue;
+            };
+            if fitted.fit.left < rival {
                 (rival, freedoms) = (fitted.fit.left, fitted.freedoms);
                 leading = Some(explanation);
             }
