@@ -121,6 +121,8 @@ fn a_part_of_the_campaign() {
         (Family::Nothing, 0..3),
         (Family::NotInLibrary, 0..1),
         (Family::TwoEffects, 0..1),
+        // A mass that moves a resonance of a cut: without slopes of its own a third cause is named.
+        (Family::TwoEffects, 4119..4120),
     ];
     for (family, seeds) in part {
         let report = Report::run(family, seeds, &ask);

@@ -26,6 +26,11 @@ pub(super) trait ClosedFit {
         limits: (f64, f64),
     ) -> Option<Explanation>;
 
+    /// True where what cannot be fitted so is no explanation: the extended case cannot even be read along its own motion.
+    fn is_needed(&self) -> bool {
+        false
+    }
+
     /// The same explanation once more with the slopes that the extended case itself has, where `fit` used those of the baseline;
     /// `None` where there is nothing to gain.
     fn polished(

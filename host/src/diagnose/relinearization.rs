@@ -180,6 +180,10 @@ impl ClosedFit for Relinearization<'_> {
         Some(found)
     }
 
+    fn is_needed(&self) -> bool {
+        true
+    }
+
     fn polished(
         &self,
         library: &mut Library,

@@ -30,6 +30,11 @@ pub(super) const WITHIN_NOISE: f64 = 0.15;
 const SHARE: f64 = 0.2;
 /// How many times what errors of the computation may be is plainly something else: twice their amplitude.
 const PLAIN: f64 = 4.0;
+/// The same of a cause more where fewer are enough: near a resonance errors come up to a thousandth of the signal, five times as much
+/// as elsewhere, and its shape is that of many causes.
+const BESIDE_ENOUGH: f64 = 25.0;
+/// Of a cut: what a cause more must take where fewer are enough, as a share of the noise. So well the noise itself is known.
+const SHARE_BESIDE_ENOUGH: f64 = 5e-3;
 /// Most causes that act together.
 const CAUSES: usize = 3;
 /// Explanations of the regression that are simulated, by the number of their causes.
@@ -112,8 +117,13 @@ impl<'a> Scale<'a> {
     }
 
     /// What a cause must gain to be believed beside what errors of the computation may give it.
-    fn least_gain(&self) -> f64 {
-        BELIEVED + PLAIN * self.coherent
+    fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
+        if self.coherent > 0.0 && fewer_are_enough {
+            let noise = regression.count(Share::Whole) as f64;
+            BELIEVED + BESIDE_ENOUGH * self.coherent + SHARE_BESIDE_ENOUGH * noise
+        } else {
+            BELIEVED + PLAIN * self.coherent
+        }
     }
 
     /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
@@ -183,7 +193,7 @@ impl<'a> Scale<'a> {
         let cost = |of: &Explanation| of.fit.left / inflation + of.freedoms as f64 * price;
         extended(self.scene, library, regression, base, &left)
             .first()
-            .is_some_and(|more| cost(best) - cost(more) > self.least_gain())
+            .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
     }
 
     /// True where `more` takes enough of what `fewer` leave beyond the noise; what has fewer parameters need not.
@@ -279,8 +289,10 @@ impl<'a> Scale<'a> {
                 continue;
             }
             let Some(fitted) = closed.fit(library, regression, &explanation, (rival, best_left)) else {
-                // What cannot be simulated stays as the regression has it, and the next has its turn.
-                simulated.push(explanation);
+                // What cannot be simulated, but might be true, stays as the regression has it; and the next has its turn.
+                if !closed.is_needed() {
+                    simulated.push(explanation);
+                }
                 tried.extend(spare.next());
                 continue;
             };
@@ -290,7 +302,11 @@ impl<'a> Scale<'a> {
             }
             simulated.push(fitted);
         }
-        if simulated.is_empty() { found } else { simulated }
+        if simulated.is_empty() && !closed.is_needed() {
+            found
+        } else {
+            simulated
+        }
     }
 
     /// The best of `found`, and what may come up to it, at the parameters where their own slopes end; sorted anew.
@@ -335,7 +351,7 @@ impl<'a> Scale<'a> {
                 let fewer = without(library, &kept, place);
                 let fewer = closed.fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))?;
                 let enough = |regression: &Regression, fewer: &Explanation| {
-                    self.gain(regression, fewer, inflation) > reached - self.least_gain()
+                    self.gain(regression, fewer, inflation) > reached - self.least_gain(regression, true)
                 };
                 if enough(regression, &fewer) {
                     return Some(fewer);
@@ -421,7 +437,10 @@ pub(super) fn select(
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = scale.inflation(regression, found.first());
         scale.sort(regression, &mut found, inflation);
-        scale.polish(library, regression, &mut found, inflation);
+        // Where fewer causes are enough already, more of them are not to win by what errors of the computation gain there.
+        if !enough {
+            scale.polish(library, regression, &mut found, inflation);
+        }
         let inflation = scale.inflation(regression, found.first());
         tell(scale, library, regression, &found, inflation);
         let Some(best) = found.first() else { break };
@@ -441,7 +460,7 @@ pub(super) fn select(
         if size > 1 && !takes_its_share {
             break;
         }
-        if gained < reached + scale.least_gain()
+        if gained < reached + scale.least_gain(regression, enough)
             || !takes_its_share
             || held_out > regression.residual(Share::HeldOut) + chance
         {
@@ -463,7 +482,9 @@ pub(super) fn select(
             .filter(|other| behind(other) < APART)
             .map(|other| (*other).clone())
             .collect();
-        selection.best = Some(best.clone());
+        let polished = scale.closed.as_ref().filter(|_| enough);
+        let polished = polished.and_then(|closed| closed.polished(library, regression, best));
+        selection.best = Some(polished.unwrap_or_else(|| best.clone()));
     }
     selection
 }
