@@ -39,8 +39,8 @@ const SHARE_BESIDE_ENOUGH: f64 = 5e-3;
 const CAUSES: usize = 3;
 /// Explanations of the regression that are simulated, by the number of their causes.
 const SIMULATED: [usize; CAUSES] = [9, 5, 3];
-/// χ² per number below which an explanation explains nearly all, and how many times that another may leave along the measured
-/// motion and still be simulated.
+/// χ² per number below which an explanation explains nearly all, and over that of another below which it is nearly as good; and how
+/// many times that another may leave along the measured motion and still be simulated.
 const NEARLY: f64 = 1.5;
 const FAR_OFF: f64 = 6.0;
 /// How many times further off one with fewer parameters may be.
@@ -355,6 +355,9 @@ impl<'a> Scale<'a> {
                 };
                 if enough(regression, &fewer) {
                     return Some(fewer);
+                }
+                if fewer.fit.left > NEARLY * kept.fit.left {
+                    return None;
                 }
                 closed
                     .polished(library, regression, &fewer)
