@@ -48,6 +48,11 @@ pub(crate) trait Lab {
     /// in units of `sigma`, one column each, not yet orthonormal.
     fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64>;
 
+    /// True where nobody knows how far the machine was pulled.
+    fn is_let_go(&self) -> bool {
+        false
+    }
+
     /// What the noise of the forces from which motion is predicted adds to `sigma`, where it adds any.
     fn whitening(&self, _sigma: &[f64]) -> Option<Whitening> {
         None
@@ -67,7 +72,28 @@ pub(crate) struct Judge<'a> {
 impl<'a> Judge<'a> {
     /// A judge; `sigma` is the noise of each sensor.
     pub(crate) fn new(lab: &'a dyn Lab, sigma: &'a [f64]) -> Self {
+        Self::of_starts(lab, sigma, &[])
+    }
+
+    /// A judge who knows of what is let go under `hidden` that each run may have begun with more or less of the same motion.
+    fn of_starts(lab: &'a dyn Lab, sigma: &'a [f64], hidden: &[Cause]) -> Self {
         let mut nuisance = lab.nuisance(sigma);
+        if lab.is_let_go() && !hidden.is_empty() {
+            let output = lab.output(hidden);
+            let length = nuisance.nrows() / output.len();
+            for (number, run) in output.iter().enumerate() {
+                let values = run
+                    .iter()
+                    .zip(sigma)
+                    .flat_map(|(samples, sigma)| samples.iter().map(move |value| value / sigma));
+                let column = nuisance.ncols();
+                nuisance = nuisance.insert_column(column, 0.0);
+                let mut rows = nuisance.column_mut(column);
+                for (row, value) in rows.rows_range_mut(number * length..).iter_mut().zip(values) {
+                    *row = value;
+                }
+            }
+        }
         let whitening = lab.whitening(sigma);
         if let Some(whitening) = &whitening {
             for mut column in nuisance.column_iter_mut() {
@@ -242,24 +268,25 @@ impl<'a> Judge<'a> {
 
     /// What can be said of two causes: they are separable where no other cause can take the place of either.
     pub(crate) fn verdict_of_two(&self, hidden: &[Cause; 2], random: &mut ChaCha8Rng) -> Verdict {
-        let truth = self.of(hidden);
+        let judge = Self::of_starts(self.lab, self.sigma, hidden);
+        let truth = judge.of(hidden);
         for (gone, stays) in [(0, 1), (1, 0)] {
-            let alone = self.nearest(&truth, &hidden[stays..=stays]).0;
+            let alone = judge.nearest(&truth, &hidden[stays..=stays]).0;
             if alone < APART {
                 return Verdict::Borderline;
             }
-            for kind in self.rivals_of(&hidden[gone]) {
+            for kind in judge.rivals_of(&hidden[gone]) {
                 if kind == hidden[stays].kind || kind.parameters() > hidden[gone].kind.parameters() {
                     continue;
                 }
-                let starts = self
+                let starts = judge
                     .candidates(kind, random)
                     .into_iter()
                     .chain(stand_in(kind, &hidden[gone]))
                     .filter(|candidate| !candidate.is_where(&hidden[gone]))
                     .map(|candidate| [candidate, hidden[stays].clone()]);
                 for start in starts.chain(by_common_factor(kind, &hidden[gone], &hidden[stays])) {
-                    if self.nearest(&truth, &start).0 < APART {
+                    if judge.nearest(&truth, &start).0 < APART {
                         return Verdict::Borderline;
                     }
                 }

@@ -411,6 +411,10 @@ impl Lab for Bench {
         STRUCTURAL.map(of_machine).to_vec()
     }
 
+    fn is_let_go(&self) -> bool {
+        self.rig.kind == RecordKind::FreeDecay
+    }
+
     /// The free motions of the believed machine, each run's by itself.
     fn nuisance(&self, sigma: &[f64]) -> DMatrix<f64> {
         let Machine {
