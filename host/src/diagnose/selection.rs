@@ -30,10 +30,8 @@ pub(super) const WITHIN_NOISE: f64 = 0.15;
 const SHARE: f64 = 0.2;
 /// How many times what errors of the computation may be is plainly something else: twice their amplitude.
 const PLAIN: f64 = 4.0;
-/// The same of a cause more where fewer are enough: near a resonance errors come up to a thousandth of the signal, five times as much
-/// as elsewhere, and its shape is that of many causes.
-const BESIDE_ENOUGH: f64 = 25.0;
-/// Of a cut: what a cause more must take where fewer are enough, as a share of the noise. So well the noise itself is known.
+/// Of a cut: what a cause more must take where fewer are enough, as a share of the noise: by so little the noise and
+/// the computation may be wrong near a resonance.
 const SHARE_BESIDE_ENOUGH: f64 = 5e-3;
 /// Most causes that act together.
 const CAUSES: usize = 3;
@@ -118,12 +116,13 @@ impl<'a> Scale<'a> {
 
     /// What a cause must gain to be believed beside what errors of the computation may give it.
     fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
-        if self.coherent > 0.0 && fewer_are_enough {
-            let noise = regression.count(Share::Whole) as f64;
-            BELIEVED + BESIDE_ENOUGH * self.coherent + SHARE_BESIDE_ENOUGH * noise
+        let noise = regression.count(Share::Whole) as f64;
+        let share = if self.coherent > 0.0 && fewer_are_enough {
+            SHARE_BESIDE_ENOUGH
         } else {
-            BELIEVED + PLAIN * self.coherent
-        }
+            0.0
+        };
+        BELIEVED + PLAIN * self.coherent + share * noise
     }
 
     /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
