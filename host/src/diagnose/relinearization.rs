@@ -145,21 +145,6 @@ impl ClosedFit for Relinearization<'_> {
                 best = Some((at.clone(), reading.clone()));
             }
             let promised = refit.before - refit.taken;
-            if std::env::var("QC_TRACE").is_ok() {
-                eprintln!(
-                    "   round {round} names {:?} before {:.4e} promised {:.4e} rival {:.3e} change {:?} coeff {:?} shapes {:?}",
-                    crate::diagnose::selection::names(library, &at),
-                    refit.before,
-                    promised,
-                    rival,
-                    refit.change,
-                    at.fit.coefficients,
-                    at.choices
-                        .iter()
-                        .map(|c| library.candidates[c.candidate].shapes[c.shape].0.clone())
-                        .collect::<Vec<_>>()
-                );
-            }
             let first = if round == 0 { FIRST * rival } else { 0.0 };
             let hopeless = promised - rival > HOPELESS + first && promised > 0.5 * refit.before;
             if !is_better || hopeless || (round > 0 && refit.taken < SETTLED) {
