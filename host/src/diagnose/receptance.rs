@@ -7,7 +7,7 @@ use crate::structure::FirstOrder;
 
 /// Poles closer than this, relative, are one.
 const SAME: f64 = 1e-9;
-/// Residues below this share of the largest are not felt.
+/// Modes with less than this share of the largest 1/mass are not felt.
 const FELT: f64 = 1e-3;
 
 /// H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N; rows displacement, columns force.
@@ -77,18 +77,17 @@ impl Receptance {
         sum
     }
 
-    /// Poles above the real axis that the force along `axis` moves, seen along it.
-    pub fn poles_along(&self, axis: usize) -> impl Iterator<Item = Complex64> {
-        let size = move |residue: &Matrix3<Complex64>| residue[(axis, axis)].norm();
-        let largest = self
-            .terms
-            .iter()
-            .map(|(_, residue)| size(residue))
-            .fold(0.0, f64::max);
+    /// Poles above the real axis that the force along `axis` moves, seen along it, and what each has there of 1/mass:
+    /// 2·Im(λ)·|R|, 1/kg.
+    pub fn modes_along(&self, axis: usize) -> impl Iterator<Item = (Complex64, f64)> {
+        let per_mass = move |(pole, residue): &(Complex64, Matrix3<Complex64>)| {
+            2.0 * pole.im * residue[(axis, axis)].norm()
+        };
+        let largest = self.terms.iter().map(per_mass).fold(0.0, f64::max);
         self.terms
             .iter()
-            .filter(move |(pole, residue)| pole.im > 0.0 && size(residue) > FELT * largest)
-            .map(|(pole, _)| *pole)
+            .map(move |term| (term.0, per_mass(term)))
+            .filter(move |(pole, per_mass)| pole.im > 0.0 && *per_mass > FELT * largest)
     }
 
     /// Root of Σ |R_r/(iω − λ_r)|² along the diagonal entry of `axis`: what H would be if its parts did not cancel, m/N.

@@ -153,7 +153,8 @@ impl Cause for MissingMode {
         Some(vec![Regressor::of_channels(observed)])
     }
 
-    /// None where a mode of the case has its peak within the peak of this one: that is a change of a mode that is there.
+    /// None where a mode of the case has its peak within the peak of this one and is as large: that is a change of a mode that is
+    /// there.
     fn parameters(
         &self,
         scene: &Scene<'_>,
@@ -168,8 +169,10 @@ impl Cause for MissingMode {
         let is_known = scene
             .baseline
             .receptance
-            .poles_along(*axis)
-            .any(|pole| (pole.norm() - natural).abs() < -pole.re + shape[1] * natural);
+            .modes_along(*axis)
+            .any(|(pole, known_per_mass)| {
+                (pole.norm() - natural).abs() < -pole.re + shape[1] * natural && per_mass < known_per_mass
+            });
         (per_mass > 0.0 && !is_known).then(|| {
             vec![
                 ("frequency_hz", shape[0]),
