@@ -39,7 +39,8 @@ pub(crate) struct Finding {
     seed: u64,
     hidden: Vec<&'static str>,
     verdict: Verdict,
-    ratio: f64,
+    /// How plain each effect is, over the noise.
+    ratios: Vec<f64>,
     redrawn: usize,
     said: Said,
     right: bool,
@@ -159,7 +160,7 @@ impl Finding {
             seed: puzzle.seed,
             hidden,
             verdict: puzzle.verdict.clone(),
-            ratio: puzzle.ratio,
+            ratios: puzzle.ratios.clone(),
             redrawn: puzzle.redrawn,
             said,
             right,
@@ -181,8 +182,13 @@ impl Finding {
         }
     }
 
+    /// True of a separable one of which every effect is above three times the noise; of a weaker one `Some(false)`.
+    fn is_plain(&self) -> Option<bool> {
+        (self.verdict == Verdict::Separable).then(|| self.ratios.iter().all(|ratio| *ratio > 3.0))
+    }
+
     fn counts(&self) -> bool {
-        self.verdict != Verdict::Separable || self.ratio > 3.0
+        self.is_plain() != Some(false)
     }
 }
 
@@ -195,11 +201,15 @@ impl fmt::Display for Finding {
             .map_or(f64::NAN, |cause| cause.confidence);
         write!(
             out,
-            "seed {} {}: hidden {} at {:.2}× noise, said {} ({confidence:.3}, left {:.1e}, {:.2} s)",
+            "seed {} {}: hidden {} at {}× noise, said {} ({confidence:.3}, left {:.1e}, {:.2} s)",
             self.seed,
             if self.right { "right" } else { "WRONG" },
             self.hidden_label(),
-            self.ratio,
+            self.ratios
+                .iter()
+                .map(|ratio| format!("{ratio:.2}"))
+                .collect::<Vec<_>>()
+                .join(", "),
             self.said.label(),
             self.said.left,
             self.said.seconds
@@ -242,9 +252,9 @@ impl Report {
         }
     }
 
-    /// Right among the separable ones whose effect is above three times the noise.
+    /// Right among the separable ones whose every effect is above three times the noise.
     pub(crate) fn separable(&self) -> Share {
-        self.share(|f| (f.verdict == Verdict::Separable && f.ratio > 3.0).then_some(f.right))
+        self.share(|f| (f.is_plain() == Some(true)).then_some(f.right))
     }
 
     /// The exact set among the equivalent ones.
@@ -259,14 +269,12 @@ impl Report {
 
     /// Weak but separable effects: right.
     fn weak(&self) -> Share {
-        self.share(|f| (f.verdict == Verdict::Separable && f.ratio <= 3.0).then_some(f.right))
+        self.share(|f| (f.is_plain() == Some(false)).then_some(f.right))
     }
 
     /// Weak but separable effects: right, or said to be nothing.
     fn weak_not_wrong(&self) -> Share {
-        self.share(|f| {
-            (f.verdict == Verdict::Separable && f.ratio <= 3.0).then_some(f.right || f.said.outcome == "none")
-        })
+        self.share(|f| (f.is_plain() == Some(false)).then_some(f.right || f.said.outcome == "none"))
     }
 
     /// Truths in their 90 % intervals.
@@ -294,8 +302,7 @@ impl Report {
     /// Held-out residual energy cut by 80 % or more where a cause of more than three times the noise is named.
     pub(crate) fn energy(&self) -> Share {
         self.share(|f| {
-            let named =
-                f.said.outcome == "cause" && f.right && f.ratio > 3.0 && f.verdict == Verdict::Separable;
+            let named = f.said.outcome == "cause" && f.right && f.is_plain() == Some(true);
             named.then(|| f.said.energy_removed.is_some_and(|share| share >= 0.8))
         })
     }

@@ -72,8 +72,8 @@ pub(crate) struct Puzzle {
     case_text: String,
     pub(crate) recordings: Vec<Recording>,
     pub(crate) hidden: Vec<Hidden>,
-    /// Root mean square of the change that the effect makes, over the noise, in the channel where it is largest.
-    pub(crate) ratio: f64,
+    /// Root mean square of the change that each effect makes beside the other, over the noise, in the channel where it is largest.
+    pub(crate) ratios: Vec<f64>,
     pub(crate) verdict: Verdict,
     /// How many draws before this one were between all verdicts.
     pub(crate) redrawn: usize,
@@ -156,7 +156,12 @@ impl Puzzle {
             // A machine that runs away under what is hidden.
             return None;
         }
-        let ratio = largest_ratio(&output, &lab.output(&[]), &judge.noise());
+        let beside = |gone: usize| {
+            let mut others = hidden.clone();
+            others.remove(gone);
+            largest_ratio(&output, &lab.output(&others), &judge.noise())
+        };
+        let ratios = (0..hidden.len()).map(beside).collect();
         let name = format!("{}-{seed}", family.name());
         let (machine, scale) = bench.machine();
         let describe = |cause: &Cause| Hidden {
@@ -175,7 +180,7 @@ impl Puzzle {
                 Bench::Cut(bench) => bench.recordings(&output, &sigma, random, &name),
             },
             hidden: hidden.iter().map(describe).collect(),
-            ratio,
+            ratios,
             verdict,
             redrawn: 0,
         })

@@ -10,6 +10,7 @@
 //! (`relinearization`).
 
 pub mod answer;
+mod around;
 mod beginning;
 pub mod cause;
 mod causes;

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use super::Stage;
+use super::around::extended_around;
 use super::closed_fit::ClosedFit;
 use super::evidence::{Explanation, Library};
 use super::output_error::OutputError;
@@ -47,6 +48,8 @@ const SIMPLER: f64 = 30.0;
 const POLISHED: usize = 4;
 /// Explanations that are simulated because of what a simulation with one cause less left: of the best, of the second.
 const EXTENDED: [usize; 2] = [6, 3];
+/// And because of what looks best around the machine as the best of those with one cause less has it.
+const AROUND: usize = 4;
 
 /// What was selected: the best explanation, and those that are as good with as many causes.
 pub(super) struct Selection {
@@ -61,6 +64,7 @@ pub(super) struct Selection {
 /// What explanations are weighed by.
 pub(super) struct Scale<'a> {
     pub(super) scene: &'a Scene<'a>,
+    recordings: &'a [Recording],
     /// Fits in closed loop, where there are such.
     closed: Option<Box<dyn ClosedFit + 'a>>,
     /// How much what the whole library leaves, and what interpolation may leave, is above the noise: along the measured motion.
@@ -89,6 +93,7 @@ impl<'a> Scale<'a> {
         let is_cut = scene.records.iter().any(|record| record.cut.is_some());
         Self {
             scene,
+            recordings,
             closed,
             coherent: if is_cut {
                 TRUSTED_IN_CUTS * TRUSTED_IN_CUTS * regression.signal(scene)
@@ -244,8 +249,12 @@ impl<'a> Scale<'a> {
             return found;
         };
         let mut tried = Vec::new();
-        let bases = fewer.iter().filter(|base| base.simulated.is_some());
-        for (base, most) in bases.zip(EXTENDED) {
+        let bases = || fewer.iter().filter(|base| base.simulated.is_some());
+        if let Some(base) = bases().next().filter(|_| self.coherent == 0.0) {
+            let around = extended_around(self.scene, self.recordings, library, regression, base);
+            tried.extend(around.into_iter().take(AROUND));
+        }
+        for (base, most) in bases().zip(EXTENDED) {
             if let Some(left) = closed.left_of(library, base) {
                 tried.extend(
                     extended(self.scene, library, regression, base, &left)
