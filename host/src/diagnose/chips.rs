@@ -5,13 +5,17 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::cut::CutForce;
+use super::mean_slopes::MeanSlopes;
 use super::turning::Turning;
 use crate::simulate::path::{Motion, between};
 use crate::simulate::{Cutter, Immersion, Tooth};
 
+/// By which share of its thickness a chip grows for the slope of its force.
+const STEP: f64 = 1e-3;
 /// Samples that are done at a time.
 const AT_A_TIME: usize = 4096;
 
@@ -102,37 +106,31 @@ impl Chips {
 
     /// The force of a tool that turns so along the motion of these chips.
     pub fn force(&self, cutter: &Cutter, turning: &Turning, motion: &Motion) -> CutForce {
-        let of = |series| self.of_series_n(series, cutter, turning, motion);
+        let of = |series, width_s| self.of_series_n(series, width_s, cutter, turning, motion);
         CutForce {
-            mean_n: of(&self.over_samples),
-            sampled_n: of(&self.at_samples),
+            mean_n: of(&self.over_samples, motion.step_s),
+            sampled_n: of(&self.at_samples, 0.0),
         }
     }
 
+    /// `width_s` is the time that a sample stands for.
     fn of_series_n(
         &self,
         series: &Series,
+        width_s: f64,
         cutter: &Cutter,
         turning: &Turning,
         motion: &Motion,
     ) -> [Vec<f64>; 3] {
-        // How far each tooth stands out along the chip.
-        let radial_m: Vec<f64> = cutter
-            .teeth
-            .iter()
-            .map(|tooth| cutter.reach_m(tooth, cutter.immersion(0.0), [0.0; 3]))
+        let (radial_m, passes) = standing_out(cutter);
+        let chips = || series.chips.iter().zip(series.thickness_m.chunks(self.passes));
+        let thickness_m: Vec<f64> = chips()
+            .map(|(chip, left_m)| thickness(cutter, &radial_m, chip, &left_m[..passes]).0)
             .collect();
-        let differ = radial_m.iter().any(|radial| *radial != radial_m[0]);
-        let passes = passes(cutter.teeth.len(), differ);
+        let in_contact = in_contact(series, &thickness_m, cutter.teeth.len(), width_s);
         let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; series.samples]);
-        for (chip, left_m) in series.chips.iter().zip(series.thickness_m.chunks(self.passes)) {
-            let mut ahead = chip.tooth;
-            let mut thickness_m = f64::INFINITY;
-            for left_m in &left_m[..passes] {
-                ahead = cutter.teeth[ahead].ahead;
-                thickness_m = thickness_m.min(left_m + radial_m[chip.tooth] - radial_m[ahead]);
-            }
-            if thickness_m <= 0.0 {
+        for (chip, (in_contact, thickness_m)) in series.chips.iter().zip(in_contact) {
+            if in_contact <= 0.0 {
                 continue;
             }
             let depth_m = cutter.depth_at_m(cutter.depth_m, chip.z_m);
@@ -145,13 +143,108 @@ impl Chips {
                     *force -= damping[0] * v[0] + damping[1] * v[1] + damping[2] * v[2];
                 }
             }
-            let factor = chip.share * cutter.force.wear(chip.t);
+            let factor = in_contact * chip.share * cutter.force.wear(chip.t);
             for (sum, force) in sum.iter_mut().zip(force) {
                 sum[chip.sample] += factor * force;
             }
         }
         sum
     }
+
+    /// How the force of a tool that turns so answers to a small motion beside the one of these chips.
+    pub fn mean_slopes(&self, cutter: &Cutter, turning: &Turning) -> MeanSlopes {
+        let (radial_m, passes) = standing_out(cutter);
+        let series = &self.over_samples;
+        let mut means = MeanSlopes::default();
+        for (chip, left_m) in series.chips.iter().zip(series.thickness_m.chunks(self.passes)) {
+            let (thickness_m, pass) = thickness(cutter, &radial_m, chip, &left_m[..passes]);
+            if thickness_m <= 0.0 {
+                continue;
+            }
+            let depth_m = cutter.depth_at_m(cutter.depth_m, chip.z_m);
+            let share = chip.share * cutter.force.wear(chip.t) / series.samples as f64;
+            let at = |thickness_m: f64| Vector3::from(cutter.force.force_n(chip.place, thickness_m, depth_m));
+            let step_m = STEP * thickness_m;
+            let force_n = at(thickness_m);
+            let even = Tooth {
+                radial_m: 0.0,
+                ..cutter.teeth[chip.tooth]
+            };
+            let axis = |axis: usize| std::array::from_fn(|other| f64::from(u8::from(other == axis)));
+            let normal = Vector3::from_fn(|i, _| cutter.reach_m(&even, chip.place, axis(i)));
+            let slope = (at(thickness_m + step_m) - force_n) / step_m * normal.transpose();
+            let (mut tooth, mut back_rad) = (chip.tooth, 0.0);
+            for _ in 0..=pass {
+                back_rad += cutter.teeth[tooth].pitch_rad;
+                tooth = cutter.teeth[tooth].ahead;
+            }
+            means.add(back_rad / TAU * turning.turn_s(), share * slope);
+            if cutter.axial_depth_modulation && depth_m > 0.0 {
+                let by_depth = means.direct_n_per_m.column(2) - share * force_n / depth_m;
+                means.direct_n_per_m.set_column(2, &by_depth);
+            }
+            if let (Some(_), Some(radius_m)) = (cutter.force.process_damping, cutter.radius_m) {
+                let speed_m_per_s = radius_m * turning.speed_rad_per_s(chip.t);
+                let damping = cutter.force.damping_ns_per_m(chip.place, depth_m, speed_m_per_s);
+                means.damping_ns_per_m += share * Matrix3::from_fn(|i, j| damping[i][j]);
+            }
+        }
+        means
+    }
+}
+
+/// How far each tooth stands out along the chip, m, and how many passes back the surface may come from.
+fn standing_out(cutter: &Cutter) -> (Vec<f64>, usize) {
+    let radial_m: Vec<f64> = cutter
+        .teeth
+        .iter()
+        .map(|tooth| cutter.reach_m(tooth, cutter.immersion(0.0), [0.0; 3]))
+        .collect();
+    let differ = radial_m.iter().any(|radial| *radial != radial_m[0]);
+    let passes = passes(cutter.teeth.len(), differ);
+    (radial_m, passes)
+}
+
+/// The thickness of a chip, m, and which earlier pass left its surface, counted from the last; not above zero where the tooth is in
+/// the air.
+fn thickness(cutter: &Cutter, radial_m: &[f64], chip: &Chip, left_m: &[f64]) -> (f64, usize) {
+    let mut ahead = chip.tooth;
+    let mut thinnest = (f64::INFINITY, 0);
+    for (pass, left_m) in left_m.iter().enumerate() {
+        ahead = cutter.teeth[ahead].ahead;
+        let thickness_m = left_m + radial_m[chip.tooth] - radial_m[ahead];
+        if thickness_m < thinnest.0 {
+            thinnest = (thickness_m, pass);
+        }
+    }
+    thinnest
+}
+
+/// Of every chip the share of its time in which its tooth touches, and its mean thickness there, m: within a sample a chip grows or
+/// thins as it does to the next sample of the same tooth, and where it comes to nothing the tooth loses contact.
+fn in_contact(series: &Series, thickness_m: &[f64], teeth: usize, width_s: f64) -> Vec<(f64, f64)> {
+    let mut all: Vec<(f64, f64)> = thickness_m
+        .iter()
+        .map(|thickness_m| (f64::from(u8::from(*thickness_m > 0.0)), *thickness_m))
+        .collect();
+    let mut last: Vec<Option<usize>> = vec![None; teeth];
+    for (index, chip) in series.chips.iter().enumerate() {
+        let before = last[chip.tooth].replace(index);
+        let Some(before) = before.filter(|before| series.chips[*before].sample + 1 == chip.sample) else {
+            continue;
+        };
+        // Both are looked at: the first chip of a pass has none before it.
+        let (from, to) = (thickness_m[before], thickness_m[index]);
+        let per_s = (to - from) / (chip.t - series.chips[before].t);
+        for at in [before, index] {
+            let half_m = 0.5 * per_s.abs() * width_s * series.chips[at].share;
+            if thickness_m[at].abs() < half_m {
+                let share = 0.5 * (1.0 + thickness_m[at] / half_m);
+                all[at] = (share, share * half_m);
+            }
+        }
+    }
+    all
 }
 
 /// What `of` puts in for each of so many samples.

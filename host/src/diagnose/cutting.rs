@@ -16,6 +16,9 @@ use crate::simulate::path::Motion;
 
 /// Rounds in which force and motion settle: the motion comes from the force, the chip from the motion.
 const ROUNDS: usize = 4;
+/// The same along the motion of a model, at most: until the motion is off the closed loop by no more than this, in units of the noise.
+const ROUNDS_OF_A_MODEL: usize = 8;
+const SETTLED: f64 = 0.03;
 
 /// A cut with its force as it is believed.
 pub struct Cutting {
@@ -130,8 +133,19 @@ impl Record {
             .iter()
             .map(|channel| cutting.skipped(channel))
             .collect();
+        let turn = cutting.cut.first_turn();
+        let count = self.grid.count();
+        self.compared = turn..if count > 4 * turn { count - turn } else { count };
         self.prepare_decays(baseline);
-        for round in 0..ROUNDS {
+        let slopes = cutting
+            .chips
+            .mean_slopes(&cutting.cut.cutter, &cutting.cut.turning);
+        let rounds = if self.clean.is_some() {
+            ROUNDS_OF_A_MODEL
+        } else {
+            ROUNDS
+        };
+        for round in 0..rounds {
             if round > 0 {
                 cutting.follow(&self.motion);
             }
@@ -158,13 +172,16 @@ impl Record {
                 self.add_terms(baseline, &mut force);
             }
             self.accept(predicted);
-            motion::learn(self, baseline, &force);
+            let off = self.off_the_closed_loop();
+            // The first force along the motion of a model is that of the measured one still.
+            let is_along = round > 0 || self.clean.is_none();
+            motion::learn(self, baseline, &force, is_along.then_some(&slopes));
+            if self.clean.is_some() && is_along && off < SETTLED {
+                break;
+            }
         }
         // What the causes add is measured from the force along the motion as it is known now.
         cutting.follow(&self.motion);
-        let turn = cutting.cut.first_turn();
-        let count = self.grid.count();
-        self.compared = turn..if count > 4 * turn { count - turn } else { count };
         self.cut = Some(cutting);
         Ok(())
     }

@@ -33,6 +33,7 @@ mod guess;
 mod judge;
 mod leftover;
 pub mod lobes;
+mod mean_slopes;
 mod missing_force;
 mod motion;
 mod named;

@@ -1,8 +1,10 @@
 //! The motion as far as it is known.
 
+use nalgebra::Vector3;
 use num_complex::Complex64;
 
 use super::DiagnoseError;
+use super::mean_slopes::MeanSlopes;
 use super::noise::{rms, white_floor};
 use super::record::{Observed, Record};
 use super::scene::{Baseline, derivatives};
@@ -20,7 +22,15 @@ const HEARD: f64 = 3.0;
 ///
 /// W = 1 − noise/power where what is left of the channels stands out of their noise, else 0 (Wiener): measured where that
 /// tells more than the model does. Several channels of an axis are weighted by the noise they mean in displacement.
-pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Option<Vec<Complex64>>; 3]) {
+///
+/// Of a cut, whose force hangs on the motion, `slopes` say what the motion is in closed loop: that is what the model predicts, and
+/// where the motion is that of a model, to be followed next.
+pub(super) fn learn(
+    record: &mut Record,
+    baseline: &Baseline<'_>,
+    force: &[Option<Vec<Complex64>>; 3],
+    slopes: Option<&MeanSlopes>,
+) {
     let grid = &record.grid;
     let bins = grid.bins();
     let rate = grid.finer() as f64 * grid.rate_hz();
@@ -31,8 +41,17 @@ pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Optio
     let mut displacement: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());
     let decay = fine_decay(record, baseline, rate);
     let mut corrections: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());
+    let mut speed_noise = [0.0; 3];
     for &axis in &baseline.axes {
         let correction = correction(record, axis, baseline.lowest_hz().unwrap_or(0.0));
+        corrections[axis] = correction.spectrum;
+        speed_noise[axis] = correction.speed_noise;
+    }
+    let closed = slopes.map(|slopes| in_closed_loop(record, slopes, &corrections));
+    if let Some(closed) = closed.as_ref().filter(|_| record.clean.is_some()) {
+        corrections.clone_from(closed);
+    }
+    for &axis in &baseline.axes {
         let x: Vec<Complex64> = (0..bins)
             .map(|bin| {
                 let model: Complex64 = force
@@ -42,7 +61,7 @@ pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Optio
                         Some(record.transfer[bin][(axis, from)] * force.as_ref()?[bin])
                     })
                     .sum();
-                model + correction.spectrum[bin]
+                model + corrections[axis][bin]
             })
             .collect();
         let mut v: Vec<Complex64> = x
@@ -59,18 +78,44 @@ pub(super) fn learn(record: &mut Record, baseline: &Baseline<'_>, force: &[Optio
         };
         motion.x[axis] = with(grid.fine_samples(&x), &decay[axis][0]);
         motion.v[axis] = with(grid.fine_samples(&v), &decay[axis][1]);
-        motion.rest_m_per_s[axis] = correction.speed_noise + 0.003 * rms(&motion.v[axis]);
+        motion.rest_m_per_s[axis] = speed_noise[axis] + 0.003 * rms(&motion.v[axis]);
         let coarse: Vec<f64> = motion.x[axis].iter().copied().step_by(grid.finer()).collect();
         displacement[axis] = grid.continued_spectrum(&coarse);
-        corrections[axis] = correction.spectrum;
     }
     if record.kind == Some(Kind::Cutting) {
-        record.readings = (0..record.channels.len())
-            .map(|channel| reading(record, channel, &corrections))
-            .collect();
+        let read = |corrections: &[Vec<Complex64>; 3]| -> Vec<Vec<f64>> {
+            (0..record.channels.len())
+                .map(|channel| reading(record, channel, corrections))
+                .collect()
+        };
+        let readings = read(&corrections);
+        let closed = closed.map(|closed| read(&closed));
+        record.readings = readings;
+        if let Some(closed) = closed {
+            record.close(closed);
+        }
     }
     record.motion = motion;
     record.displacement = displacement;
+}
+
+/// What corrects the motion to that of the closed loop, by axis, where `corrections` make it that of the record.
+fn in_closed_loop(
+    record: &Record,
+    slopes: &MeanSlopes,
+    corrections: &[Vec<Complex64>; 3],
+) -> [Vec<Complex64>; 3] {
+    let mut closed = corrections.clone();
+    for bin in 0..record.grid.bins() {
+        let off = Vector3::from_fn(|axis, _| corrections[axis].get(bin).copied().unwrap_or_default());
+        let step = slopes.closed(record.grid.omega(bin), &record.transfer[bin], off);
+        for (axis, closed) in closed.iter_mut().enumerate() {
+            if let Some(closed) = closed.get_mut(bin) {
+                *closed -= step[axis];
+            }
+        }
+    }
+    closed
 }
 
 /// What a channel reads: as predicted, with what corrects the motion.

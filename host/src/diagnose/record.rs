@@ -99,6 +99,8 @@ pub struct Record {
     pub decays: Decays,
     /// The cut, where it is the record of one.
     pub cut: Option<Cutting>,
+    /// By channel, of a cut: what it reads of the motion that the baseline has in closed loop.
+    closed: Option<Vec<Vec<f64>>>,
     /// What the motion is learned from, where that is known better than from what was measured.
     pub clean: Option<Clean>,
 }
@@ -176,6 +178,7 @@ impl Record {
             motion: Motion::default(),
             displacement: std::array::from_fn(|_| Vec::new()),
             readings: Vec::new(),
+            closed: None,
             highest_hz,
             // Forces of a cut reach to the end of the band.
             band_hz: if is_cut {
@@ -355,7 +358,7 @@ impl Record {
                 self.add_terms(baseline, &mut force);
             }
             self.predict(&force);
-            motion::learn(self, baseline, &force);
+            motion::learn(self, baseline, &force, None);
         }
         if rounds > 1 {
             let mut force = outside;
@@ -428,14 +431,37 @@ impl Record {
         }
     }
 
+    /// What the channels read in closed loop, but for samples that are not compared; goes along that if the motion is a model's.
+    pub(super) fn close(&mut self, mut closed: Vec<Vec<f64>>) {
+        for ((closed, channel), skipped) in closed.iter_mut().zip(&self.channels).zip(&self.skipped) {
+            for &sample in skipped {
+                closed[sample] = channel.predicted[sample];
+            }
+        }
+        if let Some(clean) = &mut self.clean {
+            clean.readings.clone_from(&closed);
+        }
+        self.closed = Some(closed);
+    }
+
+    /// By how much the motion is off the closed loop, in units of the noise: the most of any channel.
+    pub(super) fn off_the_closed_loop(&self) -> f64 {
+        (0..self.channels.len())
+            .filter(|index| self.channels[*index].pickup.quantity != Quantity::Force)
+            .map(|index| rms(&self.to_correct(index)[self.compared.clone()]) / self.channels[index].deviation)
+            .fold(0.0, f64::max)
+    }
+
     /// What the channels read without their noise, if the baseline is right.
     pub fn predicted(&self) -> Clean {
-        Clean {
-            readings: self
-                .channels
+        let open = || {
+            self.channels
                 .iter()
                 .map(|channel| channel.predicted.clone())
-                .collect(),
+                .collect()
+        };
+        Clean {
+            readings: self.closed.clone().unwrap_or_else(open),
             deviations: self.channels.iter().map(|channel| channel.deviation).collect(),
         }
     }
