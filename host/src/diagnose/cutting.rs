@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::DiagnoseError;
 use super::chips::Chips;
 use super::cut::{CutForce, RecordedCut};
+use super::mean_slopes::MeanSlopes;
 use super::motion;
 use super::record::{Observed, Record};
 use super::scene::Baseline;
@@ -59,6 +60,11 @@ impl Cutting {
         }
         let is_beside = |sample: &usize| self.cut.is_beside(*sample as f64 / self.cut.rate_hz());
         (0..channel.measured.len()).filter(is_beside).collect()
+    }
+
+    /// How its force answers to a small motion beside the one that its chips are of.
+    pub(super) fn mean_slopes(&self) -> MeanSlopes {
+        self.chips.mean_slopes(&self.cut.cutter, &self.cut.turning)
     }
 
     /// Goes along another motion.

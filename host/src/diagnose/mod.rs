@@ -58,6 +58,8 @@ mod stiffness;
 mod tests;
 mod together;
 pub mod turning;
+#[cfg(test)]
+mod two_effects_tests;
 mod unknowns;
 mod views;
 mod whitening;

@@ -10,10 +10,15 @@ use super::decay::dot;
 use super::gram::{Products, products};
 pub use super::part::Share;
 use super::part::{Part, Unknown, split};
+use super::record::TRUSTED_IN_CUTS;
 use super::scene::Scene;
 
 /// What is added to the squares of columns, as a share, where all columns of the library are fitted at once.
 const SOFTENED: f64 = 1e-9;
+
+/// The same of the columns of a fit, where only rounding makes columns that are one look like two; of a cut, which is computed less
+/// well, columns must be apart by more than the errors of the computation.
+const ROUNDING: f64 = 1e-13;
 
 /// A fit of some columns.
 #[derive(Clone, Debug)]
@@ -47,6 +52,8 @@ pub struct Regression {
     products: [Products; 3],
     /// So many columns have all their products.
     complete: usize,
+    /// What is added to the squares of columns, as a share, in every fit.
+    ridge: f64,
 }
 
 impl Regression {
@@ -67,6 +74,11 @@ impl Regression {
             residuals,
             products: std::array::from_fn(|_| Products::default()),
             complete: 0,
+            ridge: if scene.records.iter().any(|record| record.cut.is_some()) {
+                TRUSTED_IN_CUTS * TRUSTED_IN_CUTS
+            } else {
+                ROUNDING
+            },
         };
         regression.sum();
         regression
@@ -255,7 +267,7 @@ impl Regression {
 
     /// The fit of some columns to a share; `None` where they are one and the same, or nothing.
     pub fn fit(&self, share: Share, columns: &[usize]) -> Option<Fit> {
-        self.solve(share, columns, 1e-13)
+        self.solve(share, columns, self.ridge)
     }
 
     /// Coefficients of `columns` that fit the column `target`, and how much of its energy they take.
@@ -264,7 +276,7 @@ impl Regression {
             .iter()
             .map(|column| self.product(share, *column, target))
             .collect();
-        let (solution, _) = self.normal(share, columns, 1e-13, &right)?;
+        let (solution, _) = self.normal(share, columns, self.ridge, &right)?;
         let taken = solution.iter().zip(&right).map(|(x, right)| x * right).sum();
         Some((solution, taken))
     }
@@ -279,7 +291,7 @@ impl Regression {
                 .sum()
         };
         let right: Vec<f64> = columns.iter().map(|column| with(*column)).collect();
-        let (change, _) = self.normal(share, columns, 1e-13, &right)?;
+        let (change, _) = self.normal(share, columns, self.ridge, &right)?;
         Some(Refit {
             before: mine.iter().map(|(_, residual)| dot(residual, residual)).sum(),
             taken: change

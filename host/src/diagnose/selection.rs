@@ -332,9 +332,12 @@ impl<'a> Scale<'a> {
             .collect();
         let mut gained = 0.0;
         for place in 0..found.len().min(POLISHED) {
-            // What was behind by more than twice what the best gained will not come up to it.
-            if place > 0 && before[0] - before[place] > APART + 2.0 * gained {
-                break;
+            // What was behind by more than twice what the best gained will not come up to it, unless it is simpler: of that the other
+            // may have mended what the slopes of the baseline got wrong.
+            let is_simpler = found[place].freedoms < found[0].freedoms
+                && found[place].fit.left < NEARLY * found[0].fit.left;
+            if place > 0 && !is_simpler && before[0] - before[place] > APART + 2.0 * gained {
+                continue;
             }
             if let Some(polished) = closed.polished(library, regression, &found[place]) {
                 if place == 0 {
