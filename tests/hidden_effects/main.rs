@@ -3,6 +3,9 @@
 //! Equations, integrators and the judge are this test's own: nothing of the library's simulation or diagnosis is in them, so
 //! that a mistake in the library cannot hide in its own mirror.
 //!
+//! An effect counts as plain where its root mean square in some channel is above three times the noise; of two effects each has to
+//! be, by what it changes beside the other.
+//!
 //! The whole campaign, with so many seeds of each family (200 take long), or of the families that contain a text:
 //!
 //! ```text

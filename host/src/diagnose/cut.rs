@@ -3,7 +3,7 @@
 //! With the measured motion u the chip of every tooth is known: h = min over earlier passes p of
 //! n·(u − u(t − pτ)) + (r_j − r_(j+p)) sin γ + p f sin φ sin γ (a surface is what all earlier passes left), and the force of
 //! the cut is linear in most of what a process may have otherwise. Between samples the force jumps where teeth enter and
-//! leave: what drives the structure is its mean over each finer sample, with entry and exit at their instants.
+//! leave: what drives the structure is its mean over each finer sample, with entry, exit and loss of contact at their instants.
 
 use super::DiagnoseError;
 use super::chips::{Chips, Sampling};

@@ -143,9 +143,7 @@ impl Record {
         let count = self.grid.count();
         self.compared = turn..if count > 4 * turn { count - turn } else { count };
         self.prepare_decays(baseline);
-        let slopes = cutting
-            .chips
-            .mean_slopes(&cutting.cut.cutter, &cutting.cut.turning);
+        let slopes = cutting.mean_slopes();
         let rounds = if self.clean.is_some() {
             ROUNDS_OF_A_MODEL
         } else {

@@ -1,7 +1,7 @@
 //! The force of a cut linearized about its motion, and the motion in closed loop by it.
 //!
 //! F(u + δ) ≈ F(u) + Σ_p K_p (δ − δ(t − τ_p)) + K_z δ − C δ̇ with means over the record: K_p of ∂F/∂h nᵀ over the chips whose
-//! surface the pass p turns of τ_p ago left, K_z of what the depth of cut follows, C of process damping (the zeroth-order
+//! surface was left τ_p before, K_z of a depth of cut that follows the axial motion, C of process damping (the zeroth-order
 //! approximation: Altintas and Budak, CIRP Annals 44 (1995) 357).
 //!
 //! Along a motion u the structure answers x = H F(u). Where x = u the loop is closed; to put x in the place of u and to go on is to

@@ -18,6 +18,7 @@ mod checks;
 pub mod chips;
 mod closed_fit;
 mod closed_loop;
+mod closed_selection;
 mod cubic;
 pub mod cut;
 mod cutting;

@@ -3,8 +3,8 @@
 //! Along the measured motion what a cause adds to a cut is exact only to first order: a late sensor, a lighter structure or runout
 //! change the motion that the chip is computed from. So the recordings are read again with the extended case, which gives the
 //! residual r(θ) itself, and the columns of the regression its slopes: θ ← θ + (JᵀJ)⁻¹Jᵀ r(θ), Gauss and Newton's steps with the
-//! slopes of the first (the chord method). The motion is each time the one that the extended case predicts, so that the noise of
-//! the sensors is not in it.
+//! slopes of the first (the chord method). The motion is each time the one that the extended case has in closed loop
+//! (`mean_slopes`), so that the noise of the sensors is not in it.
 
 use std::sync::Arc;
 
