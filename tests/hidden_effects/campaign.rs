@@ -268,7 +268,7 @@ impl Report {
     }
 
     /// Weak but separable effects: right.
-    fn weak(&self) -> Share {
+    pub(crate) fn weak(&self) -> Share {
         self.share(|f| (f.is_plain() == Some(false)).then_some(f.right))
     }
 

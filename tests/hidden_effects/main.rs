@@ -133,6 +133,10 @@ fn a_part_of_the_campaign() {
         for judged in [report.separable(), report.equivalent(), report.invisible()] {
             assert_eq!(judged.good, judged.all, "{report}");
         }
+        // Of these two effects the weaker is found as well.
+        if family == Family::TwoEffects {
+            assert_eq!(report.weak().good, report.weak().all, "{report}");
+        }
     }
 }
 
