@@ -7,7 +7,7 @@ use super::closed_fit::ClosedFit;
 use super::evidence::{Explanation, Library};
 use super::regression::{Regression, Share};
 use super::selection::{APART, Scale};
-use super::stepwise::{distinct, extended, without};
+use super::stepwise::{distinct, extended, nested, without};
 
 /// χ² per number below which an explanation explains nearly all, and over that of another below which it is nearly as good; and how
 /// many times that another may leave along the measured motion and still be simulated.
@@ -155,7 +155,7 @@ impl Scale<'_> {
         self.sort(regression, found, inflation);
     }
 
-    /// The explanation without causes that others have made needless.
+    /// The explanation without causes that others have made needless, and with simpler causes where these are enough.
     pub(super) fn pruned(
         &self,
         library: &mut Library,
@@ -166,11 +166,14 @@ impl Scale<'_> {
             return best;
         };
         let mut kept = best;
-        while kept.choices.len() > 1 {
+        loop {
             let inflation = self.inflation(regression, Some(&kept));
             let reached = self.gain(regression, &kept, inflation);
-            let needless = (0..kept.choices.len()).find_map(|place| {
-                let fewer = without(library, &kept, place);
+            let places = 0..kept.choices.len();
+            let fewer = places.clone().filter(|_| kept.choices.len() > 1);
+            let mut simpler: Vec<Explanation> = fewer.map(|place| without(library, &kept, place)).collect();
+            simpler.extend(places.flat_map(|place| nested(self.scene, library, &kept, place)));
+            let needless = simpler.into_iter().find_map(|fewer| {
                 let fewer = closed.fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))?;
                 let enough = |regression: &Regression, fewer: &Explanation| {
                     self.gain(regression, fewer, inflation) > reached - self.least_gain(regression, true)

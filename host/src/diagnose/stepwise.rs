@@ -1,7 +1,8 @@
 //! Explanations with one cause more or one less, from what a simulation leaves.
 //!
 //! The residual of a simulated explanation holds neither the noise of the measured motion nor what sampling hides: which cause
-//! it asks for next is seen there (the score test), and what a later cause has made needless is taken out again.
+//! it asks for next is seen there (the score test), and what a later cause has made needless is taken out again: a whole cause, or
+//! what makes it more than a simpler one.
 
 use nalgebra::DMatrix;
 
@@ -101,6 +102,59 @@ pub(super) fn without(library: &Library, explanation: &Explanation, place: usize
         },
         simulated: None,
     }
+}
+
+/// The explanation with a simpler cause in the place of one of its own: at the same place, with some of its parameters and no others
+/// (a cubic spring for one that softens and hardens), at the values that they have.
+pub(super) fn nested(
+    scene: &Scene<'_>,
+    library: &Library,
+    explanation: &Explanation,
+    place: usize,
+) -> Vec<Explanation> {
+    let Some(parameters) = library.parameters(scene, explanation) else {
+        return Vec::new();
+    };
+    let whole = explanation.choices[place];
+    let values = &parameters[place];
+    let acts_at = &library.candidates[whole.candidate].place;
+    let before = explanation.choices[..place].iter();
+    let from: usize = before.map(|choice| library.columns(*choice).len()).sum();
+    let to = from + library.columns(whole).len();
+    let simpler = |choice: Choice| {
+        let known = &library.candidates[choice.candidate];
+        let (shape, columns) = &known.shapes[choice.shape];
+        if known.place != *acts_at || !shape.is_empty() || library.freedoms(choice) >= library.freedoms(whole)
+        {
+            return None;
+        }
+        // Its coefficients are its parameters, or it has none of these values.
+        let cause = library.cause(choice.candidate);
+        let own: Vec<f64> = values
+            .iter()
+            .take(columns.len())
+            .map(|(_, value)| *value)
+            .collect();
+        let said = cause.parameters(scene, acts_at, shape, &own)?;
+        if said.is_empty() || !said.iter().all(|parameter| values.contains(parameter)) {
+            return None;
+        }
+        let mut coefficients = explanation.fit.coefficients.clone();
+        coefficients.splice(from..to, own);
+        let mut choices = explanation.choices.clone();
+        choices[place] = choice;
+        Some(Explanation {
+            freedoms: choices.iter().map(|choice| library.freedoms(*choice)).sum(),
+            choices,
+            fit: Fit {
+                covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
+                coefficients,
+                left: explanation.fit.left,
+            },
+            simulated: None,
+        })
+    };
+    library.choices().into_iter().filter_map(simpler).collect()
 }
 
 /// Those of `found` that no earlier one is the same as.
