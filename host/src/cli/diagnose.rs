@@ -138,7 +138,7 @@ fn write(folder: &Path, name: &str, diagnosis: &Diagnosis, extended: Option<&str
 
 fn text(diagnosis: &Diagnosis) -> String {
     let mut lines = vec![format!(
-        "the case misses {:.3} % of what it was not fitted to",
+        "the case misses {:.3} % of the parts of the records that are held out",
         100.0 * diagnosis.baseline.nrmse_heldout
     )];
     lines.push(
@@ -169,7 +169,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     }
     if let (Some(extended), Some(gain)) = (diagnosis.extended, diagnosis.gain) {
         lines.push(format!(
-            "with it {:.3} % is missed: {:.2} % of the residual's energy is gone, 90 % interval {:.2} to {:.2} %",
+            "with it {:.3} % is missed: {:.2} % of the residual's energy beyond the noise is gone, 90 % interval {:.2} to {:.2} %",
             100.0 * extended.nrmse_heldout,
             100.0 * gain.residual_energy_removed,
             100.0 * gain.ci90[0],

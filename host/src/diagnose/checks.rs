@@ -32,7 +32,7 @@ pub(super) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<D
     }
     if !motion.into_iter().any(has) {
         return Err(recording
-            .lacks("a channel of motion, such as x [m] or ax [m/s^2]")
+            .lacks("channel of motion, such as x [m] or ax [m/s^2]")
             .into());
     }
     let kind = recording.sidecar.kind;
@@ -46,7 +46,7 @@ pub(super) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<D
     if driven_by_motion || (baseline.is_free() && kind != Some(Kind::FreeDecay)) {
         if !has(Quantity::Force) {
             return Err(recording
-                .lacks("the force: driven by motion, it is what the case predicts")
+                .lacks("channel of force, such as fx [N]: driven by motion, that is what the case predicts")
                 .into());
         }
         return Ok(Domain::Force);
@@ -60,7 +60,9 @@ pub(super) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<D
         Some(Kind::FreeDecay) => Ok(Domain::Response),
         _ if has(Quantity::Force) => Ok(Domain::Response),
         _ => Err(recording
-            .lacks("the force that drove it, such as fx [N] (only kind = \"free-decay\" needs none)")
+            .lacks(
+                "channel of the force that drove it, such as fx [N] (only kind = \"free-decay\" needs none)",
+            )
             .into()),
     }
 }
@@ -119,16 +121,24 @@ pub(super) fn record(
     Ok(())
 }
 
+/// How many equal samples at an end of the range one blow of a hammer may be clipped to, and how many steps of the channel's resolution
+/// are steep beside them.
+const FLAT: std::ops::RangeInclusive<usize> = 3..=64;
+const CLIFF: f64 = 8.0;
+
 /// Factors that a wrong unit brings: the name of what was likely meant.
-const UNITS: [(f64, &str); 5] = [
+const UNITS: [(f64, &str); 6] = [
+    (4.448, "4.45: pounds of force for N"),
     (1e3, "a thousand: mm, kN or g for m, N or kg"),
     (1e6, "a million: µm for m"),
     (25.4, "25.4: inches for mm"),
     (39.37, "39.37: inches for m"),
     (9.806_65, "9.81: g for m/s²"),
 ];
-/// A model may be wrong by this factor before a unit is suspected.
+/// A model may be wrong by this factor before a unit is suspected; and by this one, of a shape that is nothing like what was measured,
+/// before nothing but a unit can be the reason: no resonance and no nonlinearity of a machine brings as much.
 const WRONG_BY: f64 = 4.0;
+const FAR_OFF: f64 = 250.0;
 
 /// A prediction of less than so many times the energy that noise of the forces alone would bring tells nothing.
 const MOST_BY_NOISE: f64 = 25.0;
@@ -151,26 +161,76 @@ pub(super) fn unit(
     if own <= MOST_BY_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
+    far_off(path, channel, response, measured)?;
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
-    let size = factor.max(1.0 / factor);
-    let likely = UNITS.iter().find(|(unit, _)| (size / unit).ln().abs() < 0.4);
+    let likely = likely(factor);
     // Where no unit is known that would do, the shapes must be the same.
     let least_alike = if likely.is_some() { 0.3 } else { 0.8 };
     if alike < least_alike || (1.0 / WRONG_BY..WRONG_BY).contains(&factor) {
         return Ok(());
     }
-    let likely = likely.map_or_else(String::new, |(_, meant)| format!(" It is about {meant}."));
     Err(DiagnoseError::record(
         path,
         format!(
-            "{} is {factor:.4e} times what the case predicts, though of the same shape: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{likely}",
-            channel.pickup.name
+            "{} is {factor:.4e} times what the case predicts, though of the same shape: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
+            channel.pickup.name,
+            said(likely)
         ),
     ))
 }
 
-/// The level at which a channel is cut off: flat tops of three and more equal samples at an end of its range.
+/// Refuses a channel that reads out of all proportion to its prediction, whatever their shapes; offsets of sensors do not count.
+pub(super) fn far_off(
+    path: &std::path::Path,
+    channel: &Observed,
+    response: &[f64],
+    measured: &[f64],
+) -> Result<(), DiagnoseError> {
+    let factor = spread(measured) / spread(response);
+    if !factor.is_finite() || factor == 0.0 || (1.0 / FAR_OFF..FAR_OFF).contains(&factor) {
+        return Ok(());
+    }
+    Err(DiagnoseError::record(
+        path,
+        format!(
+            "{} is {factor:.1e} times as large as what the case predicts: no machine is that far from its model; its unit, that of what drives it, or the case is wrong; give units in the header as name [unit].{}",
+            channel.pickup.name,
+            said(likely(factor))
+        ),
+    ))
+}
+
+/// Root mean square about the mean.
+fn spread(samples: &[f64]) -> f64 {
+    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+    rms(&samples.iter().map(|x| x - mean).collect::<Vec<_>>())
+}
+
+/// What a gain that was found may be if it is none of the sensor: a unit.
+pub(super) fn unit_of_gain(gain: f64) -> Option<&'static str> {
+    unit_within(gain.abs(), 0.03)
+}
+
+/// The unit that was likely meant where something is so many times too large, or too small, by a model that may be wrong as well.
+fn likely(factor: f64) -> Option<&'static str> {
+    unit_within(factor, 0.4)
+}
+
+fn unit_within(factor: f64, share: f64) -> Option<&'static str> {
+    let size = factor.max(1.0 / factor);
+    let near = |unit: f64| (size / unit).ln().abs();
+    let units = UNITS.iter().filter(|(unit, _)| near(*unit) < share);
+    let nearest = units.min_by(|a, b| near(a.0).total_cmp(&near(b.0)));
+    nearest.map(|(_, meant)| *meant)
+}
+
+fn said(likely: Option<&str>) -> String {
+    likely.map_or_else(String::new, |meant| format!(" It is about {meant}."))
+}
+
+/// The level at which a channel is cut off: flat tops of three and more equal samples at an end of its range, many of them, or one
+/// that the signal reaches and leaves steeply.
 fn clipped(samples: &[f64]) -> Option<f64> {
     let (low, high) = samples
         .iter()
@@ -181,9 +241,17 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     if range <= 0.0 {
         return None;
     }
+    let resolution = samples
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .filter(|step| *step > 1e-9 * range)
+        .fold(f64::INFINITY, f64::min);
     // A digital channel has few levels; flat tops of a slow signal on coarse levels are no clipping.
     [high, low].into_iter().find(|end| {
         let at = |x: &f64| (x - end).abs() <= 1e-9 * range;
+        if *end != 0.0 && has_cliff(samples, at, *end, CLIFF * resolution) {
+            return true;
+        }
         let (mut flat, mut run, mut runs) = (0, 0, 0);
         for sample in samples {
             if at(sample) {
@@ -200,9 +268,52 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     })
 }
 
+/// True where some flat top, no longer than a blow, is reached and left by steps larger than `step`. Three samples of a smooth top that
+/// one level of a digital channel holds have neighbours at most five levels below: 4c under the peak where c keeps one level.
+fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, step: f64) -> bool {
+    let mut first = 0;
+    while first < samples.len() {
+        if !at(&samples[first]) {
+            first += 1;
+            continue;
+        }
+        let length = samples[first..].iter().take_while(|x| at(x)).count();
+        let beyond = first + length;
+        let is_steep = |place: usize| samples.get(place).is_some_and(|x| (x - end).abs() > step);
+        if FLAT.contains(&length) && first > 0 && is_steep(first - 1) && is_steep(beyond) {
+            return true;
+        }
+        first = beyond;
+    }
+    false
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_clipped_blow_is_enough_and_a_coarse_one_is_not_clipped() {
+        let blow = |n: i32| {
+            let phase = f64::from(n - 700) / 24.0;
+            if (0.0..1.0).contains(&phase) {
+                (std::f64::consts::PI * phase).sin()
+            } else {
+                0.0
+            }
+        };
+        let noise = |n: i32| 1e-3 * (37.0 * f64::from(n)).sin();
+        let whole: Vec<f64> = (0..20_000).map(|n| blow(n) + noise(n)).collect();
+        assert_eq!(clipped(&whole), None);
+        let cut: Vec<f64> = whole.iter().map(|x| x.min(0.8)).collect();
+        assert_eq!(clipped(&cut), Some(0.8));
+        // On 64 levels the top of a blow is flat, and is left level by level.
+        let coarse: Vec<f64> = whole.iter().map(|x| (64.0 * x).round() / 64.0).collect();
+        assert_eq!(clipped(&coarse), None);
+        // What is held and let go is no blow.
+        let held: Vec<f64> = (0..2000).map(|n| if n < 900 { 1.0 } else { 0.0 }).collect();
+        assert_eq!(clipped(&held), None);
+    }
 
     #[test]
     fn flat_tops_are_clipping_and_tones_are_not() {

@@ -3,7 +3,6 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::DiagnoseError;
 use super::chips::Chips;
 use super::cut::{CutForce, RecordedCut};
 use super::mean_slopes::MeanSlopes;
@@ -11,6 +10,7 @@ use super::motion;
 use super::record::{Observed, Record};
 use super::scene::Baseline;
 use super::turning::Turning;
+use super::{DiagnoseError, checks};
 use crate::recording::{Quantity, Recording};
 use crate::simulate::Cutter;
 use crate::simulate::path::Motion;
@@ -127,6 +127,22 @@ impl Record {
         })
     }
 
+    /// Refuses channels whose size cannot be that of this cut. What is predicted first is along no motion at all: forces are about
+    /// those of the chips as they are fed; the motion may be larger by far where regeneration amplifies it.
+    fn check_units_of_cut(&self) -> Result<(), DiagnoseError> {
+        for (index, channel) in self.channels.iter().enumerate() {
+            let predicted = self.decays.without(index, &channel.predicted);
+            if channel.pickup.quantity == Quantity::Force {
+                checks::unit(&self.path, channel, &predicted, self.compared.clone(), 0.0)?;
+            } else {
+                let range = self.compared.clone();
+                let (response, measured) = (&predicted[range.clone()], &channel.measured[range]);
+                checks::far_off(&self.path, channel, response, measured)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Predicts all channels of a cut, and learns the motion from what is left.
     pub(super) fn compare_cut(
         &mut self,
@@ -176,6 +192,9 @@ impl Record {
                 self.add_terms(baseline, &mut force);
             }
             self.accept(predicted);
+            if round == 0 && self.clean.is_none() {
+                self.check_units_of_cut()?;
+            }
             let off = self.off_the_closed_loop();
             // The first force along the motion of a model is that of the measured one still.
             let is_along = round > 0 || self.clean.is_none();

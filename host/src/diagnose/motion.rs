@@ -282,7 +282,7 @@ pub(super) fn compare_forces(
             .find_map(|pickup| Some((derivatives(pickup.quantity), recording.channel(&pickup.name)?)))
             .ok_or_else(|| {
                 recording.lacks(format!(
-                    "the motion along {}, which a record judged by its force needs",
+                    "channel of the motion along {}, which a record judged by its force needs",
                     super::scene::direction_of(axis)
                 ))
             })?;
