@@ -102,11 +102,13 @@ impl Said {
 }
 
 impl SaidCause {
-    /// True where it is one of the hidden causes, and where it says its direction or channel, at the right one.
+    /// True where it is one of the hidden causes, and where it says its direction or channel, at the right one; a sensor that is wrong
+    /// has to be named.
     fn is_any_of(&self, hidden: &[Hidden]) -> bool {
         hidden.iter().any(|hidden| {
-            let placed = hidden.place.as_ref().filter(|_| !self.places.is_empty());
-            hidden.name == self.name && placed.is_none_or(|place| self.places.contains(place))
+            let unplaced = self.places.is_empty() && !self.name.starts_with("sensor-");
+            let placed = self.places.iter().any(|place| hidden.places.contains(place));
+            hidden.name == self.name && (placed || unplaced || hidden.places.is_empty())
         })
     }
 }

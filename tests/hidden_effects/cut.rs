@@ -172,6 +172,13 @@ impl CutBench {
         self.sensors().iter().map(|sensor| sensor.name()).collect()
     }
 
+    /// Names of the channels of force.
+    pub(crate) fn force_names(&self) -> Vec<String> {
+        let sensors = self.sensors();
+        let forces = sensors.iter().filter(|sensor| matches!(sensor, Sensed::Force(_)));
+        forces.map(|force| force.name()).collect()
+    }
+
     /// The case file.
     pub(crate) fn case_text(&self) -> String {
         let Job {
@@ -269,7 +276,15 @@ impl CutBench {
             .iter()
             .enumerate()
             .map(|(index, sensed)| match sensed {
-                Sensed::Force(axis) => motion.force.iter().map(|force| force[*axis]).collect(),
+                Sensed::Force(axis) => {
+                    let gain: f64 = causes
+                        .iter()
+                        .filter(|cause| cause.sensor == index || cause.sensor == EVERY_FORCE)
+                        .filter(|cause| cause.kind == Kind::SensorGain)
+                        .map(|cause| cause.values(&self.machine, &self.scale)[0].1)
+                        .product();
+                    motion.force.iter().map(|force| gain * force[*axis]).collect()
+                }
                 Sensed::Motion(sensor) => {
                     let about = |cause: &&Cause| cause.sensor == index || cause.sensor == EVERY_SENSOR;
                     let mut causes: Vec<&Cause> = causes
@@ -471,6 +486,8 @@ impl Lab for CutBench {
             Kind::SensorGain => (first..last)
                 .map(|sensor| (self.motion[sensor - first].axis, sensor))
                 .chain([(0, EVERY_SENSOR)])
+                .chain((0..first).map(|force| (self.machine.axes[force], force)))
+                .chain((first > 1).then_some((0, EVERY_FORCE)))
                 .collect(),
             Kind::SensorOffset => Vec::new(),
             kind if kind.of_sensor() => (first..last)
@@ -525,6 +542,9 @@ impl Lab for CutBench {
 
 /// The place of an effect that all channels of motion have.
 pub(crate) const EVERY_SENSOR: usize = usize::MAX;
+
+/// The place of a gain that all channels of force have: that of a dynamometer.
+pub(crate) const EVERY_FORCE: usize = usize::MAX - 1;
 
 /// A tachometer of one pulse per turn: it rises, over two samples, where the angle passes a whole turn, and falls half a
 /// turn later.

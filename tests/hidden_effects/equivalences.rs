@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, Kind};
-use super::cut::{CutBench, EVERY_SENSOR};
+use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
 use super::judge::{Judge, Lab, Verdict};
 use super::machine::Machine;
 use super::rig::{Bench, Rig, Test};
@@ -120,4 +120,8 @@ fn measured_force_separates_a_common_gain_from_the_force() {
     let bench = CutBench::draw(&mut ChaCha8Rng::seed_from_u64(0), true);
     let sigma = percent(&bench, Some(bench.angle_sigma()));
     assert_eq!(verdict(&bench, &sigma, &gain(EVERY_SENSOR)), Verdict::Separable);
+    // A dynamometer that reads too much, as a whole or along one axis, leaves the motion as it is.
+    for sensor in [EVERY_FORCE, 0] {
+        assert_eq!(verdict(&bench, &sigma, &gain(sensor)), Verdict::Separable);
+    }
 }

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, STRANGE, Scale};
-use super::cut::CutBench;
+use super::cut::{CutBench, EVERY_FORCE};
 use super::judge::{Judge, Lab, Verdict};
 use super::machine::{Machine, between};
 use super::rig::{Bench as RigBench, Output, Rig, Test};
@@ -60,8 +60,8 @@ impl Family {
 pub(crate) struct Hidden {
     pub(crate) name: &'static str,
     pub(crate) values: Vec<(&'static str, f64)>,
-    /// Its direction or channel, where it has one.
-    pub(crate) place: Option<String>,
+    /// Its direction or channels, where it has such.
+    pub(crate) places: Vec<String>,
 }
 
 /// One seed of a family.
@@ -167,7 +167,7 @@ impl Puzzle {
         let describe = |cause: &Cause| Hidden {
             name: cause.kind.name(),
             values: cause.values(machine, scale),
-            place: bench.place(cause),
+            places: bench.places_of(cause),
         };
         let case_text = bench.case_text();
         Some(Self {
@@ -208,14 +208,21 @@ impl Bench {
         }
     }
 
-    /// The direction or the channel of a cause, as answers call it.
-    fn place(&self, cause: &Cause) -> Option<String> {
+    /// The direction or the channels of a cause, as answers call them; none where it is everywhere.
+    fn places_of(&self, cause: &Cause) -> Vec<String> {
         if !cause.kind.of_sensor() {
-            return cause.kind.has_direction().then(|| letter(cause.axis).to_string());
+            let direction = cause.kind.has_direction().then(|| letter(cause.axis).to_string());
+            return direction.into_iter().collect();
         }
         match self {
-            Self::Rig(bench) => Some(bench.rig.sensors[cause.sensor].name()),
-            Self::Cut(bench) => bench.channel_names().get(cause.sensor).cloned(),
+            Self::Rig(bench) => vec![bench.rig.sensors[cause.sensor].name()],
+            Self::Cut(bench) if cause.sensor == EVERY_FORCE => bench.force_names(),
+            Self::Cut(bench) => bench
+                .channel_names()
+                .get(cause.sensor)
+                .cloned()
+                .into_iter()
+                .collect(),
         }
     }
 

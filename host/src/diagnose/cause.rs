@@ -25,6 +25,8 @@ pub enum Place {
     Axes(usize, usize),
     /// In a channel.
     Channel(String),
+    /// In each of these channels, alike.
+    Channels(Vec<String>),
     /// In a channel, from another of the machine's axes.
     ChannelFrom(String, usize),
 }
@@ -74,6 +76,7 @@ impl fmt::Display for Place {
             }
             Self::Axes(a, b) => write!(f, "{}-{}", direction_of(*a), direction_of(*b)),
             Self::Channel(name) => f.write_str(name),
+            Self::Channels(names) => f.write_str(&names.join(" and ")),
             Self::ChannelFrom(name, axis) => write!(f, "{name} from {}", direction_of(*axis)),
         }
     }

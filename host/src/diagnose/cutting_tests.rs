@@ -252,3 +252,44 @@ fn much_process_damping_is_found_beside_runout() {
         assert!((found / truth - 1.0).abs() < 2e-3, "{}", told(&diagnosis));
     }
 }
+
+#[test]
+fn a_dynamometer_that_reads_too_much_is_no_harder_material() {
+    let cuts = records(&["sensor-gain=1.1", "sensor-gain.channel=fx,fy"], true, 17);
+    let diagnosis = diagnose(&case("0.15", ""), &cuts, &Options::default()).unwrap();
+    let said: Vec<_> = diagnosis
+        .causes
+        .iter()
+        .map(|cause| (cause.name, cause.channel.as_deref()))
+        .collect();
+    let expected = ["fx", "fy"].map(|name| ("sensor-gain", Some(name)));
+    assert_eq!(said, expected, "{}", told(&diagnosis));
+    for cause in &diagnosis.causes {
+        // 2 % of noise in 16 000 samples of each channel.
+        let gain = cause.parameters["gain"].value;
+        assert!((gain - 1.1).abs() < 2e-3, "{gain}");
+    }
+    // The case with it reads as the dynamometer does.
+    let extended = diagnosis.extended(&case("0.15", "")).unwrap();
+    let again = diagnose(&extended, &cuts, &Options::default()).unwrap();
+    assert_eq!(again.outcome, super::answer::Outcome::None, "{}", told(&again));
+}
+
+#[test]
+fn wrong_units_of_a_cut_are_said() {
+    for (name, factor) in [("x", 1e3), ("fx", 1e-3)] {
+        let mut cuts = records_of(1.0, &["force-coefficients=0.2"], true, 3);
+        let channel = cuts[0]
+            .channels
+            .iter_mut()
+            .find(|channel| channel.name == name)
+            .unwrap();
+        channel.samples.iter_mut().for_each(|sample| *sample *= factor);
+        let error = diagnose(&case("0.15", ""), &cuts, &Options::default()).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.contains(&format!("{name} is")) && said.contains("It is about a thousand"),
+            "{said}"
+        );
+    }
+}

@@ -2,6 +2,7 @@
 
 mod cross_axis;
 mod delay;
+mod force_gain;
 mod gain;
 mod offset;
 
@@ -17,6 +18,7 @@ use crate::simulate::path::Motion;
 pub(super) fn all() -> Vec<Box<dyn Cause>> {
     vec![
         Box::new(gain::Gain),
+        Box::new(force_gain::ForceGain),
         Box::new(delay::Delay),
         Box::new(cross_axis::CrossAxis),
         Box::new(offset::Offset),

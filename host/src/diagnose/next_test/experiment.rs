@@ -220,8 +220,12 @@ impl Experiment {
             }
         }
         if let Doing::Cut { .. } = self.doing {
-            let of = if bench.has_force { Of::Mounted } else { Of::Force };
-            let forces = second
+            let (of, recording) = if bench.has_force {
+                (Of::Mounted, &mounted)
+            } else {
+                (Of::Force, &second)
+            };
+            let forces = recording
                 .channels
                 .iter()
                 .filter(|channel| channel.quantity == Quantity::Force);

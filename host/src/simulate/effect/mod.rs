@@ -216,7 +216,7 @@ impl Effects {
         Self::build(all)
     }
 
-    /// The effects that a case has as extensions: one for each direction where `direction` is a list. A tool's runout is part of the tool and not among them.
+    /// The effects that a case has as extensions: one for each place where `direction` or `channel` is a list. A tool's runout is part of the tool and not among them.
     ///
     /// # Errors
     /// An extension that cannot be simulated, or a key or value that it cannot have.
@@ -252,11 +252,11 @@ impl Effects {
 
     fn build(mut all: Vec<Parameters>) -> Result<Self, EffectError> {
         coulomb_friction::take_play(&mut all)?;
-        let by_direction: Vec<Vec<Parameters>> = all
+        let by_place: Vec<Vec<Parameters>> = all
             .into_iter()
-            .map(Parameters::by_direction)
+            .map(Parameters::by_place)
             .collect::<Result<_, _>>()?;
-        by_direction
+        by_place
             .into_iter()
             .flatten()
             .map(|mut parameters| {

@@ -121,38 +121,44 @@ impl Parameters {
         }
     }
 
-    /// One set of parameters for each direction, where `direction` names several: what has several numbers has one for each, what
-    /// has one has the same for all.
+    /// One set of parameters for each place, where `direction` or `channel` names several: what has several numbers has one for each,
+    /// what has one has the same for all.
     ///
     /// # Errors
-    /// Numbers that are not as many as the directions.
-    pub(super) fn by_direction(self) -> Result<Vec<Self>, EffectError> {
-        let Some(Value::List(directions)) = self.values.get("direction").cloned() else {
+    /// Numbers that are not as many as the places.
+    pub(super) fn by_place(self) -> Result<Vec<Self>, EffectError> {
+        let listed = ["direction", "channel"]
+            .into_iter()
+            .find_map(|key| match self.values.get(key) {
+                Some(Value::List(names)) => Some((key, names.clone())),
+                _ => None,
+            });
+        let Some((place, names)) = listed else {
             return Ok(vec![self]);
         };
-        let distinct: BTreeSet<&String> = directions.iter().collect();
-        if directions.is_empty() || distinct.len() < directions.len() {
-            let found = Value::List(directions);
-            return Err(self.wrong("direction", &found, "one direction, or several that differ"));
+        let distinct: BTreeSet<&String> = names.iter().collect();
+        if names.is_empty() || distinct.len() < names.len() {
+            let found = Value::List(names);
+            return Err(self.wrong(place, &found, "one name, or several that differ"));
         }
         let uneven = self
             .values
             .iter()
-            .find(|(_, value)| matches!(value, Value::Numbers(numbers) if numbers.len() != directions.len()));
+            .find(|(_, value)| matches!(value, Value::Numbers(numbers) if numbers.len() != names.len()));
         if let Some((key, value)) = uneven {
-            return Err(self.wrong(key, value, "one number, or one for each of its directions"));
+            return Err(self.wrong(key, value, "one number, or one for each of its places"));
         }
-        let of = |(index, direction): (usize, &String)| {
+        let of = |(index, name): (usize, &String)| {
             let mut own = self.clone();
             for value in own.values.values_mut() {
                 if let Value::Numbers(numbers) = value {
                     *value = Value::Number(numbers[index]);
                 }
             }
-            own.put("direction", Value::Text(direction.clone()));
+            own.put(place, Value::Text(name.clone()));
             own
         };
-        Ok(directions.iter().enumerate().map(of).collect())
+        Ok(names.iter().enumerate().map(of).collect())
     }
 
     /// Any finite number.
