@@ -42,6 +42,12 @@ pub(super) trait ClosedFit {
         None
     }
 
+    /// The same explanation with the covariance that its parameters have where noise of the forces drives a machine that is not
+    /// linear; `None` where that changes nothing.
+    fn spread_by_force_noise(&self, _library: &Library, _explanation: &Explanation) -> Option<Explanation> {
+        None
+    }
+
     /// What the case alone leaves, in units of the noise.
     fn left_by_baseline(&self, library: &Library, regression: &Regression) -> Option<f64>;
 

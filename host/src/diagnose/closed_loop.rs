@@ -22,12 +22,13 @@ struct Measured {
 }
 
 impl Measured {
-    fn new(record: &Record) -> Self {
+    /// Forces at the samples of a record.
+    fn new(record: &Record, force_n: &[Vec<f64>; 3]) -> Self {
         let grid = Grid::new(record.grid.count(), record.grid.rate_hz(), 0.0, FINER);
         Self {
             rate_hz: FINER as f64 * record.grid.rate_hz(),
             force_n: std::array::from_fn(|axis| {
-                let force = &record.force_n[axis];
+                let force = &force_n[axis];
                 if force.is_empty() {
                     Vec::new()
                 } else {
@@ -161,9 +162,19 @@ impl ClosedLoop {
             drives: scene
                 .records
                 .par_iter()
-                .map(|record| Arc::new(Measured::new(record)))
+                .map(|record| Arc::new(Measured::new(record, &record.force_n)))
                 .collect(),
         })
+    }
+
+    /// The same records, driven by other forces: by record, at its samples.
+    pub(super) fn driven_by(scene: &Scene<'_>, forces_n: &[[Vec<f64>; 3]]) -> Self {
+        let records = scene.records.par_iter().zip(forces_n);
+        Self {
+            drives: records
+                .map(|(record, force_n)| Arc::new(Measured::new(record, force_n)))
+                .collect(),
+        }
     }
 
     fn model(&self, scene: &Scene<'_>, record: usize, effects: &Effects) -> Option<Model> {
@@ -181,6 +192,12 @@ impl ClosedLoop {
     pub(super) fn holds(&self, scene: &Scene<'_>, effects: &Effects) -> Option<bool> {
         let model = self.model(scene, 0, effects)?;
         Some(model.terms.iter().any(|term| term.holds().is_some()))
+    }
+
+    /// True where the extended case has terms of its own beside the linear structure.
+    pub(super) fn is_nonlinear(&self, scene: &Scene<'_>, effects: &Effects) -> bool {
+        self.model(scene, 0, effects)
+            .is_some_and(|model| !model.terms.is_empty())
     }
 
     /// The states of the extended case where those of the baseline are `structure`: what it has more is let go with it

@@ -1,13 +1,13 @@
 //! From evidence to an answer.
 
 use super::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
-use super::evidence::Library;
+use super::evidence::{Explanation, Library};
 use super::named::{by_common_factor, named};
 use super::regression::{Regression, Share};
 use super::scene::{Domain, Scene};
 use super::selection::{APART, Scale, Selection, WITHIN_NOISE, names, select};
 use super::views::views;
-use super::{Options, Stage};
+use super::{Options, Stage, checks};
 use crate::recording::Recording;
 
 /// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
@@ -113,11 +113,30 @@ fn answer(
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
     // Errors of the computation go along with the signal: where they are like a cause, they are not averaged away.
     let uncertain = inflation + scale.coherent;
+    let spread = |explanation: &Explanation| {
+        let closed = scale.closed.as_ref();
+        closed.and_then(|closed| closed.spread_by_force_noise(library, explanation))
+    };
+    let best = &spread(best).unwrap_or_else(|| best.clone());
     diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
+    for cause in diagnosis
+        .causes
+        .iter()
+        .filter(|cause| cause.name == "sensor-gain")
+    {
+        let gain = cause.parameters["gain"].value;
+        if let Some(unit) = checks::unit_of_gain(gain) {
+            let channel = cause.channel.as_deref().unwrap_or("every channel of motion");
+            diagnosis.warnings.push(format!(
+                "{channel} reads {gain:.4} times the truth, and that is about {unit}: are its unit and that of the force right?"
+            ));
+        }
+    }
     diagnosis.explanations = vec![diagnosis.causes.clone()];
     let who = names(library, best);
     for other in &selection.others {
+        let other = &spread(other).unwrap_or_else(|| other.clone());
         let causes = named(scene, library, regression, other, uncertain, confidence);
         diagnosis.add_rival(causes, names(library, other) == who);
     }

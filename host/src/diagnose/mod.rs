@@ -28,6 +28,7 @@ mod decay;
 mod error;
 pub mod evidence;
 mod extension;
+mod force_noise;
 mod gram;
 mod grid;
 mod guess;

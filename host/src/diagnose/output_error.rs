@@ -39,13 +39,25 @@ const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
 /// Simulations compared with records.
 pub(super) struct OutputError<'a> {
-    scene: &'a Scene<'a>,
-    closed: ClosedLoop,
+    pub(super) scene: &'a Scene<'a>,
+    pub(super) closed: ClosedLoop,
     /// Parts of each share, in the order of the records.
     parts: Vec<Part>,
     pub(super) horizons: Vec<Vec<Part>>,
     /// True where every record is of a structure that is let go.
     pub(super) is_let_go: bool,
+}
+
+/// One column of the slopes: of which record, by which slot.
+pub(super) type Column = (usize, usize, Vec<f64>);
+
+/// Jᵀ r for `size` slots.
+pub(super) fn projected(columns: &[Column], size: usize, residuals: &[Vec<f64>]) -> DVector<f64> {
+    let mut sum = DVector::zeros(size);
+    for (record, slot, column) in columns {
+        sum[*slot] += dot(column, &residuals[*record]);
+    }
+    sum
 }
 
 impl<'a> OutputError<'a> {
@@ -78,17 +90,24 @@ impl<'a> OutputError<'a> {
         })
     }
 
-    fn of_share(&self, share: Share) -> Vec<&Part> {
+    pub(super) fn of_share(&self, share: Share) -> Vec<&Part> {
         self.parts.iter().filter(|part| part.share == share).collect()
     }
 
-    /// What is left of some parts of one record, in units of the noise.
-    fn residual(&self, record: usize, parts: &[&Part], effects: &Effects, start: &[f64]) -> Option<Vec<f64>> {
+    /// What is left of some parts of one record as `closed` drives it, in units of the noise.
+    fn residual(
+        &self,
+        closed: &ClosedLoop,
+        record: usize,
+        parts: &[&Part],
+        effects: &Effects,
+        start: &[f64],
+    ) -> Option<Vec<f64>> {
         let mine: Vec<&&Part> = parts.iter().filter(|part| part.record == record).collect();
         let Some(length) = mine.iter().map(|part| part.range.end).max() else {
             return Some(Vec::new());
         };
-        let mut samples = self.closed.simulate(self.scene, record, effects, start, length)?;
+        let mut samples = closed.simulate(self.scene, record, effects, start, length)?;
         for (channel, samples) in self.scene.records[record].channels.iter().zip(&mut samples) {
             for (simulated, measured) in samples.iter_mut().zip(&channel.measured) {
                 *simulated = measured - *simulated;
@@ -103,57 +122,75 @@ impl<'a> OutputError<'a> {
         parts: &[&Part],
         point: &Point,
     ) -> Option<Vec<Vec<f64>>> {
+        self.residuals_by(&self.closed, problem, parts, point)
+    }
+
+    /// The same where other forces drive the records.
+    pub(super) fn residuals_by(
+        &self,
+        closed: &ClosedLoop,
+        problem: &Problem<'_>,
+        parts: &[&Part],
+        point: &Point,
+    ) -> Option<Vec<Vec<f64>>> {
         let effects = problem.effects(self.scene, point)?;
         (0..self.scene.records.len())
             .into_par_iter()
-            .map(|record| self.residual(record, parts, &effects, &point.starts[record]))
+            .map(|record| self.residual(closed, record, parts, &effects, &point.starts[record]))
             .collect()
     }
 
-    /// Jᵀ J and Jᵀ r, J = ∂y_simulated/∂slot by differences; steps become such that each moves χ² by about one.
-    fn normal(
+    /// The columns of J = ∂y_simulated/∂slot by differences, by record and slot; records one behind the other.
+    pub(super) fn columns(
         &self,
-        problem: &mut Problem<'_>,
+        problem: &Problem<'_>,
         parts: &[&Part],
         point: &Point,
         left: &[Vec<f64>],
-    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    ) -> Option<Vec<Column>> {
+        let effects: Vec<Option<(Effects, Point, f64)>> = problem
+            .slots
+            .iter()
+            .map(|(slot, step)| {
+                // Where a step leaves what is physical, the other way is taken.
+                [*step, -step].into_iter().find_map(|step| {
+                    let mut moved = point.clone();
+                    *slot.of(&mut moved) += step;
+                    let effects = problem.effects(self.scene, &moved)?;
+                    Some((effects, moved, step))
+                })
+            })
+            .collect();
+        let tasks: Vec<(usize, usize)> = (0..left.len())
+            .flat_map(|record| (0..problem.slots.len()).map(move |slot| (record, slot)))
+            .filter(|(record, slot)| problem.slots[*slot].0.is_felt_by(*record))
+            .collect();
+        tasks
+            .into_par_iter()
+            .map(|(record, slot)| {
+                let (effects, moved, step) = effects[slot].as_ref()?;
+                let mut column =
+                    self.residual(&self.closed, record, parts, effects, &moved.starts[record])?;
+                for (column, left) in column.iter_mut().zip(&left[record]) {
+                    *column = (left - *column) / step;
+                }
+                Some((record, slot, column))
+            })
+            .collect()
+    }
+
+    /// Jᵀ J and Jᵀ r of these columns; steps become such that each moves χ² by about one.
+    pub(super) fn normal(
+        &self,
+        problem: &mut Problem<'_>,
+        columns: &[Column],
+        point: &Point,
+        left: &[Vec<f64>],
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let size = problem.slots.len();
-        let columns: Vec<(usize, usize, Vec<f64>)> = {
-            let problem = &*problem;
-            let effects: Vec<Option<(Effects, Point, f64)>> = problem
-                .slots
-                .iter()
-                .map(|(slot, step)| {
-                    // Where a step leaves what is physical, the other way is taken.
-                    [*step, -step].into_iter().find_map(|step| {
-                        let mut moved = point.clone();
-                        *slot.of(&mut moved) += step;
-                        let effects = problem.effects(self.scene, &moved)?;
-                        Some((effects, moved, step))
-                    })
-                })
-                .collect();
-            let tasks: Vec<(usize, usize)> = (0..left.len())
-                .flat_map(|record| (0..size).map(move |slot| (record, slot)))
-                .filter(|(record, slot)| problem.slots[*slot].0.is_felt_by(*record))
-                .collect();
-            tasks
-                .into_par_iter()
-                .map(|(record, slot)| {
-                    let (effects, moved, step) = effects[slot].as_ref()?;
-                    let mut column = self.residual(record, parts, effects, &moved.starts[record])?;
-                    for (column, left) in column.iter_mut().zip(&left[record]) {
-                        *column = (left - *column) / step;
-                    }
-                    Some((record, slot, column))
-                })
-                .collect::<Option<_>>()?
-        };
         let mut normal = DMatrix::<f64>::zeros(size, size);
-        let mut gradient = DVector::<f64>::zeros(size);
+        let gradient = projected(columns, size, left);
         for (index, (record, slot, column)) in columns.iter().enumerate() {
-            gradient[*slot] += dot(column, &left[*record]);
             for (_, other, second) in columns[..=index]
                 .iter()
                 .rev()
@@ -186,7 +223,7 @@ impl<'a> OutputError<'a> {
                     .max(least * value);
             }
         }
-        Some((normal, gradient))
+        (normal, gradient)
     }
 
     /// Levenberg and Marquardt's search from `start`; `None` where the start cannot be simulated. It ends early where it stays
@@ -208,8 +245,9 @@ impl<'a> OutputError<'a> {
         }
         let mut trust = 1e-4;
         for round in 0..rounds {
+            let columns = self.columns(problem, parts, &point, &residuals)?;
             let mut gradient;
-            (normal, gradient) = self.normal(problem, parts, &point, &residuals)?;
+            (normal, gradient) = self.normal(problem, &columns, &point, &residuals);
             at_bounds(problem, &point, &mut normal, &mut gradient);
             let before = left;
             // To first order most of it is of another shape.
@@ -281,7 +319,7 @@ impl<'a> OutputError<'a> {
     }
 
     /// What may move, from what the regression says.
-    fn problem<'b>(
+    pub(super) fn problem<'b>(
         &self,
         library: &'b Library,
         explanation: &'b Explanation,
@@ -403,6 +441,10 @@ impl ClosedFit for OutputError<'_> {
         let slots: Vec<Slot> = problem.slots.iter().map(|(slot, _)| *slot).collect();
         let covariance = by_choice(&slots, &found);
         self.accept(library, regression, explanation, found, covariance)
+    }
+
+    fn spread_by_force_noise(&self, library: &Library, explanation: &Explanation) -> Option<Explanation> {
+        self.spread(library, explanation)
     }
 
     fn left_by_baseline(&self, library: &Library, _: &Regression) -> Option<f64> {

@@ -170,17 +170,26 @@ fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, n
     scaled.cholesky()
 }
 
+/// The inverse of Jᵀ J: the covariance of the slots for noise of deviation 1; zero for what does not move.
+pub(super) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let roots = roots(normal);
+    let inverse = scaled(normal, 1e-12)?.inverse();
+    Some(DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
+        inverse[(i, j)] * roots[i] * roots[j]
+    }))
+}
+
 /// Covariance for noise of deviation 1 of the numbers of each choice, initial states being unknown; zero for what did not move.
 pub(super) fn by_choice(slots: &[Slot], found: &Found) -> Vec<DMatrix<f64>> {
-    let roots = roots(&found.normal);
-    let inverse = scaled(&found.normal, 1e-12).map(|factor| factor.inverse());
     let mut all: Vec<DMatrix<f64>> = found
         .point
         .inner
         .iter()
         .map(|inner| DMatrix::zeros(inner.len(), inner.len()))
         .collect();
-    let Some(inverse) = inverse else { return all };
+    let Some(covariance) = covariance(&found.normal) else {
+        return all;
+    };
     for (i, first) in slots.iter().enumerate() {
         for (j, second) in slots.iter().enumerate() {
             if let (
@@ -193,7 +202,7 @@ pub(super) fn by_choice(slots: &[Slot], found: &Found) -> Vec<DMatrix<f64>> {
             ) = (first, second)
                 && choice == other
             {
-                all[*choice][(*index, *second)] = inverse[(i, j)] * roots[i] * roots[j];
+                all[*choice][(*index, *second)] = covariance[(i, j)];
             }
         }
     }
