@@ -102,13 +102,20 @@ impl Said {
 }
 
 impl SaidCause {
-    /// True where it is one of the hidden causes, and where it says its direction or channel, at the right one; a sensor that is wrong
-    /// has to be named.
-    fn is_any_of(&self, hidden: &[Hidden]) -> bool {
+    /// True where it is one of the hidden causes, and where it says its direction or channel, at the right one; of sensors `all` that
+    /// are said to be wrong have to be those that are.
+    fn is_any_of(&self, hidden: &[Hidden], all: &[Self]) -> bool {
         hidden.iter().any(|hidden| {
-            let unplaced = self.places.is_empty() && !self.name.starts_with("sensor-");
+            if hidden.name != self.name {
+                return false;
+            }
+            if self.name.starts_with("sensor-") {
+                let alike = all.iter().filter(|cause| cause.name == self.name);
+                let said: BTreeSet<&String> = alike.flat_map(|cause| &cause.places).collect();
+                return said == hidden.places.iter().collect();
+            }
             let placed = self.places.iter().any(|place| hidden.places.contains(place));
-            hidden.name == self.name && (placed || unplaced || hidden.places.is_empty())
+            placed || self.places.is_empty() || hidden.places.is_empty()
         })
     }
 }
@@ -125,12 +132,16 @@ impl Finding {
             (Verdict::Invisible, _) => said.outcome == "none",
             (Verdict::Equivalent(set), _) => said.outcome == "confounded" && said.names() == *set,
             (_, Family::TwoEffects) => {
-                let both = said.causes.iter().all(|cause| cause.is_any_of(&puzzle.hidden));
+                let both = said
+                    .causes
+                    .iter()
+                    .all(|cause| cause.is_any_of(&puzzle.hidden, &said.causes));
                 said.outcome == "cause" && both && said.names() == wanted
             }
             _ => {
                 let first = said.causes.first();
-                said.outcome == "cause" && first.is_some_and(|cause| cause.is_any_of(&puzzle.hidden))
+                said.outcome == "cause"
+                    && first.is_some_and(|cause| cause.is_any_of(&puzzle.hidden, &said.causes))
             }
         };
         let (mut covered, mut missed) = ([0, 0], Vec::new());

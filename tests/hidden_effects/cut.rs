@@ -174,9 +174,14 @@ impl CutBench {
 
     /// Names of the channels of force.
     pub(crate) fn force_names(&self) -> Vec<String> {
-        let sensors = self.sensors();
-        let forces = sensors.iter().filter(|sensor| matches!(sensor, Sensed::Force(_)));
-        forces.map(|force| force.name()).collect()
+        let forces = self.sensors().len() - self.motion.len();
+        self.channel_names()[..forces].to_vec()
+    }
+
+    /// Names of the channels of motion.
+    pub(crate) fn motion_names(&self) -> Vec<String> {
+        let forces = self.sensors().len() - self.motion.len();
+        self.channel_names()[forces..].to_vec()
     }
 
     /// The case file.

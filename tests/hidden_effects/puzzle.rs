@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::cause::{Cause, STRANGE, Scale};
-use super::cut::{CutBench, EVERY_FORCE};
+use super::cut::{CutBench, EVERY_FORCE, EVERY_SENSOR};
 use super::judge::{Judge, Lab, Verdict};
 use super::machine::{Machine, between};
 use super::rig::{Bench as RigBench, Output, Rig, Test};
@@ -217,6 +217,11 @@ impl Bench {
         match self {
             Self::Rig(bench) => vec![bench.rig.sensors[cause.sensor].name()],
             Self::Cut(bench) if cause.sensor == EVERY_FORCE => bench.force_names(),
+            // All of one are that one.
+            Self::Cut(bench) if cause.sensor == EVERY_SENSOR => match &bench.motion_names()[..] {
+                [one] => vec![one.clone()],
+                _ => Vec::new(),
+            },
             Self::Cut(bench) => bench
                 .channel_names()
                 .get(cause.sensor)

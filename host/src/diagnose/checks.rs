@@ -122,46 +122,51 @@ pub(super) fn record(
 }
 
 /// How many equal samples at an end of the range one blow of a hammer may be clipped to, and how many steps of the channel's resolution
-/// are steep beside them.
+/// are steep two samples beside them.
 const FLAT: std::ops::RangeInclusive<usize> = 3..=64;
-const CLIFF: f64 = 8.0;
+const CLIFF: f64 = 16.0;
 
-/// Factors that a wrong unit brings: the name of what was likely meant.
-const UNITS: [(f64, &str); 6] = [
-    (4.448, "4.45: pounds of force for N"),
-    (1e3, "a thousand: mm, kN or g for m, N or kg"),
-    (1e6, "a million: µm for m"),
-    (25.4, "25.4: inches for mm"),
-    (39.37, "39.37: inches for m"),
-    (9.806_65, "9.81: g for m/s²"),
+/// Factors that a wrong unit brings, how far from it a model that is wrong as well may make it (in the logarithm), and the name of
+/// what was likely meant.
+const UNITS: [(f64, f64, &str); 6] = [
+    (4.448, 0.1, "4.45: pounds of force for N"),
+    (1e3, 0.4, "a thousand: mm, kN or g for m, N or kg"),
+    (1e6, 0.4, "a million: µm for m"),
+    (25.4, 0.4, "25.4: inches for mm"),
+    (39.37, 0.4, "39.37: inches for m"),
+    (9.806_65, 0.4, "9.81: g for m/s²"),
 ];
 /// A model may be wrong by this factor before a unit is suspected; and by this one, of a shape that is nothing like what was measured,
 /// before nothing but a unit can be the reason: no resonance and no nonlinearity of a machine brings as much.
 const WRONG_BY: f64 = 4.0;
 const FAR_OFF: f64 = 250.0;
+/// How close to a unit a gain is that is told to be one.
+const GAIN: f64 = 0.03;
 
 /// A prediction of less than so many times the energy that noise of the forces alone would bring tells nothing.
 const MOST_BY_NOISE: f64 = 25.0;
 
 /// Refuses a channel whose size cannot be that of the case: a wrong unit.
 ///
-/// `response` is what the case predicts of the forces alone, `by_noise` the energy that it would have by the noise of the force
-/// sensors, over the samples that are compared. The factor is that by which it fits best; it counts where the two look alike.
+/// `response` is what the case predicts of the forces alone of what was `measured`, `by_noise` the energy that it would have by the
+/// noise of the force sensors. The factor is that by which it fits best; it counts where the two look alike.
 pub(super) fn unit(
     path: &std::path::Path,
-    channel: &Observed,
+    name: &str,
     response: &[f64],
-    compared: std::ops::Range<usize>,
+    measured: &[f64],
     by_noise: f64,
 ) -> Result<(), DiagnoseError> {
-    let (response, measured) = (&response[compared.clone()], &channel.measured[compared]);
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let (own, cross) = (dot(response, response), dot(response, measured));
     let whole = dot(measured, measured);
     if own <= MOST_BY_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
-    far_off(path, channel, response, measured)?;
+    // What a constant force does says nothing of what moves.
+    if spread(response).powi(2) * response.len() as f64 > MOST_BY_NOISE * by_noise {
+        far_off(path, name, response, measured)?;
+    }
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
     let likely = likely(factor);
@@ -173,29 +178,31 @@ pub(super) fn unit(
     Err(DiagnoseError::record(
         path,
         format!(
-            "{} is {factor:.4e} times what the case predicts, though of the same shape: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
-            channel.pickup.name,
+            "{name} is {factor:.4e} times what the case predicts, though of the same shape: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
             said(likely)
         ),
     ))
 }
 
-/// Refuses a channel that reads out of all proportion to its prediction, whatever their shapes; offsets of sensors do not count.
+/// Refuses a channel that reads out of all proportion to its prediction, whatever their shapes. Offsets of sensors do not count; too
+/// large is what moves more than the prediction is with its mean, since what is left of even teeth in a slot is next to nothing.
 pub(super) fn far_off(
     path: &std::path::Path,
-    channel: &Observed,
+    name: &str,
     response: &[f64],
     measured: &[f64],
 ) -> Result<(), DiagnoseError> {
-    let factor = spread(measured) / spread(response);
-    if !factor.is_finite() || factor == 0.0 || (1.0 / FAR_OFF..FAR_OFF).contains(&factor) {
-        return Ok(());
-    }
+    let moves = spread(measured);
+    let [least, most] = [moves / rms(response), moves / spread(response)];
+    let factor = match () {
+        () if least.is_finite() && least > FAR_OFF => least,
+        () if most.is_finite() && moves > 0.0 && most < 1.0 / FAR_OFF => most,
+        () => return Ok(()),
+    };
     Err(DiagnoseError::record(
         path,
         format!(
-            "{} is {factor:.1e} times as large as what the case predicts: no machine is that far from its model; its unit, that of what drives it, or the case is wrong; give units in the header as name [unit].{}",
-            channel.pickup.name,
+            "{name} is {factor:.1e} times as large as what the case predicts: no machine is that far from its model; its unit, that of what drives it, or the case is wrong; give units in the header as name [unit].{}",
             said(likely(factor))
         ),
     ))
@@ -209,20 +216,20 @@ fn spread(samples: &[f64]) -> f64 {
 
 /// What a gain that was found may be if it is none of the sensor: a unit.
 pub(super) fn unit_of_gain(gain: f64) -> Option<&'static str> {
-    unit_within(gain.abs(), 0.03)
+    unit_within(gain.abs(), |_| GAIN)
 }
 
 /// The unit that was likely meant where something is so many times too large, or too small, by a model that may be wrong as well.
 fn likely(factor: f64) -> Option<&'static str> {
-    unit_within(factor, 0.4)
+    unit_within(factor, |share| share)
 }
 
-fn unit_within(factor: f64, share: f64) -> Option<&'static str> {
+fn unit_within(factor: f64, most: impl Fn(f64) -> f64) -> Option<&'static str> {
     let size = factor.max(1.0 / factor);
     let near = |unit: f64| (size / unit).ln().abs();
-    let units = UNITS.iter().filter(|(unit, _)| near(*unit) < share);
+    let units = UNITS.iter().filter(|(unit, share, _)| near(*unit) < most(*share));
     let nearest = units.min_by(|a, b| near(a.0).total_cmp(&near(b.0)));
-    nearest.map(|(_, meant)| *meant)
+    nearest.map(|(.., meant)| *meant)
 }
 
 fn said(likely: Option<&str>) -> String {
@@ -249,7 +256,7 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     // A digital channel has few levels; flat tops of a slow signal on coarse levels are no clipping.
     [high, low].into_iter().find(|end| {
         let at = |x: &f64| (x - end).abs() <= 1e-9 * range;
-        if *end != 0.0 && has_cliff(samples, at, *end, CLIFF * resolution) {
+        if *end != 0.0 && has_cliff(samples, at, *end, resolution) {
             return true;
         }
         let (mut flat, mut run, mut runs) = (0, 0, 0);
@@ -268,10 +275,10 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     })
 }
 
-/// True where some flat top, no longer than a blow, is reached and left by steps larger than `step`. Three samples of a smooth top that
-/// one level of a digital channel holds have neighbours at most five levels below: 4c under the peak where c keeps one level.
-fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, step: f64) -> bool {
-    let mut first = 0;
+/// True where some flat top, no longer than a blow, is reached and left steeply. Of a smooth top whose level three samples share, the
+/// second ones beside them are at most twelve levels below: 9c under the peak where c keeps a level, and one for rounding.
+fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f64) -> bool {
+    let (mut first, mut steepest) = (0, 0.0_f64);
     while first < samples.len() {
         if !at(&samples[first]) {
             first += 1;
@@ -279,13 +286,26 @@ fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, step: f64) ->
         }
         let length = samples[first..].iter().take_while(|x| at(x)).count();
         let beyond = first + length;
-        let is_steep = |place: usize| samples.get(place).is_some_and(|x| (x - end).abs() > step);
-        if FLAT.contains(&length) && first > 0 && is_steep(first - 1) && is_steep(beyond) {
-            return true;
+        let sides = [first.checked_sub(2), Some(beyond + 1)];
+        if FLAT.contains(&length)
+            && let [Some(before), Some(after)] = sides.map(|place| Some(samples.get(place?)? - end))
+        {
+            steepest = steepest.max(before.abs().min(after.abs()));
         }
         first = beyond;
     }
-    false
+    steepest > CLIFF * resolution && steepest > CLIFF * written_resolution(samples, end)
+}
+
+/// The step of the last digit of `end`, where all samples are written with as few digits as they seem to be.
+fn written_resolution(samples: &[f64], end: f64) -> f64 {
+    let digits = |x: &f64| {
+        let text = format!("{x:e}");
+        let mantissa = text.split('e').next().unwrap_or_default();
+        mantissa.chars().filter(char::is_ascii_digit).count() as i32
+    };
+    let most = samples.iter().map(digits).max().unwrap_or(1);
+    10_f64.powi(end.abs().log10().floor() as i32 + 1 - most)
 }
 
 #[cfg(test)]
@@ -310,6 +330,11 @@ mod tests {
         // On 64 levels the top of a blow is flat, and is left level by level.
         let coarse: Vec<f64> = whole.iter().map(|x| (64.0 * x).round() / 64.0).collect();
         assert_eq!(clipped(&coarse), None);
+        // Written with three digits it has finer steps beside it than at its top.
+        for digits in [2, 3] {
+            let written = whole.iter().map(|x| format!("{x:.digits$e}").parse().unwrap());
+            assert_eq!(clipped(&written.collect::<Vec<f64>>()), None);
+        }
         // What is held and let go is no blow.
         let held: Vec<f64> = (0..2000).map(|n| if n < 900 { 1.0 } else { 0.0 }).collect();
         assert_eq!(clipped(&held), None);

@@ -131,13 +131,19 @@ impl Record {
     /// those of the chips as they are fed; the motion may be larger by far where regeneration amplifies it.
     fn check_units_of_cut(&self) -> Result<(), DiagnoseError> {
         for (index, channel) in self.channels.iter().enumerate() {
-            let predicted = self.decays.without(index, &channel.predicted);
+            let mut response = self.decays.without(index, &channel.predicted);
+            let mut measured = channel.measured.clone();
+            // There it is as measured.
+            for &sample in &self.skipped[index] {
+                (response[sample], measured[sample]) = (0.0, 0.0);
+            }
+            let range = self.compared.clone();
+            let (response, measured) = (&response[range.clone()], &measured[range]);
+            let name = &channel.pickup.name;
             if channel.pickup.quantity == Quantity::Force {
-                checks::unit(&self.path, channel, &predicted, self.compared.clone(), 0.0)?;
+                checks::unit(&self.path, name, response, measured, 0.0)?;
             } else {
-                let range = self.compared.clone();
-                let (response, measured) = (&predicted[range.clone()], &channel.measured[range]);
-                checks::far_off(&self.path, channel, response, measured)?;
+                checks::far_off(&self.path, name, response, measured)?;
             }
         }
         Ok(())

@@ -27,9 +27,11 @@ use super::unknowns::{Slot, at_bounds, covariance};
 /// simulated.
 const DRAWS: [usize; 2] = [4, 16];
 const SIMULATED: usize = 400_000;
-/// So many tell whether there is anything to it, which is this share of what is known already.
-const FIRST: usize = 2;
+/// Half of the draws, and four at least, tell whether there is anything to it, which is this share of what is known already.
+const FIRST: usize = 4;
 const WORTH: f64 = 0.05;
+/// A stream of random numbers of its own: a record of a simulation may have noise of the same seed.
+const STREAM: u64 = 0x666f_7263_6573;
 
 /// Forces along the axes, at the samples of a record.
 type Forces = [Vec<f64>; 3];
@@ -55,7 +57,8 @@ impl OutputError<'_> {
         for (slot, step) in &mut problem.slots {
             if let Slot::Inner { choice, index, .. } = *slot {
                 let known = simulated.covariance[choice][(index, index)].sqrt();
-                *step = known.clamp(1e-3 * *step, *step);
+                let least = problem.least_step * point.inner[choice][index].abs();
+                *step = known.clamp(1e-3 * *step, *step).max(least);
             }
         }
         let whole = self.of_share(Share::Whole);
@@ -80,22 +83,26 @@ impl OutputError<'_> {
             let linear = &covariance * projected(&columns, size, &self.by_baseline(&noise, &whole));
             Some(step.component_mul(&step) - linear.component_mul(&linear))
         };
-        let draws = |range: Range<usize>| -> Vec<DVector<f64>> {
-            range.into_par_iter().filter_map(more_of).collect()
+        let draws = |range: Range<usize>| -> Vec<Option<DVector<f64>>> {
+            range.into_par_iter().map(more_of).collect()
         };
-        let mean = |all: &[DVector<f64>]| all.iter().sum::<DVector<f64>>() / all.len() as f64;
         let samples: usize = self.scene.records.iter().map(|record| record.grid.count()).sum();
         let most = (SIMULATED / samples.max(1)).clamp(DRAWS[0], DRAWS[1]);
-        let mut drawn = draws(0..FIRST);
-        let is_worth =
-            |more: &DVector<f64>| (0..size).any(|slot| more[slot] > WORTH * covariance[(slot, slot)]);
-        if drawn.is_empty() || !is_worth(&mean(&drawn)) {
+        let first = FIRST.max(most / 2);
+        let mut drawn = draws(0..first);
+        let is_worth = |more: &DVector<f64>| {
+            let inner = problem.slots.iter().enumerate();
+            inner
+                .filter(|(_, (slot, _))| matches!(slot, Slot::Inner { .. }))
+                .any(|(slot, _)| more[slot] > WORTH * covariance[(slot, slot)])
+        };
+        if !is_worth(&mean(&drawn)?) {
             return None;
         }
-        drawn.extend(draws(FIRST..most));
+        drawn.extend(draws(first..most));
         // What a few draws tell of a variance makes of a normal distribution one of Student's, with the variance ν/(ν − 2).
-        let degrees = drawn.len().max(4) as f64;
-        let more = mean(&drawn) * (degrees / (degrees - 2.0));
+        let degrees = drawn.iter().flatten().count().max(3) as f64;
+        let more = mean(&drawn)? * (degrees / (degrees - 2.0));
         let mut spread = explanation.clone();
         let by_choice = &mut spread.simulated.as_mut()?.covariance;
         for (index, (slot, _)) in problem.slots.iter().enumerate() {
@@ -120,6 +127,7 @@ impl OutputError<'_> {
     /// Noise as that of the sensors of force is, by record.
     fn drawn(&self, draw: u64) -> Vec<Forces> {
         let mut random = ChaCha8Rng::seed_from_u64(draw);
+        random.set_stream(STREAM);
         let records = self.scene.records.iter();
         records
             .map(|record| {
@@ -166,6 +174,14 @@ impl OutputError<'_> {
             })
             .collect()
     }
+}
+
+/// The mean of draws. One that could not be simulated, since the machine ran away, moved at least as far as the one that moved
+/// farthest; `None` where none could.
+fn mean(drawn: &[Option<DVector<f64>>]) -> Option<DVector<f64>> {
+    let farthest = drawn.iter().flatten().cloned().reduce(|a, b| a.sup(&b))?;
+    let sum: DVector<f64> = drawn.iter().map(|draw| draw.as_ref().unwrap_or(&farthest)).sum();
+    Some(sum / drawn.len() as f64)
 }
 
 #[cfg(test)]

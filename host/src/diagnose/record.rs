@@ -209,15 +209,11 @@ impl Record {
                     if along.is_none_or(|axis| record.force_n[axis].is_empty()) {
                         continue;
                     }
+                    let range = record.compared.clone();
                     let response = record.decays.without(index, &channel.predicted);
+                    let (response, measured) = (&response[range.clone()], &channel.measured[range]);
                     let by_noise = record.energy_by_force_noise(index);
-                    checks::unit(
-                        &record.path,
-                        channel,
-                        &response,
-                        record.compared.clone(),
-                        by_noise,
-                    )?;
+                    checks::unit(&record.path, &channel.pickup.name, response, measured, by_noise)?;
                 }
             }
             Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,

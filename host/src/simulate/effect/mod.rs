@@ -216,7 +216,7 @@ impl Effects {
         Self::build(all)
     }
 
-    /// The effects that a case has as extensions: one for each place where `direction` or `channel` is a list. A tool's runout is part of the tool and not among them.
+    /// The effects that a case has as extensions: one for each place where `direction`, or else `channel`, is a list. A tool's runout is part of the tool and not among them.
     ///
     /// # Errors
     /// An extension that cannot be simulated, or a key or value that it cannot have.

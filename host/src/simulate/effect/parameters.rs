@@ -121,8 +121,8 @@ impl Parameters {
         }
     }
 
-    /// One set of parameters for each place, where `direction` or `channel` names several: what has several numbers has one for each,
-    /// what has one has the same for all.
+    /// One set of parameters for each place, where `direction`, or else `channel`, names several: what has several numbers has one for
+    /// each, what has one has the same for all. Ratios are one for each mode, of one channel.
     ///
     /// # Errors
     /// Numbers that are not as many as the places.
@@ -130,7 +130,9 @@ impl Parameters {
         let listed = ["direction", "channel"]
             .into_iter()
             .find_map(|key| match self.values.get(key) {
-                Some(Value::List(names)) => Some((key, names.clone())),
+                Some(Value::List(names)) if key == "direction" || !self.values.contains_key("ratio") => {
+                    Some((key, names.clone()))
+                }
                 _ => None,
             });
         let Some((place, names)) = listed else {
