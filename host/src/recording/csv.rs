@@ -374,6 +374,7 @@ mod tests {
             ("1,2x", "\"2x\" in column \"b\""),
             ("\"1,2", "\"\"1\" in column \"a\""),
             ("1,inf", "\"inf\" in column \"b\""),
+            ("1,2e308", "\"2e308\" in column \"b\""),
             ("1;2", "1 values"),
         ] {
             let said = parse(format!("a,b\n1,2\n{row}\n3,4\n").as_bytes(), 4).unwrap_err();
@@ -386,7 +387,7 @@ mod tests {
     proptest! {
         /// To the last bit as the standard library reads them.
         #[test]
-        fn numbers_are_exact(values in prop::collection::vec(any::<f64>().prop_filter("finite", |v| v.is_finite()), 1..20), digits in 0usize..20) {
+        fn numbers_are_exact(values in prop::collection::vec(any::<f64>().prop_filter("finite, with fewer digits too", |v| v.abs() < 1e308), 1..20), digits in 0usize..20) {
             let texts: Vec<String> = values.iter().map(|value| format!("{value:.digits$e}")).collect();
             let expected: Vec<f64> = texts.iter().map(|text| text.parse().unwrap()).collect();
             prop_assert_eq!(parse(format!("a\n{}", texts.join("\n")).as_bytes(), 100), Ok(vec![expected]));
