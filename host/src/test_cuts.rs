@@ -179,23 +179,23 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Vec<Cal
     speeds_rpm.dedup();
     let deepest_mm = cuts.iter().map(|cut| cut.depth_mm).fold(0.0, f64::max);
     let lines = method.lines(&speeds_rpm, deepest_mm, SAMPLES)?;
-    Ok(cuts
-        .iter()
-        .map(|cut| {
-            let line = lines.iter().find(|line| line.rpm == cut.rpm);
-            let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {
-                let mut intervals = line.into_iter().flat_map(of);
-                intervals.any(|&[from, to]| from <= cut.depth_mm && cut.depth_mm <= to)
-            };
-            match (cut.outcome, within(|line| &line.stable_mm)) {
-                _ if within(|line| &line.bistable_mm) => Call::Undecided,
-                (Outcome::Marginal, _) => Call::Undecided,
-                (Outcome::Chatter, true) => Call::MissedChatter,
-                (Outcome::Stable, false) => Call::FalseAlarm,
-                (Outcome::Stable, true) | (Outcome::Chatter, false) => Call::Right,
-            }
-        })
-        .collect())
+    Ok(cuts.iter().map(|cut| call(&lines, cut)).collect())
+}
+
+/// What lines say of a cut, of which one must be at its speed and go as deep.
+pub fn call(lines: &[SpeedLine], cut: &TestCut) -> Call {
+    let line = lines.iter().find(|line| line.rpm == cut.rpm);
+    let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {
+        let mut intervals = line.into_iter().flat_map(of);
+        intervals.any(|&[from, to]| from <= cut.depth_mm && cut.depth_mm <= to)
+    };
+    match (cut.outcome, within(|line| &line.stable_mm)) {
+        _ if within(|line| &line.bistable_mm) => Call::Undecided,
+        (Outcome::Marginal, _) => Call::Undecided,
+        (Outcome::Chatter, true) => Call::MissedChatter,
+        (Outcome::Stable, false) => Call::FalseAlarm,
+        (Outcome::Stable, true) | (Outcome::Chatter, false) => Call::Right,
+    }
 }
 
 #[cfg(test)]

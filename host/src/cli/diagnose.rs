@@ -8,11 +8,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::{Error, Output};
 use crate::case::Case;
 use crate::diagnose::answer::Outcome;
-use crate::diagnose::lobes::lobes;
-use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched};
+use crate::diagnose::lobes::{believed, lobes};
+use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched, recorded_cuts};
 use crate::recording::Recording;
 use crate::report::diagnosis::diagnosis_page;
-use crate::report::lobes_change::sentences;
+use crate::report::lobes_change::{called, sentences};
 use crate::test_cuts::{self, TestCut};
 
 /// What the simulation gets wrong about recordings, why, what to add, and how much better that is.
@@ -60,14 +60,9 @@ pub fn run(args: Args) -> Result<(), Error> {
         bar.inc(1);
     })?;
     let extended = diagnosis.extended_case(&crate::file::read_text(&args.case)?);
-    if let Some(extended) = &extended {
-        bar.set_message("limits before and after");
-        bar.inc(1);
-        compare_limits(&case, extended, &recordings, &cuts, &mut diagnosis);
-    } else if !cuts.is_empty() {
-        let why = "--cuts: without an extension there are no limits before and after; lobes --cuts says how the case calls them";
-        diagnosis.warnings.push(why.into());
-    }
+    bar.set_message("limits before and after");
+    bar.inc(1);
+    add_limits(&case, &recordings, &cuts, &mut diagnosis);
     bar.finish_and_clear();
     for warning in &diagnosis.warnings {
         tracing::warn!("{warning}");
@@ -78,22 +73,17 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&diagnosis, text(&diagnosis))
 }
 
-/// Adds what the extension changes of the limits; says why where that is not known.
-fn compare_limits(
-    case: &Case,
-    extended: &str,
-    recordings: &[Recording],
-    cuts: &[TestCut],
-    diagnosis: &mut Diagnosis,
-) {
-    let lobes = Case::parse(&case.path, extended)
-        .map_err(|error| error.to_string())
-        .and_then(|extended| lobes(case, &extended, recordings, cuts).map_err(|error| error.to_string()));
-    match lobes {
-        Ok(lobes) => diagnosis.lobes = Some(lobes),
-        Err(error) => diagnosis
-            .warnings
-            .push(format!("limits before and after are not known: {error}")),
+/// Adds what the extension changes of the limits, or without one the lobes with the cuts that are known; says why where that is not known.
+fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TestCut], diagnosis: &mut Diagnosis) {
+    let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).is_empty();
+    let found = match diagnosis.extended(case) {
+        Some(extended) => lobes(case, &extended, &diagnosis.moved(case), recordings, cuts)
+            .map(|found| diagnosis.lobes = Some(found)),
+        None if has_cuts() => believed(case, recordings, cuts).map(|found| diagnosis.believed = Some(found)),
+        None => Ok(()),
+    };
+    if let Err(error) = found {
+        diagnosis.warnings.push(format!("limits are not known: {error}"));
     }
 }
 
@@ -138,18 +128,18 @@ fn write(folder: &Path, name: &str, diagnosis: &Diagnosis, extended: Option<&str
 
 fn text(diagnosis: &Diagnosis) -> String {
     let mut lines = vec![format!(
-        "the case misses {:.3} % of the parts of the records that are held out",
-        100.0 * diagnosis.baseline.nrmse_heldout
+        "the case misses {:.3} % of the parts of the records that are held out, {:.3} % of the whole",
+        100.0 * diagnosis.baseline.nrmse_heldout,
+        100.0 * diagnosis.baseline.nrmse_whole
     )];
-    lines.push(
-        match diagnosis.outcome {
-            Outcome::Cause => "cause found:",
-            Outcome::None => "nothing is wrong beyond the noise",
-            Outcome::Confounded => "these explain it equally well:",
-            Outcome::Unexplained => "something is wrong that no known cause explains",
+    lines.push(match diagnosis.outcome {
+        Outcome::Cause => "cause found:".into(),
+        Outcome::None => "nothing is wrong beyond the noise".into(),
+        Outcome::Confounded => {
+            format!("these explain it equally well: {}", diagnosis.alternatives())
         }
-        .into(),
-    );
+        Outcome::Unexplained => "something is wrong that no known cause explains".into(),
+    });
     for cause in &diagnosis.causes {
         let place = match cause.place() {
             place if place.is_empty() => place,
@@ -185,6 +175,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     }
     lines.extend(diagnosis.unexplained.guess.clone());
     lines.extend(diagnosis.lobes.iter().flat_map(sentences));
+    lines.extend(diagnosis.believed.iter().map(called));
     if let Some(test) = &diagnosis.next_test {
         lines.push(format!("next test: {}: it {}", test.what(), test.why));
     }

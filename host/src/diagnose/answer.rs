@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::lobes::Lobes;
+use super::lobes::{Chart, Lobes};
 use super::views::View;
 
 /// A normal deviate is within this many deviations with 90 %.
@@ -54,6 +54,12 @@ pub struct NamedCause {
     /// The table `[extension.NAME]` that makes it part of a case.
     #[serde(skip)]
     pub extension: toml::Table,
+    /// Which cause of its explanation it belongs to: one that acts along two directions stands in the answer twice.
+    #[serde(skip)]
+    pub choice: usize,
+    /// The same table with one principal direction of what was fitted at either end of its 90 % interval.
+    #[serde(skip)]
+    pub moved: Vec<[toml::Table; 2]>,
 }
 
 impl NamedCause {
@@ -68,20 +74,40 @@ impl NamedCause {
     }
 }
 
-/// How well a model predicts what it was not fitted to.
+/// The causes of one explanation, each with its channel or directions: `mass along x with sensor-gain of ax`.
+pub(super) fn label(causes: &[NamedCause]) -> String {
+    let mut names: Vec<String> = Vec::new();
+    for cause in causes {
+        let name = match (&cause.channel, cause.direction, cause.directions) {
+            (Some(channel), ..) => format!("{} of {channel}", cause.name),
+            (_, Some(direction), _) => format!("{} along {direction}", cause.name),
+            (_, _, Some([one, other])) => format!("{} of {one} and {other}", cause.name),
+            _ => cause.name.to_owned(),
+        };
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names.join(" with ")
+}
+
+/// How well a model predicts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// Root mean square of the residual over that of the channels, on held-out records; every channel counts alike.
+    /// Root mean square of the residual over that of the channels, on held-out parts of records; every channel counts alike.
     pub nrmse_heldout: f64,
+    /// The same of the whole records.
+    pub nrmse_whole: f64,
 }
 
 /// What the extension gains.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gain {
     /// Share of the held-out residual's energy beyond that of the noise that the extension removes: 1 − (E_after − n)/(E_before − n), with
-    /// energies in units of the noise and n numbers that are compared.
+    /// energies in units of the noise and n numbers that are compared; −1 where it is that or less.
     pub residual_energy_removed: f64,
-    /// Its 90 % interval: of the same machine, with the noise drawn anew.
+    /// Its 90 % interval: of the same machine, with the noise drawn anew. It ends at −1, where twice as much is left: less is not told
+    /// apart, and where hardly more than noise was held out nothing is.
     pub ci90: [f64; 2],
 }
 
@@ -95,12 +121,12 @@ impl Gain {
         let left = (after - count) / there;
         let variance = |energy: f64| 2.0 * count + 4.0 * (energy - count).max(0.0);
         let deviation = (variance(after) + left * left * variance(before)).sqrt() / there;
-        let removed = (1.0 - left).min(1.0);
+        let removed = (1.0 - left).clamp(-1.0, 1.0);
         Self {
             residual_energy_removed: removed,
             ci90: [
-                removed - NINETY_PERCENT * deviation,
-                (removed + NINETY_PERCENT * deviation).min(1.0),
+                (removed - NINETY_PERCENT * deviation).max(-1.0),
+                (removed + NINETY_PERCENT * deviation).clamp(-1.0, 1.0),
             ],
         }
     }
@@ -209,13 +235,16 @@ pub struct Diagnosis {
     /// What it changes of the limits; `None` where nothing was found, or limits cannot be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobes: Option<Lobes>,
+    /// The lobes of the case with the cuts that are known, where nothing was found.
+    #[serde(skip)]
+    pub believed: Option<Chart>,
     /// What would tell more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_test: Option<NextTest>,
     /// What should be known about the records.
     pub warnings: Vec<String>,
-    /// The explanations that are left, each with its causes: more than one where the answer is `Confounded`.
-    #[serde(skip)]
+    /// The explanations that are left, each with all its causes, which act together: more than one where the answer is `Confounded`.
+    #[serde(skip_serializing_if = "is_single")]
     pub explanations: Vec<Vec<NamedCause>>,
     /// How many of `causes`, from the first, act together in the extended case.
     #[serde(skip)]
@@ -223,6 +252,11 @@ pub struct Diagnosis {
     /// The residuals, channel by channel.
     #[serde(skip)]
     pub views: Vec<View>,
+}
+
+/// Nothing that `causes` does not say.
+fn is_single(explanations: &[Vec<NamedCause>]) -> bool {
+    explanations.len() < 2
 }
 
 impl Diagnosis {
@@ -248,6 +282,12 @@ impl Diagnosis {
         if is_new && !causes.is_empty() {
             self.explanations.push(causes);
         }
+    }
+
+    /// The explanations that are left, in words: each with all that must act together.
+    pub fn alternatives(&self) -> String {
+        let labels: Vec<String> = self.explanations.iter().map(|causes| label(causes)).collect();
+        labels.join("; or ")
     }
 
     /// The names of the causes, each once: a cause that acts along several directions stands in the answer once for each.

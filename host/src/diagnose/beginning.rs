@@ -103,13 +103,14 @@ pub(super) fn diagnosed(
     {
         return None;
     }
-    diagnosis.baseline = Quality {
-        nrmse_heldout: believed.missed,
+    // Nothing was fitted to any of the rest.
+    let quality = |missed: f64| Quality {
+        nrmse_heldout: missed,
+        nrmse_whole: missed,
     };
+    diagnosis.baseline = quality(believed.missed);
     if diagnosis.outcome != Outcome::None {
-        diagnosis.extended = Some(Quality {
-            nrmse_heldout: explained.missed,
-        });
+        diagnosis.extended = Some(quality(explained.missed));
         diagnosis.gain = Some(Gain::new(believed.energy, explained.energy, explained.count));
     }
     Some(diagnosis)
@@ -132,7 +133,7 @@ impl Left {
         Some(Self {
             energy: regression.residual(Share::Whole),
             count: regression.count(Share::Whole) as f64,
-            missed: regression.missed(&scene),
+            missed: regression.missed(&scene, Share::Whole),
         })
     }
 }

@@ -49,6 +49,8 @@ struct Series {
 pub struct Chips {
     /// Earlier passes that are looked at.
     passes: usize,
+    /// True where all of them count for any tool.
+    jumps: bool,
     /// Of each finer sample, for as long as the tooth is in the arc.
     over_samples: Series,
     /// At the samples of the record.
@@ -64,6 +66,8 @@ pub struct Sampling {
     pub count: usize,
     /// Finer samples per sample.
     pub finer: usize,
+    /// Earlier passes that a surface may come from, where teeth jump over several; else as many as teeth in contact need.
+    pub passes: Option<usize>,
 }
 
 /// How many passes back the surface may come from: a turn and a pass where the teeth differ, else two.
@@ -84,17 +88,19 @@ impl Chips {
             rate_hz,
             count,
             finer,
+            passes: several,
         } = sampling;
         let along = Along {
             cutter,
             turning,
             motion,
-            passes: passes(cutter.teeth.len(), true),
+            passes: passes(cutter.teeth.len(), true).max(several.unwrap_or(0)),
             step_s: 1.0 / (rate_hz * finer as f64),
             end_s: count as f64 / rate_hz,
         };
         Self {
             passes: along.passes,
+            jumps: several.is_some(),
             over_samples: series(finer * count, |sample, into| along.over(sample, into)),
             at_samples: series(count, |sample, into| {
                 if at_samples(sample) {
@@ -122,7 +128,7 @@ impl Chips {
         turning: &Turning,
         motion: &Motion,
     ) -> [Vec<f64>; 3] {
-        let (radial_m, passes) = standing_out(cutter);
+        let (radial_m, passes) = self.standing_out(cutter);
         let chips = || series.chips.iter().zip(series.thickness_m.chunks(self.passes));
         let thickness_m: Vec<f64> = chips()
             .map(|(chip, left_m)| thickness(cutter, &radial_m, chip, &left_m[..passes]).0)
@@ -153,7 +159,7 @@ impl Chips {
 
     /// How the force of a tool that turns so answers to a small motion beside the one of these chips.
     pub fn mean_slopes(&self, cutter: &Cutter, turning: &Turning) -> MeanSlopes {
-        let (radial_m, passes) = standing_out(cutter);
+        let (radial_m, passes) = self.standing_out(cutter);
         let series = &self.over_samples;
         let mut means = MeanSlopes::default();
         for (chip, left_m) in series.chips.iter().zip(series.thickness_m.chunks(self.passes)) {
@@ -179,6 +185,10 @@ impl Chips {
                 tooth = cutter.teeth[tooth].ahead;
             }
             means.add(back_rad / TAU * turning.turn_s(), share * slope);
+            for (axis, square) in means.squares.iter_mut().enumerate() {
+                let column = slope.column(axis);
+                *square += share * chip.share * cutter.force.wear(chip.t) * column * column.transpose();
+            }
             if cutter.axial_depth_modulation && depth_m > 0.0 {
                 let by_depth = means.direct_n_per_m.column(2) - share * force_n / depth_m;
                 means.direct_n_per_m.set_column(2, &by_depth);
@@ -191,18 +201,22 @@ impl Chips {
         }
         means
     }
-}
 
-/// How far each tooth stands out along the chip, m, and how many passes back the surface may come from.
-fn standing_out(cutter: &Cutter) -> (Vec<f64>, usize) {
-    let radial_m: Vec<f64> = cutter
-        .teeth
-        .iter()
-        .map(|tooth| cutter.reach_m(tooth, cutter.immersion(0.0), [0.0; 3]))
-        .collect();
-    let differ = radial_m.iter().any(|radial| *radial != radial_m[0]);
-    let passes = passes(cutter.teeth.len(), differ);
-    (radial_m, passes)
+    /// How far each tooth stands out along the chip, m, and how many passes back the surface may come from.
+    fn standing_out(&self, cutter: &Cutter) -> (Vec<f64>, usize) {
+        let radial_m: Vec<f64> = cutter
+            .teeth
+            .iter()
+            .map(|tooth| cutter.reach_m(tooth, cutter.immersion(0.0), [0.0; 3]))
+            .collect();
+        let differ = radial_m.iter().any(|radial| *radial != radial_m[0]);
+        let passes = if self.jumps {
+            self.passes
+        } else {
+            passes(cutter.teeth.len(), differ)
+        };
+        (radial_m, passes)
+    }
 }
 
 /// The thickness of a chip, m, and which earlier pass left its surface, counted from the last; not above zero where the tooth is in

@@ -18,6 +18,10 @@ use crate::simulate::{Cutter, Effects, Spindle};
 /// which side they are.
 const BESIDE: f64 = 0.375;
 
+/// Periods of the slowest vibration for which grown chatter may throw a tooth off, and passes that it may miss at most.
+const THROWN_OFF: f64 = 4.0;
+const MOST_JUMPED: usize = 32;
+
 /// A recorded cut.
 #[derive(Clone, Debug)]
 pub struct RecordedCut {
@@ -29,6 +33,8 @@ pub struct RecordedCut {
     rate_hz: f64,
     /// Samples of the record.
     count: usize,
+    /// Earlier passes that a surface may come from, of a cut in which teeth jump over several.
+    passes: Option<usize>,
 }
 
 /// The force of a cut, N, in the machine's axes.
@@ -106,6 +112,7 @@ impl RecordedCut {
             turning,
             rate_hz: recording.sample_rate_hz,
             count: recording.len(),
+            passes: None,
         })
     }
 
@@ -115,6 +122,7 @@ impl RecordedCut {
             rate_hz: self.rate_hz,
             count: self.count,
             finer,
+            passes: self.passes,
         };
         // Where no force is measured none is compared at samples.
         Chips::new(&self.cutter, turning, motion, sampling, |sample| {
@@ -127,9 +135,18 @@ impl RecordedCut {
         self.rate_hz
     }
 
-    /// Samples of the first turn: what it cuts was left before the record.
+    /// Lets teeth jump over passes, as long as grown chatter of a structure with this lowest frequency throws them off.
+    pub fn let_jump(&mut self, lowest_hz: f64) {
+        let pass_s = self.turning.turn_s() / self.cutter.teeth.len() as f64;
+        let jumped = THROWN_OFF / (lowest_hz * pass_s).max(f64::MIN_POSITIVE);
+        self.passes = Some((jumped.ceil() as usize).clamp(2, MOST_JUMPED) + 2);
+    }
+
+    /// Samples of the first turn, or of as many as a surface may come from: what they cut was left before the record.
     pub fn first_turn(&self) -> usize {
-        ((self.turning.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
+        let passes = self.passes.unwrap_or(1).max(self.cutter.teeth.len());
+        let turns = passes as f64 / self.cutter.teeth.len() as f64;
+        ((turns * self.turning.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
     }
 
     /// True where a tooth enters or leaves within `BESIDE` of a sample of `t`.

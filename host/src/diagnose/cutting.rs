@@ -10,7 +10,7 @@ use super::motion;
 use super::record::{Observed, Record};
 use super::scene::Baseline;
 use super::turning::Turning;
-use super::{DiagnoseError, checks};
+use super::{DiagnoseError, amplification, checks};
 use crate::recording::{Quantity, Recording};
 use crate::simulate::Cutter;
 use crate::simulate::path::Motion;
@@ -149,11 +149,18 @@ impl Record {
         Ok(())
     }
 
+    /// Compares what comes after the first turn, and of all but short records what comes before the last.
+    fn compare_without_ends(&mut self, cut: &RecordedCut) {
+        let (turn, count) = (cut.first_turn(), self.grid.count());
+        self.compared = turn..if count > 4 * turn { count - turn } else { count };
+    }
+
     /// Predicts all channels of a cut, and learns the motion from what is left.
     pub(super) fn compare_cut(
         &mut self,
         baseline: &Baseline<'_>,
         recording: &Recording,
+        amplifies: Option<bool>,
     ) -> Result<(), DiagnoseError> {
         let mut cutting = Cutting::new(baseline, self, recording)?;
         self.skipped = self
@@ -161,11 +168,14 @@ impl Record {
             .iter()
             .map(|channel| cutting.skipped(channel))
             .collect();
-        let turn = cutting.cut.first_turn();
-        let count = self.grid.count();
-        self.compared = turn..if count > 4 * turn { count - turn } else { count };
+        self.compare_without_ends(&cutting.cut);
         self.prepare_decays(baseline);
         let slopes = cutting.mean_slopes();
+        self.amplifies = amplifies.unwrap_or_else(|| amplification::amplifies(self, &cutting.cut, &slopes));
+        if self.amplifies {
+            cutting.cut.let_jump(self.lowest_hz);
+            self.compare_without_ends(&cutting.cut);
+        }
         let rounds = if self.clean.is_some() {
             ROUNDS_OF_A_MODEL
         } else {
@@ -203,7 +213,7 @@ impl Record {
             }
             let off = self.off_the_closed_loop();
             // The first force along the motion of a model is that of the measured one still.
-            let is_along = round > 0 || self.clean.is_none();
+            let is_along = (round > 0 || self.clean.is_none()) && !self.amplifies;
             motion::learn(self, baseline, &force, is_along.then_some(&slopes));
             if self.clean.is_some() && is_along && off < SETTLED {
                 break;

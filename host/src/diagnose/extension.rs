@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use toml::{Table, Value};
 
 use super::answer::{Diagnosis, Figure, NamedCause, Outcome};
+use super::lobes::Moved;
 use crate::case::Case;
 
 /// Tables `[extension.NAME]`, in their order, each name once: a cause that acts along several directions has a list of them, and
@@ -64,6 +65,36 @@ impl Diagnosis {
             extended.extensions.extend(joined(self.found()));
             extended
         })
+    }
+
+    /// The extended case with each principal direction of what was fitted at either end of its 90 % interval: those of one cause after
+    /// the other, which are taken to be independent of one another.
+    pub fn moved(&self, case: &Case) -> Vec<Moved> {
+        let found = &self.causes[..self.acting];
+        let choices = found
+            .iter()
+            .map(|cause| cause.choice)
+            .max()
+            .map_or(0, |last| last + 1);
+        let mut all = Vec::new();
+        for choice in 0..choices {
+            let directions = found
+                .iter()
+                .find(|cause| cause.choice == choice)
+                .map_or(0, |cause| cause.moved.len());
+            for direction in 0..directions {
+                all.push([0, 1].map(|end| {
+                    let tables = found.iter().map(|cause| match cause.choice == choice {
+                        true => (cause.name, &cause.moved[direction][end]),
+                        false => (cause.name, &cause.extension),
+                    });
+                    let mut moved = case.clone();
+                    moved.extensions.extend(joined(tables));
+                    moved
+                }));
+            }
+        }
+        all
     }
 
     /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each cause that acts, and

@@ -23,6 +23,9 @@ const FEWER_LEFT: f64 = 0.05;
 const REJECTED: f64 = 0.03;
 const DOUBT: f64 = 0.8;
 
+/// What is held out is not like the whole records where they miss so many times as much.
+const UNLIKE: f64 = 3.0;
+
 pub(super) fn judge(
     scene: &Scene<'_>,
     recordings: &[Recording],
@@ -51,13 +54,14 @@ fn answer(
     let inflation = scale.inflation(regression, selection.best.as_ref());
     let held_out = regression.residual(Share::HeldOut);
     let count = regression.count(Share::HeldOut) as f64;
-    let missed = regression.missed(scene);
-    let quality = |left: f64| Quality {
-        nrmse_heldout: missed * (left / held_out.max(f64::MIN_POSITIVE)).sqrt(),
+    let whole = regression.residual(Share::Whole);
+    let missed = Quality {
+        nrmse_heldout: regression.missed(scene, Share::HeldOut),
+        nrmse_whole: regression.missed(scene, Share::Whole),
     };
     let mut diagnosis = Diagnosis {
         outcome: Outcome::None,
-        baseline: quality(held_out),
+        baseline: missed,
         causes: Vec::new(),
         equivalent: Vec::new(),
         extended: None,
@@ -68,12 +72,20 @@ fn answer(
             guess: None,
         },
         lobes: None,
+        believed: None,
         next_test: None,
         warnings: Vec::new(),
         explanations: Vec::new(),
         acting: 0,
         views: views(scene, library, selection.best.as_ref()),
     };
+    if missed.nrmse_whole > UNLIKE * missed.nrmse_heldout {
+        diagnosis.warnings.push(format!(
+            "the parts of the records that are held out miss {:.2} %, the whole records {:.2} %: most of what is wrong lies in what is fitted, and held-out parts tell little of the gain",
+            100.0 * missed.nrmse_heldout,
+            100.0 * missed.nrmse_whole
+        ));
+    }
     let (of_noise, of_excess) = scale.excess(regression, selection.best.as_ref());
     let allowed = match &selection.best {
         _ if scene.all_in(Domain::Force) => LEFT_OF_FORCE,
@@ -155,7 +167,11 @@ fn answer(
             .collect();
         confound(&mut diagnosis, &shared);
     }
-    diagnosis.extended = Some(quality(left_held_out));
+    let share = |left: f64, there: f64| (left / there.max(f64::MIN_POSITIVE)).sqrt();
+    diagnosis.extended = Some(Quality {
+        nrmse_heldout: missed.nrmse_heldout * share(left_held_out, held_out),
+        nrmse_whole: missed.nrmse_whole * share(best.fit.left, whole),
+    });
     diagnosis.gain = Some(Gain::new(held_out, left_held_out, count));
     diagnosis
 }
@@ -172,7 +188,8 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
         group.retain(|name| elsewhere.iter().any(|cause| cause.name == *name));
     }
     let share = 1.0 / group.len().max(diagnosis.explanations.len()) as f64;
-    for cause in &mut diagnosis.causes {
+    let explanations = diagnosis.explanations.iter_mut().flatten();
+    for cause in diagnosis.causes.iter_mut().chain(explanations) {
         if group.contains(&cause.name) {
             cause.confidence = cause.confidence.min(share);
         }

@@ -1,7 +1,9 @@
 //! What an extension changes for the user: limits, chatter frequencies, calls of stable and unstable.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
+use super::recorded_cuts::recorded_cuts;
 use crate::case::Case;
 use crate::continuation::{ForcedProblem, collocation_of};
 use crate::recording::{Kind as RecordKind, Recording};
@@ -9,7 +11,7 @@ use crate::stability::{
     CubicTerms, Kind, Limit, Method, Pitched, SpeedLine, StabilityError, after, chart, default_speeds,
     needs_orbit, spaced,
 };
-use crate::test_cuts::{Call, Calls, TestCut, calls};
+use crate::test_cuts::{Call, Calls, TestCut, call, calls};
 
 /// Speeds of the charts.
 const SPEEDS: usize = 41;
@@ -27,6 +29,9 @@ const DEEPEST_MM: f64 = 200.0;
 /// How many times the lowest limit charts go down to.
 const DEPTH: f64 = 4.0;
 
+/// How many times the deepest cut they do.
+const BELOW_CUTS: f64 = 1.2;
+
 /// The limit at one speed before and after; `None` for none up to the last depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
@@ -34,6 +39,9 @@ pub struct Change {
     pub limit_before_mm: Option<f64>,
     /// Where by the extended case, mm.
     pub limit_after_mm: Option<f64>,
+    /// The 90 % interval of that, from those of the parameters that were found; an upper end of `None` is beyond the last depth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit_after_ci90_mm: Option<[Option<f64>; 2]>,
     /// Spindle speed, rev/min.
     pub at_rpm: f64,
     /// How it is lost by the case.
@@ -46,13 +54,26 @@ pub struct Change {
     pub chatter_after_hz: Option<f64>,
 }
 
-/// How cuts that were tried are called.
+/// How cuts that were tried or recorded are called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct CallsChange {
     /// By the case.
     pub before: Calls,
     /// By the extended case.
     pub after: Calls,
+}
+
+/// The lobes of one case with the cuts that were tried or recorded.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// How they were computed.
+    pub method: &'static str,
+    /// The depth up to which limits were sought, mm.
+    pub searched_mm: f64,
+    /// The limits, speed by speed.
+    pub lines: Vec<SpeedLine>,
+    /// The cuts, each with what the lobes say of it.
+    pub cuts: Vec<(TestCut, Call)>,
 }
 
 /// The limits of the case and of the extended case.
@@ -70,88 +91,202 @@ pub struct Lobes {
     pub method_after: &'static str,
     /// At every speed.
     pub speeds: Vec<Change>,
-    /// How cuts that were tried are called, where there are any.
+    /// How cuts that were tried or recorded are called, where there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calls: Option<CallsChange>,
-    /// The lines of both charts.
+    /// Both charts.
     #[serde(skip)]
-    pub lines: [Vec<SpeedLine>; 2],
-    /// The cuts, each with what both say of it.
-    #[serde(skip)]
-    pub cuts: Vec<(TestCut, [Call; 2])>,
+    pub charts: [Chart; 2],
 }
 
-/// The limits of a case and of its extension, over the speeds of the cuts that were tried or recorded, else of the machine.
+/// An extended case with one direction of its parameters moved to either end of their 90 % interval.
+pub type Moved = [Case; 2];
+
+/// The lobes of a case over the speeds of the cuts that were tried or recorded, else of the machine.
 ///
 /// # Errors
 /// A case without tool, material or cut, or one whose limits cannot be computed.
+pub fn believed(case: &Case, recordings: &[Recording], cuts: &[TestCut]) -> Result<Chart, StabilityError> {
+    let method = method(case, after_s(&[case], recordings))?;
+    let cuts = Cuts::new(case, recordings, cuts);
+    let range = Range::new(case, &*method, &cuts, is_costly(case))?;
+    Chart::new(&*method, &range, &cuts)
+}
+
+/// The limits of a case and of its extension, over the same speeds; `moved` says how well the parameters of the extension are known.
+///
+/// # Errors
+/// As [`believed`], also for the extended case.
 pub fn lobes(
     case: &Case,
     extended: &Case,
+    moved: &[Moved],
     recordings: &[Recording],
     cuts: &[TestCut],
 ) -> Result<Lobes, StabilityError> {
-    let moves = [case, extended].into_iter().any(|case| {
-        ["drift", "wear"]
-            .iter()
-            .any(|name| case.extensions.contains_key(*name))
-    });
-    let after_s = moves.then(|| recordings.iter().map(duration_s).fold(0.0, f64::max));
+    let after_s = after_s(&[case, extended], recordings);
     let methods = [method(case, after_s)?, method(extended, after_s)?];
-    let recorded_rpm: Vec<f64> = recordings
-        .iter()
-        .filter(|recording| recording.sidecar.kind == Some(RecordKind::Cutting))
-        .filter_map(|recording| recording.sidecar.cut?.spindle_rpm)
-        .collect();
-    let is_costly = [case, extended].into_iter().any(|case| {
-        needs_orbit(case) && ForcedProblem::new(case).is_ok_and(|problem| problem.is_over_revolution())
-    });
-    let speeds_rpm = speeds(
-        case,
-        cuts,
-        &recorded_rpm,
-        if is_costly { FEW_SPEEDS } else { SPEEDS },
-    )?;
-    let searched_mm = match cuts.iter().map(|cut| cut.depth_mm).max_by(f64::total_cmp) {
-        Some(deepest_mm) => 1.2 * deepest_mm,
-        None => depth_mm(&*methods[0], &speeds_rpm)?,
-    };
-    let lines = [
-        chart(&*methods[0], &speeds_rpm, searched_mm, 0)?.speeds,
-        chart(&*methods[1], &speeds_rpm, searched_mm, 0)?.speeds,
+    let cuts = Cuts::new(case, recordings, cuts);
+    let is_costly = is_costly(case) || is_costly(extended);
+    let range = Range::new(case, &*methods[0], &cuts, is_costly)?;
+    let charts = [
+        Chart::new(&*methods[0], &range, &cuts)?,
+        Chart::new(&*methods[1], &range, &cuts)?,
     ];
-    let changes: Vec<Change> = lines[0].iter().zip(&lines[1]).map(Change::from).collect();
-    let at = match recorded_rpm.first() {
-        Some(rpm) => changes.iter().find(|change| change.at_rpm == *rpm),
-        None => changes.iter().max_by(|a, b| {
-            a.relative(searched_mm)
-                .abs()
-                .total_cmp(&b.relative(searched_mm).abs())
+    let lines = charts[0].lines.iter().zip(&charts[1].lines);
+    let mut speeds: Vec<Change> = lines.map(Change::from).collect();
+    let at = match cuts.recorded_rpm.first() {
+        Some(rpm) => speeds.iter().position(|change| change.at_rpm == *rpm),
+        None => (0..speeds.len()).max_by(|a, b| {
+            let by = |index: &usize| speeds[*index].relative(range.searched_mm).abs();
+            by(a).total_cmp(&by(b))
         }),
     };
-    let at = *at.ok_or(StabilityError::Argument {
+    let at = at.ok_or(StabilityError::Argument {
         quantity: "number of speeds",
         value: 0.0,
         expected: "a speed",
     })?;
-    let said = [calls(&*methods[0], cuts)?, calls(&*methods[1], cuts)?];
+    let known = if is_costly { at..at + 1 } else { 0..speeds.len() };
+    spread(&mut speeds[known], range.searched_mm, moved, after_s);
     Ok(Lobes {
-        at,
-        searched_mm,
+        at: speeds[at],
+        searched_mm: range.searched_mm,
         after_s,
-        method_after: methods[1].name(),
-        speeds: changes,
-        calls: (!cuts.is_empty()).then(|| CallsChange {
-            before: Calls::of(&said[0]),
-            after: Calls::of(&said[1]),
+        method_after: charts[1].method,
+        speeds,
+        calls: (!charts[0].cuts.is_empty()).then(|| CallsChange {
+            before: charts[0].calls(),
+            after: charts[1].calls(),
         }),
-        lines,
-        cuts: cuts
-            .iter()
-            .zip(said[0].iter().zip(&said[1]))
-            .map(|(cut, (before, after))| (*cut, [*before, *after]))
-            .collect(),
+        charts,
     })
+}
+
+/// The 90 % intervals of limits: those of the directions of parameters, which are independent of one another, added by their
+/// squares, upward and downward apart. None where a moved case has no limits.
+fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[Moved], after_s: Option<f64>) {
+    if moved.is_empty() {
+        return;
+    }
+    let speeds_rpm: Vec<f64> = speeds.iter().map(|change| change.at_rpm).collect();
+    let or_last = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm);
+    let limits = |case: &Case| -> Option<Vec<f64>> {
+        let lines = chart(&*method(case, after_s).ok()?, &speeds_rpm, searched_mm, 0).ok()?;
+        let limits = lines.speeds.iter().map(|line| line.first_limit);
+        Some(
+            limits
+                .map(|limit| or_last(limit.map(|limit| limit.depth_mm)))
+                .collect(),
+        )
+    };
+    let moved: Option<Vec<[Vec<f64>; 2]>> = moved
+        .par_iter()
+        .map(|[low, high]| Some([limits(low)?, limits(high)?]))
+        .collect();
+    let Some(moved) = moved else { return };
+    for (index, change) in speeds.iter_mut().enumerate() {
+        let center_mm = or_last(change.limit_after_mm);
+        let reach = |sign: f64| {
+            let squares = moved.iter().map(|[low, high]| {
+                let furthest = |a: f64, limits: &Vec<f64>| a.max(sign * (limits[index] - center_mm));
+                [low, high].into_iter().fold(0.0, furthest).powi(2)
+            });
+            squares.sum::<f64>().sqrt()
+        };
+        let high_mm = center_mm + reach(1.0);
+        change.limit_after_ci90_mm = Some([
+            Some((center_mm - reach(-1.0)).max(0.0)),
+            (high_mm < searched_mm).then_some(high_mm),
+        ]);
+    }
+}
+
+/// The cuts that are known.
+struct Cuts<'a> {
+    tried: &'a [TestCut],
+    recorded: Vec<TestCut>,
+    /// Speeds of all recorded cuts, also of those that are on no chart of the case.
+    recorded_rpm: Vec<f64>,
+}
+
+impl<'a> Cuts<'a> {
+    fn new(case: &Case, recordings: &[Recording], tried: &'a [TestCut]) -> Self {
+        Self {
+            tried,
+            recorded: recorded_cuts(case, recordings),
+            recorded_rpm: recordings
+                .iter()
+                .filter(|recording| recording.sidecar.kind == Some(RecordKind::Cutting))
+                .filter_map(|recording| recording.sidecar.cut?.spindle_rpm)
+                .collect(),
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &TestCut> {
+        self.tried.iter().chain(&self.recorded)
+    }
+}
+
+/// Speeds and depths of charts.
+struct Range {
+    speeds_rpm: Vec<f64>,
+    searched_mm: f64,
+}
+
+impl Range {
+    fn new(
+        case: &Case,
+        method: &dyn Method,
+        cuts: &Cuts<'_>,
+        is_costly: bool,
+    ) -> Result<Self, StabilityError> {
+        let count = if is_costly { FEW_SPEEDS } else { SPEEDS };
+        let speeds_rpm = speeds(case, cuts.tried, &cuts.recorded_rpm, count)?;
+        let below_cuts_mm = BELOW_CUTS * cuts.all().map(|cut| cut.depth_mm).fold(0.0, f64::max);
+        let searched_mm = if cuts.tried.is_empty() {
+            depth_mm(method, &speeds_rpm)?.max(below_cuts_mm)
+        } else {
+            below_cuts_mm
+        };
+        Ok(Self {
+            speeds_rpm,
+            searched_mm,
+        })
+    }
+}
+
+impl Chart {
+    fn new(method: &dyn Method, range: &Range, cuts: &Cuts<'_>) -> Result<Self, StabilityError> {
+        let lines = chart(method, &range.speeds_rpm, range.searched_mm, 0)?.speeds;
+        let mut said = calls(method, cuts.tried)?;
+        said.extend(cuts.recorded.iter().map(|cut| call(&lines, cut)));
+        Ok(Self {
+            method: method.name(),
+            searched_mm: range.searched_mm,
+            lines,
+            cuts: cuts.all().copied().zip(said).collect(),
+        })
+    }
+
+    /// How often the cuts are called right.
+    pub fn calls(&self) -> Calls {
+        let calls: Vec<Call> = self.cuts.iter().map(|(_, call)| *call).collect();
+        Calls::of(&calls)
+    }
+}
+
+fn after_s(cases: &[&Case], recordings: &[Recording]) -> Option<f64> {
+    let moves = cases.iter().any(|case| {
+        ["drift", "wear"]
+            .iter()
+            .any(|name| case.extensions.contains_key(*name))
+    });
+    moves.then(|| recordings.iter().map(duration_s).fold(0.0, f64::max))
+}
+
+fn is_costly(case: &Case) -> bool {
+    needs_orbit(case) && ForcedProblem::new(case).is_ok_and(|problem| problem.is_over_revolution())
 }
 
 impl Change {
@@ -169,6 +304,7 @@ impl From<(&SpeedLine, &SpeedLine)> for Change {
         Self {
             limit_before_mm: a.map(depth),
             limit_after_mm: b.map(depth),
+            limit_after_ci90_mm: None,
             at_rpm: before.rpm,
             kind_before: a.map(|limit| limit.kind),
             kind_after: b.map(|limit| limit.kind),

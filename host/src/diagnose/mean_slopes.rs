@@ -21,6 +21,8 @@ pub struct MeanSlopes {
     pub direct_n_per_m: Matrix3<f64>,
     /// C, N s/m.
     pub damping_ns_per_m: Matrix3<f64>,
+    /// By axis of the motion: the mean of k kᵀ, k the column of ∂F/∂h nᵀ at an instant that belongs to the axis, N²/m².
+    pub squares: [Matrix3<f64>; 3],
 }
 
 impl MeanSlopes {
@@ -34,6 +36,20 @@ impl MeanSlopes {
             Some((_, sum)) => *sum += slope_n_per_m,
             None => self.by_delay.push((delay_s, slope_n_per_m)),
         }
+    }
+
+    /// Power of the force that noise of the motion makes beyond L, N²: slopes K(t) that come and go with the teeth carry noise n of
+    /// this power along each axis, m², from one frequency to others: Σ 2 n (⟨k kᵀ⟩ − Σ_p k_p k_pᵀ), as much at every frequency.
+    pub fn carried(&self, noise_m2: [f64; 3]) -> Matrix3<f64> {
+        let mut power = Matrix3::zeros();
+        for (axis, noise_m2) in noise_m2.into_iter().enumerate() {
+            let mut beyond = self.squares[axis];
+            for (_, slope) in &self.by_delay {
+                beyond -= slope.column(axis) * slope.column(axis).transpose();
+            }
+            power += 2.0 * noise_m2 * beyond;
+        }
+        power
     }
 
     /// L(ω), N/m.

@@ -9,6 +9,7 @@
 //! motion in it. Tests of structures are simulated (`output_error`), cuts are read again with the extended case
 //! (`relinearization`).
 
+mod amplification;
 pub mod answer;
 mod around;
 mod beginning;
@@ -46,6 +47,7 @@ mod own_slopes;
 mod part;
 mod receptance;
 mod record;
+mod recorded_cuts;
 mod refine;
 pub mod regression;
 mod relinearization;
@@ -73,6 +75,7 @@ pub use grid::Grid;
 pub use missing_force::{AtAmplitude, MissingForce};
 pub use receptance::Receptance;
 pub use record::{Observed, Record};
+pub use recorded_cuts::recorded_cuts;
 pub use scene::{Baseline, Domain, Scene};
 pub use views::{TurningView, View};
 

@@ -42,9 +42,11 @@ pub(super) fn learn(
     let decay = fine_decay(record, baseline, rate);
     let mut corrections: [Vec<Complex64>; 3] = std::array::from_fn(|_| Vec::new());
     let mut speed_noise = [0.0; 3];
+    let mut shares: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
     for &axis in &baseline.axes {
-        let correction = correction(record, axis, baseline.lowest_hz().unwrap_or(0.0));
+        let correction = correction(record, axis);
         corrections[axis] = correction.spectrum;
+        shares[axis] = correction.share;
         speed_noise[axis] = correction.speed_noise;
     }
     let closed = slopes.map(|slopes| in_closed_loop(record, slopes, &corrections));
@@ -97,6 +99,7 @@ pub(super) fn learn(
     }
     record.motion = motion;
     record.displacement = displacement;
+    record.measured_share = shares;
 }
 
 /// What corrects the motion to that of the closed loop, by axis, where `corrections` make it that of the record.
@@ -146,12 +149,14 @@ fn reading(record: &Record, channel: usize, corrections: &[Vec<Complex64>; 3]) -
 
 struct Correction {
     spectrum: Vec<Complex64>,
+    /// W.
+    share: Vec<f64>,
     /// Noise that it leaves in the velocity, m/s.
     speed_noise: f64,
 }
 
 /// W·(x_measured − x_model) along an axis.
-fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
+fn correction(record: &Record, axis: usize) -> Correction {
     let grid = &record.grid;
     let bins = grid.bins();
     let of_axis: Vec<(&Observed, Vec<Complex64>)> = record
@@ -164,20 +169,12 @@ fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
     let mut spectrum = vec![Complex64::ZERO; bins];
     let mut precision = vec![0.0; bins];
     for (channel, residual) in &of_axis {
-        let weight = channel.pickup.weights[axis];
-        // Integrals of what leaks to low frequencies would bury the motion: there the model is the better witness.
-        let lowest = if derivatives(channel.pickup.quantity) > 0 {
-            INTEGRATED * std::f64::consts::TAU * lowest_hz
-        } else {
-            0.0
-        };
-        for bin in (0..bins).filter(|bin| grid.omega(*bin) >= lowest) {
-            let factor = channel.factor(grid.omega(bin)) * weight;
-            let gain = factor.norm_sqr() / (channel.deviation * channel.deviation);
-            if gain > 0.0 {
-                spectrum[bin] += residual[bin] / factor * gain;
-                precision[bin] += gain;
-            }
+        for bin in 0..bins {
+            let Some((factor, gain)) = weighed(channel, axis, grid.omega(bin), record.lowest_hz) else {
+                continue;
+            };
+            spectrum[bin] += residual[bin] / factor * gain;
+            precision[bin] += gain;
         }
     }
     // Power in units of the noise: of white noise of deviation 1 over the length with its continuation.
@@ -193,8 +190,9 @@ fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
             }
         })
         .collect();
-    let weights = match record.clean {
+    let mut weights = match record.clean {
         Some(_) => vec![1.0; bins],
+        None if record.amplifies => vec![1.0; bins],
         None => heard(&power),
     };
     let mut speed_noise = 0.0;
@@ -204,12 +202,32 @@ fn correction(record: &Record, axis: usize, lowest_hz: f64) -> Correction {
             speed_noise += grid.omega(bin).powi(2) * weights[bin] * weights[bin] / precision[bin];
         } else {
             spectrum[bin] = Complex64::ZERO;
+            weights[bin] = 0.0;
         }
     }
     Correction {
         spectrum,
+        share: weights,
         speed_noise: (2.0 * speed_noise / grid.length() as f64).sqrt(),
     }
+}
+
+/// What becomes of a displacement along an axis in a channel that reads it, and the precision with which the channel then tells of it,
+/// 1/m²; `None` where it tells nothing.
+pub(super) fn weighed(
+    channel: &Observed,
+    axis: usize,
+    omega: f64,
+    lowest_hz: f64,
+) -> Option<(Complex64, f64)> {
+    // Integrals of what leaks to low frequencies would bury the motion: there the model is the better witness.
+    let is_integral = derivatives(channel.pickup.quantity) > 0;
+    if is_integral && omega < INTEGRATED * std::f64::consts::TAU * lowest_hz {
+        return None;
+    }
+    let factor = channel.factor(omega) * channel.pickup.weights[axis];
+    let gain = factor.norm_sqr() / (channel.deviation * channel.deviation);
+    (gain > 0.0).then_some((factor, gain))
 }
 
 /// Wiener's weight of each bin from its power in units of the noise.

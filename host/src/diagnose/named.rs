@@ -1,6 +1,6 @@
 //! Causes with their parameters and intervals, as an answer says them.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::answer::{Figure, NINETY_PERCENT, NamedCause};
 use super::cause::{Part, Place};
@@ -29,7 +29,7 @@ pub(super) fn named(
         let cause = library.cause(choice.candidate);
         let shape = &candidate.shapes[choice.shape].0;
         let coefficients = library.coefficients(explanation, place);
-        let parts = |inner: &[f64]| -> Option<Vec<Part>> {
+        let parts_of = |inner: &[f64]| -> Option<Vec<Part>> {
             let (coefficients, shape) = inner.split_at(coefficients.len());
             let parameters = cause.parameters(scene, &candidate.place, shape, coefficients)?;
             let mut parts = cause.parts(&candidate.place, &parameters);
@@ -39,7 +39,7 @@ pub(super) fn named(
             Some(parts)
         };
         let values = |inner: &[f64]| -> Option<Vec<f64>> {
-            let parts = parts(inner)?;
+            let parts = parts_of(inner)?;
             Some(
                 parts
                     .iter()
@@ -48,13 +48,19 @@ pub(super) fn named(
             )
         };
         let inner: Vec<f64> = coefficients.iter().chain(shape).copied().collect();
-        let (Some(parts), Some(center)) = (parts(&inner), values(&inner)) else {
+        let (Some(parts), Some(center)) = (parts_of(&inner), values(&inner)) else {
             continue;
         };
         let known = cause.known_deviations(scene);
         let mut deviations = deviations(&values, &inner, &center, covariance, inflation).into_iter();
-        for part in parts {
+        let moved = moved(&parts_of, &inner, covariance, inflation);
+        for (index, part) in parts.into_iter().enumerate() {
+            let tables = moved
+                .iter()
+                .map(|ends| ends.each_ref().map(|parts| parts[index].extension.clone()));
             all.push(NamedCause {
+                choice: place,
+                moved: tables.collect(),
                 parameters: part
                     .parameters
                     .iter()
@@ -145,6 +151,8 @@ fn empty(name: &'static str, place: &Place, confidence: f64, extension: toml::Ta
         channel: place.channel().map(String::from),
         parameters: std::collections::BTreeMap::new(),
         extension,
+        choice: 0,
+        moved: Vec::new(),
     }
 }
 
@@ -195,6 +203,49 @@ pub(super) fn covariance(
         .map(|rows| {
             DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
                 whole.get((rows[i], rows[j])).copied().unwrap_or(0.0)
+            })
+        })
+        .collect()
+}
+
+/// The parts of a cause with each principal direction of its covariance at the ends of its 90 % interval; a direction in which no
+/// such cause is physical at one end stays where it is there.
+fn moved(
+    parts_of: &dyn Fn(&[f64]) -> Option<Vec<Part>>,
+    inner: &[f64],
+    covariance: &DMatrix<f64>,
+    inflation: f64,
+) -> Vec<[Vec<Part>; 2]> {
+    // In units of the deviations: coefficients are of different kinds and sizes.
+    let scales: Vec<f64> = covariance
+        .diagonal()
+        .iter()
+        .map(|variance| variance.max(0.0).sqrt())
+        .collect();
+    let of = |i: usize, j: usize| match scales[i] * scales[j] {
+        0.0 => 0.0,
+        scale => covariance[(i, j)] / scale,
+    };
+    let correlation = SymmetricEigen::new(DMatrix::from_fn(scales.len(), scales.len(), of));
+    let Some(center) = parts_of(inner) else {
+        return Vec::new();
+    };
+    correlation
+        .eigenvalues
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| **value > 0.0)
+        .map(|(direction, value)| {
+            [-1.0, 1.0].map(|sign| {
+                let size = sign * NINETY_PERCENT * (inflation * value).sqrt();
+                let along = correlation.eigenvectors.column(direction);
+                let moves = inner.iter().zip(along.iter().zip(&scales));
+                let moved: Vec<f64> = moves
+                    .map(|(inner, (along, scale))| inner + size * along * scale)
+                    .collect();
+                parts_of(&moved)
+                    .filter(|parts| parts.len() == center.len())
+                    .unwrap_or_else(|| center.clone())
             })
         })
         .collect()

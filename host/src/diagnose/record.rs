@@ -83,6 +83,8 @@ pub struct Record {
     pub readings: Vec<Vec<f64>>,
     /// Below this lies all but a two-hundredth of the motion's power, Hz.
     pub highest_hz: f64,
+    /// Lowest natural frequency of the baseline, Hz; 0 where nothing vibrates.
+    pub lowest_hz: f64,
     /// Highest frequency at which the record is compared, Hz.
     pub band_hz: f64,
     /// H(iω) of the baseline at the bins of the finer samples, m/N; in the domain of force the dynamic stiffness at the bins
@@ -103,6 +105,19 @@ pub struct Record {
     closed: Option<Vec<Vec<f64>>>,
     /// What the motion is learned from, where that is known better than from what was measured.
     pub clean: Option<Clean>,
+    /// Of a cut: true where force and motion amplify one another, so that the motion is taken as it was measured (see `amplification`).
+    pub amplifies: bool,
+    /// By axis, of a cut: the share of the measured motion in the one that chips are computed along, at the bins of the samples.
+    pub(super) measured_share: [Vec<f64>; 3],
+}
+
+/// What is known of a record before it is read.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Known {
+    /// What the channels read without their noise.
+    pub(super) clean: Option<Clean>,
+    /// Whether the cut amplifies; else the record itself says.
+    pub(super) amplifies: Option<bool>,
 }
 
 impl Observed {
@@ -127,11 +142,11 @@ impl Record {
     ///
     /// # Errors
     /// A record that tells nothing: too short, clipped, without a channel that is needed, of a kind that is not judged.
-    pub fn new(
+    pub(super) fn new(
         baseline: &Baseline<'_>,
         index: usize,
         recording: &Recording,
-        clean: Option<Clean>,
+        known: Known,
     ) -> Result<Self, DiagnoseError> {
         let domain = checks::domain(baseline, recording)?;
         let is_cut = recording.sidecar.kind == Some(Kind::Cutting);
@@ -180,6 +195,7 @@ impl Record {
             readings: Vec::new(),
             closed: None,
             highest_hz,
+            lowest_hz: baseline.lowest_hz().unwrap_or(0.0),
             // Forces of a cut reach to the end of the band.
             band_hz: if is_cut {
                 0.5 * rate_hz
@@ -192,14 +208,16 @@ impl Record {
             skipped: vec![Vec::new(); count],
             decays: Decays::default(),
             cut: None,
-            clean,
+            clean: known.clean,
+            amplifies: false,
+            measured_share: std::array::from_fn(|_| Vec::new()),
         };
         match domain {
             Domain::Response => {
                 let of = |channel| record.responses_by(channel, record.seen_by(channel), &baseline.axes);
                 record.responses = record.channels.iter().map(of).collect();
                 if is_cut {
-                    record.compare_cut(baseline, recording)?;
+                    record.compare_cut(baseline, recording, known.amplifies)?;
                 } else {
                     record.compare_responses(baseline);
                 }

@@ -244,10 +244,10 @@ impl Regression {
         self.products(share).count
     }
 
-    /// Root mean square of the residual over that of what was measured, on what is held out; channels count alike.
-    pub fn missed(&self, scene: &Scene<'_>) -> f64 {
+    /// Root mean square of the residual over that of what was measured, on a share; channels count alike.
+    pub fn missed(&self, scene: &Scene<'_>, share: Share) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
-        for part in self.parts.iter().filter(|part| part.share == Share::HeldOut) {
+        for part in self.parts.iter().filter(|part| part.share == share) {
             for channel in &scene.records[part.record].channels {
                 let energy =
                     |samples: &[f64]| dot(&samples[part.range.clone()], &samples[part.range.clone()]);

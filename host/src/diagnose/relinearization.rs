@@ -4,7 +4,7 @@
 //! change the motion that the chip is computed from. So the recordings are read again with the extended case, which gives the
 //! residual r(θ) itself, and the columns of the regression its slopes: θ ← θ + (JᵀJ)⁻¹Jᵀ r(θ), Gauss and Newton's steps with the
 //! slopes of the first (the chord method). The motion is each time the one that the extended case has in closed loop
-//! (`mean_slopes`), so that the noise of the sensors is not in it.
+//! (`mean_slopes`), so that the noise of the sensors is not in it; where it would be amplified (`amplification`) the measured one.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use super::closed_fit::{ClosedFit, Reading};
 use super::evidence::{Choice, Explanation, Library, Simulated};
 use super::extension::joined;
 use super::named::covariance;
-use super::record::{Clean, Record};
+use super::record::{Clean, Known, Record};
 use super::regression::{Regression, Share};
 use super::scene::Scene;
 use crate::recording::Recording;
@@ -51,8 +51,16 @@ impl<'a> Relinearization<'a> {
         let mut case = self.scene.baseline.case.clone();
         let tables = extensions.iter().map(|(name, table)| (*name, table));
         case.extensions.extend(joined(tables));
-        let clean = |index: usize| predicted.map(|predicted| predicted[index].clone());
-        let read = Scene::with(&case, self.recordings, clean).ok()?;
+        // As the case alone has it: an explanation is not compared with another along another motion.
+        let known = |index: usize| {
+            let amplifies = self.scene.records[index].amplifies;
+            let predicted = predicted.filter(|_| !amplifies);
+            Known {
+                clean: predicted.map(|predicted| predicted[index].clone()),
+                amplifies: Some(amplifies),
+            }
+        };
+        let read = Scene::with(&case, self.recordings, known).ok()?;
         let residuals: Residuals = read
             .records
             .iter()

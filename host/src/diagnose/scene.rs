@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use super::DiagnoseError;
 use super::cubic::cubic_term;
 use super::receptance::Receptance;
-use super::record::{Clean, Record};
+use super::record::{Known, Record};
 use crate::case::Case;
 use crate::recording::Recording;
 use crate::simulate::effect::Pickup;
@@ -139,10 +139,10 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// A case that cannot be simulated, or a record that tells nothing.
     pub fn new(case: &'a Case, recordings: &[Recording]) -> Result<Self, DiagnoseError> {
-        Self::with(case, recordings, |_| None)
+        Self::with(case, recordings, |_| Known::default())
     }
 
-    /// The same with the motion as `clean`, what a case that explains a record says that its channels read, where there is such.
+    /// The same with what is `known`: the motion as a case that explains a record says that its channels read it, where there is such.
     ///
     /// Along a measured motion every term carries the noise of that motion, which is also in the residual: the coefficient of a
     /// term is then off by about the square of noise over signal, which is more than its deviation once
@@ -153,7 +153,7 @@ impl<'a> Scene<'a> {
     pub(super) fn with(
         case: &'a Case,
         recordings: &[Recording],
-        clean: impl Fn(usize) -> Option<Clean>,
+        known: impl Fn(usize) -> Known,
     ) -> Result<Self, DiagnoseError> {
         if recordings.is_empty() {
             return Err(DiagnoseError::NoRecording);
@@ -162,7 +162,7 @@ impl<'a> Scene<'a> {
         let records = recordings
             .iter()
             .enumerate()
-            .map(|(index, recording)| Record::new(&baseline, index, recording, clean(index)))
+            .map(|(index, recording)| Record::new(&baseline, index, recording, known(index)))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self { baseline, records })
     }

@@ -1,7 +1,9 @@
 //! What makes the noise of a record white, with deviation 1, and independent from channel to channel.
 
+use nalgebra::Cholesky;
 use num_complex::Complex64;
 
+use super::amplification::LoopNoise;
 use super::record::Record;
 use super::scene::Domain;
 
@@ -37,16 +39,26 @@ impl Whitening {
             }
             Domain::Force => Vec::new(),
         };
+        let of_loop = LoopNoise::of(record);
+        let has_common = !forces.is_empty() || of_loop.is_some();
         let deviations: Vec<f64> = record.channels.iter().map(|channel| channel.deviation).collect();
         let mut read = vec![Complex64::ZERO; channels * forces.len()];
         let mut rows = vec![Complex64::ZERO; channels * channels];
         for bin in 0..bins {
             let omega = std::f64::consts::TAU * record.grid.rate_hz() * bin as f64 / length as f64;
-            read_of_noise(record, omega, &forces, &mut read);
-            factorize(&deviations, &read, &mut rows);
+            let loud = of_loop
+                .as_ref()
+                .and_then(|of_loop| Cholesky::new(of_loop.covariance(omega)));
+            if let Some(loud) = loud {
+                let l = loud.l();
+                (0..channels * channels).for_each(|at| rows[at] = l[(at / channels, at % channels)]);
+            } else {
+                read_of_noise(record, omega, &forces, &mut read);
+                factorize(&deviations, &read, &mut rows);
+            }
             for i in 0..channels {
                 whitening.weights.push(1.0 / rows[i * channels + i].re);
-                if !forces.is_empty() {
+                if has_common {
                     whitening
                         .common
                         .extend_from_slice(&rows[i * channels..i * channels + i]);

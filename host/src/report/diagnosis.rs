@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::PictureError;
-use super::lobes_change::section;
+use super::lobes_change::{called, picture, section};
 use super::page::page;
 use super::residual_pictures::{file_name, pictures};
 use crate::diagnose::answer::{Figure, NamedCause, Outcome};
@@ -33,6 +33,11 @@ pub fn diagnosis_page(
         @if let Some(lobes) = &diagnosis.lobes {
             h2 { "What it changes" }
             (section(lobes)?)
+        }
+        @if let Some(chart) = &diagnosis.believed {
+            h2 { "Lobes and cuts" }
+            p { (called(chart)) "." }
+            (picture("Lobes of the case", chart, &format!("By {}.", chart.method))?)
         }
         @if let Some(test) = &diagnosis.next_test {
             h2 { "The next test" }
@@ -73,7 +78,7 @@ fn verdict(case_name: &str, diagnosis: &Diagnosis) -> Markup {
                 (format!(" (confidence {sure:.2})."))
             },
             Outcome::Confounded => {
-                "is wrong; these explain it equally well: " span.chatter { (names.join(", ")) } "."
+                "is wrong; these explain it equally well: " span.chatter { (diagnosis.alternatives()) } "."
             },
             Outcome::Unexplained => {
                 "is wrong in a way that " span.chatter { "no known cause explains" } "."
@@ -81,12 +86,12 @@ fn verdict(case_name: &str, diagnosis: &Diagnosis) -> Markup {
         }
         @if let (Some(extended), Some(gain)) = (diagnosis.extended, diagnosis.gain) {
             (format!(
-                " On what was held out it misses {}; with the extension {}: {:.1} % of the residual's energy beyond the noise is gone (90 % interval {:.1} to {:.1} %).",
-                percent(diagnosis.baseline.nrmse_heldout), percent(extended.nrmse_heldout), 100.0 * gain.residual_energy_removed,
+                " On what was held out it misses {} (on the whole {}); with the extension {}: {:.1} % of the residual's energy beyond the noise is gone (90 % interval {:.1} to {:.1} %).",
+                percent(diagnosis.baseline.nrmse_heldout), percent(diagnosis.baseline.nrmse_whole), percent(extended.nrmse_heldout), 100.0 * gain.residual_energy_removed,
                 100.0 * gain.ci90[0], 100.0 * gain.ci90[1]
             ))
         } @else {
-            (format!(" On what was held out it misses {}.", percent(diagnosis.baseline.nrmse_heldout)))
+            (format!(" On what was held out it misses {}, on the whole {}.", percent(diagnosis.baseline.nrmse_heldout), percent(diagnosis.baseline.nrmse_whole)))
         }
     }
 }
@@ -121,7 +126,12 @@ fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
     views.sort_by(|a, b| loudness(b).total_cmp(&loudness(a)));
     let mut all = Vec::new();
     for view in views.into_iter().take(PICTURED) {
-        all.push(pictures(view, !view.left.is_empty())?);
+        let same_channel = diagnosis
+            .views
+            .iter()
+            .filter(|other| other.channel == view.channel);
+        let fellows: Vec<&View> = same_channel.collect();
+        all.push(pictures(view, &fellows, !view.left.is_empty())?);
     }
     Ok(html! { @for picture in all { (picture) } })
 }

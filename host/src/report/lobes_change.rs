@@ -6,7 +6,7 @@ use super::PictureError;
 use super::lobe_chart::{Column, lobe_chart};
 use super::marks::Mark;
 use super::page::figure;
-use crate::diagnose::lobes::{Change, Lobes};
+use crate::diagnose::lobes::{Change, Chart, Lobes};
 
 /// The change in sentences.
 pub fn sentences(lobes: &Lobes) -> Vec<String> {
@@ -23,7 +23,7 @@ pub fn sentences(lobes: &Lobes) -> Vec<String> {
     }
     if let Some(calls) = lobes.calls {
         all.push(format!(
-            "of {} cuts that were tried the case calls {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
+            "of {} cuts that are known the case calls {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
             calls.before.cuts,
             calls.before.wrong,
             calls.before.missed_chatter,
@@ -61,6 +61,17 @@ fn limits(lobes: &Lobes) -> Vec<String> {
             lobes
         ),
     )];
+    if let Some([low_mm, high_mm]) = lobes.at.limit_after_ci90_mm {
+        let end = |limit_mm: Option<f64>| match limit_mm {
+            Some(limit_mm) => format!("{limit_mm:.3} mm"),
+            None => format!("beyond {:.3} mm", lobes.searched_mm),
+        };
+        all[0].push_str(&format!(
+            "; 90 % interval by that of the parameters {} to {}",
+            end(low_mm),
+            end(high_mm)
+        ));
+    }
     if let (Some(first), Some(last)) = (lobes.speeds.first(), lobes.speeds.last()) {
         let percent: Vec<f64> = lobes
             .speeds
@@ -93,45 +104,71 @@ fn limit(
     }
 }
 
-/// Both charts, with the cuts that were tried; those that a chart calls wrong are ringed.
+/// How a chart calls the cuts, in a sentence without its end.
+pub fn called(chart: &Chart) -> String {
+    let calls = chart.calls();
+    format!(
+        "of {} cuts that are known the case calls {} wrong ({} missed chatter, {} false alarms), and of {} it cannot be told",
+        calls.cuts, calls.wrong, calls.missed_chatter, calls.false_alarms, calls.undecided
+    )
+}
+
+/// Both charts, with the cuts that are known; those that a chart calls wrong are ringed.
 ///
 /// # Errors
 /// A picture that cannot be drawn.
 pub(super) fn section(lobes: &Lobes) -> Result<Markup, PictureError> {
-    let mut charts = Vec::new();
-    for (which, title) in ["Lobes of the case", "Lobes of the extended case"]
-        .into_iter()
-        .enumerate()
-    {
-        let columns: Vec<Column> = lobes.lines[which].iter().map(Column::from).collect();
-        let marks: Vec<Mark> = lobes
-            .cuts
-            .iter()
-            .map(|(cut, calls)| Mark {
-                wrong: calls[which].is_wrong(),
-                ..Mark::from(cut)
-            })
-            .collect();
-        charts.push(lobe_chart(title, &columns, lobes.searched_mm, &marks)?);
-    }
-    let mut by = format!("By {}.", lobes.method_after);
-    if !lobes.cuts.is_empty() {
-        by.push_str(
-            " Circles: cuts that were stable; crosses: that chattered; squares: of which it cannot be told; an orange ring: the chart calls it wrong.",
-        );
+    let [before, after] = &lobes.charts;
+    let mut columns: Vec<Column> = after.lines.iter().map(Column::from).collect();
+    for (column, change) in columns.iter_mut().zip(&lobes.speeds) {
+        let interval = change.limit_after_ci90_mm;
+        column.percentiles_mm = interval.map(|[low, high]| [low, change.limit_after_mm, high]);
     }
     Ok(html! {
         ul { @for sentence in sentences(lobes) { li { (sentence) "." } } }
-        (figure(&charts[0], "What was believed."))
-        (figure(&charts[1], &by))
+        (picture("Lobes of the case", before, "What was believed.")?)
+        (figure(
+            &drawn("Lobes of the extended case", after, &columns)?,
+            &format!("By {}. Grey: 90 % interval of the limits. {}", after.method, words_of_cuts(after))
+        ))
         details {
             summary { "Limits, speed by speed" }
             table {
-                tr { th { "rev/min" } th { "limit before [mm]" } th { "chatter [Hz]" } th { "limit after [mm]" } th { "chatter [Hz]" } }
+                tr { th { "rev/min" } th { "limit before [mm]" } th { "chatter [Hz]" } th { "limit after [mm]" } th { "90 % interval [mm]" } th { "chatter [Hz]" } }
                 @for change in &lobes.speeds { (row(change)) }
             }
         }
     })
+}
+
+/// One chart with the cuts that are known; those that it calls wrong are ringed.
+///
+/// # Errors
+/// A picture that cannot be drawn.
+pub(super) fn picture(title: &str, chart: &Chart, said: &str) -> Result<Markup, PictureError> {
+    let columns: Vec<Column> = chart.lines.iter().map(Column::from).collect();
+    let caption = format!("{said} {}", words_of_cuts(chart));
+    Ok(figure(&drawn(title, chart, &columns)?, &caption))
+}
+
+fn drawn(title: &str, chart: &Chart, columns: &[Column]) -> Result<String, PictureError> {
+    let marks: Vec<Mark> = chart
+        .cuts
+        .iter()
+        .map(|(cut, call)| Mark {
+            wrong: call.is_wrong(),
+            ..Mark::from(cut)
+        })
+        .collect();
+    lobe_chart(title, columns, chart.searched_mm, &marks)
+}
+
+fn words_of_cuts(chart: &Chart) -> &'static str {
+    if chart.cuts.is_empty() {
+        ""
+    } else {
+        "Circles: cuts that were stable; crosses: that chattered; squares: of which it cannot be told; an orange ring: the chart calls it wrong. What came of a recorded cut is what the signal chain of the device hears in it."
+    }
 }
 
 fn row(change: &Change) -> Markup {
@@ -144,6 +181,7 @@ fn row(change: &Change) -> Markup {
             td { (number(change.limit_before_mm, 3)) }
             td { (number(change.chatter_before_hz, 2)) }
             td { (number(change.limit_after_mm, 3)) }
+            td { @if let Some([low, high]) = change.limit_after_ci90_mm { (number(low, 3)) " to " (number(high, 3)) } @else { "–" } }
             td { (number(change.chatter_after_hz, 2)) }
         }
     }

@@ -21,11 +21,11 @@ const ORDERS_PER_TOOTH: f64 = 4.5;
 /// Tooth passes that are shown.
 const PASSES: usize = 400;
 
-/// All pictures of one channel of one record.
+/// All pictures of one channel of one record; `fellows` are the views of all records of that channel.
 ///
 /// # Errors
 /// A picture that cannot be drawn.
-pub(super) fn pictures(view: &View, with_extension: bool) -> Result<Markup, PictureError> {
+pub(super) fn pictures(view: &View, fellows: &[&View], with_extension: bool) -> Result<Markup, PictureError> {
     let what = format!("{} of {}", view.channel, file_name(&view.record));
     let time = if with_extension {
         "over time: what was measured, what the case misses, and what the extended case misses."
@@ -52,10 +52,11 @@ pub(super) fn pictures(view: &View, with_extension: bool) -> Result<Markup, Pict
         }
     }
     if let Some(missing) = &view.missing {
-        if let Some(picture) = over_amplitude(missing)? {
+        let all: Vec<&MissingForce> = fellows.iter().filter_map(|view| view.missing.as_ref()).collect();
+        if let Some(picture) = over_amplitude(&all)? {
             halves.push(figure(
                 &picture,
-                "Does the receptance move with force? The stiffness and damping that are missing, as shares of the static stiffness, stretch by stretch over its amplitude. Level: a linear parameter; sloped: a term that is not linear.",
+                "Does the receptance move with force? The stiffness and damping that are missing, as shares of the static stiffness, stretch by stretch over its amplitude, of this channel in all records. Level: a linear parameter; sloped: a term that is not linear.",
             ));
         }
         if let Some(picture) = over_displacement(missing)? {
@@ -154,34 +155,35 @@ fn strobed(samples: &[(u32, f64)], what: &str, view: &View) -> Result<String, Pi
     samples_per_tooth("", &quantity, shown, None)
 }
 
-/// `None` where the amplitude does not change enough to tell.
-fn over_amplitude(missing: &MissingForce) -> Result<Option<String>, PictureError> {
-    let all = missing.at_amplitudes();
-    let extent =
-        |pick: fn(f64, f64) -> f64, start: f64| all.iter().map(|at| at.amplitude_m).fold(start, pick);
-    if all.len() < 3
-        || missing.stiffness <= 0.0
-        || extent(f64::max, 0.0) < 1.2 * extent(f64::min, f64::INFINITY)
-    {
+/// `None` where the amplitude does not change enough to tell, within a record and from one to the other.
+fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureError> {
+    let rms = |a: &[f64]| (a.iter().map(|x| x * x).sum::<f64>() / a.len().max(1) as f64).sqrt();
+    // Amplitude in µm, and stiffness and damping as shares of the static stiffness; damping times the frequency at which velocity and
+    // displacement have their sizes.
+    let mut all: Vec<[f64; 3]> = Vec::new();
+    for missing in records.iter().filter(|missing| missing.stiffness > 0.0) {
+        let omega = rms(&missing.v) / rms(&missing.x).max(f64::MIN_POSITIVE);
+        all.extend(missing.at_amplitudes().iter().map(|at| {
+            [
+                1e6 * at.amplitude_m,
+                at.stiffness / missing.stiffness,
+                omega * at.damping / missing.stiffness,
+            ]
+        }));
+    }
+    let extent = |pick: fn(f64, f64) -> f64, start: f64| all.iter().map(|at| at[0]).fold(start, pick);
+    if all.len() < 3 || extent(f64::max, 0.0) < 1.2 * extent(f64::min, f64::INFINITY) {
         return Ok(None);
     }
-    // Damping times the frequency at which velocity and displacement have their sizes.
-    let rms = |a: &[f64]| (a.iter().map(|x| x * x).sum::<f64>() / a.len().max(1) as f64).sqrt();
-    let omega = rms(&missing.v) / rms(&missing.x).max(f64::MIN_POSITIVE);
     let every = all.len().div_ceil(POINTS / 2).max(1);
-    let cloud = |name: &str, look, of: &dyn Fn(usize) -> f64| Line {
+    let cloud = |name: &str, look, of: usize| Line {
         name: name.into(),
-        points: (0..all.len())
-            .step_by(every)
-            .map(|n| (1e6 * all[n].amplitude_m, of(n) / missing.stiffness))
-            .collect(),
+        points: all.iter().step_by(every).map(|at| (at[0], at[of])).collect(),
         look,
     };
     let lines = [
-        cloud("missing stiffness", Look::Cloud, &|n| all[n].stiffness),
-        cloud("missing damping · ω", Look::OtherCloud, &|n| {
-            omega * all[n].damping
-        }),
+        cloud("missing stiffness", Look::Cloud, 1),
+        cloud("missing damping · ω", Look::OtherCloud, 2),
     ];
     let labels = ["", "amplitude [µm]", "share of the static stiffness"];
     comparison(HALF, labels, &lines, None).map(Some)

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use self::bench::Bench;
 use self::experiment::{Experiment, Sensors, experiments};
 use self::separation::{Difference, Rival};
-use super::answer::{Diagnosis, NamedCause, NextTest};
+use super::answer::{Diagnosis, NextTest, label};
 use crate::case::Case;
 use crate::recording::Recording;
 
@@ -121,19 +121,4 @@ impl Proposal<'_> {
             )
         }
     }
-}
-
-/// Names of an explanation, with the channel where it is about one.
-fn label(causes: &[NamedCause]) -> String {
-    let mut names: Vec<String> = Vec::new();
-    for cause in causes {
-        let name = match &cause.channel {
-            Some(channel) => format!("{} of {channel}", cause.name),
-            None => cause.name.to_owned(),
-        };
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
-    names.join(" with ")
 }
