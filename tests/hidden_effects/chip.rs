@@ -1,5 +1,6 @@
 //! Chips: which teeth cut when, how thick a chip, how hard it pushes.
 
+use std::cell::Cell;
 use std::f64::consts::TAU;
 
 use super::motion::{State, System, interpolated};
@@ -28,6 +29,8 @@ pub(crate) struct Run {
     pub(crate) feed_mm: f64,
     /// Spindle angle at the start of the record, rad.
     pub(crate) angle: f64,
+    /// Passes that teeth in chatter may jump over; 0 of stable cuts.
+    pub(crate) jumped: usize,
 }
 
 /// The chips of one run.
@@ -37,6 +40,8 @@ pub(crate) struct Chips<'a> {
     pub(crate) process: Process,
     pub(crate) before_s: f64,
     pub(crate) step_s: f64,
+    /// The furthest that the tool has been from where it stands at rest, m.
+    pub(crate) furthest_m: Cell<f64>,
 }
 
 impl Chips<'_> {
@@ -167,6 +172,7 @@ impl Chips<'_> {
         } else {
             self.job.teeth + 1
         };
+        let passes = passes.max(self.run.jumped);
         for pass in 1..=passes {
             let angle = self.angle(t) - TAU * pass as f64 / self.job.teeth as f64;
             let then = self.time_at(angle, t - pass as f64 * period);
@@ -177,6 +183,14 @@ impl Chips<'_> {
             };
             // The feed axis moves on steadily, however the spindle turns.
             let fed = 1e-3 * self.run.feed_mm * (t - then) / period;
+            if pass > 2 && self.run.jumped > 0 {
+                // What was left further back cannot stand out any more.
+                let most = 2.0 * self.furthest_m.get()
+                    + self.process.radial_m[(tooth + pass) % self.job.teeth].abs();
+                if reach(x, tooth) - most + fed * sin * sin_edge > chip {
+                    break;
+                }
+            }
             let left = reach(was, (tooth + pass) % self.job.teeth) - fed * sin * sin_edge;
             chip = chip.min(reach(x, tooth) - left);
             // What lies before the start is the tool at rest, once.

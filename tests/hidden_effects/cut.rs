@@ -1,6 +1,7 @@
 //! Stable cuts with everything that a chip can have: teeth that enter and leave at their angles, the surface that all earlier
 //! passes left, teeth that lose it.
 
+use std::cell::Cell;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::sync::OnceLock;
@@ -108,6 +109,7 @@ impl CutBench {
                 depth_mm: depth_mm * [1.0, 0.9, 0.6][index],
                 feed_mm: feed_mm * [1.0, 0.6, 1.3][index],
                 angle: random.random_range(0.0..TAU),
+                jumped: 0,
             })
             .collect();
         let fastest = runs.iter().fold(0.0_f64, |most, run| most.max(run.rpm)) / 60.0 * teeth as f64;
@@ -152,6 +154,30 @@ impl CutBench {
             scale,
             plain: OnceLock::new(),
         }
+    }
+
+    /// The same with its first run alone, so deep that it chatters; `None` where no depth makes it.
+    ///
+    /// Chatter is a motion that is mostly new in each turn; it may not be larger than the tool could stand.
+    pub(crate) fn chattering(mut self) -> Option<Self> {
+        self.runs.truncate(1);
+        self.runs[0].jumped = JUMPED;
+        for _ in 0..16 {
+            self.runs[0].depth_mm *= 1.3;
+            let motion = self.motion(&self.runs[0], &[]);
+            if motion.largest_m() > MOST_FEEDS * 1e-3 * self.runs[0].feed_mm {
+                return None;
+            }
+            if motion.share_new_each_turn() > 0.7 {
+                self.scale.cut = Some(CutScale {
+                    job: self.job.clone(),
+                    depth_mm: self.runs[0].depth_mm,
+                    rpm: self.runs[0].rpm,
+                });
+                return Some(self);
+            }
+        }
+        None
     }
 
     /// The same with its first run alone, from the moment the tool, at rest, is put into the full cut.
@@ -234,6 +260,7 @@ impl CutBench {
             process: Process::under(causes, &self.job, &self.machine, &self.scale),
             before_s: self.before as f64 / self.rate_hz,
             step_s,
+            furthest_m: Cell::new(0.0),
         };
         let count = (self.before + self.samples) * self.steps;
         let mut found = Motion::default();
@@ -251,7 +278,10 @@ impl CutBench {
                 found.a.push(path.a[0]);
                 found.angle.push(chips.angle(t));
             }
-            u.push(system.displacement(&y));
+            let x = system.displacement(&y);
+            let away = x.iter().fold(0.0, |sum, x| sum + x * x).sqrt();
+            chips.furthest_m.set(chips.furthest_m.get().max(away));
+            u.push(x);
             let mut from = t;
             for switch in chips.switches(t, to) {
                 chips.advance(&system, [from, switch], &mut y, &u);
@@ -438,6 +468,30 @@ struct Motion {
 }
 
 impl Motion {
+    fn largest_m(&self) -> f64 {
+        self.u.iter().flatten().fold(0.0, |most, u| most.max(u.abs()))
+    }
+
+    /// The least of all axes that move: variance about the mean over turns at the same angle, over that about the mean.
+    fn share_new_each_turn(&self) -> f64 {
+        const PARTS: usize = 48;
+        let share = |axis: usize| {
+            let mut parts = vec![Vec::new(); PARTS];
+            for (u, angle) in self.u.iter().zip(&self.angle) {
+                let part = angle.rem_euclid(TAU) / TAU * PARTS as f64;
+                parts[(part as usize).min(PARTS - 1)].push(u[axis]);
+            }
+            let scatter = |values: &[f64]| {
+                let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+                values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
+            };
+            let all: Vec<f64> = self.u.iter().map(|u| u[axis]).collect();
+            let whole = scatter(&all);
+            (whole > 0.0).then(|| parts.iter().map(|part| scatter(part)).sum::<f64>() / whole)
+        };
+        (0..3).filter_map(share).fold(1.0, f64::min)
+    }
+
     /// The acceleration `delay_s` before each sample: its steps stay steps, between them it is smooth.
     fn late(&self, delay_s: f64, rate_hz: f64) -> Vec<[f64; 3]> {
         let jumped = |t: f64| {
@@ -544,6 +598,12 @@ impl Lab for CutBench {
         columns
     }
 }
+
+/// Passes that a tooth in chatter may jump over.
+const JUMPED: usize = 64;
+
+/// Feeds per tooth that a tool in chatter moves at most.
+const MOST_FEEDS: f64 = 20.0;
 
 /// The place of an effect that all channels of motion have.
 pub(crate) const EVERY_SENSOR: usize = usize::MAX;

@@ -26,10 +26,13 @@ pub(crate) enum Family {
     Nothing,
     NotInLibrary,
     TwoEffects,
+    /// Cuts in chatter. What their records could tell at best is not known: every trajectory of a motion that grows tells more of the
+    /// machine than can be had from it, so that there is no judge, and no rate is asked for but of what is said with confidence.
+    Chatter,
 }
 
 impl Family {
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Shaker,
         Self::Sweep,
         Self::FreeDecay,
@@ -38,6 +41,7 @@ impl Family {
         Self::Nothing,
         Self::NotInLibrary,
         Self::TwoEffects,
+        Self::Chatter,
     ];
 
     /// Its name, by which it is asked for.
@@ -51,6 +55,7 @@ impl Family {
             Self::Nothing => "nothing-hidden",
             Self::NotInLibrary => "not-in-library",
             Self::TwoEffects => "two-effects",
+            Self::Chatter => "chatter",
         }
     }
 }
@@ -82,6 +87,9 @@ pub(crate) struct Puzzle {
 /// Noise, as a share of the signal: from that of a good sensor to that of a bad one.
 const NOISE: [f64; 2] = [3e-4, 0.05];
 
+/// The most in chatter.
+const NOISE_IN_CHATTER: f64 = 0.01;
+
 impl Puzzle {
     /// The puzzle of a seed: the first draw that is not between the verdicts.
     pub(crate) fn draw(family: Family, seed: u64) -> Self {
@@ -111,10 +119,14 @@ impl Puzzle {
         let cutting = match family {
             Family::CuttingWithForce => Some(true),
             Family::CuttingWithoutForce => Some(false),
+            Family::Chatter => Some(random.random()),
             Family::Nothing | Family::TwoEffects if random.random::<f64>() < 0.4 => Some(random.random()),
             _ => None,
         };
         let bench = match cutting {
+            Some(forces) if family == Family::Chatter => {
+                Bench::Cut(CutBench::draw(random, forces).chattering()?)
+            }
             Some(forces) => Bench::Cut(CutBench::draw(random, forces)),
             None => {
                 let test = match family {
@@ -136,6 +148,7 @@ impl Puzzle {
         let judge = Judge::new(lab, &sigma);
         let verdict = match &hidden[..] {
             [] => Verdict::Invisible,
+            _ if family == Family::Chatter => Verdict::Separable,
             [one] if STRANGE.contains(&one.kind) => {
                 // As plain as half the noise, in the mean over all samples.
                 let samples = judge.of(&[]).len();
@@ -253,6 +266,7 @@ fn hide(family: Family, bench: &dyn Lab, random: &mut ChaCha8Rng) -> Option<Vec<
         Family::Nothing => return Some(Vec::new()),
         Family::NotInLibrary => (STRANGE.to_vec(), 1),
         Family::TwoEffects => (bench.kinds(), 2),
+        Family::Chatter if random.random::<f64>() < 0.2 => return Some(Vec::new()),
         _ => (bench.kinds(), 1),
     };
     let mut hidden: Vec<Cause> = Vec::new();
@@ -281,7 +295,9 @@ fn noise(family: Family, bench: &Bench, hidden: &[Cause], random: &mut ChaCha8Rn
     let size: Vec<f64> = (0..sensors)
         .map(|sensor| rms(plain.iter().map(|run| &run[sensor][..])))
         .collect();
-    let share = if hidden.is_empty() {
+    let share = if family == Family::Chatter {
+        between(random, NOISE[0], NOISE_IN_CHATTER)
+    } else if hidden.is_empty() {
         between(random, NOISE[0], NOISE[1])
     } else {
         let changed = bench.lab().output(hidden);

@@ -18,9 +18,10 @@ use crate::simulate::{Cutter, Effects, Spindle};
 /// which side they are.
 const BESIDE: f64 = 0.375;
 
-/// Periods of the slowest vibration for which grown chatter may throw a tooth off, and passes that it may miss at most.
-const THROWN_OFF: f64 = 4.0;
-const MOST_JUMPED: usize = 32;
+/// Share of the feed in a chip, sin φ, from which on a surface that was left long ago is looked at.
+const SHALLOW: f64 = 0.1;
+/// Passes that a tooth may jump over, at most.
+const MOST_JUMPED: usize = 24;
 
 /// A recorded cut.
 #[derive(Clone, Debug)]
@@ -135,11 +136,11 @@ impl RecordedCut {
         self.rate_hz
     }
 
-    /// Lets teeth jump over passes, as long as grown chatter of a structure with this lowest frequency throws them off.
-    pub fn let_jump(&mut self, lowest_hz: f64) {
-        let pass_s = self.turning.turn_s() / self.cutter.teeth.len() as f64;
-        let jumped = THROWN_OFF / (lowest_hz * pass_s).max(f64::MIN_POSITIVE);
-        self.passes = Some((jumped.ceil() as usize).clamp(2, MOST_JUMPED) + 2);
+    /// Lets teeth jump over passes as a tool that swings by `swing_m` does: where the feed adds a share `SHALLOW` of itself to a chip,
+    /// near the ends of a slot, what it cut ahead is caught up with after swing / (share · feed) passes.
+    pub fn let_jump(&mut self, swing_m: f64) {
+        let jumped = swing_m / (SHALLOW * self.cutter.feed_per_tooth_m).max(f64::MIN_POSITIVE);
+        self.passes = Some((jumped.ceil() as usize).min(MOST_JUMPED) + 2);
     }
 
     /// Samples of the first turn, or of as many as a surface may come from: what they cut was left before the record.

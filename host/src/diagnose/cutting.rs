@@ -171,10 +171,9 @@ impl Record {
         self.compare_without_ends(&cutting.cut);
         self.prepare_decays(baseline);
         let slopes = cutting.mean_slopes();
-        self.amplifies = amplifies.unwrap_or_else(|| amplification::amplifies(self, &cutting.cut, &slopes));
-        if self.amplifies {
-            cutting.cut.let_jump(self.lowest_hz);
-            self.compare_without_ends(&cutting.cut);
+        let loop_gain = amplification::loop_gain(self, &slopes);
+        if amplifies.unwrap_or_else(|| amplification::amplifies(self, &cutting.cut, &loop_gain)) {
+            self.amplified = Some(loop_gain);
         }
         let rounds = if self.clean.is_some() {
             ROUNDS_OF_A_MODEL
@@ -182,6 +181,10 @@ impl Record {
             ROUNDS
         };
         for round in 0..rounds {
+            if round == 1 && self.amplifies() {
+                cutting.cut.let_jump(self.motion.swing_m());
+                self.compare_without_ends(&cutting.cut);
+            }
             if round > 0 {
                 cutting.follow(&self.motion);
             }
@@ -213,7 +216,7 @@ impl Record {
             }
             let off = self.off_the_closed_loop();
             // The first force along the motion of a model is that of the measured one still.
-            let is_along = (round > 0 || self.clean.is_none()) && !self.amplifies;
+            let is_along = (round > 0 || self.clean.is_none()) && !self.amplifies();
             motion::learn(self, baseline, &force, is_along.then_some(&slopes));
             if self.clean.is_some() && is_along && off < SETTLED {
                 break;

@@ -15,6 +15,8 @@ mod around;
 mod beginning;
 pub mod cause;
 mod causes;
+#[cfg(test)]
+mod chatter_tests;
 mod checks;
 pub mod chips;
 mod closed_fit;

@@ -28,6 +28,17 @@ impl Motion {
         self.len() == 0
     }
 
+    /// How far it swings from end to end, along the axis along which that is most, m.
+    pub fn swing_m(&self) -> f64 {
+        let swing = |x: &Vec<f64>| {
+            let ends = x
+                .iter()
+                .fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(*x), high.max(*x)));
+            ends.1 - ends.0
+        };
+        self.x.iter().map(swing).fold(0.0, f64::max)
+    }
+
     /// The tool at a sample.
     pub fn at(&self, sample: usize) -> At {
         let of = |signal: &[Vec<f64>; 3]| {
