@@ -7,7 +7,7 @@
 //! of a channel with noise e: H is what the channel hears of a force, L what the force owes to a small motion (`mean_slopes`). Where
 //! |H L| < 1 at all frequencies, the motion that the case has in closed loop follows from the measured one without its noise. Beyond
 //! that it does not: (I − H L)⁻¹ is as large as a free motion of the cut lives long, which was there before the record began, and in
-//! chatter it grows. There the motion stays the measured one wherever |H L| is not small, and r is compared with the noise that it has:
+//! chatter it grows. There the motion stays the measured one, and r is compared with the noise that it has:
 //!
 //! S(ω) = (I − A) D (I − A)ᴴ + P Q Pᴴ
 //!
@@ -25,26 +25,18 @@ use crate::recording::Quantity;
 
 /// Loop gain from which on the loop is not closed: with less the slopes that come and go close it all the same.
 const LOOP_GAIN: f64 = 0.9;
-/// Loop gain up to which the model is followed at a frequency where it tells more than the sensors: what it makes of its own errors
-/// is less than they are.
-pub(super) const FOLLOWED: f64 = 0.5;
 /// Share of a motion that does not come again turn after turn, from which on it is chatter.
 const NEW_EACH_TURN: f64 = 0.5;
 /// Parts of a turn over which that is looked at.
 const PARTS: usize = 64;
 
-/// |H L| at the bins of the samples.
-pub(super) fn loop_gain(record: &Record, slopes: &MeanSlopes) -> Vec<f64> {
+/// True of a cut whose loop gain |H L| comes near one at some frequency, or whose motion, in every channel, is mostly new in each turn.
+pub(super) fn amplifies(record: &Record, cut: &RecordedCut, slopes: &MeanSlopes) -> bool {
     let gain = |bin: usize| {
         let open = record.transfer[bin] * slopes.at(record.grid.omega(bin));
         open.singular_values().max()
     };
-    (0..record.grid.bins()).map(gain).collect()
-}
-
-/// True of a cut whose loop gain comes near one at some frequency, or whose motion, in every channel, is mostly new in each turn.
-pub(super) fn amplifies(record: &Record, cut: &RecordedCut, loop_gain: &[f64]) -> bool {
-    loop_gain.iter().any(|gain| *gain > LOOP_GAIN) || is_new_each_turn(record, cut)
+    (1..record.grid.bins()).any(|bin| gain(bin) > LOOP_GAIN) || is_new_each_turn(record, cut)
 }
 
 fn is_new_each_turn(record: &Record, cut: &RecordedCut) -> bool {
@@ -89,7 +81,7 @@ pub(super) struct LoopNoise<'a> {
 impl<'a> LoopNoise<'a> {
     /// `None` of a record that does not amplify.
     pub(super) fn of(record: &'a Record) -> Option<Self> {
-        let slopes = record.cut.as_ref().filter(|_| record.amplifies())?.mean_slopes();
+        let slopes = record.cut.as_ref().filter(|_| record.amplifies)?.mean_slopes();
         let mut noise = Self {
             record,
             slopes,

@@ -171,17 +171,14 @@ impl Record {
         self.compare_without_ends(&cutting.cut);
         self.prepare_decays(baseline);
         let slopes = cutting.mean_slopes();
-        let loop_gain = amplification::loop_gain(self, &slopes);
-        if amplifies.unwrap_or_else(|| amplification::amplifies(self, &cutting.cut, &loop_gain)) {
-            self.amplified = Some(loop_gain);
-        }
+        self.amplifies = amplifies.unwrap_or_else(|| amplification::amplifies(self, &cutting.cut, &slopes));
         let rounds = if self.clean.is_some() {
             ROUNDS_OF_A_MODEL
         } else {
             ROUNDS
         };
         for round in 0..rounds {
-            if round == 1 && self.amplifies() {
+            if round == 1 && self.amplifies {
                 cutting.cut.let_jump(self.motion.swing_m());
                 self.compare_without_ends(&cutting.cut);
             }
@@ -216,7 +213,7 @@ impl Record {
             }
             let off = self.off_the_closed_loop();
             // The first force along the motion of a model is that of the measured one still.
-            let is_along = (round > 0 || self.clean.is_none()) && !self.amplifies();
+            let is_along = (round > 0 || self.clean.is_none()) && !self.amplifies;
             motion::learn(self, baseline, &force, is_along.then_some(&slopes));
             if self.clean.is_some() && is_along && off < SETTLED {
                 break;

@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 use num_complex::Complex64;
 
 use super::DiagnoseError;
-use super::amplification::FOLLOWED;
 use super::mean_slopes::MeanSlopes;
 use super::noise::{rms, white_floor};
 use super::record::{Observed, Record};
@@ -192,16 +191,9 @@ fn correction(record: &Record, axis: usize) -> Correction {
         })
         .collect();
     let mut weights = match record.clean {
-        Some(_) => vec![1.0; bins],
-        None => heard(&power),
+        None if !record.amplifies => heard(&power),
+        _ => vec![1.0; bins],
     };
-    // There what is left is no error of the motion alone, and the model no witness.
-    let loud = record.amplified.iter().flatten();
-    for (weight, gain) in weights.iter_mut().zip(loud) {
-        if *gain > FOLLOWED {
-            *weight = 1.0;
-        }
-    }
     let mut speed_noise = 0.0;
     for bin in 0..bins {
         if weights[bin] > 0.0 && precision[bin] > 0.0 {

@@ -105,8 +105,8 @@ pub struct Record {
     closed: Option<Vec<Vec<f64>>>,
     /// What the motion is learned from, where that is known better than from what was measured.
     pub clean: Option<Clean>,
-    /// Of a cut in which force and motion amplify one another (see `amplification`): the gain of their loop at the bins of the samples.
-    pub(super) amplified: Option<Vec<f64>>,
+    /// True of a cut in which force and motion amplify one another, so that the motion is taken as it was measured (see `amplification`).
+    pub(super) amplifies: bool,
     /// By axis, of a cut: the share of the measured motion in the one that chips are computed along, at the bins of the samples.
     pub(super) measured_share: [Vec<f64>; 3],
 }
@@ -209,7 +209,7 @@ impl Record {
             decays: Decays::default(),
             cut: None,
             clean: known.clean,
-            amplified: None,
+            amplifies: false,
             measured_share: std::array::from_fn(|_| Vec::new()),
         };
         match domain {
@@ -237,11 +237,6 @@ impl Record {
             Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,
         }
         Ok(record)
-    }
-
-    /// True of a cut in which force and motion amplify one another, so that the motion is taken as it was measured.
-    pub(super) fn amplifies(&self) -> bool {
-        self.amplified.is_some()
     }
 
     /// Σ y² of what a channel reads of the response to the noise of the force sensors, over the samples of the record.

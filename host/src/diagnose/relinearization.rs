@@ -53,7 +53,7 @@ impl<'a> Relinearization<'a> {
         case.extensions.extend(joined(tables));
         // As the case alone has it: an explanation is not compared with another along another motion.
         let known = |index: usize| {
-            let amplifies = self.scene.records[index].amplifies();
+            let amplifies = self.scene.records[index].amplifies;
             let predicted = predicted.filter(|_| !amplifies);
             Known {
                 clean: predicted.map(|predicted| predicted[index].clone()),
