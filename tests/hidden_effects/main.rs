@@ -130,6 +130,8 @@ fn a_part_of_the_campaign() {
         (Family::TwoEffects, 4119..4120),
         // Beside hysteresis the search ends at a cubic spring only from where one that softens and hardens ends.
         (Family::TwoEffects, 7009..7010),
+        // One with nothing hidden, one with a late sensor.
+        (Family::Chatter, 54..56),
     ];
     for (family, seeds) in part {
         let report = Report::run(family, seeds, &ask);

@@ -7,7 +7,7 @@
 //!
 //! That finds the few explanations that are worth more: the extended case itself is then fitted, without the noise of the measured
 //! motion in it. Tests of structures are simulated (`output_error`), cuts are read again with the extended case
-//! (`relinearization`).
+//! (`relinearization`), near a lobe and in chatter along the measured motion still (`amplification`).
 
 mod amplification;
 pub mod answer;
