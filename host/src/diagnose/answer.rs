@@ -301,3 +301,24 @@ impl Diagnosis {
         names
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gain_is_said_where_there_is_one_to_be_measured() {
+        // Of 1 000 numbers: twice their noise before, and noise after.
+        let gain = Gain::new(2000.0, 1000.0, 1000.0);
+        assert_eq!(gain.residual_energy_removed, 1.0);
+        // √(2 000)/1 000 after, and as much of what was there before: 1.645·0.0447.
+        assert!(
+            (gain.ci90[0] - 0.926).abs() < 1e-3 && gain.ci90[1] == 1.0,
+            "{gain:?}"
+        );
+        // Nothing but noise before: whatever is removed, it is not known.
+        let gain = Gain::new(990.0, 980.0, 1000.0);
+        assert_eq!(gain.ci90, [-1.0, 1.0]);
+        assert_eq!(Gain::new(1001.0, 1500.0, 1000.0).residual_energy_removed, -1.0);
+    }
+}

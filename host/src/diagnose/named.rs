@@ -226,10 +226,11 @@ fn moved(
         0.0 => 0.0,
         scale => covariance[(i, j)] / scale,
     };
-    let correlation = SymmetricEigen::new(DMatrix::from_fn(scales.len(), scales.len(), of));
-    let Some(center) = parts_of(inner) else {
+    let correlation = DMatrix::from_fn(scales.len(), scales.len(), of);
+    let Some(center) = parts_of(inner).filter(|_| correlation.iter().all(|value| value.is_finite())) else {
         return Vec::new();
     };
+    let correlation = SymmetricEigen::new(correlation);
     correlation
         .eigenvalues
         .iter()

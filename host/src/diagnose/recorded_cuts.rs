@@ -42,8 +42,8 @@ fn is_on_chart(case: &Case, said: &RecordedCut) -> bool {
         )
 }
 
-/// Chatter where it is heard at any time, else the last verdict; marginal where none is given, or the recording has nothing that the
-/// device could hear.
+/// Chatter where it is heard at any time, stable where that is heard and no chatter; marginal where nothing can be told, or the recording
+/// has nothing that the device could hear.
 fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
     let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
     let speed = Speed {
@@ -59,14 +59,59 @@ fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
         return Outcome::Marginal;
     };
     let mut state = State::default();
-    let mut last = Outcome::Marginal;
+    let mut heard = Outcome::Marginal;
     for (block, edges) in sensed.steps() {
         let report = monitor.step(&mut state, block, edges, None, None);
-        last = match report.judgement.verdict {
+        match report.judgement.verdict {
             verdict if verdict.is_chatter() => return Outcome::Chatter,
-            Verdict::Stable | Verdict::Forced | Verdict::Runout => Outcome::Stable,
-            _ => Outcome::Marginal,
-        };
+            Verdict::Stable | Verdict::Forced | Verdict::Runout => heard = Outcome::Stable,
+            // Before the tool enters, and after it has left.
+            _ => {}
+        }
     }
-    last
+    heard
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::simulate::{Accelerometer, Entry, Recorder, TachometerModel, VirtualCut};
+    use crate::stability::{CubicTerms, Problem, line};
+
+    #[test]
+    fn what_came_of_a_recorded_cut_is_what_the_device_hears() {
+        let case = crate::case::tests::case("kuka-kr90-acetal");
+        let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
+        let limit_mm = line(&problem, 900.0, 8.0, 80)
+            .unwrap()
+            .first_limit
+            .unwrap()
+            .depth_mm;
+        let record = |depth_mm| {
+            let cut = VirtualCut {
+                entry: Entry::Ramp { seconds: 0.2 },
+                ..VirtualCut::new(900.0, depth_mm, 4.0)
+            };
+            let recorder = Recorder::Sensor {
+                accelerometer: Accelerometer::IIS3DWB_16G,
+                seed: 7,
+            };
+            let path = Path::new("cut.csv");
+            cut.record(&case, recorder, TachometerModel::ONE_MARK, path)
+                .unwrap()
+                .0
+        };
+        let shallow = record(0.5 * limit_mm);
+        let mut silent = shallow.clone();
+        silent.channels.retain(|channel| !channel.name.starts_with('a'));
+        let mut elsewhere = shallow.clone();
+        elsewhere.sidecar.cut.as_mut().unwrap().exit_deg = Some(150.0);
+        let cuts = recorded_cuts(&case, &[shallow, record(1.8 * limit_mm), silent, elsewhere]);
+        let outcomes: Vec<Outcome> = cuts.iter().map(|cut| cut.outcome).collect();
+        // That of another immersion is on another chart.
+        assert_eq!(outcomes, [Outcome::Stable, Outcome::Chatter, Outcome::Marginal]);
+        assert_eq!((cuts[1].rpm, cuts[1].depth_mm), (900.0, 1.8 * limit_mm));
+    }
 }

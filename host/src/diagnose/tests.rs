@@ -254,6 +254,15 @@ fn a_gain_is_the_same_as_mass_stiffness_and_damping_by_one_factor() {
     let mut group = answer.equivalent[0].clone();
     group.sort_unstable();
     assert_eq!(group, ["damping", "mass", "sensor-gain", "stiffness"]);
+    // Which of them act together.
+    let said = answer.alternatives();
+    assert_eq!(
+        said,
+        "sensor-gain of x; or mass along x with stiffness along x with damping along x"
+    );
+    let json = serde_json::to_value(&answer).unwrap();
+    assert_eq!(json["explanations"][1][0]["name"], "mass");
+    assert!(json["explanations"][1][2]["confidence"].as_f64().unwrap() < 0.3);
     assert!((value(&answer, "sensor-gain", "gain") - 1.1).abs() < 0.002);
     assert!((value(&answer, "mass", "mass_kg") * 1.1 / 188.0 - 1.0).abs() < 0.002);
     // Nothing that the same sensor says of the same force can tell them apart.
