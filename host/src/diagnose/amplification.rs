@@ -4,10 +4,10 @@
 //!
 //! r = e − H L n
 //!
-//! of a channel with noise e: H is what the channel hears of a force, L what the force owes to a small motion (`mean_slopes`). Where
-//! |H L| < 1 at all frequencies, the motion that the case has in closed loop follows from the measured one without its noise. Beyond
-//! that it does not: (I − H L)⁻¹ is as large as a free motion of the cut lives long, which was there before the record began, and in
-//! chatter it grows. There the motion stays the measured one, and r is compared with the noise that it has:
+//! of a channel with noise e: H is what the channel hears of a force, L what the force owes to a small motion (`mean_slopes`). Where a
+//! cut is well away from its limit, the motion that the case has in closed loop follows from the measured one without its noise. Near it
+//! that is not so: (I − H L)⁻¹ is as large as a free motion of the cut lives long, which was there before the record began, and in
+//! chatter it has grown. There the motion stays the measured one, and r is compared with the noise that it has:
 //!
 //! S(ω) = (I − A) D (I − A)ᴴ + P Q Pᴴ
 //!
@@ -23,20 +23,32 @@ use super::motion::{main_axis, weighed};
 use super::record::Record;
 use crate::recording::Quantity;
 
-/// Loop gain from which on the loop is not closed: with less the slopes that come and go close it all the same.
-const LOOP_GAIN: f64 = 0.9;
+/// |I − H L| below which the loop is not closed: near a resonance it is the damping of a free motion of the cut over that of the structure
+/// alone.
+const NEARLY_SINGULAR: f64 = 0.1;
 /// Share of a motion that does not come again turn after turn, from which on it is chatter.
-const NEW_EACH_TURN: f64 = 0.5;
+const NEW_EACH_TURN: f64 = 0.2;
 /// Parts of a turn over which that is looked at.
-const PARTS: usize = 64;
+const PARTS: usize = 256;
 
-/// True of a cut whose loop gain |H L| comes near one at some frequency, or whose motion, in every channel, is mostly new in each turn.
+/// True of a cut whose closed loop is nearly singular at some frequency or not stable, or whose motion, in every channel, is new in each
+/// turn to a good part.
+///
+/// By Nyquist the loop with mean slopes is not stable where det(I − H L) goes around the origin as ω goes from 0 to where H has died.
 pub(super) fn amplifies(record: &Record, cut: &RecordedCut, slopes: &MeanSlopes) -> bool {
-    let gain = |bin: usize| {
+    let mut turned_rad = 0.0;
+    let mut before = Complex64::ONE;
+    for bin in 1..record.grid.bins() {
         let open = record.transfer[bin] * slopes.at(record.grid.omega(bin));
-        open.singular_values().max()
-    };
-    (1..record.grid.bins()).any(|bin| gain(bin) > LOOP_GAIN) || is_new_each_turn(record, cut)
+        let closing: Matrix3<Complex64> = Matrix3::identity() - open;
+        if closing.singular_values().min() < NEARLY_SINGULAR {
+            return true;
+        }
+        let determinant = closing.determinant();
+        turned_rad += (determinant * before.conj()).arg();
+        before = determinant;
+    }
+    f64::abs(turned_rad) > std::f64::consts::PI || is_new_each_turn(record, cut)
 }
 
 fn is_new_each_turn(record: &Record, cut: &RecordedCut) -> bool {
