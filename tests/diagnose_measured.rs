@@ -35,6 +35,7 @@ fn recording(
         path: name.into(),
         sample_rate_hz: rate_hz,
         start_s: 0.0,
+        since_s: 0.0,
         channels: vec![
             channel("fx", Quantity::Force, force),
             channel("x", Quantity::Displacement, displacement),

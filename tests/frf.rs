@@ -49,6 +49,7 @@ fn blows(ratio: f64) -> Recording {
         path: "hammer.csv".into(),
         sample_rate_hz: RATE,
         start_s: 0.0,
+        since_s: 0.0,
         channels: vec![
             channel("fy", Quantity::Force, force),
             channel("ay", Quantity::Acceleration, acceleration),

@@ -42,6 +42,7 @@ fn recording() -> Recording {
         path: "long.csv".into(),
         sample_rate_hz: RATE_HZ,
         start_s: 0.0,
+        since_s: 0.0,
         channels,
         sidecar: Sidecar {
             kind: Some(Kind::Shaker),

@@ -96,6 +96,7 @@ fn recordings_are_read_by_pyuff() {
         path: "a.uff".into(),
         sample_rate_hz: 10_240.0,
         start_s: 0.25,
+        since_s: 0.0,
         channels: vec![
             channel("fx", Quantity::Force, 123.456_789),
             channel("ay", Quantity::Acceleration, -9.8e-4),

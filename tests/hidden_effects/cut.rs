@@ -421,6 +421,7 @@ impl CutBench {
                     path: format!("{name}-{number}.csv").into(),
                     sample_rate_hz: self.rate_hz,
                     start_s: 0.0,
+                    since_s: 0.0,
                     channels,
                     sidecar,
                 }

@@ -4,8 +4,6 @@
 //! it tells in a minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of
 //! the rest as of the beginnings; and what it gains is told of the rest alone, which nothing was fitted to.
 
-use std::ops::Range;
-
 use super::answer::{Diagnosis, Gain, Outcome, Quality};
 use super::judge::LEFT_OF_RESPONSE;
 use super::regression::{Regression, Share};
@@ -13,7 +11,7 @@ use super::scene::{Baseline, Scene};
 use super::selection::WITHIN_NOISE;
 use super::{Options, Stage, judge};
 use crate::case::Case;
-use crate::recording::{Channel, Kind, Recording};
+use crate::recording::{Kind, Recording};
 
 /// Samples of all records together that are searched.
 const SEARCHED: usize = 32_768;
@@ -40,7 +38,7 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
             let count = (SEARCHED / recordings.len()).max(least);
             let to = (from + count).min(recording.len());
             let from = to.saturating_sub(count);
-            Some((part(recording, from..to), part(recording, to..recording.len())))
+            Some((recording.part(from..to), recording.part(to..recording.len())))
         })
         .collect::<Option<_>>()?;
     let left: usize = shortened.iter().map(Recording::len).sum();
@@ -53,20 +51,6 @@ fn turns_s(recording: &Recording) -> Option<f64> {
         (Some(Kind::Shaker), _) => Some(0.0),
         (Some(Kind::Cutting), Some(cut)) if cut.last_rpm.is_none() => Some(60.0 * TURNS / cut.spindle_rpm?),
         _ => None,
-    }
-}
-
-fn part(recording: &Recording, range: Range<usize>) -> Recording {
-    let channels = recording.channels.iter().map(|channel| Channel {
-        samples: channel.samples[range.clone()].to_vec(),
-        ..channel.clone()
-    });
-    Recording {
-        channels: channels.collect(),
-        path: recording.path.clone(),
-        sidecar: recording.sidecar.clone(),
-        start_s: recording.start_s + range.start as f64 / recording.sample_rate_hz,
-        ..*recording
     }
 }
 

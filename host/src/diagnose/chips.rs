@@ -149,7 +149,7 @@ impl Chips {
                     *force -= damping[0] * v[0] + damping[1] * v[1] + damping[2] * v[2];
                 }
             }
-            let factor = in_contact * chip.share * cutter.force.wear(chip.t);
+            let factor = in_contact * chip.share * cutter.force.wear(turning.since_s(chip.t));
             for (sum, force) in sum.iter_mut().zip(force) {
                 sum[chip.sample] += factor * force;
             }
@@ -168,7 +168,7 @@ impl Chips {
                 continue;
             }
             let depth_m = cutter.depth_at_m(cutter.depth_m, chip.z_m);
-            let share = chip.share * cutter.force.wear(chip.t) / series.samples as f64;
+            let share = chip.share * cutter.force.wear(turning.since_s(chip.t)) / series.samples as f64;
             let at = |thickness_m: f64| Vector3::from(cutter.force.force_n(chip.place, thickness_m, depth_m));
             let step_m = STEP * thickness_m;
             let force_n = at(thickness_m);
@@ -187,7 +187,11 @@ impl Chips {
             means.add(back_rad / TAU * turning.turn_s(), share * slope);
             for (axis, square) in means.squares.iter_mut().enumerate() {
                 let column = slope.column(axis);
-                *square += share * chip.share * cutter.force.wear(chip.t) * column * column.transpose();
+                *square += share
+                    * chip.share
+                    * cutter.force.wear(turning.since_s(chip.t))
+                    * column
+                    * column.transpose();
             }
             if cutter.axial_depth_modulation && depth_m > 0.0 {
                 let by_depth = means.direct_n_per_m.column(2) - share * force_n / depth_m;

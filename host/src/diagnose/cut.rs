@@ -66,23 +66,32 @@ impl CutForce {
     }
 }
 
+/// Immersion and feed of a recording: from its sidecar, and what that does not say from the case.
+///
+/// # Errors
+/// The case has no cut.
+pub(super) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, DiagnoseError> {
+    let believed = case.cut()?;
+    let said = recording.sidecar.cut.unwrap_or_default();
+    Ok(Cut {
+        start_deg: said.start_deg.unwrap_or(believed.start_deg),
+        exit_deg: said.exit_deg.unwrap_or(believed.exit_deg),
+        feed_per_tooth_mm: said.feed_per_tooth_mm.unwrap_or(believed.feed_per_tooth_mm),
+        feed_direction_deg: believed.feed_direction_deg,
+    })
+}
+
 impl RecordedCut {
     /// The cut of a recording: working point from its sidecar, the rest from the case with its extensions.
     ///
     /// # Errors
     /// The case has no tool, material or cut, the sidecar no depth, the recording no tachometer; an extension that cannot be.
     pub fn new(case: &Case, effects: &Effects, recording: &Recording) -> Result<Self, DiagnoseError> {
-        let (tool, material, believed) = (case.tool()?, case.material()?, case.cut()?);
+        let (tool, material, cut) = (case.tool()?, case.material()?, cut_of(case, recording)?);
         let said = recording.sidecar.cut.unwrap_or_default();
         let depth_mm = said.axial_depth_mm.ok_or_else(|| {
             recording.lacks("axial_depth_mm under [cut] in the .toml beside it, the depth that was cut")
         })?;
-        let cut = Cut {
-            start_deg: said.start_deg.unwrap_or(believed.start_deg),
-            exit_deg: said.exit_deg.unwrap_or(believed.exit_deg),
-            feed_per_tooth_mm: said.feed_per_tooth_mm.unwrap_or(believed.feed_per_tooth_mm),
-            feed_direction_deg: believed.feed_direction_deg,
-        };
         if let Some(teeth) = said.teeth.filter(|teeth| *teeth as usize != tool.teeth) {
             return Err(DiagnoseError::record(
                 &recording.path,

@@ -32,6 +32,7 @@ mod error;
 pub mod evidence;
 mod extension;
 mod force_noise;
+mod full_cut;
 mod gram;
 mod grid;
 mod guess;
@@ -128,14 +129,16 @@ pub fn diagnose_watched(
     watch: &dyn Fn(Stage),
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
-    let mut diagnosis = match beginning::diagnosed(case, recordings, options, watch) {
+    let (recordings, shortened) = full_cut::in_full_cut(case, recordings)?;
+    let mut diagnosis = match beginning::diagnosed(case, &recordings, options, watch) {
         Some(diagnosis) => diagnosis,
         None => {
             watch(Stage::Records);
-            let scene = Scene::new(case, recordings)?;
-            judge::judge(&scene, recordings, options, watch)
+            let scene = Scene::new(case, &recordings)?;
+            judge::judge(&scene, &recordings, options, watch)
         }
     };
-    diagnosis.next_test = next_test::next_test(case, recordings, &diagnosis);
+    diagnosis.next_test = next_test::next_test(case, &recordings, &diagnosis);
+    diagnosis.warnings.splice(0..0, shortened);
     Ok(diagnosis)
 }

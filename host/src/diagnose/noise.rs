@@ -41,12 +41,13 @@ fn mean(squares: &mut [f64]) -> f64 {
     squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
-fn median(squares: &mut [f64]) -> f64 {
-    let middle = squares.len() / 2;
-    if squares.is_empty() {
+/// The middle of values that it puts in another order; 0 of none.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
         return 0.0;
     }
-    *squares.select_nth_unstable_by(middle, f64::total_cmp).1
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn floor(

@@ -16,8 +16,11 @@ const FEWEST_EDGES: usize = 4;
 pub struct Turning {
     spindle: Spindle,
     rpm: f64,
+    /// The angle at the beginning of the whole recording, from which a fluctuation counts as well.
     start_rad: f64,
     fluctuation: Option<Fluctuation>,
+    /// See [`Recording::since_s`].
+    since_s: f64,
     /// Times of the edges at immersion angle 0 of tooth 1, s.
     edges_s: Vec<f64>,
 }
@@ -36,7 +39,7 @@ impl Turning {
         let tacho = recording.sidecar.channels.get("tacho");
         let per_turn = tacho.and_then(|tacho| tacho.pulses_per_rev).unwrap_or(1);
         let missing = tacho.and_then(|tacho| tacho.missing).unwrap_or(0);
-        let all_s = rises_s(&level.samples, recording.sample_rate_hz);
+        let all_s = rises_s(&level.samples, recording.sample_rate_hz, recording.since_s);
         let edges_s = firsts_of_turns(&all_s, usize::from(per_turn), usize::from(missing));
         if edges_s.len() < FEWEST_EDGES {
             return Err(DiagnoseError::record(
@@ -52,6 +55,7 @@ impl Turning {
             rpm: 1.0,
             start_rad: 0.0,
             fluctuation,
+            since_s: recording.since_s,
             edges_s,
         }
         .fitted())
@@ -104,19 +108,24 @@ impl Turning {
         self.rpm
     }
 
-    /// The angle at `t`, rad: immersion angle of tooth 1.
+    /// The angle `t` after the first sample, rad: immersion angle of tooth 1.
     pub fn angle_rad(&self, t: f64) -> f64 {
-        self.start_rad + self.spindle.angle_rad(t)
+        self.start_rad + self.spindle.angle_rad(self.since_s(t))
     }
 
-    /// The speed at `t`, rad/s.
+    /// The speed `t` after the first sample, rad/s.
     pub fn speed_rad_per_s(&self, t: f64) -> f64 {
-        self.spindle.speed_at_rad_per_s(t)
+        self.spindle.speed_at_rad_per_s(self.since_s(t))
     }
 
-    /// How long before `t` the spindle stood `angle_rad` back, s.
+    /// How long after the beginning of the whole recording `t` after the first sample is, s.
+    pub fn since_s(&self, t: f64) -> f64 {
+        self.since_s + t
+    }
+
+    /// How long before `t` after the first sample the spindle stood `angle_rad` back, s.
     pub fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
-        self.spindle.delay_s(t, angle_rad)
+        self.spindle.delay_s(self.since_s(t), angle_rad)
     }
 
     /// Mean of the time of a turn, s.
@@ -129,7 +138,7 @@ impl Turning {
 /// line.
 ///
 /// A device finds its threshold as it goes; here the whole record is known.
-fn rises_s(level: &[f64], rate_hz: f64) -> Vec<f64> {
+fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
     let (low, high) = level
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -142,7 +151,7 @@ fn rises_s(level: &[f64], rate_hz: f64) -> Vec<f64> {
         is_armed |= pair[0] < quarter;
         if is_armed && pair[0] < middle && pair[1] >= middle {
             let share = (middle - pair[0]) / (pair[1] - pair[0]);
-            rises_s.push((index as f64 + share) / rate_hz);
+            rises_s.push(since_s + (index as f64 + share) / rate_hz);
             is_armed = false;
         }
     }
@@ -341,6 +350,7 @@ mod tests {
             rpm: 1.0,
             start_rad: 0.0,
             fluctuation: None,
+            since_s: 0.0,
             edges_s,
         }
         .fitted()

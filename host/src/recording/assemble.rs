@@ -53,6 +53,7 @@ pub(super) fn recording(path: &Path, raw: Raw, sidecar: Sidecar) -> Result<Recor
         path: path.into(),
         sample_rate_hz,
         start_s,
+        since_s: 0.0,
         channels,
         sidecar,
     })

@@ -13,6 +13,7 @@ pub(crate) mod uff;
 mod unit;
 mod wav;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 pub use blocks::{Sensed, Speed};
@@ -34,6 +35,9 @@ pub struct Recording {
     pub sample_rate_hz: f64,
     /// Time of the first sample, s.
     pub start_s: f64,
+    /// How long after the beginning of the recording of which it is a part it begins, s: what grows or swings with time counts from
+    /// there. 0 where it is whole.
+    pub since_s: f64,
     /// The channels, all of one length. Time is not among them.
     pub channels: Vec<Channel>,
     /// What the file beside it says.
@@ -139,6 +143,26 @@ impl Recording {
     /// Time of a sample, s.
     pub fn time_s(&self, sample: usize) -> f64 {
         self.start_s + sample as f64 / self.sample_rate_hz
+    }
+
+    /// A part of it, of these samples.
+    ///
+    /// # Panics
+    /// Where it has fewer samples.
+    #[must_use]
+    pub fn part(&self, range: Range<usize>) -> Self {
+        let channels = self.channels.iter().map(|channel| Channel {
+            samples: channel.samples[range.clone()].to_vec(),
+            ..channel.clone()
+        });
+        Self {
+            channels: channels.collect(),
+            path: self.path.clone(),
+            sidecar: self.sidecar.clone(),
+            start_s: self.time_s(range.start),
+            since_s: self.since_s + range.start as f64 / self.sample_rate_hz,
+            ..*self
+        }
     }
 
     /// The error that it has no channel that is needed.

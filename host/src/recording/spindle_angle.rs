@@ -144,6 +144,7 @@ mod tests {
             path: "cut.csv".into(),
             sample_rate_hz: 1e4,
             start_s: 0.0,
+            since_s: 0.0,
             channels: vec![Channel {
                 name: "tacho".into(),
                 quantity: Quantity::Level,

@@ -201,6 +201,7 @@ proptest! {
             path: path.clone(),
             sample_rate_hz: rate,
             start_s: 0.25,
+            since_s: 0.0,
             channels: vec![Channel { name: "fx".into(), quantity: Quantity::Force, samples }],
             sidecar: Sidecar { kind: Some(Kind::Sweep), ..Sidecar::default() },
         };

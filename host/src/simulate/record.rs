@@ -126,6 +126,7 @@ impl VirtualCut {
             path: path.into(),
             sample_rate_hz: rate_hz,
             start_s: 0.0,
+            since_s: 0.0,
             channels,
             sidecar: self.sidecar(case, tachometer.wheel)?,
         };

@@ -135,6 +135,7 @@ fn record(kind: Kind, forces: [Vec<f64>; 3], noise: f64, random: &mut ChaCha8Rng
         path: "test.csv".into(),
         sample_rate_hz: RATE,
         start_s: 0.0,
+        since_s: 0.0,
         channels,
         sidecar: Sidecar {
             kind: Some(kind),

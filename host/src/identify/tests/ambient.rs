@@ -81,6 +81,7 @@ fn recording(seconds: f64, seed: u64) -> Recording {
         path: Path::new("idle.csv").into(),
         sample_rate_hz: RATE_HZ,
         start_s: 0.0,
+        since_s: 0.0,
         channels: vec![channel("x", x), channel("y", y)],
         sidecar: Sidecar {
             kind: Some(Kind::Idle),

@@ -496,6 +496,7 @@ fn recording(samples: Vec<f64>) -> Recording {
         path: "a.uff".into(),
         sample_rate_hz: 10_240.0,
         start_s: 0.5,
+        since_s: 0.0,
         channels: vec![
             channel("fx", Quantity::Force),
             channel("az", Quantity::Acceleration),

@@ -111,6 +111,7 @@ impl Rig {
             path: path.into(),
             sample_rate_hz: self.sample_rate_hz,
             start_s: 0.0,
+            since_s: 0.0,
             channels: recorder.channels(),
             sidecar: Sidecar {
                 kind: Some(self.signal.kind()),

@@ -106,6 +106,7 @@ fn record(modes: &[Mode], seconds: f64, seed: u64, unmeasured: f64) -> Recording
         path: "test.csv".into(),
         sample_rate_hz: RATE_HZ,
         start_s: 0.0,
+        since_s: 0.0,
         channels: forces
             .map(|(name, force)| channel(name, Quantity::Force, smoothed(force)))
             .chain(moved.map(|(name, moved)| channel(name, Quantity::Displacement, moved)))
