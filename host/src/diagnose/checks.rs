@@ -184,6 +184,18 @@ pub(super) fn unit(
     ))
 }
 
+/// Of channels of a cut that were checked: the first complaint, or none where one of them is right. Then so is the unit of the others,
+/// if they are not out of all proportion: one edge coefficient makes ten times an axial force that was believed to be small.
+pub(super) fn unless_one_is_right(
+    checked: impl IntoIterator<Item = Result<(), DiagnoseError>>,
+) -> Result<(), DiagnoseError> {
+    let checked: Vec<_> = checked.into_iter().collect();
+    if checked.iter().any(Result::is_ok) {
+        return Ok(());
+    }
+    checked.into_iter().collect()
+}
+
 /// Refuses a channel that reads out of all proportion to its prediction, whatever their shapes. Offsets of sensors do not count; too
 /// large is what moves more than the prediction is with its mean, since what is left of even teeth in a slot is next to nothing.
 pub(super) fn far_off(

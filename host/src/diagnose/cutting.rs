@@ -130,12 +130,8 @@ impl Record {
 
     /// Refuses channels whose size cannot be that of this cut. What is predicted first is along no motion at all: forces are about
     /// those of the chips as they are fed; the motion may be larger by far where regeneration amplifies it.
-    ///
-    /// Where one of the forces is as large as predicted the unit of the others is right as well, if they are not out of all proportion:
-    /// one edge coefficient makes ten times an axial force that was believed to be small.
     fn check_units_of_cut(&self) -> Result<(), DiagnoseError> {
-        let mut one_is_right = false;
-        let mut refused = Ok(());
+        let mut forces = Vec::new();
         for (index, channel) in self.channels.iter().enumerate() {
             let mut response = self.decays.without(index, &channel.predicted);
             let mut measured = channel.measured.clone();
@@ -147,14 +143,11 @@ impl Record {
             let (response, measured) = (&response[range.clone()], &measured[range]);
             let name = &channel.pickup.name;
             checks::far_off(&self.path, name, response, measured)?;
-            if channel.pickup.quantity == Quantity::Force {
-                match checks::unit(&self.path, name, response, measured, 0.0) {
-                    Ok(()) => one_is_right |= rms(response) > 0.0,
-                    Err(error) => refused = refused.and(Err(error)),
-                }
+            if channel.pickup.quantity == Quantity::Force && rms(response) > 0.0 {
+                forces.push(checks::unit(&self.path, name, response, measured, 0.0));
             }
         }
-        if one_is_right { Ok(()) } else { refused }
+        checks::unless_one_is_right(forces)
     }
 
     /// Compares what comes after the first turn, and of all but short records what comes before the last.

@@ -221,22 +221,34 @@ impl Record {
                 } else {
                     record.compare_responses(baseline);
                 }
-                for (index, channel) in record.channels.iter().enumerate() {
-                    // Across the force a little of another axis is as large as what is predicted.
-                    let along = motion::main_axis(channel);
-                    if along.is_none_or(|axis| record.force_n[axis].is_empty()) {
-                        continue;
-                    }
-                    let range = record.compared.clone();
-                    let response = record.decays.without(index, &channel.predicted);
-                    let (response, measured) = (&response[range.clone()], &channel.measured[range]);
-                    let by_noise = record.energy_by_force_noise(index);
-                    checks::unit(&record.path, &channel.pickup.name, response, measured, by_noise)?;
-                }
+                record.check_units(is_cut)?;
             }
             Domain::Force => motion::compare_forces(&mut record, baseline, recording)?,
         }
         Ok(record)
+    }
+
+    /// Refuses channels whose size cannot be that of the case; of a cut those of motion, whose forces are checked before.
+    fn check_units(&self, is_cut: bool) -> Result<(), DiagnoseError> {
+        let checked = |(index, channel): (usize, &Observed)| {
+            // Across the force a little of another axis is as large as what is predicted.
+            let axis = motion::main_axis(channel)?;
+            if self.force_n[axis].is_empty() || is_cut && channel.pickup.quantity == Quantity::Force {
+                return None;
+            }
+            let range = self.compared.clone();
+            let response = self.decays.without(index, &channel.predicted);
+            let (response, measured) = (&response[range.clone()], &channel.measured[range]);
+            let by_noise = self.energy_by_force_noise(index);
+            let name = &channel.pickup.name;
+            Some(checks::unit(&self.path, name, response, measured, by_noise))
+        };
+        let mut checked = self.channels.iter().enumerate().filter_map(checked);
+        if is_cut {
+            checks::unless_one_is_right(checked)
+        } else {
+            checked.try_for_each(|checked| checked)
+        }
     }
 
     /// Σ y² of what a channel reads of the response to the noise of the force sensors, over the samples of the record.
