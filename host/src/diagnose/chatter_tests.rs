@@ -1,24 +1,18 @@
 //! Virtual cuts near a lobe and in grown chatter, diagnosed with the plain case.
 
-use std::path::Path;
-
 use super::answer::Outcome;
+use super::virtual_records::{case, record};
 use super::{Diagnosis, Options, Scene, diagnose};
 use crate::case::Case;
 use crate::recording::{Quantity, Recording};
-use crate::simulate::rig::Noise;
-use crate::simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
+use crate::simulate::{Effects, Entry, VirtualCut};
 
 const RPM: f64 = 900.0;
 /// Where this slot becomes unstable at that speed.
 const LIMIT_MM: f64 = 2.083;
 
 fn believed() -> Case {
-    let path = format!(
-        "{}/../tests/cases/kuka-kr90-full.toml",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    Case::read(Path::new(&path)).unwrap()
+    case("kuka-kr90-full", "")
 }
 
 /// A slot of six seconds with half a percent of noise in all channels of these kinds.
@@ -30,20 +24,7 @@ fn slot(depth_mm: f64, effects: &[&str], measured: &[Quantity], seed: u64) -> Re
         measured: measured.to_vec(),
         ..VirtualCut::new(RPM, depth_mm, seconds)
     };
-    let recorder = Recorder::Ideal { rate_hz: 500.0 };
-    let tachometer = TachometerModel {
-        jitter_s: 0.0,
-        ..TachometerModel::ONE_MARK
-    };
-    let (mut recording, _) = cut
-        .record(&believed(), recorder, tachometer, Path::new("cut.csv"))
-        .unwrap();
-    let noise = Noise {
-        relative: 0.005,
-        ..Noise::default()
-    };
-    noise.add(&mut recording, seed);
-    recording
+    record(&believed(), &cut, "cut.csv", 500.0, 0.005, seed)
 }
 
 fn asked(recording: Recording) -> Diagnosis {

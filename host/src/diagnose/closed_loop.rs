@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::grid::{Grid, catmull_rom};
 use super::record::Record;
 use super::scene::{Domain, Scene};
-use crate::recording::{Kind, Quantity};
-use crate::simulate::{At, Drive, Dynamics, Effects, Model, Room, Settings};
+use crate::recording::Kind;
+use crate::simulate::{At, Drive, Dynamics, Effects, Model, Reading, Settings};
 use crate::structure::FirstOrder;
 
 /// Instants between two samples at which a force is interpolated without changing its band; between these by cubics.
@@ -244,15 +244,12 @@ impl ClosedLoop {
         let record = &scene.records[index];
         let model = self.model(scene, index, effects)?;
         let count = record.grid.count();
-        let pickups: Vec<_> = record
+        let rate_hz = record.grid.rate_hz();
+        let mut readings: Vec<Reading> = record
             .channels
             .iter()
             .map(|channel| effects.pickup(channel.pickup.clone()))
-            .collect();
-        let mut samples: Vec<Vec<f64>> = vec![Vec::with_capacity(count); pickups.len()];
-        let mut rooms: Vec<Room> = pickups
-            .iter()
-            .map(|pickup| Room::seeing(&model, &pickup.modes))
+            .map(|pickup| Reading::new(&model, pickup, rate_hz, length))
             .collect();
         let settings = Settings {
             relative: STEP_ERROR,
@@ -261,7 +258,6 @@ impl ClosedLoop {
             largest_m: AWAY * largest_m(record),
             steps_max: STEPS_PER_SAMPLE * count as u64,
         };
-        let rate_hz = record.grid.rate_hz();
         let mut states = start.to_vec();
         if states.is_empty() {
             states.resize(model.dynamics.order(), 0.0);
@@ -272,33 +268,15 @@ impl ClosedLoop {
         if starts_anywhere(record) {
             let_go(scene, &model.dynamics, &mut states);
         }
-        let end_s = (length.max(2) - 1) as f64 / rate_hz;
+        // The mean over the last sample ends half a sample later.
+        let later = if model.dynamics.velocity_jumps() { 0.5 } else { 0.0 };
+        let end_s = ((length.max(2) - 1) as f64 + later) / rate_hz;
         model
             .run_from(states, end_s, settings, |segment| {
-                for ((pickup, room), samples) in pickups.iter().zip(&mut rooms).zip(&mut samples) {
-                    while samples.len() < length {
-                        let t = samples.len() as f64 / rate_hz - pickup.delay_s;
-                        if t > segment.to_s() {
-                            break;
-                        }
-                        let motion = segment.motion(t.max(0.0), room);
-                        // Before the start it is held where it is let go.
-                        if t < 0.0 {
-                            samples.push(match pickup.quantity {
-                                Quantity::Displacement => pickup.read(motion.displacement_m),
-                                _ => 0.0,
-                            });
-                            continue;
-                        }
-                        samples.push(pickup.read(match pickup.quantity {
-                            Quantity::Velocity => motion.velocity_m_per_s,
-                            Quantity::Acceleration => motion.acceleration_m_per_s2.unwrap_or([0.0; 3]),
-                            _ => motion.displacement_m,
-                        }));
-                    }
-                }
+                readings.iter_mut().for_each(|reading| reading.observe(segment));
             })
             .ok()?;
+        let mut samples: Vec<Vec<f64>> = readings.into_iter().map(|reading| reading.samples().1).collect();
         for samples in &mut samples {
             // Rounding of the last instant may leave it out.
             let last = samples.last().copied().unwrap_or(0.0);

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use nalgebra::Matrix3;
 
+use super::virtual_records::record;
 use super::{Diagnosis, Options, Scene, diagnose};
 use crate::case::Case;
 use crate::milling::{Engagement, ToothForce};
 use crate::recording::{Quantity, Recording};
-use crate::simulate::rig::Noise;
-use crate::simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
+use crate::simulate::{Effects, Entry, VirtualCut};
 
 fn case(feed_mm: &str, more: &str) -> Case {
     let path = format!(
@@ -48,20 +48,7 @@ fn records_of(seconds: f64, effects: &[&str], forces: bool, seed: u64) -> Vec<Re
                 ..VirtualCut::new(rpm, depth_mm, seconds)
             };
             let path = format!("cut-{index}.csv");
-            let recorder = Recorder::Ideal { rate_hz: 2048.0 };
-            let tachometer = TachometerModel {
-                jitter_s: 0.0,
-                ..TachometerModel::ONE_MARK
-            };
-            let (mut recording, _) = cut
-                .record(&case(feed_mm, ""), recorder, tachometer, Path::new(&path))
-                .unwrap();
-            let noise = Noise {
-                relative: 0.02,
-                ..Noise::default()
-            };
-            noise.add(&mut recording, seed + index as u64);
-            recording
+            record(&case(feed_mm, ""), &cut, &path, 2048.0, 0.02, seed + index as u64)
         })
         .collect()
 }

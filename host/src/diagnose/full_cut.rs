@@ -285,29 +285,17 @@ fn longest_gap(stretches: &[Range<usize>], count: usize) -> Option<Range<usize>>
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::diagnose::answer::Outcome;
+    use crate::diagnose::virtual_records::{case, record};
     use crate::diagnose::{Options, diagnose};
-    use crate::simulate::rig::Noise;
-    use crate::simulate::{Entry, Recorder, TachometerModel, VirtualCut};
+    use crate::simulate::{Entry, VirtualCut};
 
     /// How long the tool takes through a face at 900 rev/min with two teeth and 0.15 mm of feed each, s: its radius over the feed.
     const WAY_S: f64 = 6.35 / (0.3 * 15.0);
     const SECONDS: f64 = 8.0;
     const AIR_S: f64 = 0.2;
     const SLOT: &str = "kuka-kr90-full";
-
-    fn case(name: &str) -> Case {
-        extended(name, "")
-    }
-
-    fn extended(name: &str, extensions: &str) -> Case {
-        let path = format!("{}/../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-        let text = std::fs::read_to_string(&path).unwrap() + extensions;
-        Case::parse(Path::new(&path), &text).unwrap()
-    }
 
     fn entering(entry: Entry, depth_mm: f64, seconds: f64) -> VirtualCut {
         VirtualCut {
@@ -316,25 +304,12 @@ mod tests {
         }
     }
 
-    fn record(case: &Case, cut: VirtualCut, measured: &[Quantity], noise: f64) -> Recording {
+    fn recorded(case: &Case, cut: VirtualCut, measured: &[Quantity], noise: f64) -> Recording {
         let cut = VirtualCut {
             measured: measured.to_vec(),
             ..cut
         };
-        let recorder = Recorder::Ideal { rate_hz: 1000.0 };
-        let tachometer = TachometerModel {
-            jitter_s: 0.0,
-            ..TachometerModel::ONE_MARK
-        };
-        let (mut recording, _) = cut
-            .record(case, recorder, tachometer, Path::new("cut.csv"))
-            .unwrap();
-        let noise = Noise {
-            relative: noise,
-            ..Noise::default()
-        };
-        noise.add(&mut recording, 3);
-        recording
+        record(case, &cut, "cut.csv", 1000.0, noise, 3)
     }
 
     #[test]
@@ -350,8 +325,8 @@ mod tests {
             (SLOT, 1.0, ramp, &[Displacement], 0.005),
             ("kuka-kr90-acetal", 1.0, Entry::Feed, &[Force, Acceleration], 0.02),
         ] {
-            let case = case(name);
-            let recording = record(&case, entering(entry, depth_mm, SECONDS), measured, noise);
+            let case = case(name, "");
+            let recording = recorded(&case, entering(entry, depth_mm, SECONDS), measured, noise);
             let range = range(&Baseline::new(&case).unwrap(), &recording).unwrap();
             let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
             println!("{name} {depth_mm} mm {entry:?} {measured:?}: {from_s} to {to_s} s");
@@ -371,8 +346,8 @@ mod tests {
             // Grows to chatter.
             (4.0, Quantity::Displacement),
         ] {
-            let case = case(SLOT);
-            let recording = record(
+            let case = case(SLOT, "");
+            let recording = recorded(
                 &case,
                 entering(Entry::None, depth_mm, SECONDS),
                 &[measured],
@@ -388,9 +363,9 @@ mod tests {
         // What swings and grows counts from the start of the recording, not from that of the full cut.
         let swings = "\n[extension.speed-fluctuation]\ndelta = 0.01\nfrequency_hz = 0.7\nphase_deg = 40.0\n";
         let wears = "\n[extension.wear]\nrelative_rate_per_s = 0.1\n";
-        let (cut, believed) = (extended(SLOT, &[swings, wears].concat()), extended(SLOT, swings));
+        let (cut, believed) = (case(SLOT, &[swings, wears].concat()), case(SLOT, swings));
         let measured = [Quantity::Displacement];
-        let recording = record(&cut, entering(Entry::Feed, 1.0, SECONDS), &measured, 0.005);
+        let recording = recorded(&cut, entering(Entry::Feed, 1.0, SECONDS), &measured, 0.005);
         let asked = |case: &Case| {
             let recordings = std::slice::from_ref(&recording);
             let diagnosis = diagnose(case, recordings, &Options::default()).unwrap();
@@ -412,9 +387,9 @@ mod tests {
 
     #[test]
     fn a_full_cut_that_is_too_short_is_refused() {
-        let case = case(SLOT);
+        let case = case(SLOT, "");
         let short = entering(Entry::Feed, 1.0, 2.0 * (AIR_S + WAY_S) + 0.2);
-        let recording = record(&case, short, &[Quantity::Displacement], 0.005);
+        let recording = recorded(&case, short, &[Quantity::Displacement], 0.005);
         let error = diagnose(&case, &[recording], &Options::default()).unwrap_err();
         let said = error.to_string();
         assert!(

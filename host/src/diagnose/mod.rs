@@ -68,7 +68,11 @@ pub mod turning;
 #[cfg(test)]
 mod two_effects_tests;
 mod unknowns;
+#[cfg(test)]
+mod velocity_jump_tests;
 mod views;
+#[cfg(test)]
+mod virtual_records;
 mod whitening;
 
 pub use answer::Diagnosis;

@@ -38,6 +38,8 @@ pub struct Observed {
     pub predicted: Vec<f64>,
     /// Standard deviation of its white noise.
     pub deviation: f64,
+    /// The time over which it is the mean, s: of accelerations one sample where the velocity jumps, else none.
+    mean_s: f64,
     /// The receptance of its sensor's place, where the baseline knows the modes there: see [`Record::seen_by`].
     seen: Option<Vec<Matrix3<Complex64>>>,
 }
@@ -130,10 +132,13 @@ impl Observed {
             .collect()
     }
 
-    /// (iω)^q e^(−iωτ): what becomes of a displacement in this channel, without its weights.
+    /// (iω)^q e^(−iωτ), and of a mean over T times sin(ωT/2)/(ωT/2): what becomes of a displacement in this channel, without its weights.
     pub fn factor(&self, omega: f64) -> Complex64 {
+        let half = 0.5 * omega * self.mean_s;
+        let mean = if half == 0.0 { 1.0 } else { half.sin() / half };
         Complex64::new(0.0, omega).powi(derivatives(self.pickup.quantity))
             * Complex64::cis(-omega * self.pickup.delay_s)
+            * mean
     }
 }
 
@@ -558,7 +563,13 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             // The force of a cut is an answer as well.
             let compared =
                 is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(Kind::Cutting);
+            let is_mean = baseline.velocity_jumps && pickup.quantity == Quantity::Acceleration;
             (axes_known && compared).then(|| Observed {
+                mean_s: if is_mean {
+                    1.0 / recording.sample_rate_hz
+                } else {
+                    0.0
+                },
                 pickup,
                 measured: channel.samples.clone(),
                 predicted: Vec::new(),

@@ -37,6 +37,8 @@ pub struct Baseline<'a> {
     pub first_order: FirstOrder,
     /// Its receptance.
     pub receptance: Receptance,
+    /// True where a jump of the force makes the velocity jump, so that accelerations are means over a sample: see [`crate::simulate::Dynamics::velocity_jumps`].
+    pub velocity_jumps: bool,
     /// The machine's axes (0, 1, 2) that the structure has.
     pub axes: Vec<usize>,
 }
@@ -72,6 +74,7 @@ impl<'a> Baseline<'a> {
             terms,
             receptance: Receptance::new(&first_order),
             first_order,
+            velocity_jumps: dynamics.velocity_jumps(),
             axes: axes_of(structure),
         })
     }

@@ -8,7 +8,7 @@ use quietcut_core::tachometer::Wheel;
 use super::anti_aliasing::decimated;
 use super::effect::{Effects, Pickup};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
-use super::{Model, Room, Segment, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
+use super::{Model, Reading, Segment, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
 use crate::case::Case;
 use crate::recording::{Channel, Kind, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar};
 use crate::structure::Direction;
@@ -77,29 +77,30 @@ impl VirtualCut {
         let samples = (self.seconds * rate_hz).floor() as usize + 1;
         let pickups = self.pickups(case)?;
         let oversampling = recorder.oversampling();
-        let mut truth = Truth::new(
-            &model,
-            rate_hz * oversampling as f64,
-            (samples - 1) * oversampling + 1,
-            pickups.clone(),
-        );
+        let mut readings: Vec<Reading> = pickups
+            .iter()
+            .map(|pickup| {
+                let count = (samples - 1) * oversampling + 1;
+                Reading::new(&model, pickup.clone(), rate_hz * oversampling as f64, count)
+            })
+            .collect();
         let mut sensors = Sensors::new(&model, recorder, &pickups);
         let tail_s = sensors.tail_s().max(1.0 / rate_hz);
         let statistics = model.run(self.seconds + tail_s, Settings::default(), |segment| {
-            truth.observe(segment);
+            readings.iter_mut().for_each(|reading| reading.observe(segment));
             sensors.observe(segment);
         })?;
         let seed = match recorder {
             Recorder::Sensor { seed, .. } => Some(seed),
             Recorder::Ideal { .. } | Recorder::Filtered { .. } => None,
         };
-        let mut channels: Vec<Channel> = pickups
-            .iter()
-            .zip(truth.channels())
+        let mut channels: Vec<Channel> = readings
+            .into_iter()
+            .map(Reading::samples)
             .map(|(pickup, truth)| Channel {
                 name: pickup.name.clone(),
                 quantity: pickup.quantity,
-                samples: match sensors.felt(pickup) {
+                samples: match sensors.felt(&pickup) {
                     Some(felt) => felt
                         .iter()
                         .take(samples)
@@ -288,76 +289,6 @@ impl Sensors {
                 .map(|counts| counts.map(|value| f64::from(value) * count))
                 .collect(),
         )
-    }
-}
-
-/// What channels would say without a sensor's faults, each at its own delay, at a steady rate.
-///
-/// Where a structure has no acceleration at an instant it is the mean over one sample.
-struct Truth {
-    rate_hz: f64,
-    samples: usize,
-    velocity_jumps: bool,
-    /// Samples of each channel; where accelerations are means, its velocities half a sample before.
-    channels: Vec<(Pickup, Room, Vec<f64>)>,
-}
-
-impl Truth {
-    fn new(model: &Model, rate_hz: f64, samples: usize, pickups: Vec<Pickup>) -> Self {
-        Self {
-            rate_hz,
-            samples,
-            velocity_jumps: model.dynamics.velocity_jumps(),
-            channels: pickups
-                .into_iter()
-                .map(|pickup| {
-                    let room = Room::seeing(model, &pickup.modes);
-                    (pickup, room, Vec::with_capacity(samples + 1))
-                })
-                .collect(),
-        }
-    }
-
-    fn observe(&mut self, segment: &Segment<'_>) {
-        for (pickup, room, values) in &mut self.channels {
-            let mean = self.velocity_jumps && pickup.quantity == Quantity::Acceleration;
-            let (early, count) = if mean {
-                (0.5, self.samples + 1)
-            } else {
-                (0.0, self.samples)
-            };
-            while values.len() < count {
-                let t = (values.len() as f64 - early) / self.rate_hz - pickup.delay_s;
-                if t > segment.to_s() {
-                    break;
-                }
-                if t < 0.0 {
-                    values.push(0.0);
-                    continue;
-                }
-                let motion = segment.motion(t, room);
-                values.push(pickup.read(match pickup.quantity {
-                    Quantity::Force => motion.force_n,
-                    Quantity::Displacement => motion.displacement_m,
-                    Quantity::Acceleration if !mean => motion.acceleration_m_per_s2.unwrap_or([0.0; 3]),
-                    _ => motion.velocity_m_per_s,
-                }));
-            }
-        }
-    }
-
-    fn channels(self) -> impl Iterator<Item = Vec<f64>> {
-        let (rate_hz, velocity_jumps) = (self.rate_hz, self.velocity_jumps);
-        self.channels.into_iter().map(move |(pickup, _, values)| {
-            if velocity_jumps && pickup.quantity == Quantity::Acceleration {
-                values
-                    .windows(2)
-                    .map(|pair| (pair[1] - pair[0]) * rate_hz)
-                    .collect()
-            } else {
-                values
-            }
-        })
     }
 }
 

@@ -12,7 +12,7 @@ pub use noise::Noise;
 pub use signal::{Impact, Signal, Step};
 
 use super::effect::{Effects, Pickup};
-use super::{Drive, Model, Room, Segment, Settings, SimulateError, Statistics};
+use super::{Drive, Model, Reading, Settings, SimulateError, Statistics};
 use crate::recording::{Channel, Kind, Quantity, Recording, Sidecar};
 use crate::structure::{Direction, Structure};
 
@@ -103,16 +103,22 @@ impl Rig {
             })),
             terms,
         };
-        let mut recorder = Recorder::new(&model, self, self.pickups(structure, axis));
-        let statistics = model.run(self.signal.duration_s(), Settings::default(), |segment| {
-            recorder.observe(segment);
+        let seconds = self.signal.duration_s();
+        let count = (seconds * self.sample_rate_hz).floor() as usize;
+        let mut readings: Vec<Reading> = self
+            .pickups(structure, axis)
+            .into_iter()
+            .map(|pickup| Reading::new(&model, pickup, self.sample_rate_hz, count))
+            .collect();
+        let statistics = model.run(seconds, Settings::default(), |segment| {
+            readings.iter_mut().for_each(|reading| reading.observe(segment));
         })?;
         let recording = Recording {
             path: path.into(),
             sample_rate_hz: self.sample_rate_hz,
             start_s: 0.0,
             since_s: 0.0,
-            channels: recorder.channels(),
+            channels: channels(readings),
             sidecar: Sidecar {
                 kind: Some(self.signal.kind()),
                 input: Some(vec![format!("f{}", self.direction)]),
@@ -141,71 +147,22 @@ impl Rig {
     }
 }
 
-/// Samples of each channel, each at its own delay.
-struct Recorder {
-    rate_hz: f64,
-    count: usize,
-    pickups: Vec<(Pickup, Room, Vec<f64>)>,
-}
-
-impl Recorder {
-    fn new(model: &Model, rig: &Rig, pickups: Vec<Pickup>) -> Self {
-        let count = (rig.signal.duration_s() * rig.sample_rate_hz).floor() as usize;
-        Self {
-            rate_hz: rig.sample_rate_hz,
-            count,
-            pickups: pickups
-                .into_iter()
-                .map(|pickup| {
-                    let room = Room::seeing(model, &pickup.modes);
-                    (pickup, room, Vec::with_capacity(count))
-                })
-                .collect(),
-        }
+fn channels(readings: Vec<Reading>) -> Vec<Channel> {
+    let mut channels: Vec<Channel> = readings
+        .into_iter()
+        .map(Reading::samples)
+        .map(|(pickup, samples)| Channel {
+            name: pickup.name,
+            quantity: pickup.quantity,
+            samples,
+        })
+        .collect();
+    let lengths = channels.iter().map(|channel| channel.samples.len());
+    let shortest = lengths.min().unwrap_or(0);
+    for channel in &mut channels {
+        channel.samples.truncate(shortest);
     }
-
-    fn observe(&mut self, segment: &Segment<'_>) {
-        for (pickup, room, samples) in &mut self.pickups {
-            while samples.len() < self.count {
-                let t = samples.len() as f64 / self.rate_hz - pickup.delay_s;
-                if t > segment.to_s() {
-                    break;
-                }
-                // Before the test all was at rest.
-                if t < 0.0 {
-                    samples.push(0.0);
-                    continue;
-                }
-                let motion = segment.motion(t, room);
-                samples.push(pickup.read(match pickup.quantity {
-                    Quantity::Force => motion.force_n,
-                    Quantity::Velocity => motion.velocity_m_per_s,
-                    Quantity::Acceleration => motion.acceleration_m_per_s2.unwrap_or([0.0; 3]),
-                    _ => motion.displacement_m,
-                }));
-            }
-        }
-    }
-
-    fn channels(self) -> Vec<Channel> {
-        let shortest = self
-            .pickups
-            .iter()
-            .map(|(_, _, samples)| samples.len())
-            .min()
-            .unwrap_or(0);
-        self.pickups
-            .into_iter()
-            .map(|(pickup, _, mut samples)| {
-                samples.truncate(shortest);
-                Channel {
-                    name: pickup.name,
-                    quantity: pickup.quantity,
-                    samples,
-                }
-            })
-            .collect()
-    }
+    channels
 }
 
 impl Signal {

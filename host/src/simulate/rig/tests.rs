@@ -332,6 +332,37 @@ fn sensors_read_what_their_effects_say() {
 }
 
 #[test]
+fn where_the_velocity_jumps_accelerations_are_means_over_a_sample() {
+    // Modes that add up to no mass.
+    let structure = case("kuka-kr90-acetal").structure.unwrap();
+    let impact = Signal::Impacts {
+        impacts: vec![Impact {
+            start_s: 0.1,
+            peak_n: 200.0,
+            pulse_s: 0.02,
+        }],
+        seconds: 1.0,
+    };
+    let at = |sample_rate_hz| {
+        let rig = Rig {
+            sample_rate_hz,
+            ..rig(impact.clone(), &[])
+        };
+        rig.record(&structure, Path::new("a.csv")).unwrap().0
+    };
+    let (means, halves) = (at(500.0), at(1000.0));
+    let (means, v) = (samples(&means, "ay"), samples(&halves, "vy"));
+    let largest = means
+        .iter()
+        .fold(0.0, |largest: f64, mean| largest.max(mean.abs()));
+    assert!(largest > 0.1, "{largest}");
+    for sample in 1..means.len() - 1 {
+        let mean = (v[2 * sample + 1] - v[2 * sample - 1]) * 500.0;
+        assert!((means[sample] - mean).abs() < 1e-6 * largest, "{sample}");
+    }
+}
+
+#[test]
 fn an_uncontrolled_shaker_loses_force_at_resonance() {
     let step = Signal::step_sine(&[10.0, 17.45], &[10.0], 20.0, 1.0);
     let (recording, _) = Rig {
