@@ -26,10 +26,14 @@ use crate::simulate::{Cutter, Passage, Spindle};
 const QUIET: f64 = 0.2;
 /// The tool is well in the cut where every channel has this share of it.
 const LOUD: f64 = 0.8;
-/// What a depth that grows evenly has still to grow where it is loud, and a quarter more for how roughly this is known.
-const BEYOND_LOUD: f64 = 1.3;
+/// From where it is no longer quiet to full cut a depth that grows evenly takes 4/3 of the time that it takes to where it is loud.
+const BEYOND_LOUD: f64 = 1.4;
 /// Margin on the way through a face: the first touch itself is not seen.
 const UNSEEN: f64 = 1.1;
+/// Share of the way out that is over before it is quiet: chips are thin at the end of it.
+const SEEN_OUT: f64 = 0.7;
+/// Chatter is what makes the motion so many times that by the feed alone.
+const CHATTER: f64 = 2.0;
 /// A channel tells of air where a turn in the cut is so many times its noise.
 const TELLING: f64 = 3.0;
 /// Fewest turns of air at an end of a recording, and within it, where chatter may beat.
@@ -102,17 +106,20 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
     let is_loud = |turn: &usize| levels.smallest(*turn) >= LOUD;
     let first = cut.clone().find(is_loud)?;
     let last = cut.clone().rev().find(is_loud)?;
-    let way_in = Passage::way_in_s(&cutter, &Spindle::new(60.0 / turn_s)).unwrap_or(0.0) / turn_s;
-    let beyond = |turns: usize| (UNSEEN * way_in).max(BEYOND_LOUD * turns as f64) + 1.0;
+    let by_diameter = Passage::way_in_s(&cutter, &Spindle::new(60.0 / turn_s)).ok();
+    let loud_after = BEYOND_LOUD * (first - cut.start) as f64;
+    let way = by_diameter.map_or(loud_after, |seconds| seconds / turn_s);
     let from = match cut.start {
         0 => 0.0,
-        start => start as f64 + beyond(first - start),
+        start => start as f64 + (UNSEEN * way).max(loud_after) + 1.0,
     };
-    // Who records air before the cut may stop when the cut is over, before all is quiet.
+    // Who records air before the cut may stop when the cut is over, before all is quiet. Chatter is loud to the end of the way out.
     let to = if cut.end == levels.count && cut.end - last <= FEWEST_AT_ENDS {
         f64::INFINITY
     } else {
-        cut.end as f64 - beyond(cut.end - 1 - last)
+        let loud_before = BEYOND_LOUD * (cut.end - 1 - last) as f64;
+        let out = if levels.chatters { UNSEEN } else { SEEN_OUT };
+        cut.end as f64 - (out * way).max(loud_before) - 1.0
     };
     let sample =
         |turn: f64| ((turn * turn_s * recording.sample_rate_hz).max(0.0) as usize).min(recording.len());
@@ -197,6 +204,8 @@ fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
 /// more, what the feed alone makes of it.
 struct Levels {
     count: usize,
+    /// True where the median is more by far.
+    chatters: bool,
     /// By channel.
     of: Vec<Vec<f64>>,
     /// The noise of each.
@@ -211,6 +220,7 @@ impl Levels {
         let count = (recording.len() as f64 / per_turn) as usize;
         let mut levels = Self {
             count,
+            chatters: false,
             of: Vec::new(),
             noise: Vec::new(),
         };
@@ -223,8 +233,10 @@ impl Levels {
                 .map(|turn| [turn, turn + 1].map(|turn| (turn as f64 * per_turn) as usize))
                 .map(|[from, to]| deviation(&channel.samples[from..to], noise))
                 .collect();
-            let in_cut = median(&mut turns.clone()).min(forced.level(&pickup, rate_hz));
+            let (usual, fed) = (median(&mut turns.clone()), forced.level(&pickup, rate_hz));
+            let in_cut = usual.min(fed);
             if in_cut > TELLING * noise {
+                levels.chatters |= usual > CHATTER * fed;
                 levels.of.push(turns.iter().map(|level| level / in_cut).collect());
                 levels.noise.push(noise / in_cut);
             }
