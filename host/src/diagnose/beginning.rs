@@ -1,7 +1,7 @@
-//! Long records of random forces and of cuts: their beginnings are searched, and what is found there is held against the rest.
+//! Long records of random forces, of blows and of cuts: their beginnings are searched, and what is found there is held against the rest.
 //!
-//! A search computes its records hundreds of times, and a random excitation or a cut at one speed tells in its first seconds what
-//! it tells in a minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of
+//! A search computes its records hundreds of times, and a random excitation, some blows or a cut at one speed tell in their first
+//! seconds what they tell in a minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of
 //! the rest as of the beginnings; and what it gains is told of the rest alone, which nothing was fitted to.
 
 use super::answer::{Diagnosis, Gain, Outcome, Quality};
@@ -22,7 +22,7 @@ const TURNS: f64 = 24.0;
 /// Records are shortened where that leaves less than this share of them.
 const WORTH: f64 = 0.5;
 
-/// The beginnings of records, all of them of random forces or of cuts at one speed, and what comes after them; `None` where they are
+/// The beginnings of records, all of them of random forces, of blows or of cuts at one speed, and what comes after them; `None` where they are
 /// too short to be shortened.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
@@ -45,10 +45,10 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
     ((left as f64) < WORTH * all as f64).then_some([shortened, rest])
 }
 
-/// How long the turns take that the beginning of a record must hold: none of a shaker; `None` of what is not shortened.
+/// How long the turns take that the beginning of a record must hold: none of a shaker or a hammer; `None` of what is not shortened.
 fn turns_s(recording: &Recording) -> Option<f64> {
     match (recording.sidecar.kind, &recording.sidecar.cut) {
-        (Some(Kind::Shaker), _) => Some(0.0),
+        (Some(Kind::Shaker | Kind::Hammer), _) => Some(0.0),
         (Some(Kind::Cutting), Some(cut)) if cut.last_rpm.is_none() => Some(60.0 * TURNS / cut.spindle_rpm?),
         _ => None,
     }

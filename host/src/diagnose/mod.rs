@@ -36,6 +36,8 @@ mod full_cut;
 mod gram;
 mod grid;
 mod guess;
+#[cfg(test)]
+mod hammer_tests;
 mod judge;
 mod leftover;
 pub mod lobes;

@@ -13,7 +13,7 @@ use super::cutting::Cutting;
 use super::decay::Decays;
 use super::grid::Grid;
 use super::motion;
-use super::noise::{BANDS, floor_between_lines, rms, white_floor, white_floor_beside};
+use super::noise::{BANDS, floor_between_lines, quiet_floor, rms, white_floor, white_floor_beside};
 use super::receptance::Receptance;
 use super::scene::{Baseline, Domain, derivatives};
 use crate::recording::{Kind, Quantity, Recording};
@@ -193,7 +193,9 @@ impl Record {
             elsewhere: elsewhere(recording),
             grid,
             channels,
-            force_deviation_n: force_n.each_ref().map(|force| floor_n(force)),
+            force_deviation_n: force_n
+                .each_ref()
+                .map(|force| floor_n(force, recording.sidecar.kind)),
             force_n,
             motion: Motion::default(),
             displacement: std::array::from_fn(|_| Vec::new()),
@@ -525,10 +527,17 @@ fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
 /// A force that is white itself has no floor; its noise is taken to be no more than this share of it.
 const MOST_FORCE_NOISE: f64 = 0.02;
 
-fn floor_n(force_n: &[f64]) -> f64 {
+fn floor_n(force_n: &[f64], kind: Option<Kind>) -> f64 {
     let size = rms(force_n);
+    let quiet_n = if kind == Some(Kind::Hammer) {
+        quiet_floor(force_n)
+    } else {
+        f64::INFINITY
+    };
     if size > 0.0 {
-        white_floor(force_n, size).min(MOST_FORCE_NOISE * size)
+        white_floor(force_n, size)
+            .min(quiet_n)
+            .min(MOST_FORCE_NOISE * size)
     } else {
         0.0
     }
