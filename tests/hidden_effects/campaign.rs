@@ -44,6 +44,8 @@ pub(crate) struct Finding {
     redrawn: usize,
     said: Said,
     right: bool,
+    /// What is named first is hidden; of two effects this is less than right.
+    first: bool,
     /// Of the parameters of causes that were named rightly: how many have their truth in the interval, of how many.
     covered: [usize; 2],
     /// The worst: name and key, truth, interval.
@@ -127,6 +129,11 @@ impl Finding {
         let said = Said::of(&tool(puzzle), began.elapsed().as_secs_f64());
         let hidden: Vec<&'static str> = puzzle.hidden.iter().map(|hidden| hidden.name).collect();
         let wanted: BTreeSet<&str> = hidden.iter().copied().collect();
+        let first = said.outcome == "cause"
+            && said
+                .causes
+                .first()
+                .is_some_and(|cause| cause.is_any_of(&puzzle.hidden, &said.causes));
         let right = match (&puzzle.verdict, puzzle.family) {
             (_, Family::NotInLibrary) => said.outcome == "unexplained",
             (Verdict::Invisible, _) => said.outcome == "none",
@@ -138,11 +145,7 @@ impl Finding {
                     .all(|cause| cause.is_any_of(&puzzle.hidden, &said.causes));
                 said.outcome == "cause" && both && said.names() == wanted
             }
-            _ => {
-                let first = said.causes.first();
-                said.outcome == "cause"
-                    && first.is_some_and(|cause| cause.is_any_of(&puzzle.hidden, &said.causes))
-            }
+            _ => first,
         };
         let (mut covered, mut missed) = ([0, 0], Vec::new());
         if right && puzzle.verdict == Verdict::Separable {
@@ -177,6 +180,7 @@ impl Finding {
             redrawn: puzzle.redrawn,
             said,
             right,
+            first,
             covered,
             missed,
         }
@@ -268,6 +272,11 @@ impl Report {
     /// Right among the separable ones whose every effect is above three times the noise.
     pub(crate) fn separable(&self) -> Share {
         self.share(|f| (f.is_plain() == Some(true)).then_some(f.right))
+    }
+
+    /// Of two effects, each above three times the noise: one of them is named first.
+    fn one_of_two_first(&self) -> Share {
+        self.share(|f| (f.hidden.len() == 2 && f.is_plain() == Some(true)).then_some(f.first))
     }
 
     /// The exact set among the equivalent ones.
@@ -380,6 +389,7 @@ impl fmt::Display for Report {
         }
         for (what, share) in [
             ("right, separable and above 3× noise", self.separable()),
+            ("one of the two first, the same", self.one_of_two_first()),
             ("exact set, equivalent", self.equivalent()),
             ("none, nothing to be seen", self.invisible()),
             ("right, separable and below 3× noise", self.weak()),

@@ -140,6 +140,9 @@ const UNITS: [(f64, f64, &str); 6] = [
 /// before nothing but a unit can be the reason: no resonance and no nonlinearity of a machine brings as much.
 const WRONG_BY: f64 = 4.0;
 const FAR_OFF: f64 = 250.0;
+/// Friction may hold a machine back to this share of what a case without it predicts. Newtons that were read as pounds are then told as a
+/// gain of the sensors.
+const HELD_BACK: f64 = 0.15;
 /// How close to a unit a gain is that is told to be one.
 const GAIN: f64 = 0.03;
 
@@ -172,7 +175,7 @@ pub(super) fn unit(
     let likely = likely(factor);
     // Where no unit is known that would do, the shapes must be the same.
     let least_alike = if likely.is_some() { 0.3 } else { 0.8 };
-    if alike < least_alike || (1.0 / WRONG_BY..WRONG_BY).contains(&factor) {
+    if alike < least_alike || (HELD_BACK..WRONG_BY).contains(&factor) {
         return Ok(());
     }
     Err(DiagnoseError::record(
