@@ -392,7 +392,7 @@ mod tests {
         };
         assert_eq!(cause.name, "wear");
         println!("{:?}", cause.parameters);
-        for (_, figure) in &cause.parameters {
+        for figure in cause.parameters.values() {
             assert!((figure.value / 0.1 - 1.0).abs() < 0.05, "{figure:?}");
         }
     }
