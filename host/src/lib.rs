@@ -1,22 +1,19 @@
 //! What quietcut does with measured data: the library behind the `quietcut` command.
+//!
+//! The parts are crates of their own; here they stand under one roof.
 
-pub mod case;
+pub use quietcut_diagnose as diagnose;
+pub use quietcut_frf as frf;
+pub use quietcut_identify as identify;
+pub use quietcut_identify::plan;
+pub use quietcut_model::{case, milling, structure};
+pub use quietcut_recording as recording;
+pub use quietcut_recording::file;
+pub use quietcut_simulate as simulate;
+pub use quietcut_stability as stability;
+pub use quietcut_stability::{continuation, lobe_table, test_cuts};
+
 pub mod cli;
-mod complex_eigenvalues;
-pub mod continuation;
 pub mod demo;
 pub mod device;
-pub mod diagnose;
-mod eigenvalues;
-pub mod file;
-pub mod frf;
-pub mod identify;
-pub mod lobe_table;
-pub mod milling;
-pub mod plan;
-pub mod recording;
 pub mod report;
-pub mod simulate;
-pub mod stability;
-pub mod structure;
-pub mod test_cuts;

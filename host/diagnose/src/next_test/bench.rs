@@ -1,0 +1,216 @@
+//! A machine and its sensors, as the records show them.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Matrix3;
+use num_complex::Complex64;
+
+use super::experiment::Reading;
+use crate::noise::rms;
+use crate::scene::{Baseline, derivatives};
+use crate::views::View;
+use quietcut_model::case::Case;
+use quietcut_model::milling::Cut;
+use quietcut_recording::{Channel, Kind, Quantity, Recording};
+
+/// Most samples that are simulated of one test.
+const SAMPLES: f64 = 8192.0;
+/// Periods of the slowest mode that a test of the structure lasts at most, and at least.
+const PERIODS: [f64; 2] = [20.0, 60.0];
+/// Samples per period of the fastest mode.
+const SAMPLES_PER_PERIOD: f64 = 24.0;
+/// Noise that is assumed of a sensor that has not been heard yet, as a share of what it says.
+const NOISE: f64 = 0.01;
+/// Longest time constants of the structure after which a cut has settled: records are of tools in full cut.
+const SETTLED: f64 = 12.0;
+/// The longest that is waited for that, in lengths of the record.
+const WAITED: f64 = 4.0;
+
+/// A channel of motion that was heard.
+pub(super) struct Heard {
+    pub(super) name: String,
+    quantity: Quantity,
+    /// Deviation of its noise; 0 where it is not known.
+    deviation: f64,
+}
+
+/// The first of the recorded cuts.
+#[derive(Clone)]
+pub(super) struct CutSoFar {
+    pub(super) rpm: f64,
+    pub(super) depth_mm: f64,
+    /// As its file says it, beside the case.
+    pub(super) cut: Cut,
+}
+
+/// A machine and its sensors.
+pub(super) struct Bench<'a> {
+    pub(super) case: &'a Case,
+    pub(super) baseline: Baseline<'a>,
+    pub(super) channels: Vec<Heard>,
+    /// Natural frequencies, the lowest and the highest.
+    pub(super) modes_hz: [f64; 2],
+    /// True where the force of a cut was measured.
+    pub(super) has_force: bool,
+    /// Peak force of the tests of the structure, N; what moves it as far as the records where none was measured.
+    pub(super) force_n: f64,
+    /// Peak displacement of the records.
+    pub(super) largest_m: f64,
+    /// Length of a test.
+    pub(super) seconds: f64,
+    pub(super) rate_hz: f64,
+    pub(super) cut: Option<CutSoFar>,
+}
+
+impl<'a> Bench<'a> {
+    /// `None` where the machine cannot be simulated, or does not vibrate.
+    pub(super) fn new(case: &'a Case, recordings: &[Recording], views: &[View]) -> Option<Self> {
+        let baseline = Baseline::new(case).ok()?;
+        let modes_hz = [baseline.lowest_hz()?, highest_hz(&baseline)?];
+        let [lowest_hz, highest_hz] = modes_hz;
+        let channels = heard(&baseline, recordings, views);
+        let rate_hz = SAMPLES_PER_PERIOD * highest_hz;
+        let longest_s = recordings
+            .iter()
+            .map(|recording| recording.len() as f64 / recording.sample_rate_hz)
+            .fold(0.0, f64::max);
+        let seconds = longest_s.clamp(PERIODS[0] / lowest_hz, PERIODS[1] / lowest_hz);
+        let of_motion = |channel: &&Channel| is_motion(channel.quantity);
+        let largest_m = channels_of(recordings.iter())
+            .filter(of_motion)
+            .map(|channel| peak(channel) / (TAU * lowest_hz).powi(derivatives(channel.quantity)))
+            .fold(0.0, f64::max);
+        let of_force = |channel: &&Channel| channel.quantity == Quantity::Force;
+        let of_rigs = recordings.iter().filter(|recording| !is_cut(recording));
+        let measured_n = channels_of(of_rigs)
+            .filter(of_force)
+            .map(peak)
+            .fold(0.0, f64::max);
+        let force_n = match measured_n {
+            0.0 => largest_m / compliance(&baseline, lowest_hz),
+            measured_n => measured_n,
+        };
+        let cuts = || recordings.iter().filter(|recording| is_cut(recording));
+        let usable = force_n.is_finite() && force_n > 0.0 && !channels.is_empty();
+        usable.then(|| Self {
+            has_force: channels_of(cuts()).any(|channel| of_force(&channel)),
+            cut: cuts().find_map(|recording| cut_so_far(case, recording)),
+            case,
+            baseline,
+            channels,
+            modes_hz,
+            force_n,
+            largest_m,
+            seconds: seconds.min(SAMPLES / rate_hz),
+            rate_hz,
+        })
+    }
+
+    /// The largest static compliance along an axis, m/N.
+    pub(super) fn static_compliance(&self) -> f64 {
+        compliance(&self.baseline, 0.0)
+    }
+
+    /// The noise of each reading.
+    pub(super) fn deviations(&self, readings: &[Reading]) -> Vec<f64> {
+        let of = |reading: &Reading| {
+            let heard = self.channels.iter().find(|heard| heard.name == reading.name);
+            let known = heard
+                .map(|heard| heard.deviation)
+                .filter(|deviation| *deviation > 0.0);
+            known.unwrap_or_else(|| (NOISE * rms(&reading.samples)).max(f64::MIN_POSITIVE))
+        };
+        readings.iter().map(of).collect()
+    }
+
+    /// How long a cut takes until nothing is left of its beginning, s.
+    pub(super) fn settled_s(&self) -> f64 {
+        (SETTLED * self.baseline.slowest_decay_s()).min(WAITED * self.seconds)
+    }
+
+    /// What the sensors measure, each once.
+    pub(super) fn quantities(&self) -> Vec<Quantity> {
+        let mut all: Vec<Quantity> = Vec::new();
+        for heard in &self.channels {
+            if !all.contains(&heard.quantity) {
+                all.push(heard.quantity);
+            }
+        }
+        all
+    }
+}
+
+fn is_motion(quantity: Quantity) -> bool {
+    matches!(
+        quantity,
+        Quantity::Displacement | Quantity::Velocity | Quantity::Acceleration
+    )
+}
+
+fn is_cut(recording: &Recording) -> bool {
+    recording.sidecar.kind == Some(Kind::Cutting)
+}
+
+fn channels_of<'r>(recordings: impl Iterator<Item = &'r Recording>) -> impl Iterator<Item = &'r Channel> {
+    recordings.flat_map(|recording| &recording.channels)
+}
+
+fn peak(channel: &Channel) -> f64 {
+    channel
+        .samples
+        .iter()
+        .fold(0.0, |most: f64, value| value.abs().max(most))
+}
+
+/// The channels of motion, each name once.
+fn heard(baseline: &Baseline<'_>, recordings: &[Recording], views: &[View]) -> Vec<Heard> {
+    let mut all: Vec<Heard> = Vec::new();
+    for channel in channels_of(recordings.iter()) {
+        let is_known = all.iter().any(|heard| heard.name == channel.name);
+        if is_motion(channel.quantity) && !is_known && baseline.pickup(&channel.name).is_some() {
+            all.push(Heard {
+                name: channel.name.clone(),
+                quantity: channel.quantity,
+                deviation: deviation(views, &channel.name),
+            });
+        }
+    }
+    all
+}
+
+fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
+    let (said, believed) = (recording.sidecar.cut?, case.cut().ok()?);
+    Some(CutSoFar {
+        rpm: said.spindle_rpm?,
+        depth_mm: said.axial_depth_mm?,
+        cut: Cut {
+            start_deg: said.start_deg.unwrap_or(believed.start_deg),
+            exit_deg: said.exit_deg.unwrap_or(believed.exit_deg),
+            feed_per_tooth_mm: said.feed_per_tooth_mm.unwrap_or(believed.feed_per_tooth_mm),
+            feed_direction_deg: believed.feed_direction_deg,
+        },
+    })
+}
+
+/// The noise of a channel, the mean over the records; 0 where it is not known.
+fn deviation(views: &[View], name: &str) -> f64 {
+    let known: Vec<f64> = views
+        .iter()
+        .filter(|view| view.channel == name)
+        .map(|view| view.deviation)
+        .collect();
+    rms(&known)
+}
+
+fn highest_hz(baseline: &Baseline<'_>) -> Option<f64> {
+    let poles = baseline.first_order.poles();
+    let modes = poles.iter().filter(|pole| pole.im > 0.0);
+    modes.map(|pole| pole.norm() / TAU).max_by(f64::total_cmp)
+}
+
+/// The largest compliance along an axis at a frequency, m/N.
+fn compliance(baseline: &Baseline<'_>, frequency_hz: f64) -> f64 {
+    let receptance: Matrix3<Complex64> = baseline.receptance.at(TAU * frequency_hz);
+    let along = baseline.axes.iter().map(|axis| receptance[(*axis, *axis)].norm());
+    along.fold(0.0, f64::max)
+}

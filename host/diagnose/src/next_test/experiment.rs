@@ -1,0 +1,360 @@
+//! Experiments that a machine could make, and what their sensors would say.
+
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+use super::bench::Bench;
+use super::separation::Difference;
+use crate::answer::NextTest;
+use quietcut_model::case::Case;
+use quietcut_model::milling::Cut;
+use quietcut_model::structure::Direction;
+use quietcut_recording::{Quantity, Recording};
+use quietcut_simulate::rig::{Impact, Rig, Signal, Step};
+use quietcut_simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
+
+/// A cut whose motion is so many times that of the records is none that anyone would try.
+const TOO_LARGE: f64 = 10.0;
+/// The smallest blow of a hammer, N.
+const LEAST_BLOW_N: f64 = 1.0;
+/// Which sensors are heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sensors {
+    /// Those that made the records.
+    Mounted,
+    /// Those, and beside each of them another at the tool.
+    Second,
+    /// Those, and a dynamometer.
+    Force,
+}
+
+/// Which sensor a reading is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Of {
+    Mounted,
+    Second,
+    Force,
+}
+
+/// What one sensor says.
+pub(super) struct Reading {
+    pub(super) name: String,
+    of: Of,
+    pub(super) samples: Vec<f64>,
+}
+
+/// Something to do, without what is measured.
+#[derive(Clone, Debug)]
+pub(super) enum Doing {
+    /// A force on the structure at standstill.
+    Rig { direction: Direction, signal: Signal },
+    /// A stable cut.
+    Cut {
+        rpm: f64,
+        depth_mm: f64,
+        feed_per_tooth_mm: f64,
+        seconds: f64,
+    },
+}
+
+/// An experiment.
+#[derive(Clone, Debug)]
+pub(super) struct Experiment {
+    pub(super) doing: Doing,
+    rate_hz: f64,
+    /// How much more work it is than another.
+    pub(super) effort: f64,
+}
+
+impl Sensors {
+    pub(super) fn effort(self) -> f64 {
+        match self {
+            Self::Mounted => 0.0,
+            Self::Second => 1.0,
+            Self::Force => 1.5,
+        }
+    }
+
+    fn described(self) -> Option<&'static str> {
+        match self {
+            Self::Mounted => None,
+            Self::Second => Some("a second sensor at the tool beside each that is mounted"),
+            Self::Force => Some("the cutting force, with a dynamometer"),
+        }
+    }
+}
+
+impl Reading {
+    pub(super) fn is_heard(&self, sensors: Sensors) -> bool {
+        match self.of {
+            Of::Mounted => true,
+            Of::Second => sensors == Sensors::Second,
+            Of::Force => sensors == Sensors::Force,
+        }
+    }
+
+    pub(super) fn described(&self) -> String {
+        match self.of {
+            Of::Second => format!("a second sensor of {}", self.name),
+            Of::Mounted | Of::Force => self.name.clone(),
+        }
+    }
+}
+
+/// Everything that is thought of, with what each costs.
+pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
+    let mut all = Vec::new();
+    for direction in &bench.baseline.structure.directions {
+        all.extend(of_structure(bench, *direction));
+    }
+    all.extend(of_cuts(bench));
+    all
+}
+
+/// A blow, a sweep at three levels and over a longer time, and three levels at the lowest resonance.
+fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
+    let [lowest_hz, highest_hz] = bench.modes_hz;
+    let experiment = |signal: Signal, effort: f64| Experiment {
+        doing: Doing::Rig { direction, signal },
+        rate_hz: bench.rate_hz,
+        effort,
+    };
+    let sweep = |level: f64, longer: f64| Signal::Sweep {
+        first_hz: 0.5 * lowest_hz,
+        last_hz: 1.5 * highest_hz,
+        amplitude_n: level * bench.force_n,
+        seconds: longer * bench.seconds,
+    };
+    let levels = [1.0 / 3.0, 1.0, 3.0].map(|level| Step {
+        frequency_hz: lowest_hz,
+        amplitude_n: level * bench.force_n,
+    });
+    let step_sine = Signal::StepSine {
+        steps: levels.to_vec(),
+        dwell_s: bench.seconds / 8.0,
+        pause_s: bench.seconds / 8.0,
+    };
+    let mut all = vec![
+        experiment(sweep(1.0, 1.0), 1.0),
+        experiment(sweep(1.0 / 3.0, 1.0), 1.1),
+        experiment(step_sine, 1.2),
+        experiment(sweep(3.0, 1.0), 1.3),
+        experiment(sweep(1.0, 4.0), 1.5),
+    ];
+    // Up to the highest mode a half sine of this length excites without a gap: its first zero is at 1.5/pulse. It moves the
+    // structure as far as the records have it: x = ω·impulse/k.
+    let pulse_s = 0.75 / highest_hz;
+    let impulse_ns = bench.largest_m / (TAU * lowest_hz * bench.static_compliance());
+    let peak_n = (impulse_ns / (2.0 / PI * pulse_s)).max(LEAST_BLOW_N);
+    if peak_n.is_finite() {
+        let blow = Impact {
+            start_s: 0.05 * bench.seconds,
+            peak_n,
+            pulse_s,
+        };
+        let signal = Signal::Impacts {
+            impacts: vec![blow],
+            seconds: bench.seconds,
+        };
+        all.push(experiment(signal, 0.9));
+    }
+    all
+}
+
+/// The recorded cut again, at other speeds, depths and feeds, and for longer.
+fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
+    let Some(so_far) = &bench.cut else {
+        return Vec::new();
+    };
+    // Speed, depth, feed and length, each over what it was.
+    let some = [
+        (1.0, 1.0, 1.0, 1.0),
+        (0.8, 1.0, 1.0, 1.0),
+        (1.25, 1.0, 1.0, 1.0),
+        (1.0, 0.5, 1.0, 1.0),
+        (1.0, 1.5, 1.0, 1.0),
+        (1.0, 1.0, 0.5, 1.0),
+        (1.0, 1.0, 2.0, 1.0),
+        (1.0, 1.0, 1.0, 4.0),
+    ];
+    some.into_iter()
+        .map(|(by_rpm, by_depth, by_feed, longer)| Experiment {
+            doing: Doing::Cut {
+                rpm: by_rpm * so_far.rpm,
+                depth_mm: by_depth * so_far.depth_mm,
+                feed_per_tooth_mm: by_feed * so_far.cut.feed_per_tooth_mm,
+                seconds: longer * bench.seconds,
+            },
+            rate_hz: bench.rate_hz,
+            effort: if longer > 1.0 { 1.0 } else { 0.8 },
+        })
+        .collect()
+}
+
+impl Experiment {
+    /// The sensors with which it can be made.
+    pub(super) fn sensors(&self) -> Vec<Sensors> {
+        match self.doing {
+            Doing::Rig { .. } => vec![Sensors::Mounted, Sensors::Second],
+            Doing::Cut { .. } => vec![Sensors::Mounted, Sensors::Second, Sensors::Force],
+        }
+    }
+
+    /// What all sensors say of it, while the machine is `case`; `None` where that cannot be simulated, or moves too far.
+    pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Option<Vec<Reading>> {
+        let mounted = self.recording(bench, case)?;
+        // A sensor that is put beside the mounted ones has none of their faults.
+        let mut faultless = case.clone();
+        faultless
+            .extensions
+            .retain(|name, _| !name.starts_with("sensor-") && name != "cross-axis");
+        let second = self.recording(bench, &faultless)?;
+        let mut all = Vec::new();
+        for (recording, of) in [(&mounted, Of::Mounted), (&second, Of::Second)] {
+            for heard in &bench.channels {
+                let channel = recording
+                    .channels
+                    .iter()
+                    .find(|channel| channel.name == heard.name)?;
+                all.push((heard.name.clone(), of, channel.samples.clone()));
+            }
+        }
+        if let Doing::Cut { .. } = self.doing {
+            let (of, recording) = if bench.has_force {
+                (Of::Mounted, &mounted)
+            } else {
+                (Of::Force, &second)
+            };
+            let forces = recording
+                .channels
+                .iter()
+                .filter(|channel| channel.quantity == Quantity::Force);
+            all.extend(forces.map(|channel| (channel.name.clone(), of, channel.samples.clone())));
+        }
+        let from = match self.doing {
+            Doing::Rig { .. } => 0,
+            Doing::Cut { .. } => (bench.settled_s() * self.rate_hz) as usize,
+        };
+        let whole = all
+            .iter()
+            .all(|(.., samples)| samples.iter().all(|value| value.is_finite()));
+        whole.then(|| {
+            all.into_iter()
+                .map(|(name, of, mut samples)| {
+                    samples.drain(..from.min(samples.len()));
+                    Reading { name, of, samples }
+                })
+                .collect()
+        })
+    }
+
+    fn recording(&self, bench: &Bench<'_>, case: &Case) -> Option<Recording> {
+        match &self.doing {
+            Doing::Rig { direction, signal } => {
+                let mut rig = Rig::new(*direction, signal.clone(), self.rate_hz);
+                rig.measured = bench.quantities();
+                rig.effects = Effects::of_case(case).ok()?;
+                Some(rig.record(case.structure().ok()?, Path::new("next-test")).ok()?.0)
+            }
+            Doing::Cut {
+                rpm,
+                depth_mm,
+                feed_per_tooth_mm,
+                seconds,
+            } => {
+                let mut case = case.clone();
+                case.cut = bench.cut.as_ref().map(|so_far| Cut {
+                    feed_per_tooth_mm: *feed_per_tooth_mm,
+                    ..so_far.cut
+                });
+                let mut measured = bench.quantities();
+                measured.push(Quantity::Force);
+                measured.push(Quantity::Displacement);
+                measured.dedup();
+                let cut = VirtualCut {
+                    entry: Entry::None,
+                    air_s: 0.0,
+                    measured,
+                    ..VirtualCut::new(*rpm, *depth_mm, *seconds + bench.settled_s())
+                };
+                let recorder = Recorder::Ideal {
+                    rate_hz: self.rate_hz,
+                };
+                let tachometer = TachometerModel {
+                    jitter_s: 0.0,
+                    ..TachometerModel::ONE_MARK
+                };
+                let (recording, _) = cut
+                    .record(&case, recorder, tachometer, Path::new("next-test"))
+                    .ok()?;
+                let most = recording
+                    .channels
+                    .iter()
+                    .filter(|channel| channel.quantity == Quantity::Displacement)
+                    .flat_map(|channel| &channel.samples)
+                    .fold(0.0, |most: f64, value| value.abs().max(most));
+                (most <= TOO_LARGE * bench.largest_m).then_some(recording)
+            }
+        }
+    }
+
+    /// As the answer has it.
+    pub(super) fn described(&self, sensors: Sensors, least: &Difference, why: String) -> NextTest {
+        let plain = NextTest {
+            kind: "",
+            direction: None,
+            force_n: Vec::new(),
+            band_hz: None,
+            spindle_rpm: None,
+            axial_depth_mm: None,
+            feed_per_tooth_mm: None,
+            seconds: 0.0,
+            measure: sensors.described(),
+            distance: least.squared.sqrt(),
+            why,
+        };
+        match &self.doing {
+            Doing::Rig { direction, signal } => {
+                let (kind, force_n, band_hz) = match signal {
+                    Signal::Sweep {
+                        first_hz,
+                        last_hz,
+                        amplitude_n,
+                        ..
+                    } => ("sweep", vec![*amplitude_n], Some([*first_hz, *last_hz])),
+                    Signal::StepSine { steps, .. } => (
+                        "step-sine",
+                        steps.iter().map(|step| step.amplitude_n).collect(),
+                        steps.first().map(|step| [step.frequency_hz; 2]),
+                    ),
+                    Signal::Impacts { impacts, .. } => {
+                        ("hammer", impacts.iter().map(|blow| blow.peak_n).collect(), None)
+                    }
+                    Signal::Tones { .. } => ("shaker", Vec::new(), None),
+                    Signal::Release { force_n, .. } => ("free-decay", vec![*force_n], None),
+                };
+                NextTest {
+                    kind,
+                    direction: Some(direction.name()),
+                    force_n,
+                    band_hz,
+                    seconds: signal.duration_s(),
+                    ..plain
+                }
+            }
+            Doing::Cut {
+                rpm,
+                depth_mm,
+                feed_per_tooth_mm,
+                seconds,
+            } => NextTest {
+                kind: "cutting",
+                spindle_rpm: Some(*rpm),
+                axial_depth_mm: Some(*depth_mm),
+                feed_per_tooth_mm: Some(*feed_per_tooth_mm),
+                seconds: *seconds,
+                ..plain
+            },
+        }
+    }
+}

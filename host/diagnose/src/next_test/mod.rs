@@ -1,0 +1,124 @@
+//! The experiment that separates what is still confounded.
+//!
+//! Every explanation that is left is simulated in experiments that the machine could make ([`experiment`]), and what their sensors
+//! would say is compared, in units of the noise and beyond what the parameters of the one can do to look like the other
+//! ([`separation`]). The least effort that separates all of them plainly is proposed: A. C. Atkinson and V. V. Fedorov, The design of
+//! experiments for discriminating between two rival models, Biometrika 62 (1975), T-optimality.
+
+mod bench;
+mod experiment;
+mod separation;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+
+use self::bench::Bench;
+use self::experiment::{Experiment, Sensors, experiments};
+use self::separation::{Difference, Rival};
+use super::answer::{Diagnosis, NextTest, label};
+use quietcut_model::case::Case;
+use quietcut_recording::Recording;
+
+/// Squared distance beyond which a test tells nearly always: the difference of twice the log-likelihoods of two explanations D apart
+/// is D² ± 2D, and [`super::selection::APART`] of it is asked for.
+const PLAIN: f64 = 60.0;
+
+/// What could be done, and what it would tell.
+struct Proposal<'a> {
+    experiment: &'a Experiment,
+    sensors: Sensors,
+    /// Between the two explanations that it separates least.
+    least: Difference,
+    between: [usize; 2],
+}
+
+/// The experiment for the explanations of `diagnosis`; `None` where there are not two, or where nothing can be simulated.
+pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagnosis) -> Option<NextTest> {
+    let explanations = &diagnosis.explanations;
+    if explanations.len() < 2 {
+        return None;
+    }
+    let bench = Bench::new(case, recordings, &diagnosis.views)?;
+    let experiments = experiments(&bench);
+    let rivals: Vec<Rival<'_>> = explanations.iter().map(|causes| Rival { causes }).collect();
+    let proposals: Vec<Proposal<'_>> = experiments
+        .par_iter()
+        .flat_map_iter(|experiment| proposals(&bench, experiment, &rivals))
+        .collect();
+    let plain = |proposal: &&Proposal<'_>| proposal.least.squared >= PLAIN;
+    let best = proposals
+        .iter()
+        .filter(plain)
+        .min_by(|a, b| {
+            let by_effort = a.effort().total_cmp(&b.effort());
+            by_effort.then(b.least.squared.total_cmp(&a.least.squared))
+        })
+        .or_else(|| {
+            proposals
+                .iter()
+                .max_by(|a, b| a.least.squared.total_cmp(&b.least.squared))
+        })?;
+    let [one, other] = best.between.map(|index| label(&explanations[index]));
+    Some(
+        best.experiment
+            .described(best.sensors, &best.least, best.why(&one, &other)),
+    )
+}
+
+/// What one experiment tells, with the sensors that there are and with more.
+fn proposals<'a>(bench: &Bench<'_>, experiment: &'a Experiment, rivals: &[Rival<'_>]) -> Vec<Proposal<'a>> {
+    let readings: Option<Vec<_>> = rivals
+        .iter()
+        .map(|rival| rival.simulated(bench, experiment))
+        .collect();
+    let Some(readings) = readings else {
+        return Vec::new();
+    };
+    let pairs = (0..rivals.len()).flat_map(|one| (one + 1..rivals.len()).map(move |other| [one, other]));
+    let pairs: Vec<[usize; 2]> = pairs.collect();
+    experiment
+        .sensors()
+        .into_iter()
+        .filter_map(|sensors| {
+            let (between, least) = pairs
+                .iter()
+                .map(|pair| {
+                    let [one, other] = pair.map(|index| &readings[index]);
+                    (*pair, separation::between(bench, one, other, sensors))
+                })
+                .min_by(|a, b| a.1.squared.total_cmp(&b.1.squared))?;
+            Some(Proposal {
+                experiment,
+                sensors,
+                least,
+                between,
+            })
+        })
+        .collect()
+}
+
+impl Proposal<'_> {
+    fn effort(&self) -> f64 {
+        self.experiment.effort + self.sensors.effort()
+    }
+
+    fn why(&self, one: &str, other: &str) -> String {
+        let Difference {
+            squared,
+            channel,
+            times_noise,
+        } = &self.least;
+        let distance = squared.sqrt();
+        if *squared >= PLAIN {
+            format!(
+                "separates {one} from {other}: {channel} would differ by {times_noise:.2} times its noise, whatever their parameters are; over the record a distance of {distance:.0} deviations"
+            )
+        } else {
+            format!(
+                "of the tests that were thought of none separates {one} from {other} plainly; this one comes nearest, with a distance of {distance:.1} deviations where {:.1} are needed",
+                PLAIN.sqrt()
+            )
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! How far apart two explanations are in an experiment.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::bench::Bench;
+use super::experiment::{Experiment, Reading, Sensors};
+use crate::answer::{Figure, NINETY_PERCENT, NamedCause};
+use crate::extension::joined;
+use quietcut_model::case::Case;
+
+/// The least step of a parameter by which readings are differenced, as a share of it: the simulation is exact to 1e-9.
+const LEAST_STEP: f64 = 1e-4;
+
+/// An explanation: the causes that act together.
+pub(super) struct Rival<'a> {
+    pub(super) causes: &'a [NamedCause],
+}
+
+/// What an explanation says of an experiment.
+pub(super) struct Predicted {
+    readings: Vec<Reading>,
+    /// By parameter: readings with it moved by a step, and that step in standard deviations of what is known of it.
+    moved: Vec<(Vec<Reading>, f64)>,
+}
+
+/// How plainly two explanations differ.
+#[derive(Clone, Debug)]
+pub(super) struct Difference {
+    /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², readings in deviations of their noise and δ in those of the parameters; of the two ways
+    /// round the smaller.
+    pub(super) squared: f64,
+    /// The channel that says most of it.
+    pub(super) channel: String,
+    /// Root mean square of the difference there, over the noise.
+    pub(super) times_noise: f64,
+}
+
+impl Rival<'_> {
+    /// The readings of an experiment; `None` where it cannot be simulated with this explanation, or runs away.
+    pub(super) fn simulated(&self, bench: &Bench<'_>, experiment: &Experiment) -> Option<Predicted> {
+        let readings = experiment.readings(bench, &self.case(bench.case, None))?;
+        let moved = self
+            .steps()
+            .into_iter()
+            .filter_map(|(cause, key, step, deviations)| {
+                let case = self.case(bench.case, Some((cause, key, step)));
+                Some((experiment.readings(bench, &case)?, deviations))
+            })
+            .collect();
+        Some(Predicted { readings, moved })
+    }
+
+    /// Parameters that are not exactly known: cause, key, step, and the step in standard deviations.
+    fn steps(&self) -> Vec<(usize, &'static str, f64, f64)> {
+        let of = |(index, cause): (usize, &NamedCause)| {
+            let figures: Vec<(&'static str, Figure)> = cause
+                .parameters
+                .iter()
+                .map(|(key, figure)| (*key, *figure))
+                .collect();
+            figures.into_iter().filter_map(
+                move |(
+                    key,
+                    Figure {
+                        value,
+                        ci90: [low, high],
+                    },
+                )| {
+                    let deviation = 0.5 * (high - low) / NINETY_PERCENT;
+                    let step = deviation.max(LEAST_STEP * value.abs());
+                    (deviation > 0.0 && step.is_finite()).then(|| (index, key, step, step / deviation))
+                },
+            )
+        };
+        self.causes.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// The case with these causes, one parameter of one of them moved.
+    fn case(&self, case: &Case, moved: Option<(usize, &'static str, f64)>) -> Case {
+        let tables: Vec<(&str, toml::Table)> = self
+            .causes
+            .iter()
+            .enumerate()
+            .map(|(index, cause)| {
+                let mut table = cause.extension.clone();
+                if let Some((_, key, step)) = moved.filter(|(of, ..)| *of == index) {
+                    move_by(&mut table, key, step);
+                }
+                (cause.name, table)
+            })
+            .collect();
+        let mut extended = case.clone();
+        extended
+            .extensions
+            .extend(joined(tables.iter().map(|(name, table)| (*name, table))));
+        extended
+    }
+}
+
+/// Adds to a number of a table, or of a list in it (`ratio_2` is the second of `ratio`). Keys that only say the same in other words
+/// are in no table.
+fn move_by(table: &mut toml::Table, key: &str, step: f64) {
+    let add = |value: &mut toml::Value| {
+        if let toml::Value::Float(number) = value {
+            *number += step;
+        }
+    };
+    if let Some(value) = table.get_mut(key) {
+        add(value);
+        return;
+    }
+    let numbered = key
+        .rsplit_once('_')
+        .and_then(|(list, number)| Some((list, number.parse::<usize>().ok()?.checked_sub(1)?)));
+    if let Some((list, index)) = numbered
+        && let Some(toml::Value::Array(list)) = table.get_mut(list)
+        && let Some(value) = list.get_mut(index)
+    {
+        add(value);
+    }
+}
+
+/// How far `one` and `other` are apart for these sensors.
+pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sensors: Sensors) -> Difference {
+    let there = nearest(bench, one, other, sensors);
+    let back = nearest(bench, other, one, sensors);
+    if there.squared <= back.squared {
+        there
+    } else {
+        back
+    }
+}
+
+/// What is left of `truth` where the parameters of `model` are free within what is known of them.
+fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sensors) -> Difference {
+    let deviations = bench.deviations(&truth.readings);
+    let heard: Vec<usize> = (0..truth.readings.len())
+        .filter(|index| truth.readings[*index].is_heard(sensors))
+        .collect();
+    let stacked = |a: &[Reading], b: &[Reading]| -> DVector<f64> {
+        let values = heard.iter().flat_map(|&index| {
+            let pairs = a[index].samples.iter().zip(&b[index].samples);
+            let difference: Vec<f64> = pairs.map(|(a, b)| (a - b) / deviations[index]).collect();
+            // Sensors have offsets of their own.
+            let mean = difference.iter().sum::<f64>() / difference.len().max(1) as f64;
+            difference.into_iter().map(move |value| value - mean)
+        });
+        DVector::from_vec(values.collect())
+    };
+    let apart = stacked(&truth.readings, &model.readings);
+    let columns: Vec<DVector<f64>> = model
+        .moved
+        .iter()
+        .map(|(moved, _)| stacked(moved, &model.readings))
+        .collect();
+    let steps: Vec<f64> = model.moved.iter().map(|(_, step)| *step).collect();
+    let (left, squared) = least(&apart, &columns, &steps);
+    let mut from = 0;
+    let sizes = heard.iter().map(|&index| {
+        let count = truth.readings[index].samples.len();
+        let rms = left.rows(from, count).norm() / (count.max(1) as f64).sqrt();
+        from += count;
+        (index, rms)
+    });
+    let (index, times_noise) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0));
+    Difference {
+        squared,
+        channel: truth
+            .readings
+            .get(index)
+            .map_or_else(String::new, Reading::described),
+        times_noise,
+    }
+}
+
+/// What is left of `apart`, and the least of ‖apart − Jδ‖² + Σ (step δ)².
+pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64]) -> (DVector<f64>, f64) {
+    if columns.is_empty() {
+        return (apart.clone(), apart.norm_squared());
+    }
+    let jacobian = DMatrix::from_columns(columns);
+    let known = DVector::from_iterator(steps.len(), steps.iter().map(|step| step * step));
+    let normal = jacobian.tr_mul(&jacobian) + DMatrix::from_diagonal(&known);
+    let Some(step) = normal
+        .cholesky()
+        .map(|normal| normal.solve(&jacobian.tr_mul(apart)))
+    else {
+        return (apart.clone(), apart.norm_squared());
+    };
+    let left = apart - &jacobian * &step;
+    let squared = left.norm_squared() + step.component_mul(&step).dot(&known);
+    (left, squared)
+}

@@ -1,0 +1,115 @@
+//! The proposed test, made: it must tell apart what was confounded.
+
+use std::path::Path;
+
+use super::separation::least;
+use crate::answer::{Diagnosis, Outcome};
+use crate::{Options, diagnose};
+use quietcut_model::case::Case;
+use quietcut_model::structure::Direction;
+use quietcut_recording::{Quantity, Recording};
+use quietcut_simulate::rig::{Impact, Noise, Rig, Signal};
+use quietcut_simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
+
+fn case(name: &str) -> Case {
+    let path = format!("{}/../../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Case::read(Path::new(&path)).unwrap()
+}
+
+/// The same share of noise on every channel.
+fn noisy(mut recording: Recording, seed: u64) -> Recording {
+    let noise = Noise {
+        relative: 0.01,
+        ..Noise::default()
+    };
+    noise.add(&mut recording, seed);
+    recording
+}
+
+/// Two stable cuts whose displacement is measured, without force; what came of their beginning is past.
+fn cuts(case: &Case, effects: &Effects) -> Vec<Recording> {
+    [(900.0, 0.2), (1230.0, 0.15)]
+        .into_iter()
+        .zip(1..)
+        .map(|((rpm, depth_mm), seed)| {
+            let cut = VirtualCut {
+                effects: effects.clone(),
+                entry: Entry::None,
+                measured: vec![Quantity::Displacement],
+                ..VirtualCut::new(rpm, depth_mm, 8.0)
+            };
+            let tachometer = TachometerModel {
+                jitter_s: 0.0,
+                ..TachometerModel::ONE_MARK
+            };
+            let path = format!("cut-{seed}.csv");
+            let recorder = Recorder::Ideal { rate_hz: 2048.0 };
+            let (mut recording, _) = cut.record(case, recorder, tachometer, Path::new(&path)).unwrap();
+            for channel in &mut recording.channels {
+                channel.samples.drain(..4 * 2048);
+            }
+            noisy(recording, seed)
+        })
+        .collect()
+}
+
+fn names(diagnosis: &Diagnosis) -> Vec<&'static str> {
+    diagnosis.names()
+}
+
+#[test]
+fn parameters_take_what_they_can_within_what_is_known_of_them() {
+    use nalgebra::DVector;
+    let apart = DVector::from_vec(vec![3.0, -1.0, 2.0, 0.5]);
+    let column = DVector::from_vec(vec![1.0, 0.0, 1.0, -1.0]);
+    for step in [0.1, 1.0, 30.0] {
+        let (_, squared) = least(&apart, std::slice::from_ref(&column), &[step]);
+        // By trying out.
+        let brute = (-4000..=4000)
+            .map(|n| 1e-3 * f64::from(n))
+            .map(|delta| (&apart - &column * delta).norm_squared() + (step * delta).powi(2))
+            .fold(f64::INFINITY, f64::min);
+        // A grid of 1e-3 misses the least of a parabola of this curvature by at most (3 + 900)·2.5e-7.
+        assert!(
+            (0.0..2.5e-4).contains(&(brute - squared)),
+            "{step}: {squared} {brute}"
+        );
+    }
+    assert_eq!(least(&apart, &[], &[]).1, apart.norm_squared());
+}
+
+#[test]
+fn a_blow_separates_a_gain_from_the_cutting_force_as_it_was_said_to() {
+    let case = case("kuka-kr90-half");
+    let gains = Effects::parse(["sensor-gain=1.2"]).unwrap();
+    let mut records = cuts(&case, &gains);
+    let answer = diagnose(&case, &records, &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Confounded, "{:?}", names(&answer));
+    let test = answer.next_test.unwrap();
+    println!("{}: it {}", test.what(), test.why);
+    assert_eq!((test.kind, test.measure), ("hammer", None), "{test:?}");
+    let direction = Direction::X;
+    assert_eq!(test.direction, Some(direction.name()));
+    let impacts = vec![Impact {
+        start_s: 0.05 * test.seconds,
+        peak_n: test.force_n[0],
+        pulse_s: 0.01,
+    }];
+    let signal = Signal::Impacts {
+        impacts,
+        seconds: test.seconds,
+    };
+    let rig = Rig {
+        measured: vec![Quantity::Displacement],
+        effects: gains,
+        ..Rig::new(direction, signal, 2048.0)
+    };
+    let (blow, _) = rig
+        .record(case.structure().unwrap(), Path::new("blow.csv"))
+        .unwrap();
+    records.push(noisy(blow, 3));
+    let answer = diagnose(&case, &records, &Options::default()).unwrap();
+    assert_eq!(answer.outcome, Outcome::Cause, "{:?}", names(&answer));
+    assert_eq!(names(&answer), ["sensor-gain"]);
+    assert!(answer.next_test.is_none());
+}

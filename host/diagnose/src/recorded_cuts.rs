@@ -1,0 +1,117 @@
+//! The cuts among recordings as cuts that were tried: what came of each is what the signal chain of the device hears in it.
+
+use quietcut_core::detector::Verdict;
+use quietcut_core::monitor::{Monitor, State};
+
+use quietcut_model::case::Case;
+use quietcut_recording::{Kind, RecordedCut, Recording, Sensed, Speed};
+use quietcut_stability::test_cuts::{Outcome, TestCut};
+
+/// Immersion angles and feeds that are no further apart are those of the same chart.
+const SAME_DEG: f64 = 0.5;
+const SAME_FEED: f64 = 1e-3;
+
+/// The recorded cuts that are on the chart of a case: with its immersion and feed, at one speed and one depth, both said.
+pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TestCut> {
+    recordings
+        .iter()
+        .filter(|recording| recording.sidecar.kind == Some(Kind::Cutting))
+        .filter_map(|recording| {
+            let said = recording.sidecar.cut?;
+            Some(TestCut {
+                rpm: said.spindle_rpm.filter(|_| is_on_chart(case, &said))?,
+                depth_mm: said.axial_depth_mm?,
+                outcome: outcome(recording, case.tool.as_ref().map(|tool| tool.teeth)),
+            })
+        })
+        .collect()
+}
+
+fn is_on_chart(case: &Case, said: &RecordedCut) -> bool {
+    let Some(believed) = case.cut else { return false };
+    let near = |said: Option<f64>, believed: f64, apart: f64| {
+        said.is_none_or(|said| (said - believed).abs() <= apart)
+    };
+    said.last_rpm.is_none()
+        && near(said.start_deg, believed.start_deg, SAME_DEG)
+        && near(said.exit_deg, believed.exit_deg, SAME_DEG)
+        && near(
+            said.feed_per_tooth_mm,
+            believed.feed_per_tooth_mm,
+            SAME_FEED * believed.feed_per_tooth_mm,
+        )
+}
+
+/// Chatter where it is heard at any time, stable where that is heard and no chatter; marginal where nothing can be told, or the recording
+/// has nothing that the device could hear.
+fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
+    let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
+    let speed = Speed {
+        rpm: None,
+        teeth: teeth
+            .filter(|_| recorded.is_none())
+            .and_then(|teeth| teeth.try_into().ok()),
+    };
+    let Ok(sensed) = Sensed::new(recording, speed) else {
+        return Outcome::Marginal;
+    };
+    let Ok(monitor) = Monitor::new(sensed.settings) else {
+        return Outcome::Marginal;
+    };
+    let mut state = State::default();
+    let mut heard = Outcome::Marginal;
+    for (block, edges) in sensed.steps() {
+        let report = monitor.step(&mut state, block, edges, None, None);
+        match report.judgement.verdict {
+            verdict if verdict.is_chatter() => return Outcome::Chatter,
+            Verdict::Stable | Verdict::Forced | Verdict::Runout => heard = Outcome::Stable,
+            // Before the tool enters, and after it has left.
+            _ => {}
+        }
+    }
+    heard
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use quietcut_simulate::{Accelerometer, Entry, Recorder, TachometerModel, VirtualCut};
+    use quietcut_stability::{CubicTerms, Problem, line};
+
+    #[test]
+    fn what_came_of_a_recorded_cut_is_what_the_device_hears() {
+        let case = quietcut_testkit::case("kuka-kr90-acetal");
+        let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
+        let limit_mm = line(&problem, 900.0, 8.0, 80)
+            .unwrap()
+            .first_limit
+            .unwrap()
+            .depth_mm;
+        let record = |depth_mm| {
+            let cut = VirtualCut {
+                entry: Entry::Ramp { seconds: 0.2 },
+                ..VirtualCut::new(900.0, depth_mm, 4.0)
+            };
+            let recorder = Recorder::Sensor {
+                accelerometer: Accelerometer::IIS3DWB_16G,
+                seed: 7,
+            };
+            let path = Path::new("cut.csv");
+            cut.record(&case, recorder, TachometerModel::ONE_MARK, path)
+                .unwrap()
+                .0
+        };
+        let shallow = record(0.5 * limit_mm);
+        let mut silent = shallow.clone();
+        silent.channels.retain(|channel| !channel.name.starts_with('a'));
+        let mut elsewhere = shallow.clone();
+        elsewhere.sidecar.cut.as_mut().unwrap().exit_deg = Some(150.0);
+        let cuts = recorded_cuts(&case, &[shallow, record(1.8 * limit_mm), silent, elsewhere]);
+        let outcomes: Vec<Outcome> = cuts.iter().map(|cut| cut.outcome).collect();
+        // That of another immersion is on another chart.
+        assert_eq!(outcomes, [Outcome::Stable, Outcome::Chatter, Outcome::Marginal]);
+        assert_eq!((cuts[1].rpm, cuts[1].depth_mm), (900.0, 1.8 * limit_mm));
+    }
+}

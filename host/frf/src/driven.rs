@@ -1,0 +1,190 @@
+//! Which channels of a recording are the forces and which the responses.
+
+use quietcut_model::structure::Direction;
+use quietcut_recording::{Channel, Quantity, Recording, RecordingError};
+
+use super::FrfError;
+
+/// The channels of a recording that a frequency response function relates.
+#[derive(Clone, Debug)]
+pub(super) struct Driven<'a> {
+    /// The recording.
+    pub(super) recording: &'a Recording,
+    /// Forces, in the order x, y, z.
+    pub(super) forces: Vec<(Direction, &'a Channel)>,
+    /// Responses, in the order x, y, z.
+    pub(super) responses: Vec<Response<'a>>,
+    /// What was chosen for the user.
+    pub(super) warnings: Vec<String>,
+}
+
+/// A response.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Response<'a> {
+    pub(super) direction: Direction,
+    pub(super) channel: &'a Channel,
+    /// How often displacement was differentiated: 0, 1 for a velocity, 2 for an acceleration.
+    pub(super) derivatives: i32,
+}
+
+impl<'a> Driven<'a> {
+    /// The forces and responses of a recording; `chosen` are names of channels where not all are meant.
+    ///
+    /// Forces are those that the sidecar calls input, else all that do not rest. Of several sensors of a direction the
+    /// displacement is taken, else the velocity.
+    ///
+    /// # Errors
+    /// No force, no response, a chosen channel that is not there, an input that is no force.
+    pub(super) fn of(recording: &'a Recording, chosen: &[String]) -> Result<Self, FrfError> {
+        let refused = |error: RecordingError| FrfError::Recording(error);
+        for name in chosen {
+            if recording.channel(name).is_none() {
+                return Err(refused(recording.lacks(format!("channel \"{name}\""))));
+            }
+        }
+        let is_chosen = |channel: &Channel, of: Quantity| {
+            let of_this_kind = |name: &String| {
+                let other = recording.channel(name).map(|channel| channel.quantity);
+                other.is_some_and(|other| (other == Quantity::Force) == (of == Quantity::Force))
+            };
+            !chosen.iter().any(of_this_kind) || chosen.contains(&channel.name)
+        };
+        let (responses, warnings) = responses(recording, is_chosen);
+        let driven = Self {
+            forces: forces(recording, is_chosen)?,
+            responses,
+            recording,
+            warnings,
+        };
+        if driven.forces.is_empty() {
+            return Err(refused(recording.lacks("force fx, fy or fz that drives it")));
+        }
+        if driven.responses.is_empty() {
+            return Err(refused(recording.lacks(
+                "response: a displacement x, y, z, a velocity vx … or an acceleration ax …",
+            )));
+        }
+        Ok(driven)
+    }
+
+    /// Directions of the forces.
+    pub(super) fn force_directions(&self) -> Vec<Direction> {
+        self.forces.iter().map(|(direction, _)| *direction).collect()
+    }
+
+    /// Directions and derivatives of the responses.
+    pub(super) fn response_kinds(&self) -> Vec<(Direction, i32)> {
+        self.responses
+            .iter()
+            .map(|response| (response.direction, response.derivatives))
+            .collect()
+    }
+
+    /// The samples: forces, then responses.
+    pub(super) fn signals(&self) -> Vec<&'a [f64]> {
+        let forces = self.forces.iter().map(|(_, channel)| channel.samples.as_slice());
+        let responses = self
+            .responses
+            .iter()
+            .map(|response| response.channel.samples.as_slice());
+        forces.chain(responses).collect()
+    }
+
+    /// The only force.
+    ///
+    /// # Errors
+    /// There are several; `needed` says what needs one.
+    pub(super) fn only_force(&self, needed: &str) -> Result<&'a Channel, FrfError> {
+        match self.forces.as_slice() {
+            [(_, channel)] => Ok(channel),
+            several => {
+                let names: Vec<&str> = several.iter().map(|(_, channel)| channel.name.as_str()).collect();
+                Err(FrfError::Content {
+                    path: self.recording.path.clone(),
+                    what: format!(
+                        "{} forces ({}), but {needed} needs one; say which by --channel, or by input in the sidecar",
+                        names.len(),
+                        names.join(", ")
+                    ),
+                })
+            }
+        }
+    }
+}
+
+fn forces(
+    recording: &Recording,
+    is_chosen: impl Fn(&Channel, Quantity) -> bool,
+) -> Result<Vec<(Direction, &Channel)>, FrfError> {
+    let inputs = recording.sidecar.input.as_deref();
+    for name in inputs.unwrap_or_default() {
+        let channel = recording.channel(name).ok_or_else(|| {
+            FrfError::Recording(recording.lacks(format!("channel \"{name}\" that input names")))
+        })?;
+        if channel.quantity != Quantity::Force {
+            return Err(FrfError::Content {
+                path: recording.path.clone(),
+                what: format!(
+                    "it is driven by \"{name}\", which is {}; a receptance needs a force",
+                    channel.quantity
+                ),
+            });
+        }
+    }
+    let mut forces = Vec::new();
+    for (direction, name) in AXES.into_iter().zip(["fx", "fy", "fz"]) {
+        let Some(channel) = recording
+            .channel(name)
+            .filter(|channel| channel.quantity == Quantity::Force)
+        else {
+            continue;
+        };
+        let drives = match inputs {
+            Some(names) => names.iter().any(|input| input == name),
+            None => channel.samples.windows(2).any(|pair| pair[0] != pair[1]),
+        };
+        if drives && is_chosen(channel, Quantity::Force) {
+            forces.push((direction, channel));
+        }
+    }
+    Ok(forces)
+}
+
+const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
+
+fn responses<'a>(
+    recording: &'a Recording,
+    is_chosen: impl Fn(&Channel, Quantity) -> bool,
+) -> (Vec<Response<'a>>, Vec<String>) {
+    let (mut responses, mut warnings) = (Vec::new(), Vec::new());
+    for direction in AXES {
+        let found: Vec<Response<'a>> = [
+            ("", Quantity::Displacement),
+            ("v", Quantity::Velocity),
+            ("a", Quantity::Acceleration),
+        ]
+        .into_iter()
+        .zip(0..)
+        .filter_map(|((prefix, quantity), derivatives)| {
+            let channel = recording.channel(&format!("{prefix}{direction}"))?;
+            (channel.quantity == quantity && is_chosen(channel, quantity)).then_some(Response {
+                direction,
+                channel,
+                derivatives,
+            })
+        })
+        .collect();
+        if let [taken, others @ ..] = found.as_slice() {
+            responses.push(*taken);
+            let names: Vec<&str> = others.iter().map(|other| other.channel.name.as_str()).collect();
+            if !names.is_empty() {
+                warnings.push(format!(
+                    "{} is taken for the response in {direction}, not {}; --channel chooses",
+                    taken.channel.name,
+                    names.join(", ")
+                ));
+            }
+        }
+    }
+    (responses, warnings)
+}

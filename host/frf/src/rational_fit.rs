@@ -1,0 +1,250 @@
+//! A sum of modes through measured receptances: common poles by vector fitting.
+//!
+//! Gustavsen and Semlyen (1999), with the poles of all functions in common and each function eliminated by itself
+//! (Deschrijver and others, 2008). This is what tool-tip calibration needs of modal analysis, poles and residues in
+//! a band, and where the fit of complex modes begins.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+/// Rounds of moving the poles; they settle within a few.
+const ROUNDS: usize = 20;
+
+/// A sum of modes H_k(s) = Σ_r R_kr/(s − λ_r) + R*_kr/(s − λ*_r) + d_k + e_k/s², s = iω.
+#[derive(Clone, Debug)]
+pub struct RationalFit {
+    /// The poles with positive imaginary part, 1/s, by rising frequency.
+    pub(crate) poles: Vec<Complex64>,
+    /// Residues, functions by poles.
+    pub residues: Vec<Vec<Complex64>>,
+    /// Root mean square of what is left, as a part of that of the functions.
+    pub(crate) rest: f64,
+}
+
+impl RationalFit {
+    /// The part of one mode in a function.
+    pub(super) fn mode_at(&self, function: usize, mode: usize, frequency_hz: f64) -> Complex64 {
+        let s = Complex64::new(0.0, TAU * frequency_hz);
+        let (pole, residue) = (self.poles[mode], self.residues[function][mode]);
+        residue / (s - pole) + residue.conj() / (s - pole.conj())
+    }
+
+    /// Natural frequency of a mode, Hz.
+    pub(super) fn frequency_hz(&self, mode: usize) -> f64 {
+        self.poles[mode].norm() / TAU
+    }
+}
+
+/// Fits `modes` modes; `None` where there are too few frequencies or the equations break down.
+///
+/// `functions` have a value for each frequency.
+pub(super) fn fit(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) -> Option<RationalFit> {
+    let (first, last) = (*frequency_hz.first()?, *frequency_hz.last()?);
+    if modes == 0 || frequency_hz.len() < 2 * modes + 4 || functions.is_empty() {
+        return None;
+    }
+    // Lightly damped, over the band.
+    let mut poles: Vec<Complex64> = (0..modes)
+        .map(|mode| {
+            let omega = TAU * (first + (last - first) * (mode as f64 + 0.5) / modes as f64);
+            Complex64::new(-0.01 * omega, omega)
+        })
+        .collect();
+    for _ in 0..ROUNDS {
+        poles = moved(frequency_hz, functions, &poles)?;
+    }
+    poles.sort_by(|a, b| a.im.total_cmp(&b.im));
+    residues(frequency_hz, functions, poles)
+}
+
+/// The basis of a pole pair at s: the coefficient of the real and of the imaginary part of a residue.
+fn pair(s: Complex64, pole: Complex64) -> [Complex64; 2] {
+    let (a, b) = ((s - pole).inv(), (s - pole.conj()).inv());
+    [a + b, Complex64::i() * (a - b)]
+}
+
+/// The basis of a function: pole pairs, a constant and the inertia of modes below.
+fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
+    let s = Complex64::new(0.0, TAU * frequency_hz);
+    let mut row: Vec<Complex64> = poles.iter().flat_map(|&pole| pair(s, pole)).collect();
+    row.push(Complex64::ONE / scale);
+    row.push(scale / (s * s));
+    row
+}
+
+/// Poles of the next round: zeros of σ(s) = 1 + Σ c_n φ_n(s), which makes σH a sum of the old poles.
+fn moved(frequency_hz: &[f64], functions: &[&[Complex64]], poles: &[Complex64]) -> Option<Vec<Complex64>> {
+    let own = 2 * poles.len();
+    let scale = TAU * frequency_hz.last()?;
+    let rows = 2 * frequency_hz.len();
+    let mut left = DMatrix::<f64>::zeros(0, own);
+    let mut right = DVector::<f64>::zeros(0);
+    for function in functions {
+        let norm = function.iter().map(|h| h.norm_sqr()).sum::<f64>().sqrt();
+        if norm == 0.0 {
+            continue;
+        }
+        let width = own + 2;
+        let mut matrix = DMatrix::<f64>::zeros(rows, width + own + 1);
+        for (k, (&hertz, h)) in frequency_hz.iter().zip(*function).enumerate() {
+            let (h, row) = (h / norm, basis(hertz, poles, scale));
+            for (column, value) in row.iter().enumerate() {
+                matrix[(2 * k, column)] = value.re;
+                matrix[(2 * k + 1, column)] = value.im;
+                if column < own {
+                    let product = -h * value;
+                    matrix[(2 * k, width + column)] = product.re;
+                    matrix[(2 * k + 1, width + column)] = product.im;
+                }
+            }
+            matrix[(2 * k, width + own)] = h.re;
+            matrix[(2 * k + 1, width + own)] = h.im;
+        }
+        // What is left of the common unknowns once those of this function are gone.
+        balance(&mut matrix, width);
+        let r = matrix.qr().r();
+        let count = (r.nrows() - width).min(own);
+        let at = left.nrows();
+        left = left.resize_vertically(at + count, 0.0);
+        right = right.resize_vertically(at + count, 0.0);
+        for i in 0..count {
+            for j in 0..own {
+                left[(at + i, j)] = r[(width + i, width + j)];
+            }
+            right[at + i] = r[(width + i, width + own)];
+        }
+    }
+    if left.nrows() < own {
+        return None;
+    }
+    let c = left.svd(true, true).solve(&right, 1e-13).ok()?;
+    zeros(poles, &c)
+}
+
+/// Scales the first columns to one: the basis spans many powers of ten, and these unknowns are not used.
+fn balance(matrix: &mut DMatrix<f64>, columns: usize) {
+    for mut column in matrix.column_iter_mut().take(columns) {
+        let norm = column.norm();
+        if norm > 0.0 {
+            column /= norm;
+        }
+    }
+}
+
+/// Zeros of 1 + Σ c_n φ_n: eigenvalues of A − b cᵀ in real form, turned to the stable side.
+fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Option<Vec<Complex64>> {
+    let size = 2 * poles.len();
+    let mut matrix = DMatrix::<f64>::zeros(size, size);
+    for (n, pole) in poles.iter().enumerate() {
+        let at = 2 * n;
+        matrix[(at, at)] = pole.re;
+        matrix[(at, at + 1)] = pole.im;
+        matrix[(at + 1, at)] = -pole.im;
+        matrix[(at + 1, at + 1)] = pole.re;
+        for column in 0..size {
+            matrix[(at, column)] -= 2.0 * c[column];
+        }
+    }
+    if matrix.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let mut upper: Vec<Complex64> = matrix
+        .complex_eigenvalues()
+        .iter()
+        .filter(|value| value.im > 0.0)
+        .map(|value| Complex64::new(-value.re.abs(), value.im))
+        .collect();
+    // Two real ones are a mode that is not there: try again at a place of its own.
+    let highest = poles.iter().map(|pole| pole.im).fold(0.0, f64::max);
+    while upper.len() < poles.len() {
+        let omega = highest * (0.9 + 0.05 * upper.len() as f64);
+        upper.push(Complex64::new(-0.05 * omega, omega));
+    }
+    Some(upper)
+}
+
+/// Residues by least squares, for poles that are settled.
+pub fn residues(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+    poles: Vec<Complex64>,
+) -> Option<RationalFit> {
+    let scale = TAU * frequency_hz.last()?;
+    let width = 2 * poles.len() + 2;
+    let mut matrix = DMatrix::<f64>::zeros(2 * frequency_hz.len(), width);
+    for (k, &hertz) in frequency_hz.iter().enumerate() {
+        for (column, value) in basis(hertz, &poles, scale).iter().enumerate() {
+            matrix[(2 * k, column)] = value.re;
+            matrix[(2 * k + 1, column)] = value.im;
+        }
+    }
+    let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
+    balance(&mut matrix, width);
+    let decomposed = matrix.clone().svd(true, true);
+    let (mut all, mut rest) = (0.0, 0.0);
+    let mut residues = Vec::with_capacity(functions.len());
+    for function in functions {
+        let values = function.iter().flat_map(|h| [h.re, h.im]);
+        let right = DVector::from_iterator(2 * frequency_hz.len(), values);
+        let solution = decomposed.solve(&right, 1e-13).ok()?;
+        // Each function counts alike, however small it is.
+        let norm = right.norm_squared();
+        if norm > 0.0 {
+            rest += (&matrix * &solution - &right).norm_squared() / norm;
+            all += 1.0;
+        }
+        let residue = |mode: usize| {
+            Complex64::new(
+                solution[2 * mode] / norms[2 * mode],
+                solution[2 * mode + 1] / norms[2 * mode + 1],
+            )
+        };
+        residues.push((0..poles.len()).map(residue).collect());
+    }
+    Some(RationalFit {
+        poles,
+        residues,
+        rest: if all > 0.0 { (rest / all).sqrt() } else { 0.0 },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poles_and_residues_of_known_modes_come_back() {
+        let frequency_hz: Vec<f64> = (0..400).map(|k| 5.0 + 0.0625 * f64::from(k)).collect();
+        let poles = [(8.9, 0.015), (10.4, 0.02), (17.5, 0.03)].map(|(hertz, damping): (f64, f64)| {
+            TAU * hertz * Complex64::new(-damping, (1.0 - damping * damping).sqrt())
+        });
+        let residues = [
+            [(1e-6, -2e-4), (0.0, -1e-4), (2e-5, -5e-4)],
+            [(0.0, 1e-4), (1e-6, -3e-4), (0.0, -1e-5)],
+        ];
+        let function = |k: usize| -> Vec<Complex64> {
+            let value = |hertz: &f64| {
+                let s = Complex64::new(0.0, TAU * hertz);
+                let modes = poles.iter().zip(residues[k]).map(|(pole, (re, im))| {
+                    let residue = Complex64::new(re, im);
+                    residue / (s - pole) + residue.conj() / (s - pole.conj())
+                });
+                modes.sum::<Complex64>() + 2e-7 + 1e-3 / (s * s)
+            };
+            frequency_hz.iter().map(value).collect()
+        };
+        let (a, b) = (function(0), function(1));
+        let fit = fit(&frequency_hz, &[&a, &b], 3).unwrap();
+        assert!(fit.rest < 1e-9, "{}", fit.rest);
+        for (k, row) in residues.iter().enumerate() {
+            for (mode, (pole, (re, im))) in poles.iter().zip(row).enumerate() {
+                // What the arithmetic leaves.
+                assert!((fit.poles[mode] - pole).norm() < 1e-6 * pole.norm());
+                let residue = Complex64::new(*re, *im);
+                assert!((fit.residues[k][mode] - residue).norm() < 1e-5 * residue.norm());
+            }
+        }
+    }
+}

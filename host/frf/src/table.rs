@@ -1,0 +1,201 @@
+//! A table of frequency response functions: receptances of the tool centre point over frequency.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Matrix3;
+use num_complex::Complex64;
+
+use super::FrfError;
+use quietcut_model::structure::Direction;
+
+/// One receptance H_ij(f): displacement in direction i per force in direction j, m/N.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frf {
+    /// Direction of the displacement: x, y or z.
+    pub response: Direction,
+    /// Direction of the force: x, y or z.
+    pub force: Direction,
+    /// One value per line of the table, m/N; force and displacement as e^{+iωt}.
+    pub receptance: Vec<Complex64>,
+    /// Ordinary coherence γ² of each line, from 0 to 1; `None` where nothing is known of it.
+    pub coherence: Option<Vec<f64>>,
+}
+
+/// Receptances over common frequencies.
+///
+/// Frequencies ascend and are not negative; there is at least one line and one receptance, none twice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrfTable {
+    path: PathBuf,
+    frequency_hz: Vec<f64>,
+    entries: Vec<Frf>,
+}
+
+impl Frf {
+    /// Both directions in the order of a header: `xy` is displacement in x by force in y.
+    pub fn name(&self) -> String {
+        format!("{}{}", self.response, self.force)
+    }
+}
+
+impl FrfTable {
+    /// A table of given values; `path` is the file it came from or goes to, for messages.
+    ///
+    /// # Errors
+    /// Frequencies that do not ascend from 0 or more, receptances that are not finite, of another length than the
+    /// frequencies, of rotations, or twice the same, coherence outside 0 to 1.
+    pub fn new(path: &Path, frequency_hz: Vec<f64>, entries: Vec<Frf>) -> Result<Self, FrfError> {
+        let table = Self {
+            path: path.into(),
+            frequency_hz,
+            entries,
+        };
+        match table.fault() {
+            None => Ok(table),
+            Some(what) => Err(FrfError::Content {
+                path: path.into(),
+                what,
+            }),
+        }
+    }
+
+    /// What keeps the values from being a table.
+    fn fault(&self) -> Option<String> {
+        if self.frequency_hz.is_empty() || self.entries.is_empty() {
+            return Some(
+                "there is nothing in it; at least one frequency and one receptance are needed".into(),
+            );
+        }
+        if !self.frequency_hz.iter().all(|f| f.is_finite() && *f >= 0.0) {
+            return Some("a frequency is negative or no number; 0 Hz or more is needed".into());
+        }
+        if let Some(pair) = self.frequency_hz.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Some(format!(
+                "{} Hz comes after {} Hz; frequencies must ascend",
+                pair[1], pair[0]
+            ));
+        }
+        for (index, entry) in self.entries.iter().enumerate() {
+            let name = entry.name();
+            if entry.response.axis().is_none() || entry.force.axis().is_none() {
+                return Some(format!(
+                    "h{name} has a rotation; directions x, y and z are needed"
+                ));
+            }
+            if self.entries[..index].iter().any(|other| other.name() == name) {
+                return Some(format!("h{name} is given twice"));
+            }
+            let lines = self.frequency_hz.len();
+            let coherence = entry.coherence.as_deref().unwrap_or_default();
+            if entry.receptance.len() != lines || !(coherence.is_empty() || coherence.len() == lines) {
+                return Some(format!(
+                    "h{name} does not have one value for each of {lines} frequencies"
+                ));
+            }
+            if !entry.receptance.iter().all(|h| h.is_finite()) {
+                return Some(format!("h{name} has a value that is no finite number"));
+            }
+            if let Some(wrong) = coherence.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+                return Some(format!(
+                    "coherence_{name} is {wrong}; a number from 0 to 1 is needed"
+                ));
+            }
+        }
+        None
+    }
+
+    /// The file it came from or goes to.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Frequencies of the lines, Hz, ascending.
+    pub fn frequency_hz(&self) -> &[f64] {
+        &self.frequency_hz
+    }
+
+    /// The receptances, in the order of the file.
+    pub fn entries(&self) -> &[Frf] {
+        &self.entries
+    }
+
+    /// The receptance of displacement in `response` by force in `force`; `None` where it was not measured.
+    pub fn entry(&self, response: Direction, force: Direction) -> Option<&Frf> {
+        self.entries
+            .iter()
+            .find(|entry| entry.response == response && entry.force == force)
+    }
+
+    /// The receptances of x, y and z that the table does not have, as `xy`.
+    pub fn missing(&self) -> Vec<String> {
+        const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
+        AXES.iter()
+            .flat_map(|&response| AXES.iter().map(move |&force| (response, force)))
+            .filter(|&(response, force)| self.entry(response, force).is_none())
+            .map(|(response, force)| format!("{response}{force}"))
+            .collect()
+    }
+
+    /// H of one line, m/N, rows displacement, columns force in x, y, z; zero where nothing was measured.
+    ///
+    /// `None` beyond the last line.
+    pub fn line(&self, index: usize) -> Option<Matrix3<Complex64>> {
+        let mut matrix = Matrix3::zeros();
+        for entry in &self.entries {
+            if let (Some(i), Some(j)) = (entry.response.axis(), entry.force.axis()) {
+                matrix[(i, j)] = *entry.receptance.get(index)?;
+            }
+        }
+        (index < self.frequency_hz.len()).then_some(matrix)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(response: Direction, force: Direction, values: &[f64]) -> Frf {
+        Frf {
+            response,
+            force,
+            receptance: values.iter().map(|&value| Complex64::from(value)).collect(),
+            coherence: None,
+        }
+    }
+
+    #[test]
+    fn missing_receptances_are_zero_and_named() {
+        use Direction::{X, Y};
+        let entries = vec![entry(X, X, &[1.0, 2.0]), entry(X, Y, &[3.0, 4.0])];
+        let table = FrfTable::new(Path::new("a.csv"), vec![1.0, 2.0], entries).unwrap();
+        assert_eq!(table.missing(), ["xz", "yx", "yy", "yz", "zx", "zy", "zz"]);
+        let line = table.line(1).unwrap();
+        assert_eq!(
+            (line[(0, 0)].re, line[(0, 1)].re, line[(1, 0)].re),
+            (2.0, 4.0, 0.0)
+        );
+        assert!(table.line(2).is_none());
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused() {
+        use Direction::{Rx, X};
+        let refused = |frequencies: &[f64], entries: Vec<Frf>, said: &str| {
+            let error = FrfTable::new(Path::new("a.csv"), frequencies.to_vec(), entries).unwrap_err();
+            assert!(error.to_string().contains(said), "{error}");
+        };
+        let good = || entry(X, X, &[1.0, 2.0]);
+        refused(&[], vec![good()], "nothing");
+        refused(&[2.0, 1.0], vec![good()], "ascend");
+        refused(&[-1.0, 1.0], vec![good()], "negative");
+        refused(&[1.0, 2.0], vec![good(), good()], "twice");
+        refused(&[1.0, 2.0, 3.0], vec![good()], "each of 3");
+        refused(&[1.0, 2.0], vec![entry(Rx, X, &[1.0, 2.0])], "rotation");
+        refused(&[1.0, 2.0], vec![entry(X, X, &[1.0, f64::NAN])], "finite");
+        let incoherent = Frf {
+            coherence: Some(vec![0.5, 1.5]),
+            ..good()
+        };
+        refused(&[1.0, 2.0], vec![incoherent], "1.5");
+    }
+}

@@ -1,0 +1,440 @@
+//! The table in a file: CSV with `frequency_hz,hxx_re [m/N],hxx_im [m/N],hxy_re [m/N],…`, optional `coherence_xx`.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use num_complex::Complex64;
+
+use super::{Frf, FrfError, FrfTable};
+use quietcut_model::structure::Direction;
+use quietcut_recording::{Quantity, Unit};
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Content {
+    Frequency,
+    Receptance {
+        pair: Pair,
+        part: Part,
+        unit: Compliance,
+    },
+    Coherence(Pair),
+}
+
+/// Direction of the displacement and of the force.
+type Pair = (Direction, Direction);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Real,
+    Imaginary,
+}
+
+/// The unit of a frequency response function: SI units in one of it, and how often displacement was differentiated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Compliance {
+    factor: f64,
+    derivatives: i32,
+}
+
+struct Column {
+    title: String,
+    content: Content,
+    values: Vec<f64>,
+}
+
+impl FrfTable {
+    /// Reads a table: CSV, or UFF 58 where the name ends so.
+    ///
+    /// Displacement (m, mm, um, nm), velocity or acceleration per force (N, kN): mobility and accelerance become
+    /// receptance. A header without unit is m/N. Lines that begin with # are comments.
+    ///
+    /// # Errors
+    /// The file cannot be read; a column whose name or unit is not known or whose other part is missing; a line with a
+    /// value that is no number, or whose frequency does not ascend.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, FrfError> {
+        let path = path.as_ref();
+        let ending = quietcut_recording::file::ending(path);
+        match ending.as_str() {
+            "uff" | "unv" | "bunv" => super::table_uff::read(path),
+            _ => Self::parse(path, &quietcut_recording::file::read_text(path)?),
+        }
+    }
+
+    /// A table from the text of a file; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`FrfTable::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, FrfError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .comment(Some(b'#'))
+            .from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|error| malformed(path, &error))?.clone();
+        let mut columns = header
+            .iter()
+            .map(|title| column(path, title))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut record = csv::StringRecord::new();
+        while reader
+            .read_record(&mut record)
+            .map_err(|error| malformed(path, &error))?
+        {
+            push_line(path, &mut columns, &record)?;
+        }
+        assemble(path, columns)
+    }
+
+    /// Writes the table to `path`: afterwards the file is there whole, or what was there before still is.
+    ///
+    /// Numbers are written with all their digits: what is read back is the same table.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), FrfError> {
+        quietcut_recording::file::write_with(path, |writer| {
+            let mut writer = csv::Writer::from_writer(writer);
+            let mut titles = vec!["frequency_hz".to_owned()];
+            for entry in self.entries() {
+                let name = entry.name();
+                titles.push(format!("h{name}_re [m/N]"));
+                titles.push(format!("h{name}_im [m/N]"));
+                if entry.coherence.is_some() {
+                    titles.push(format!("coherence_{name}"));
+                }
+            }
+            writer.write_record(&titles)?;
+            for (index, frequency_hz) in self.frequency_hz().iter().enumerate() {
+                let mut row = vec![frequency_hz.to_string()];
+                for entry in self.entries() {
+                    let value = entry.receptance[index];
+                    row.push(format!("{:e}", value.re));
+                    row.push(format!("{:e}", value.im));
+                    row.extend(
+                        entry
+                            .coherence
+                            .iter()
+                            .map(|coherence| coherence[index].to_string()),
+                    );
+                }
+                writer.write_record(&row)?;
+            }
+            writer.flush()
+        })?;
+        Ok(())
+    }
+}
+
+fn malformed(path: &Path, error: &csv::Error) -> FrfError {
+    FrfError::Line {
+        path: path.into(),
+        line: error.position().map_or(1, csv::Position::line),
+        what: error.to_string(),
+    }
+}
+
+fn column(path: &Path, title: &str) -> Result<Column, FrfError> {
+    let wrong = |what: String| FrfError::Column {
+        path: path.into(),
+        column: title.into(),
+        what,
+    };
+    let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.split_once('[')) {
+        Some((name, unit)) => (name.trim(), Some(unit.trim())),
+        None => (title, None),
+    };
+    let part = |name: &str| {
+        let (pair, part) = name.strip_prefix('h')?.split_once('_')?;
+        let part = match part {
+            "re" => Part::Real,
+            "im" => Part::Imaginary,
+            _ => return None,
+        };
+        Some((pair_of(pair)?, part))
+    };
+    let content = if name == "frequency_hz" && unit.is_none_or(|unit| unit == "Hz") {
+        Content::Frequency
+    } else if let Some((pair, part)) = part(name) {
+        Content::Receptance {
+            pair,
+            part,
+            unit: unit.map_or(Ok(Compliance::SI), compliance).map_err(wrong)?,
+        }
+    } else if let Some(pair) = name.strip_prefix("coherence_").and_then(pair_of)
+        && unit.is_none_or(|unit| unit == "1")
+    {
+        Content::Coherence(pair)
+    } else {
+        return Err(wrong(
+            "no column of a table of frequency response functions; frequency_hz, hxy_re [m/N], hxy_im [m/N] and \
+             coherence_xy with x, y or z in both places are"
+                .into(),
+        ));
+    };
+    Ok(Column {
+        title: title.into(),
+        content,
+        values: Vec::new(),
+    })
+}
+
+/// `xy`: displacement in x by force in y.
+fn pair_of(text: &str) -> Option<Pair> {
+    let axis = |text: &str| {
+        let direction: Direction = text.parse().ok()?;
+        direction.axis().map(|_| direction)
+    };
+    let (response, force) = text.split_at_checked(1)?;
+    Some((axis(response)?, axis(force)?))
+}
+
+impl Compliance {
+    const SI: Self = Self {
+        factor: 1.0,
+        derivatives: 0,
+    };
+
+    /// The receptance, m/N, of a value in this unit; `None` where it cannot be integrated: at 0 Hz.
+    fn receptance(self, value: Complex64, frequency_hz: f64) -> Option<Complex64> {
+        let rate = Complex64::new(0.0, TAU * frequency_hz).powi(self.derivatives);
+        let receptance = value * self.factor / rate;
+        receptance.is_finite().then_some(receptance)
+    }
+}
+
+/// A unit such as `um/N`, `m/s^2/N` or `g/N`.
+fn compliance(text: &str) -> Result<Compliance, String> {
+    let wrong = || {
+        format!(
+            "\"{text}\" is no unit of it; a displacement, velocity or acceleration per force such as m/N, um/N or \
+             (m/s^2)/N is needed"
+        )
+    };
+    let (response, force) = text.rsplit_once('/').ok_or_else(wrong)?;
+    let response = response
+        .strip_prefix('(')
+        .and_then(|inner| inner.strip_suffix(')'))
+        .unwrap_or(response);
+    let response: Unit = response.parse().map_err(|_| wrong())?;
+    let force: Unit = force.parse().map_err(|_| wrong())?;
+    let derivatives = match response.quantity {
+        Quantity::Displacement => 0,
+        Quantity::Velocity => 1,
+        Quantity::Acceleration => 2,
+        _ => return Err(wrong()),
+    };
+    if force.quantity != Quantity::Force {
+        return Err(wrong());
+    }
+    Ok(Compliance {
+        factor: response.factor / force.factor,
+        derivatives,
+    })
+}
+
+fn push_line(path: &Path, columns: &mut [Column], record: &csv::StringRecord) -> Result<(), FrfError> {
+    let line = record.position().map_or(0, csv::Position::line);
+    let wrong = |what: String| FrfError::Line {
+        path: path.into(),
+        line,
+        what,
+    };
+    if record.len() != columns.len() {
+        return Err(wrong(format!(
+            "{} values, but the header has {} columns",
+            record.len(),
+            columns.len()
+        )));
+    }
+    for (column, field) in columns.iter_mut().zip(record) {
+        let (title, previous) = (&column.title, column.values.last().copied());
+        let needed = |what: &str| wrong(format!("\"{field}\" in column \"{title}\": {what} is needed"));
+        let value = match field.parse::<f64>() {
+            Ok(value) if value.is_finite() => value,
+            _ => return Err(needed("a number")),
+        };
+        match column.content {
+            Content::Frequency if value < 0.0 => return Err(needed("a frequency of 0 or more")),
+            Content::Frequency if previous.is_some_and(|previous| previous >= value) => {
+                return Err(needed("a frequency above that of the line before"));
+            }
+            Content::Coherence(_) if !(0.0..=1.0).contains(&value) => {
+                return Err(needed("a number from 0 to 1"));
+            }
+            _ => column.values.push(value),
+        }
+    }
+    Ok(())
+}
+
+fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
+    let lacks = |what: String| FrfError::Content {
+        path: path.into(),
+        what,
+    };
+    for (index, column) in columns.iter().enumerate() {
+        let same = |other: &Column| match (column.content, other.content) {
+            (
+                Content::Receptance { pair, part, .. },
+                Content::Receptance {
+                    pair: others,
+                    part: other,
+                    ..
+                },
+            ) => pair == others && part == other,
+            (one, other) => one == other,
+        };
+        if columns[..index].iter().any(same) {
+            return Err(lacks(format!("column \"{}\" is there twice", column.title)));
+        }
+    }
+    let frequency_hz = columns
+        .iter()
+        .find(|column| column.content == Content::Frequency)
+        .ok_or_else(|| lacks("there is no column frequency_hz".into()))?
+        .values
+        .clone();
+    let mut entries: Vec<Frf> = Vec::new();
+    for column in &columns {
+        let Content::Receptance { pair, part, unit } = column.content else {
+            continue;
+        };
+        let other = columns.iter().find_map(|other| match other.content {
+            Content::Receptance {
+                pair: others,
+                part: other_part,
+                unit,
+            } if others == pair && other_part != part => Some((&other.values, unit)),
+            _ => None,
+        });
+        let Some((other, other_unit)) = other else {
+            return Err(lacks(format!(
+                "column \"{}\" stands alone; real and imaginary part are needed",
+                column.title
+            )));
+        };
+        // Each pair is made once, where its real part stands.
+        if part == Part::Imaginary {
+            continue;
+        }
+        if unit != other_unit {
+            return Err(lacks(format!(
+                "column \"{}\" and its imaginary part have different units",
+                column.title
+            )));
+        }
+        let receptance = frequency_hz
+            .iter()
+            .zip(column.values.iter().zip(other))
+            .map(|(&f, (&re, &im))| {
+                unit.receptance(Complex64::new(re, im), f).ok_or_else(|| {
+                    lacks(format!(
+                        "column \"{}\" cannot be turned into a receptance at {f} Hz; leave out that line",
+                        column.title
+                    ))
+                })
+            })
+            .collect::<Result<_, _>>()?;
+        entries.push(Frf {
+            response: pair.0,
+            force: pair.1,
+            receptance,
+            coherence: coherence_of(&columns, pair),
+        });
+    }
+    if let Some(orphan) = columns.iter().find(
+        |column| matches!(column.content, Content::Coherence(pair) if !entries.iter().any(|e| (e.response, e.force) == pair)),
+    ) {
+        return Err(lacks(format!(
+            "column \"{}\" has no receptance it belongs to",
+            orphan.title
+        )));
+    }
+    FrfTable::new(path, frequency_hz, entries)
+}
+
+fn coherence_of(columns: &[Column], pair: Pair) -> Option<Vec<f64>> {
+    columns
+        .iter()
+        .find(|column| column.content == Content::Coherence(pair))
+        .map(|column| column.values.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<FrfTable, FrfError> {
+        FrfTable::parse(Path::new("a.csv"), text)
+    }
+
+    #[test]
+    fn units_become_si() {
+        let table = parse(
+            "# from a tap test\nfrequency_hz,hxx_re [um/N],hxx_im [um/N],hyx_re [m/s^2/N],hyx_im [m/s^2/N],coherence_xx\n\
+             10,1,-2,3,4,0.9\n20,2,-3,4,5,1\n",
+        )
+        .unwrap();
+        assert_eq!(table.frequency_hz(), [10.0, 20.0]);
+        let h = table.line(0).unwrap();
+        assert!((h[(0, 0)] - Complex64::new(1e-6, -2e-6)).norm() < 1e-20);
+        let accelerance = -h[(1, 0)] * (TAU * 10.0).powi(2);
+        assert!((accelerance - Complex64::new(3.0, 4.0)).norm() < 1e-13);
+        assert_eq!(table.entries()[0].coherence, Some(vec![0.9, 1.0]));
+        assert_eq!(table.entries()[1].coherence, None);
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let table = parse(
+            "frequency_hz,hxx_re [m/N],hxx_im [m/N],coherence_xx,hzy_re,hzy_im\n0.1,1.25e-7,-0.333e-9,0.5,1,2\n\
+             7,1e-300,4.940656e-10,1,-0.1,0.30000000000000004\n",
+        )
+        .unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frf.csv");
+        table.write(&path).unwrap();
+        let again = FrfTable::read(&path).unwrap();
+        assert_eq!(again.entries(), table.entries());
+        assert_eq!(again.frequency_hz(), table.frequency_hz());
+    }
+
+    #[test]
+    fn wrong_tables_are_refused_with_file_line_and_value() {
+        let refused = |text: &str, said: &[&str]| {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains("a.csv"), "{error}");
+            for said in said {
+                assert!(error.contains(said), "{error}: {said}");
+            }
+        };
+        let header = "frequency_hz,hxx_re [m/N],hxx_im [m/N]\n";
+        refused(
+            &format!("{header}1,2,x\n"),
+            &["line 2", "\"x\"", "hxx_im", "number"],
+        );
+        refused(&format!("{header}2,1,1\n1,1,1\n"), &["line 3", "\"1\"", "above"]);
+        refused(&format!("{header}-2,1,1\n"), &["line 2", "-2"]);
+        refused(&format!("{header}1,2\n"), &["line 2", "3 columns"]);
+        refused(header, &["nothing"]);
+        refused("frequency_hz,hxx_re [m/N]\n1,2\n", &["hxx_re", "imaginary"]);
+        refused("hxx_re [m/N],hxx_im [m/N]\n1,2\n", &["frequency_hz"]);
+        refused(
+            "frequency_hz,hxx_re [N/m],hxx_im [N/m]\n1,2,3\n",
+            &["hxx_re", "N/m"],
+        );
+        refused("frequency_hz,hxx_re [um/N],hxx_im [m/N]\n1,2,3\n", &["units"]);
+        refused("frequency_hz,hxr_re,hxr_im\n1,2,3\n", &["hxr_re"]);
+        refused("frequency_hz,hxx_re,hxx_re,hxx_im\n1,2,3,4\n", &["twice"]);
+        refused(
+            "frequency_hz,hxx_re,hxx_im,coherence_xx\n1,2,3,1.5\n",
+            &["line 2", "1.5"],
+        );
+        refused(
+            "frequency_hz,hxx_re,hxx_im,coherence_xy\n1,2,3,1\n",
+            &["coherence_xy"],
+        );
+        refused("frequency_hz,hxx_re [g/N],hxx_im [g/N]\n0,2,3\n", &["0 Hz"]);
+    }
+}

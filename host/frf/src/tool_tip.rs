@@ -1,0 +1,329 @@
+//! Tool-tip calibration: a sensor on the spindle housing, and what the tool tip does.
+//!
+//! Where spindle, holder and tool move as a rigid body in a mode, tip T and sensor S keep the ratio φ_T/φ_S of their
+//! mode shape (equations 7.13 and 7.14). Two blows of a hammer at the tip, one with the sensor where it sits during
+//! the cut and one with a sensor at the tip, give it for each mode.
+
+use num_complex::Complex64;
+
+use super::rational_fit::{RationalFit, fit};
+use super::{Frf, FrfError, FrfTable};
+use quietcut_model::structure::Direction;
+
+/// The most modes that are looked for.
+const MODES_MAX: usize = 8;
+
+/// A further mode must take off this part of what is left, to be one.
+const WORTH: f64 = 0.3;
+
+/// What is left of a good fit, as a part: no mode is looked for beyond.
+const GOOD: f64 = 2e-3;
+
+/// Farthest that a mode may move between the calibration and the cut, as a part of its frequency.
+const SAME: f64 = 0.15;
+
+/// Part of the largest residue below which a pole is noise, no mode.
+const MODE: f64 = 2e-3;
+
+/// The ratio of tip and sensor in one mode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModeRatio {
+    /// Natural frequency, Hz, in the calibration.
+    pub frequency_hz: f64,
+    /// Direction of the response.
+    pub response: Direction,
+    /// φ_T/φ_S.
+    pub ratio: f64,
+    /// How far the residues are from this ratio: root mean square, as a part. A rigid body in a clean measurement has
+    /// few hundredths.
+    pub misfit: f64,
+}
+
+/// Receptances at the tool tip from those at a sensor on the housing.
+///
+/// `housing` and `tip` are the calibration: responses at the sensor and at the tip to forces at the tip. `measured` is
+/// what is calibrated, with responses at the same sensor. Each of its modes is fitted, and multiplied by the ratio of
+/// the nearest mode of the calibration: H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r. With one mode this is equation (7.14);
+/// with several, the tail of each mode gets its own ratio as well.
+///
+/// # Errors
+/// Tables without a receptance in common, too few lines, a mode without a counterpart in the calibration.
+pub fn calibrate(
+    measured: &FrfTable,
+    housing: &FrfTable,
+    tip: &FrfTable,
+) -> Result<(FrfTable, Vec<ModeRatio>), FrfError> {
+    let ratios = ratios(housing, tip)?;
+    let refused = |what: String| FrfError::Content {
+        path: measured.path().into(),
+        what,
+    };
+    let functions: Vec<&[Complex64]> = measured
+        .entries()
+        .iter()
+        .map(|entry| entry.receptance.as_slice())
+        .collect();
+    let modes = modes(measured.frequency_hz(), &functions)
+        .ok_or_else(|| refused("no mode can be fitted to it; a band with a resonance is needed".into()))?;
+    let mut entries: Vec<Frf> = measured.entries().to_vec();
+    for mode in mode_numbers(&modes) {
+        let hertz = modes.frequency_hz(mode);
+        for (function, entry) in entries.iter_mut().enumerate() {
+            let ratio = nearest(&ratios, hertz, entry.response).ok_or_else(|| {
+                let known: Vec<String> = ratios.iter().map(|ratio| format!("{:.2} ({})", ratio.frequency_hz, ratio.response)).collect();
+                refused(format!(
+                    "its mode at {hertz:.2} Hz has no counterpart in {} for the response in {}; calibrated are {} Hz",
+                    housing.path().display(),
+                    entry.response,
+                    known.join(", ")
+                ))
+            })?;
+            for (value, &line_hz) in entry.receptance.iter_mut().zip(measured.frequency_hz()) {
+                *value += (ratio.ratio - 1.0) * modes.mode_at(function, mode, line_hz);
+            }
+        }
+    }
+    Ok((
+        FrfTable::new(measured.path(), measured.frequency_hz().to_vec(), entries)?,
+        ratios,
+    ))
+}
+
+fn nearest(ratios: &[ModeRatio], hertz: f64, response: Direction) -> Option<&ModeRatio> {
+    let off = |ratio: &ModeRatio| (ratio.frequency_hz / hertz).ln().abs();
+    ratios
+        .iter()
+        .filter(|ratio| ratio.response == response && off(ratio) < SAME)
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
+/// The ratios of all modes and directions of a calibration.
+fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError> {
+    let refused = |what: String| FrfError::Content {
+        path: tip.path().into(),
+        what,
+    };
+    if housing.frequency_hz() != tip.frequency_hz() {
+        return Err(refused(format!(
+            "other frequencies than {}; measure both with one resolution and band",
+            housing.path().display()
+        )));
+    }
+    let pairs: Vec<(&Frf, &Frf)> = tip
+        .entries()
+        .iter()
+        .filter_map(|at_tip| Some((housing.entry(at_tip.response, at_tip.force)?, at_tip)))
+        .collect();
+    if pairs.is_empty() {
+        return Err(refused(format!(
+            "no receptance in common with {}",
+            housing.path().display()
+        )));
+    }
+    let functions: Vec<&[Complex64]> = pairs
+        .iter()
+        .flat_map(|(at_sensor, at_tip)| [at_sensor.receptance.as_slice(), at_tip.receptance.as_slice()])
+        .collect();
+    let modes = modes(tip.frequency_hz(), &functions)
+        .ok_or_else(|| refused("no mode can be fitted to it; a band with a resonance is needed".into()))?;
+    let mut ratios = Vec::new();
+    for mode in mode_numbers(&modes) {
+        for response in [Direction::X, Direction::Y, Direction::Z] {
+            let residues: Vec<(Complex64, Complex64)> = pairs
+                .iter()
+                .enumerate()
+                .filter(|(_, (at_tip, _))| at_tip.response == response)
+                .map(|(index, _)| {
+                    (
+                        modes.residues[2 * index][mode],
+                        modes.residues[2 * index + 1][mode],
+                    )
+                })
+                .collect();
+            let power: f64 = residues.iter().map(|(s, _)| s.norm_sqr()).sum();
+            if power == 0.0 {
+                continue;
+            }
+            let ratio = residues.iter().map(|(s, t)| (t * s.conj()).re).sum::<f64>() / power;
+            let rest: f64 = residues.iter().map(|(s, t)| (t - s * ratio).norm_sqr()).sum();
+            ratios.push(ModeRatio {
+                frequency_hz: modes.frequency_hz(mode),
+                response,
+                ratio,
+                misfit: (rest / power).sqrt() / ratio.abs(),
+            });
+        }
+    }
+    Ok(ratios)
+}
+
+/// The fewest modes that describe the functions.
+fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Option<RationalFit> {
+    let mut best: Option<RationalFit> = None;
+    // A mode may only help once the next is there, too.
+    let mut in_vain = 0;
+    for count in 1..=MODES_MAX {
+        let Some(next) = fit(frequency_hz, functions, count) else {
+            continue;
+        };
+        match &best {
+            Some(before) if next.rest > (1.0 - WORTH) * before.rest => in_vain += 1,
+            _ => {
+                best = Some(next);
+                in_vain = 0;
+            }
+        }
+        if in_vain == 2 || best.as_ref().is_some_and(|best| best.rest < GOOD) {
+            break;
+        }
+    }
+    best
+}
+
+/// Poles that are modes: lightly damped, and seen in a function.
+fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
+    // At its peak a mode is its residue by its decay.
+    let height =
+        |function: usize, mode: usize| modes.residues[function][mode].norm() / modes.poles[mode].re.abs();
+    let functions = 0..modes.residues.len();
+    let highest: Vec<f64> = functions
+        .clone()
+        .map(|function| {
+            (0..modes.poles.len())
+                .map(|mode| height(function, mode))
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    (0..modes.poles.len())
+        .filter(|&mode| {
+            let pole = modes.poles[mode];
+            pole.re.abs() < 0.3 * pole.norm()
+                && functions
+                    .clone()
+                    .any(|function| height(function, mode) > MODE * highest[function])
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::path::Path;
+
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    /// Modes of frequency, damping ratio, shape of the tip in x and y; a table of tip or sensor.
+    fn table(modes: &[(f64, f64, [f64; 2])], ratios: Option<&[f64]>, noise: f64, seed: u64) -> FrfTable {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let frequency_hz: Vec<f64> = (0..400).map(|k| 8.0 + 0.05 * f64::from(k)).collect();
+        let directions = [Direction::X, Direction::Y];
+        let mut entries = Vec::new();
+        for (p, &response) in directions.iter().enumerate() {
+            for (q, &force) in directions.iter().enumerate() {
+                let value = |hertz: &f64| -> Complex64 {
+                    modes
+                        .iter()
+                        .enumerate()
+                        .map(|(r, &(own, damping, shape))| {
+                            let (omega, own) = (TAU * hertz, TAU * own);
+                            // φ_S = ratio φ_T.
+                            let at = shape[p] * ratios.map_or(1.0, |ratios| ratios[r]);
+                            at * shape[q]
+                                / Complex64::new(own * own - omega * omega, 2.0 * damping * own * omega)
+                        })
+                        .sum()
+                };
+                let clean: Vec<Complex64> = frequency_hz.iter().map(value).collect();
+                let peak = clean.iter().map(|h| h.norm()).fold(0.0, f64::max);
+                let mut jitter = || noise * peak * random.random_range(-1.0..1.0);
+                let receptance = clean
+                    .iter()
+                    .map(|h| h + Complex64::new(jitter(), jitter()))
+                    .collect();
+                entries.push(Frf {
+                    response,
+                    force,
+                    receptance,
+                    coherence: None,
+                });
+            }
+        }
+        FrfTable::new(Path::new("a.csv"), frequency_hz, entries).unwrap()
+    }
+
+    #[test]
+    fn tool_tip_frfs_come_from_the_housing_within_two_percent_at_the_peaks() {
+        for seed in 0..20 {
+            let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+            let modes = [
+                (11.0, 0.02, [1.0, 0.2]),
+                (17.5, 0.025, [0.3, 1.0]),
+                (19.8, 0.03, [1.0, -0.5]),
+            ];
+            let ratios: Vec<f64> = modes.iter().map(|_| random.random_range(0.6..0.9)).collect();
+            let housing = table(&modes, Some(&ratios), 0.002, 100 + seed);
+            let tip = table(&modes, None, 0.002, 200 + seed);
+            // In the cut, modes move and are damped more.
+            let in_cut = modes.map(|(hertz, damping, shape)| (0.97 * hertz, 1.4 * damping, shape));
+            let measured = table(&in_cut, Some(&ratios), 0.002, 300 + seed);
+            let truth = table(&in_cut, None, 0.0, 0);
+            let (calibrated, found) = calibrate(&measured, &housing, &tip).unwrap();
+            for ratio in &found {
+                let mode = modes
+                    .iter()
+                    .position(|mode| (mode.0 / ratio.frequency_hz - 1.0).abs() < 0.01)
+                    .unwrap();
+                // Half a percent: noise of 0.2 % of the peak, over the dozens of lines of a peak.
+                assert!(
+                    (ratio.ratio * ratios[mode] - 1.0).abs() < 0.01,
+                    "seed {seed}: {ratio:?} {ratios:?}"
+                );
+            }
+            for (entry, expected) in calibrated.entries().iter().zip(truth.entries()) {
+                for (mode, _) in modes.iter().enumerate() {
+                    let hertz = in_cut[mode].0;
+                    let at = truth.frequency_hz().partition_point(|&f| f < hertz);
+                    let (h, truth) = (entry.receptance[at].norm(), expected.receptance[at].norm());
+                    let highest = expected.receptance.iter().map(|h| h.norm()).fold(0.0, f64::max);
+                    // Peaks, that is: not where a mode hardly shows.
+                    if truth > 0.2 * highest {
+                        assert!(
+                            (h / truth - 1.0).abs() < 0.02,
+                            "seed {seed}: {} {hertz}: {h} {truth}",
+                            entry.name()
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_together_is_refused() {
+        let modes = [(11.0, 0.02, [1.0, 0.2])];
+        let (housing, tip) = (table(&modes, Some(&[0.7]), 0.0, 1), table(&modes, None, 0.0, 1));
+        let elsewhere = table(&[(16.0, 0.02, [1.0, 0.2])], Some(&[0.7]), 0.0, 1);
+        let said = calibrate(&elsewhere, &housing, &tip).unwrap_err().to_string();
+        assert!(
+            said.contains("16.00 Hz has no counterpart") && said.contains("11.00 (x)"),
+            "{said}"
+        );
+        let shorter = FrfTable::new(
+            Path::new("b.csv"),
+            vec![1.0],
+            vec![Frf {
+                receptance: vec![Complex64::ONE],
+                ..tip.entries()[0].clone()
+            }],
+        )
+        .unwrap();
+        assert!(
+            calibrate(&housing, &housing, &shorter)
+                .unwrap_err()
+                .to_string()
+                .contains("other frequencies")
+        );
+    }
+}

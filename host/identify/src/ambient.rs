@@ -1,0 +1,141 @@
+//! Records of motion alone, made ready: what turns with the spindle is taken out, the band is kept, the rest is thinned out.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{DMatrix, DVector};
+
+use super::least_squares::scaled_solve;
+use quietcut_recording::{Quantity, Recording, SpindleAngle};
+
+/// Motion that is driven by something that nobody measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ambient {
+    /// Samples of each channel.
+    pub channels: Vec<Vec<f64>>,
+    /// Names of the channels.
+    pub names: Vec<String>,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// The spindle's turns per second whose harmonics were taken out; `None` where no speed is known.
+    pub turn_hz: Option<f64>,
+}
+
+/// How many samples per period of the highest frequency are kept at least.
+const PER_PERIOD: f64 = 3.0;
+
+impl Ambient {
+    /// All motions of one quantity of a recording up to `high_hz`: accelerations, else velocities, else displacements.
+    ///
+    /// `None` where there is no motion.
+    pub fn new(recording: &Recording, high_hz: f64) -> Option<Self> {
+        let of = |quantity: Quantity| -> Vec<_> {
+            let motions = recording.channels.iter();
+            motions.filter(|channel| channel.quantity == quantity).collect()
+        };
+        let chosen = [Quantity::Acceleration, Quantity::Velocity, Quantity::Displacement]
+            .into_iter()
+            .map(of)
+            .find(|channels| !channels.is_empty())?;
+        let mut samples: Vec<Vec<f64>> = chosen.iter().map(|channel| channel.samples.clone()).collect();
+        let turn_hz = without_harmonics(recording, &mut samples, high_hz);
+        let every = (recording.sample_rate_hz / (PER_PERIOD * high_hz))
+            .floor()
+            .max(1.0) as usize;
+        Some(Self {
+            channels: samples.iter().map(|channel| thinned(channel, every)).collect(),
+            names: chosen.iter().map(|channel| channel.name.clone()).collect(),
+            rate_hz: recording.sample_rate_hz / every as f64,
+            turn_hz,
+        })
+    }
+
+    /// Length, s.
+    pub fn seconds(&self) -> f64 {
+        self.channels.first().map_or(0, Vec::len) as f64 / self.rate_hz
+    }
+}
+
+/// Takes the mean and every harmonic of the turning spindle up to a fifth beyond `high_hz` out, by least squares over the record;
+/// what is left begins and ends where the angle is known. The turns per second.
+fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f64) -> Option<f64> {
+    let cut = recording.sidecar.cut.unwrap_or_default();
+    let rate_hz = recording.sample_rate_hz;
+    let (first, angle) = match SpindleAngle::new(recording, cut.teeth.unwrap_or(1)) {
+        Ok(angle) => (angle.first, angle.rad),
+        Err(_) => {
+            let rad_per_sample = cut.spindle_rpm.map_or(0.0, |rpm| TAU * rpm / 60.0 / rate_hz);
+            let count = recording.len();
+            (
+                0,
+                (0..count).map(|sample| rad_per_sample * sample as f64).collect(),
+            )
+        }
+    };
+    let turned = angle.last().unwrap_or(&0.0) - angle.first().unwrap_or(&0.0);
+    let turn_hz = turned / TAU * rate_hz / angle.len().max(2) as f64;
+    for channel in samples.iter_mut() {
+        channel.drain(..first.min(channel.len()));
+        channel.truncate(angle.len());
+    }
+    let harmonics = if turn_hz > 0.0 {
+        (1.2 * high_hz / turn_hz) as usize
+    } else {
+        0
+    };
+    let width = 1 + 2 * harmonics;
+    let mut row = DVector::from_element(width, 1.0);
+    let fill = |row: &mut DVector<f64>, angle: f64| {
+        for harmonic in 1..=harmonics {
+            let (sin, cos) = (harmonic as f64 * angle).sin_cos();
+            (row[2 * harmonic - 1], row[2 * harmonic]) = (cos, sin);
+        }
+    };
+    let mut normal = DMatrix::zeros(width, width);
+    let mut right = DMatrix::zeros(width, samples.len());
+    for (sample, angle) in angle.iter().enumerate() {
+        fill(&mut row, *angle);
+        normal.ger(1.0, &row, &row, 1.0);
+        for (channel, samples) in samples.iter().enumerate() {
+            right.column_mut(channel).axpy(samples[sample], &row, 1.0);
+        }
+    }
+    for (channel, samples) in samples.iter_mut().enumerate() {
+        if let Some(found) = scaled_solve(&normal, &right.column(channel).into_owned()) {
+            for (sample, angle) in samples.iter_mut().zip(&angle) {
+                fill(&mut row, *angle);
+                *sample -= found.dot(&row);
+            }
+        }
+    }
+    (turn_hz > 0.0).then_some(turn_hz)
+}
+
+/// Every so many samples, after a low-pass that is flat to a third of the new rate and closed from two thirds on (windowed sinc,
+/// Hann): what folds over falls above a third of the new rate.
+fn thinned(samples: &[f64], every: usize) -> Vec<f64> {
+    if every == 1 {
+        return samples.to_vec();
+    }
+    let half = 10 * every;
+    let weight = |offset: usize| {
+        let x = offset as f64 / every as f64;
+        let sinc = if offset == 0 {
+            1.0
+        } else {
+            (PI * x).sin() / (PI * x)
+        };
+        sinc * (0.5 + 0.5 * (PI * offset as f64 / half as f64).cos())
+    };
+    let weights: Vec<f64> = (0..=half).map(weight).collect();
+    let sum = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
+    (half..samples.len().saturating_sub(half))
+        .step_by(every)
+        .map(|center| {
+            let mut value = weights[0] * samples[center];
+            for (offset, weight) in weights.iter().enumerate().skip(1) {
+                value += weight * (samples[center - offset] + samples[center + offset]);
+            }
+            value / sum
+        })
+        .collect()
+}

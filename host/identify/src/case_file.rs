@@ -1,0 +1,392 @@
+//! What was identified, as the text of a case file.
+
+use nalgebra::{DMatrix, Vector3};
+use num_complex::Complex64;
+use toml::{Table, Value};
+
+use super::joints::JointParameter;
+use super::modes::{IdentifiedMode, ModalModel};
+use quietcut_model::milling::Runout;
+use quietcut_model::structure::{Direction, Joint, Mode, Robot};
+
+/// One identified parameter with its interval.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Its key: `mass_kg`, `k3_n_per_m3` …
+    pub key: &'static str,
+    /// The directions that it belongs to: one, or two for an entry off the diagonal and for a coupling.
+    pub directions: Vec<Direction>,
+    /// Its value, SI.
+    pub value: f64,
+    /// Its standard deviation.
+    pub deviation: f64,
+}
+
+/// An identified model that no case file can hold.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CaseFileError {
+    /// A matrix is missing.
+    #[error("a case needs {0}, which this method does not give")]
+    Missing(&'static str),
+    /// The same extension in two directions.
+    #[error(
+        "[extension.{0}] is needed in two directions; a case holds one: identify the directions one by one"
+    )]
+    Twice(&'static str),
+    /// Modes that are driven in other directions than they are seen in.
+    #[error(
+        "no direction is both driven and measured, so the modes are not those of a tool; drive where the motion is measured"
+    )]
+    NoDirection,
+}
+
+/// The sections of a case that are not the machine's dynamics.
+const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
+
+/// The text of a case with the tool, material, cut and limits of another one, as they stand there.
+pub fn with_sections(text: &str, other: &Table) -> String {
+    let mut case: Table = text.parse().unwrap_or_default();
+    for section in OTHERS {
+        if let Some(value) = other.get(section) {
+            case.insert(section.into(), value.clone());
+        }
+    }
+    toml::to_string(&case).unwrap_or_default()
+}
+
+/// The text of a case with complex modes, in the directions that are both driven and measured.
+///
+/// # Errors
+/// There is no such direction.
+pub fn text_of_modes(name: &str, model: &ModalModel) -> Result<String, CaseFileError> {
+    let directions = model.directions();
+    if directions.is_empty() {
+        return Err(CaseFileError::NoDirection);
+    }
+    let picked = |all: &[Direction], index: usize| all.iter().position(|known| *known == directions[index]);
+    let modes: Vec<IdentifiedMode> = model
+        .modes
+        .iter()
+        .map(|found| {
+            let places = |all| (0..directions.len()).filter_map(move |index| picked(all, index));
+            let (left, right) = (places(&model.forces), places(&model.responses));
+            IdentifiedMode {
+                mode: Mode {
+                    left: left.clone().map(|place| found.mode.left[place]).collect(),
+                    right: right.clone().map(|place| found.mode.right[place]).collect(),
+                    ..found.mode
+                },
+                left_std: left.map(|place| found.left_std[place]).collect(),
+                right_std: right.map(|place| found.right_std[place]).collect(),
+                ..*found
+            }
+        })
+        .collect();
+    Ok(toml::to_string(&modal(name, &directions, &modes)).unwrap_or_default())
+}
+
+/// A case with complex modes whose shapes have an entry for each of `directions`.
+pub fn modal(name: &str, directions: &[Direction], modes: &[IdentifiedMode]) -> Table {
+    let pairs = |shape: &[[f64; 2]]| -> Value {
+        let entry = |parts: &[f64; 2]| Value::Array(parts.map(Value::Float).into());
+        Value::Array(shape.iter().map(entry).collect())
+    };
+    let parts = |shape: &[Complex64]| -> Vec<[f64; 2]> { shape.iter().map(|z| [z.re, z.im]).collect() };
+    let modes = modes.iter().map(|found| {
+        let mut mode = Table::new();
+        mode.insert("frequency_hz".into(), found.mode.frequency_hz.into());
+        mode.insert("frequency_hz_std".into(), found.frequency_std_hz.into());
+        mode.insert("damping_ratio".into(), found.mode.damping_ratio.into());
+        mode.insert("damping_ratio_std".into(), found.damping_ratio_std.into());
+        mode.insert("left".into(), pairs(&parts(&found.mode.left)));
+        mode.insert("left_std".into(), pairs(&found.left_std));
+        mode.insert("right".into(), pairs(&parts(&found.mode.right)));
+        mode.insert("right_std".into(), pairs(&found.right_std));
+        Value::Table(mode)
+    });
+    let mut structure = Table::new();
+    structure.insert("kind".into(), "modes".into());
+    let names = directions.iter().map(|direction| Value::from(direction.name()));
+    structure.insert("directions".into(), Value::Array(names.collect()));
+    structure.insert("mode".into(), Value::Array(modes.collect()));
+    let mut case = Table::new();
+    case.insert("name".into(), name.into());
+    case.insert("structure".into(), Value::Table(structure));
+    case
+}
+
+/// A case of a robot at its posture; `deviations` are those of what was identified.
+pub fn robot(name: &str, robot: &Robot, deviations: &[(JointParameter, f64)]) -> Table {
+    let place = |place: &Vector3<f64>| numbers(place.iter().copied());
+    let joint = |joint: &Joint| {
+        let mut table = Table::new();
+        let i = &joint.inertia_kg_m2;
+        table.insert("axis".into(), place(&joint.axis));
+        table.insert("point_m".into(), place(&joint.point_m));
+        table.insert("center_m".into(), place(&joint.center_m));
+        table.insert(
+            "inertia_kg_m2".into(),
+            numbers([i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]].into_iter()),
+        );
+        for (key, value) in [
+            ("stiffness_nm_per_rad", joint.stiffness_nm_per_rad),
+            ("damping_nms_per_rad", joint.damping_nms_per_rad),
+            ("mass_kg", joint.mass_kg),
+            ("rotor_kg_m2", joint.rotor_kg_m2),
+            ("cubic_stiffness_nm_per_rad3", joint.cubic_stiffness_nm_per_rad3),
+            ("cubic_damping_nms3_per_rad3", joint.cubic_damping_nms3_per_rad3),
+        ] {
+            table.insert(key.into(), value.into());
+        }
+        table
+    };
+    let mut joints: Vec<Table> = robot.joints.iter().map(joint).collect();
+    for (parameter, deviation) in deviations {
+        if let Some(table) = joints.get_mut(parameter.joint(robot.joints.len())) {
+            table.insert(format!("{}_std", parameter.key()), (*deviation).into());
+        }
+    }
+    let mut structure = Table::new();
+    structure.insert("kind".into(), "joints".into());
+    structure.insert(
+        "directions".into(),
+        Value::Array(["x", "y", "z"].map(Value::from).into()),
+    );
+    structure.insert("tool_m".into(), place(&robot.tool_m));
+    let joints = joints.into_iter().map(Value::Table).collect();
+    structure.insert("joint".into(), Value::Array(joints));
+    let mut posture = Table::new();
+    let angles = robot.angles_rad.iter().map(|angle| angle.to_degrees());
+    posture.insert("joints_deg".into(), numbers(angles));
+    let mut case = Table::new();
+    case.insert("name".into(), name.into());
+    case.insert("structure".into(), Value::Table(structure));
+    case.insert("posture".into(), Value::Table(posture));
+    case
+}
+
+fn numbers(values: impl Iterator<Item = f64>) -> Value {
+    Value::Array(values.map(Value::Float).collect())
+}
+
+/// A case that says what is cut by what: force coefficients, teeth, and the runout where it was told.
+///
+/// # Errors
+/// A cutting coefficient is missing.
+pub fn cutting(
+    name: &str,
+    material: &[Estimate],
+    teeth: usize,
+    edge_angle_deg: f64,
+    runout: Option<Runout>,
+) -> Result<Table, CaseFileError> {
+    let mut table = Table::new();
+    for key in ["ktc_mpa", "krc_mpa", "kac_mpa"] {
+        if !material.iter().any(|estimate| estimate.key == key) {
+            return Err(CaseFileError::Missing(key));
+        }
+    }
+    for estimate in material {
+        table.insert(estimate.key.into(), estimate.value.into());
+        table.insert(format!("{}_std", estimate.key), estimate.deviation.into());
+    }
+    let mut tool = Table::new();
+    tool.insert("teeth".into(), Value::Integer(teeth as i64));
+    tool.insert("edge_angle_deg".into(), edge_angle_deg.into());
+    if let Some(runout) = runout {
+        tool.insert("runout_um".into(), runout.offset_um.into());
+        tool.insert("runout_angle_deg".into(), runout.angle_deg.into());
+    }
+    let mut case = Table::new();
+    case.insert("name".into(), name.into());
+    case.insert("tool".into(), Value::Table(tool));
+    case.insert("material".into(), Value::Table(table));
+    Ok(case)
+}
+
+/// The extension that holds a key.
+fn extension_of(key: &str) -> Option<&'static str> {
+    Some(match key {
+        "k2_n_per_m2" => "quadratic-stiffness",
+        "k5_n_per_m5" => "softening-hardening",
+        "fc_n" => "coulomb-friction",
+        "kxyy_n_per_m3" | "kxxy_n_per_m2" => "mode-coupling",
+        _ => return None,
+    })
+}
+
+/// The text of a case with mass, damping, stiffness and cubic terms as matrices, and everything else as extensions.
+///
+/// # Errors
+/// No mass, or two of one extension.
+pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Result<String, CaseFileError> {
+    let mut structure = Table::new();
+    structure.insert("kind".into(), "matrices".into());
+    let names = directions.iter().map(|direction| Value::from(direction.name()));
+    structure.insert("directions".into(), Value::Array(names.collect()));
+    // Where k5 is, k3 stands beside it.
+    let turned = estimates.iter().any(|estimate| estimate.key == "k5_n_per_m5");
+    let matrices = [
+        ("mass", "mass_kg", true),
+        ("damping", "damping_ns_per_m", true),
+        ("stiffness", "stiffness_n_per_m", true),
+        ("cubic_damping", "c3_ns3_per_m3", false),
+        ("cubic_stiffness", "k3_n_per_m3", false),
+    ];
+    for (matrix, key, needed) in matrices {
+        let of_matrix: Vec<&Estimate> = estimates.iter().filter(|estimate| estimate.key == key).collect();
+        if of_matrix.is_empty() && needed {
+            return Err(CaseFileError::Missing(matrix));
+        }
+        if of_matrix.is_empty() || (turned && matrix == "cubic_stiffness") {
+            continue;
+        }
+        structure.insert(
+            matrix.into(),
+            rows(directions, &of_matrix, |estimate| estimate.value),
+        );
+        structure.insert(
+            format!("{matrix}_std"),
+            rows(directions, &of_matrix, |estimate| estimate.deviation),
+        );
+    }
+    let mut case = Table::new();
+    case.insert("name".into(), name.into());
+    case.insert("structure".into(), Value::Table(structure));
+    let extensions = extensions(directions, estimates, turned)?;
+    if !extensions.is_empty() {
+        case.insert("extension".into(), Value::Table(extensions));
+    }
+    // A table of numbers and words is always TOML.
+    Ok(toml::to_string(&case).unwrap_or_default())
+}
+
+fn extensions(
+    directions: &[Direction],
+    estimates: &[Estimate],
+    turned: bool,
+) -> Result<Table, CaseFileError> {
+    let mut extensions = Table::new();
+    for estimate in estimates {
+        let extension = match estimate.key {
+            "k3_n_per_m3" if turned => Some("softening-hardening"),
+            key => extension_of(key),
+        };
+        let Some(extension) = extension else { continue };
+        let place: Value = match estimate.directions[..] {
+            [one] => one.name().into(),
+            _ => Value::Array(
+                estimate
+                    .directions
+                    .iter()
+                    .map(|direction| direction.name().into())
+                    .collect(),
+            ),
+        };
+        let table = extensions
+            .entry(extension)
+            .or_insert_with(|| Value::Table(Table::new()));
+        let Value::Table(table) = table else { continue };
+        let key = if estimate.directions.len() > 1 {
+            "directions"
+        } else {
+            "direction"
+        };
+        if directions.len() > 1 || key == "directions" {
+            match table.get(key) {
+                Some(known) if *known != place => return Err(CaseFileError::Twice(extension)),
+                _ => table.insert(key.into(), place),
+            };
+        }
+        table.insert(estimate.key.into(), estimate.value.into());
+        table.insert(format!("{}_std", estimate.key), estimate.deviation.into());
+    }
+    Ok(extensions)
+}
+
+fn rows(directions: &[Direction], estimates: &[&Estimate], of: impl Fn(&Estimate) -> f64) -> Value {
+    let mut matrix = DMatrix::zeros(directions.len(), directions.len());
+    for estimate in estimates {
+        let place =
+            |direction: Option<&Direction>| directions.iter().position(|known| Some(known) == direction);
+        if let (Some(i), Some(j)) = (
+            place(estimate.directions.first()),
+            place(estimate.directions.last()),
+        ) {
+            matrix[(i, j)] = of(estimate);
+            matrix[(j, i)] = of(estimate);
+        }
+    }
+    let rows = matrix.row_iter().map(|row| {
+        let entries: Vec<Value> = row.iter().map(|entry| Value::Float(*entry)).collect();
+        Value::Array(entries)
+    });
+    Value::Array(rows.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quietcut_model::case::Case;
+    use quietcut_model::structure::Form;
+    use quietcut_simulate::Effects;
+
+    #[test]
+    fn a_robot_that_is_written_is_read_again() {
+        let mut before = quietcut_testkit::robot();
+        before.joints[2].cubic_stiffness_nm_per_rad3 = -1e12;
+        let of: [fn(usize) -> JointParameter; 3] = [
+            JointParameter::Stiffness,
+            JointParameter::Damping,
+            JointParameter::CubicStiffness,
+        ];
+        let deviations: Vec<(JointParameter, f64)> = of
+            .iter()
+            .flat_map(|of| (0..6).map(move |joint| (of(joint), 1.0 + joint as f64)))
+            .collect();
+        let text = toml::to_string(&robot("found", &before, &deviations)).unwrap();
+        let case = Case::parse(std::path::Path::new("found.toml"), &text).unwrap();
+        let Form::Joints(after) = &case.structure.as_ref().unwrap().form else {
+            panic!("joints")
+        };
+        assert_eq!(after.joints, before.joints);
+        assert_eq!(after.tool_m, before.tool_m);
+        assert_eq!(case.deviations.len(), 18);
+        // Degrees are rounded once.
+        for (a, b) in after.angles_rad.iter().zip(&before.angles_rad) {
+            assert!((a - b).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let estimate = |key, directions: &[Direction], value| Estimate {
+            key,
+            directions: directions.to_vec(),
+            value,
+            deviation: 0.01 * f64::abs(value),
+        };
+        let (y, z) = (Direction::Y, Direction::Z);
+        let mut estimates = Vec::new();
+        for direction in [y, z] {
+            estimates.push(estimate("mass_kg", &[direction], 200.0));
+            estimates.push(estimate("damping_ns_per_m", &[direction], 400.0));
+            estimates.push(estimate("stiffness_n_per_m", &[direction], 2e6));
+            estimates.push(estimate("k3_n_per_m3", &[direction], -3e12));
+        }
+        estimates.push(estimate("mass_kg", &[y, z], 5.0));
+        estimates.push(estimate("kxyy_n_per_m3", &[y, z], 1e12));
+        let text = text("found", &[y, z], &estimates).unwrap();
+        let case = Case::parse(std::path::Path::new("found.toml"), &text).unwrap();
+        let Form::Matrices(m) = &case.structure.as_ref().unwrap().form else {
+            panic!("matrices")
+        };
+        assert_eq!((m.mass[(0, 1)], m.mass[(1, 1)]), (5.0, 200.0));
+        assert_eq!(m.cubic_stiffness.as_ref().unwrap()[(1, 1)], -3e12);
+        assert_eq!(case.deviations.len(), 2 * 4 + 2);
+        let effects = Effects::of_case(&case).unwrap();
+        assert_eq!(effects.0.len(), 1);
+        let (_, terms) = effects.dynamics(case.structure().unwrap()).unwrap();
+        assert_eq!(terms.len(), 1);
+    }
+}

@@ -1,0 +1,181 @@
+//! A cutting test: forces, and motion where it was measured, over the angle of the tool.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Vector3;
+
+use quietcut_model::structure::feed_axes;
+use quietcut_recording::{Quantity, Recording, RecordingError, SpindleAngle};
+
+/// A recorded cut, everything in feed, normal and axial direction and SI units. Sample 0 is the first that has an angle.
+#[derive(Clone, Debug)]
+pub struct CuttingTest {
+    /// Axial depth, m.
+    pub depth_m: f64,
+    /// Immersion angle of entry, rad.
+    pub start: f64,
+    /// Immersion angle of exit, rad.
+    pub exit: f64,
+    /// Feed per tooth, m.
+    pub feed_per_tooth_m: f64,
+    /// Number of teeth, at equal pitch.
+    pub teeth: usize,
+    /// Edge angle γ, rad.
+    pub edge_angle: f64,
+    /// Spindle angle of each sample, rad, ascending.
+    pub angle: Vec<f64>,
+    /// Force on the tool, N.
+    pub force: Vec<Vector3<f64>>,
+    /// False where the axial force was not measured: its entries are 0.
+    pub has_axial_force: bool,
+    /// Displacement of the tool, m; `None` where none was measured.
+    pub displacement: Option<Vec<Vector3<f64>>>,
+    /// Samples from and to in full cut, whole revolutions.
+    pub full_cut: [usize; 2],
+}
+
+/// What a recording does not say of the tool and its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setup {
+    /// Edge angle γ, degrees.
+    pub edge_angle_deg: f64,
+    /// Angle from the machine's x to the feed, degrees.
+    pub feed_direction_deg: f64,
+    /// From when to when the tool is in full cut, s; `None`: where the force says so.
+    pub full_cut_s: Option<[f64; 2]>,
+}
+
+/// Fewest revolutions in full cut.
+const REVOLUTIONS: usize = 4;
+
+/// Force of a revolution as a share of that of full cut, above which the tool is in.
+const INSIDE: f64 = 0.9;
+
+impl CuttingTest {
+    /// The test of a recording.
+    ///
+    /// # Errors
+    /// No tachometer, no fx or fy, a cut that the sidecar does not describe in full, or too few revolutions in full cut.
+    pub fn new(recording: &Recording, setup: Setup) -> Result<Self, RecordingError> {
+        let cut = recording.sidecar.cut.unwrap_or_default();
+        let said = |value: Option<f64>, key: &str| {
+            value.ok_or_else(|| RecordingError::Content {
+                path: quietcut_recording::Sidecar::path_of(&recording.path),
+                what: format!("[cut] {key} is needed and not there"),
+            })
+        };
+        let depth_mm = said(cut.axial_depth_mm, "axial_depth_mm")?;
+        let start_deg = said(cut.start_deg, "start_deg")?;
+        let exit_deg = said(cut.exit_deg, "exit_deg")?;
+        let feed_mm = said(cut.feed_per_tooth_mm, "feed_per_tooth_mm")?;
+        let teeth = said(cut.teeth.map(f64::from), "teeth")? as u32;
+        let SpindleAngle { first, rad: angle } = SpindleAngle::new(recording, teeth)?;
+        if recording.channel("fx").is_none() || recording.channel("fy").is_none() {
+            return Err(recording.lacks("fx and fy, the forces on the tool"));
+        }
+        let machine_from_feed = feed_axes(setup.feed_direction_deg);
+        let vectors = |names: [&str; 3], quantity: Quantity| {
+            let channels = names.map(|name| {
+                recording
+                    .channel(name)
+                    .filter(|channel| channel.quantity == quantity)
+            });
+            let at = |sample: usize| {
+                let of_machine = Vector3::from(
+                    channels.map(|channel| channel.map_or(0.0, |channel| channel.samples[sample])),
+                );
+                machine_from_feed.tr_mul(&of_machine)
+            };
+            let is_there = channels.iter().any(Option::is_some);
+            is_there.then(|| (first..first + angle.len()).map(at).collect::<Vec<_>>())
+        };
+        let force = vectors(["fx", "fy", "fz"], Quantity::Force).unwrap_or_default();
+        let displacement = vectors(["x", "y", "z"], Quantity::Displacement);
+        let mut test = Self {
+            depth_m: 1e-3 * depth_mm,
+            start: start_deg.to_radians(),
+            exit: exit_deg.to_radians(),
+            feed_per_tooth_m: 1e-3 * feed_mm,
+            teeth: teeth as usize,
+            edge_angle: setup.edge_angle_deg.to_radians(),
+            angle,
+            force,
+            has_axial_force: recording.channel("fz").is_some(),
+            displacement,
+            full_cut: [0, 0],
+        };
+        let window = setup.full_cut_s.map(|ends| {
+            ends.map(|end_s| {
+                let sample = ((end_s - recording.start_s) * recording.sample_rate_hz).max(0.0) as usize;
+                sample.saturating_sub(first).min(test.angle.len())
+            })
+        });
+        test.find_full_cut(window).ok_or_else(|| RecordingError::Content {
+            path: recording.path.clone(),
+            what: format!(
+                "fewer than {REVOLUTIONS} whole revolutions in full cut; record longer, or say from when to when the tool is in full cut (--cut-s)"
+            ),
+        })?;
+        Ok(test)
+    }
+
+    /// Angle from tooth to tooth, rad.
+    pub fn pitch(&self) -> f64 {
+        TAU / self.teeth as f64
+    }
+
+    /// Index of the first sample at or beyond a spindle angle.
+    pub fn sample_at(&self, angle: f64) -> usize {
+        self.angle.partition_point(|&known| known < angle)
+    }
+
+    /// Whole revolutions in full cut, as ranges of samples. The first of the recording serves to know the surface.
+    pub fn revolutions(&self) -> Vec<[usize; 2]> {
+        let [from, to] = self.full_cut;
+        if to <= from {
+            return Vec::new();
+        }
+        let (first, last) = (self.angle[from], self.angle[to - 1]);
+        let (first, last) = ((first / TAU).ceil() as i64, (last / TAU).floor() as i64);
+        (first..last)
+            .map(|turn| [turn, turn + 1].map(|turn| self.sample_at(TAU * turn as f64)))
+            .filter(|[from, to]| to > from)
+            .collect()
+    }
+
+    /// Finds the revolutions in full cut, within `window` where it is given.
+    fn find_full_cut(&mut self, window: Option<[usize; 2]>) -> Option<()> {
+        let (first, last) = (*self.angle.first()?, *self.angle.last()?);
+        // The first turn in view leaves the surface that the second one cuts.
+        let warm = self.sample_at(TAU * (first / TAU).ceil() + TAU);
+        self.full_cut = [warm, self.sample_at(TAU * (last / TAU).floor())];
+        if let Some([from, to]) = window {
+            self.full_cut = [warm.max(from), self.full_cut[1].min(to)];
+        } else {
+            let revolutions = self.revolutions();
+            let size = |[from, to]: &[usize; 2]| {
+                let sum: f64 = self.force[*from..*to].iter().map(Vector3::norm).sum();
+                sum / (to - from) as f64
+            };
+            let sizes: Vec<f64> = revolutions.iter().map(size).collect();
+            let mut sorted = sizes.clone();
+            sorted.sort_by(f64::total_cmp);
+            // Most of a test is full cut: the upper quartile belongs to it, and growing vibration hardly moves it.
+            let full = *sorted.get(3 * sorted.len() / 4)?;
+            let above = |share: f64| sizes.iter().position(|size| *size > share * full);
+            let below = |share: f64| sizes.iter().rposition(|size| *size > share * full);
+            let (rise, fall) = (above(INSIDE)?, below(INSIDE)?);
+            // From a tenth to nine tenths; half of that again takes the last tenth four times over, on a straight way.
+            let way_in = rise - above(1.0 - INSIDE)?;
+            let way_out = below(1.0 - INSIDE)? - fall;
+            let beyond = |way: usize| if way > 0 { way / 2 + 2 } else { 0 };
+            let from = rise + beyond(way_in);
+            let to = fall.checked_sub(beyond(way_out))?;
+            if to < from {
+                return None;
+            }
+            self.full_cut = [revolutions[from][0], revolutions[to][1]];
+        }
+        (self.revolutions().len() >= REVOLUTIONS).then_some(())
+    }
+}

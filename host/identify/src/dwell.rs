@@ -1,0 +1,320 @@
+//! Steady harmonic motion in a recording: where one frequency is held, and its Fourier coefficients with their noise.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use quietcut_model::structure::Direction;
+use quietcut_recording::{Channel, Quantity, Recording};
+
+/// A stretch of samples in which one frequency is held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    /// First sample.
+    pub from: usize,
+    /// One behind the last sample.
+    pub to: usize,
+    /// The frequency as first estimated, Hz.
+    pub frequency_hz: f64,
+}
+
+/// A measured periodic motion.
+#[derive(Clone, Debug)]
+pub struct Dwell {
+    /// Fundamental frequency, rad/s.
+    pub omega: f64,
+    /// Its variance.
+    pub omega_variance: f64,
+    /// Number of samples that were used.
+    pub samples: usize,
+    /// (AᵀA)⁻¹ of the harmonic regression: times a channel's variance, the covariance of its coefficients.
+    pub gram_inverse: DMatrix<f64>,
+    /// The force channels.
+    pub forces: Vec<Line>,
+    /// The channels of motion.
+    pub motions: Vec<Line>,
+}
+
+/// Fourier coefficients of a channel: 1, cos, sin, cos 2 … about the middle of the stretch.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// The direction of the channel.
+    pub direction: Direction,
+    /// What it measures.
+    pub quantity: Quantity,
+    /// The coefficients.
+    pub coefficients: DVector<f64>,
+    /// Variance of the noise of one sample.
+    pub variance: f64,
+}
+
+impl Line {
+    /// Amplitude of harmonic h.
+    pub fn amplitude(&self, h: usize) -> f64 {
+        self.coefficients[2 * h - 1].hypot(self.coefficients[2 * h])
+    }
+
+    /// The harmonic h as a complex amplitude: the channel is the real part of it times e^{ihωt}.
+    pub fn phasor(&self, h: usize) -> num_complex::Complex64 {
+        num_complex::Complex64::new(self.coefficients[2 * h - 1], -self.coefficients[2 * h])
+    }
+}
+
+/// The direction of a channel of force or motion, by its name.
+pub(super) fn direction_of(channel: &Channel) -> Option<Direction> {
+    let direction = match channel.quantity {
+        Quantity::Displacement => channel.name.as_str(),
+        Quantity::Force | Quantity::Velocity | Quantity::Acceleration => channel.name.get(1..)?,
+        _ => return None,
+    };
+    direction.parse().ok()
+}
+
+/// Blocks in which the size of the force is looked at, s.
+const BLOCK_S: f64 = 0.1;
+
+/// The stretches of `recording` in which one frequency is held, by the force alone.
+///
+/// A stretch ends where the force pauses or its frequency steps. Steps without a pause are found where the time between
+/// zero crossings changes by more than it scatters.
+pub fn stretches(recording: &Recording) -> Vec<Stretch> {
+    let Some(force) = recording
+        .channels
+        .iter()
+        .filter(|channel| channel.quantity == Quantity::Force)
+        .max_by(|a, b| energy(&a.samples).total_cmp(&energy(&b.samples)))
+    else {
+        return Vec::new();
+    };
+    let rate = recording.sample_rate_hz;
+    let block = ((BLOCK_S * rate) as usize).max(2);
+    let sizes: Vec<f64> = force
+        .samples
+        .chunks(block)
+        .map(|chunk| (energy(chunk) / chunk.len() as f64).sqrt())
+        .collect();
+    let mut sorted = sizes.clone();
+    sorted.sort_by(f64::total_cmp);
+    let (Some(&quietest), Some(&loudest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
+        return Vec::new();
+    };
+    // Between noise and the weakest level: a pause is quiet, and every level is well above the noise.
+    let threshold = (3.0 * quietest).min(0.3 * loudest).max(0.02 * loudest);
+    let mut found = Vec::new();
+    let mut start = None;
+    for index in 0..=sizes.len() {
+        let loud = sizes.get(index).is_some_and(|size| *size > threshold);
+        match (loud, start) {
+            (true, None) => start = Some(index),
+            (false, Some(first)) => {
+                // The blocks at the ends may be half filled.
+                let (from, to) = ((first + 1) * block, (index - 1).max(first + 1) * block);
+                split(
+                    &force.samples[..to.min(force.samples.len())],
+                    from,
+                    rate,
+                    &mut found,
+                );
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+fn energy(samples: &[f64]) -> f64 {
+    samples.iter().map(|x| x * x).sum()
+}
+
+/// Periods over which a frequency is estimated where steps are looked for.
+const PERIODS: usize = 8;
+
+/// Cuts `samples[from..]` where the frequency steps.
+fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<Stretch>) {
+    let crossings = rising_crossings(samples, from);
+    if crossings.len() <= 2 * PERIODS {
+        return;
+    }
+    let frequency = |a: usize, b: usize| (b - a) as f64 * rate_hz / (crossings[b] - crossings[a]);
+    let local: Vec<f64> = (0..crossings.len() - PERIODS)
+        .map(|i| frequency(i, i + PERIODS))
+        .collect();
+    let mut steps: Vec<f64> = local.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    steps.sort_by(f64::total_cmp);
+    let scatter = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+    let mut begin = 0;
+    for end in 1..=local.len() {
+        let held = frequency(
+            begin,
+            (begin + (end - begin).max(PERIODS)).min(crossings.len() - 1),
+        );
+        // Ten times the scatter is no chance event; a thousandth is less than any step of a test.
+        let stepped = end < local.len() && (local[end] - held).abs() > (10.0 * scatter).max(1e-3 * held);
+        if stepped || end == local.len() {
+            let last = if stepped { end } else { crossings.len() - 1 };
+            if last > begin + 2 * PERIODS {
+                found.push(Stretch {
+                    from: crossings[begin].ceil() as usize,
+                    to: crossings[last].floor() as usize,
+                    frequency_hz: frequency(begin, last),
+                });
+            }
+            // The window that saw the step holds both frequencies.
+            begin = if stepped && last > begin + 2 * PERIODS {
+                end + PERIODS
+            } else {
+                end
+            };
+        }
+    }
+}
+
+/// Places between samples where the signal rises through zero, at most one per noisy crossing.
+fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
+    let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();
+    let mut crossings = Vec::new();
+    let mut armed = false;
+    for i in from.max(1)..samples.len() {
+        armed |= samples[i] < -0.5 * size;
+        if armed && samples[i - 1] < 0.0 && samples[i] >= 0.0 {
+            crossings.push(i as f64 - samples[i] / (samples[i] - samples[i - 1]));
+            armed = false;
+        }
+    }
+    crossings
+}
+
+impl Dwell {
+    /// The periodic motion in `samples` of a recording with `harmonics` harmonics, its frequency refined from all channels.
+    ///
+    /// `None` where there are fewer samples than the fit needs, or no force.
+    pub fn fit(recording: &Recording, stretch: Stretch, harmonics: usize) -> Option<Self> {
+        let count = stretch.to.checked_sub(stretch.from)?;
+        if count < 4 * (2 * harmonics + 1) {
+            return None;
+        }
+        let rate = recording.sample_rate_hz;
+        let channels: Vec<_> = recording
+            .channels
+            .iter()
+            .filter_map(|c| Some((c, direction_of(c)?)))
+            .filter(|(c, _)| c.quantity == Quantity::Force || c.samples.iter().any(|x| *x != 0.0))
+            .collect();
+        let mut omega = TAU * stretch.frequency_hz;
+        let mut omega_variance = f64::INFINITY;
+        let mut lines = Vec::new();
+        let mut gram_inverse = DMatrix::zeros(0, 0);
+        // Gauss–Newton in the frequency: from half a line width each round squares the error.
+        for round in 0..5 {
+            let design = design(count, omega / rate, harmonics);
+            gram_inverse = (design.transpose() * &design).try_inverse()?;
+            lines.clear();
+            let (mut slope, mut weight) = (0.0, 0.0);
+            for (channel, direction) in &channels {
+                let samples = DVector::from_column_slice(channel.samples.get(stretch.from..stretch.to)?);
+                let coefficients = &gram_inverse * design.tr_mul(&samples);
+                let residual = &samples - &design * &coefficients;
+                let free = count as f64 - (2 * harmonics + 1) as f64;
+                // Rounding of the samples is the least noise there is.
+                let variance =
+                    (residual.norm_squared() / free).max(1e-28 * samples.norm_squared() / count as f64);
+                if variance > 0.0 {
+                    let by_omega = slope_by_omega(&coefficients, &design, rate);
+                    slope += by_omega.dot(&residual) / variance;
+                    weight += by_omega.norm_squared() / variance;
+                }
+                lines.push(Line {
+                    direction: *direction,
+                    quantity: channel.quantity,
+                    coefficients,
+                    variance,
+                });
+            }
+            if weight <= 0.0 {
+                return None;
+            }
+            omega_variance = 1.0 / weight;
+            let step = slope / weight;
+            if round == 4 || step.abs() < 1e-3 * omega_variance.sqrt() {
+                break;
+            }
+            omega += step;
+        }
+        let (forces, motions) = lines
+            .into_iter()
+            .partition(|line| line.quantity == Quantity::Force);
+        let dwell = Self {
+            omega,
+            omega_variance,
+            samples: count,
+            gram_inverse,
+            forces,
+            motions,
+        };
+        (!dwell.forces.is_empty()).then_some(dwell)
+    }
+
+    /// The strongest force.
+    pub fn force(&self) -> Option<&Line> {
+        self.forces
+            .iter()
+            .max_by(|a, b| a.amplitude(1).total_cmp(&b.amplitude(1)))
+    }
+}
+
+/// 1, cos, sin, cos 2 … of the phase about the middle.
+fn design(count: usize, radians_per_sample: f64, harmonics: usize) -> DMatrix<f64> {
+    let middle = 0.5 * (count as f64 - 1.0);
+    let mut design = DMatrix::zeros(count, 2 * harmonics + 1);
+    for row in 0..count {
+        let (sin, cos) = ((row as f64 - middle) * radians_per_sample).sin_cos();
+        let (mut s, mut c) = (0.0, 1.0);
+        design[(row, 0)] = 1.0;
+        for h in 1..=harmonics {
+            (c, s) = (c * cos - s * sin, s * cos + c * sin);
+            design[(row, 2 * h - 1)] = c;
+            design[(row, 2 * h)] = s;
+        }
+    }
+    design
+}
+
+/// Derivative of the fitted signal by ω.
+fn slope_by_omega(coefficients: &DVector<f64>, design: &DMatrix<f64>, rate_hz: f64) -> DVector<f64> {
+    let middle = 0.5 * (design.nrows() as f64 - 1.0);
+    DVector::from_fn(design.nrows(), |row, _| {
+        let t = (row as f64 - middle) / rate_hz;
+        let mut sum = 0.0;
+        for h in 1..=coefficients.len() / 2 {
+            let turned = coefficients[2 * h] * design[(row, 2 * h - 1)]
+                - coefficients[2 * h - 1] * design[(row, 2 * h)];
+            sum += h as f64 * turned;
+        }
+        sum * t
+    })
+}
+
+/// One noise variance per channel for all dwells of a recording: their residuals together.
+pub fn pool_variances(dwells: &mut [Dwell]) {
+    type Pick = fn(&mut Dwell) -> &mut Vec<Line>;
+    let picks: [Pick; 2] = [|dwell| &mut dwell.forces, |dwell| &mut dwell.motions];
+    for pick in picks {
+        let lines = dwells
+            .iter_mut()
+            .map(|dwell| pick(dwell).len())
+            .min()
+            .unwrap_or(0);
+        for line in 0..lines {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for dwell in dwells.iter_mut() {
+                let samples = dwell.samples as f64;
+                sum += samples * pick(dwell)[line].variance;
+                count += samples;
+            }
+            for dwell in dwells.iter_mut() {
+                pick(dwell)[line].variance = sum / count;
+            }
+        }
+    }
+}

@@ -1,0 +1,577 @@
+//! Force coefficients from cutting tests.
+//!
+//! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ} over the teeth that
+//! cut (eqs 3.2 to 3.4), with the chip thickness h of [`chips`], and the runout of each tooth in it: least squares over all
+//! samples, each channel weighed with what it leaves. Beside it the classical way: forces averaged over a revolution, over
+//! the feed (Altintas): runout and a stable vibration do not act on them as long as every tooth stays in its chip. Intervals come from the scatter between
+//! revolutions.
+
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
+
+use super::chip::{Chip, chips};
+use super::cutting_test::CuttingTest;
+use super::least_squares::{scaled_inverse, scaled_least_squares, scaled_solve};
+use super::steady_fit::NINETY_PERCENT;
+use super::student::ninety_percent;
+use quietcut_model::milling::{Material, Runout, Tool, ToothForce, TurningVector};
+
+/// The coefficients as they are called in cases: MPa, and N/mm.
+pub const KEYS: [&str; 6] = [
+    "ktc_mpa",
+    "krc_mpa",
+    "kac_mpa",
+    "kte_n_per_mm",
+    "kre_n_per_mm",
+    "kae_n_per_mm",
+];
+
+/// Feeds that differ by less than this are one.
+const SAME_FEED: f64 = 0.02;
+
+/// A value with its deviation: 1.645 of them are half the 90 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Value {
+    /// The value.
+    pub value: f64,
+    /// The deviation.
+    pub deviation: f64,
+}
+
+/// Length of the last step, in deviations.
+const SETTLED: f64 = 1e-2;
+
+/// The same where chips at the edge of contact come and go with every step.
+const SETTLED_ENOUGH: f64 = 0.3;
+
+/// What a set of cutting tests says.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The coefficients in the order of [`KEYS`]; `None` for the axial ones where no axial force was measured.
+    pub coefficients: [Option<Value>; 6],
+    /// The same by forces averaged over revolutions; `None` where all feeds are the same.
+    pub averaged: Option<[Option<Value>; 6]>,
+    /// How far each tooth stands out from the mean of all, m.
+    pub runout_m: Vec<Value>,
+    /// Root mean square of what is left over that of the force.
+    pub relative_error: f64,
+    /// Revolutions that were used.
+    pub revolutions: usize,
+    /// Feeds that differ.
+    pub feeds: usize,
+    /// Feed per tooth, mean of the tests, m.
+    pub feed_per_tooth_m: f64,
+}
+
+/// Why there is none.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ForceCoefficientError {
+    /// Tests of different tools.
+    #[error("the tests have tools with {0} and {1} teeth; tests of one tool are needed")]
+    Teeth(usize, usize),
+    /// Radial and axial coefficients cannot be told apart.
+    #[error(
+        "no fz was measured, and with an edge angle of {0:.1} degrees radial and axial forces act in one direction in the plane of the tool; fz, or a square end mill (90 degrees), is needed"
+    )]
+    NoAxialForce(f64),
+    /// Data that do not determine the coefficients.
+    #[error(
+        "the tests do not determine the coefficients; cuts at two or more feeds, in which teeth cut air now and then, are needed"
+    )]
+    Undetermined,
+    /// The fit does not settle.
+    #[error("the fit does not converge: chips that come and go with the runout; larger feeds are needed")]
+    NotConverged,
+}
+
+/// A test with what does not change while fitting.
+struct Prepared<'a> {
+    test: &'a CuttingTest,
+    /// a e and a e/sin γ at an angle, N per unit of each coefficient and meter of chip; N per unit.
+    cutting: [TurningVector; 3],
+    edge: [TurningVector; 3],
+    /// Samples within one of an entry or exit: half of what they measure is another engagement.
+    switching: BTreeSet<usize>,
+    revolutions: Vec<[usize; 2]>,
+    /// 1/σ² of each direction.
+    weights: [f64; 3],
+}
+
+/// The coefficients, and how far teeth stand out.
+#[derive(Clone)]
+struct State {
+    /// In the order of [`KEYS`].
+    coefficients: [f64; 6],
+    runout_m: Vec<f64>,
+}
+
+/// Sums over samples.
+struct Sums {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// Σ g gᵀ over revolutions.
+    scatter: DMatrix<f64>,
+    /// Of squares, of each direction.
+    left: Vector3<f64>,
+    all: f64,
+    samples: usize,
+    revolutions: usize,
+}
+
+impl Sums {
+    fn new(size: usize) -> Self {
+        Self {
+            matrix: DMatrix::zeros(size, size),
+            gradient: DVector::zeros(size),
+            scatter: DMatrix::zeros(size, size),
+            left: Vector3::zeros(),
+            all: 0.0,
+            samples: 0,
+            revolutions: 0,
+        }
+    }
+
+    fn add(mut self, other: &Self) -> Self {
+        self.matrix += &other.matrix;
+        self.gradient += &other.gradient;
+        self.scatter += &other.scatter;
+        self.left += other.left;
+        self.all += other.all;
+        self.samples += other.samples;
+        self.revolutions += other.revolutions;
+        self
+    }
+}
+
+/// The coefficients of tests with one tool.
+///
+/// # Errors
+/// See [`ForceCoefficientError`].
+pub fn fit(tests: &[CuttingTest]) -> Result<Fit, ForceCoefficientError> {
+    let Some(first) = tests.first() else {
+        return Err(ForceCoefficientError::Undetermined);
+    };
+    if let Some(other) = tests.iter().find(|test| test.teeth != first.teeth) {
+        return Err(ForceCoefficientError::Teeth(first.teeth, other.teeth));
+    }
+    let has_axial = tests.iter().all(|test| test.has_axial_force);
+    if !has_axial && first.edge_angle.cos().abs() > 1e-9 {
+        return Err(ForceCoefficientError::NoAxialForce(first.edge_angle.to_degrees()));
+    }
+    let mut fitter = Fitter {
+        tests: tests.iter().map(prepared).collect(),
+        teeth: first.teeth,
+        has_axial,
+    };
+    let start = State {
+        coefficients: [0.0; 6],
+        runout_m: vec![0.0; first.teeth],
+    };
+    // Without coefficients runout has no effect: the first step finds the coefficients alone.
+    let linear = fitter.step(&start, &fitter.sums(&start))?.0;
+    fitter.weigh(&linear);
+    let state = fitter.settle(linear)?;
+    // What is left is known better now.
+    fitter.weigh(&state);
+    let state = fitter.settle(state)?;
+    Ok(fitter.finish(&state))
+}
+
+/// Vectors of a tool of depth `depth_m`: N per unit of a coefficient.
+fn vectors(test: &CuttingTest) -> [ToothForce; 3] {
+    let tool = Tool {
+        teeth: test.teeth,
+        edge_angle_deg: test.edge_angle.to_degrees(),
+        diameter_mm: None,
+        pitch_deg: vec![360.0 / test.teeth as f64; test.teeth],
+        runout: None,
+    };
+    std::array::from_fn(|index| {
+        let unit = |place: usize| f64::from(u8::from(place == index));
+        let material = Material {
+            ktc_mpa: unit(0),
+            krc_mpa: unit(1),
+            kac_mpa: unit(2),
+            kte_n_per_mm: unit(0),
+            kre_n_per_mm: unit(1),
+            kae_n_per_mm: unit(2),
+        };
+        ToothForce::new(&tool, &material)
+    })
+}
+
+fn prepared(test: &CuttingTest) -> Prepared<'_> {
+    let scaled = |vector: TurningVector| TurningVector {
+        constant: vector.constant * test.depth_m,
+        cosine: vector.cosine * test.depth_m,
+        sine: vector.sine * test.depth_m,
+    };
+    let vectors = vectors(test);
+    let [from, to] = test.full_cut;
+    let mut switching = BTreeSet::new();
+    let passes = |angle: f64| (angle / test.pitch()) as i64;
+    for pass in passes(test.angle[from]) - 1..=passes(test.angle[to - 1]) + 1 {
+        for end in [test.start, test.exit] {
+            let sample = test.sample_at(end + pass as f64 * test.pitch());
+            switching.extend([sample.saturating_sub(1), sample]);
+        }
+    }
+    Prepared {
+        test,
+        cutting: vectors.map(|force| scaled(force.cutting)),
+        edge: vectors.map(|force| scaled(force.edge)),
+        switching,
+        revolutions: test.revolutions(),
+        weights: [1.0; 3],
+    }
+}
+
+impl Prepared<'_> {
+    /// The mean force of a revolution without runout and vibration, N per unit of each coefficient; and the measured one, N.
+    ///
+    /// Both are those of the same samples, so that entry and exit between samples move neither against the other.
+    fn mean_forces(&self, [from, to]: [usize; 2]) -> ([Vector3<f64>; 6], Vector3<f64>) {
+        let test = self.test;
+        let mut sums = [Vector3::zeros(); 6];
+        let (mut force, mut count) = (Vector3::zeros(), 0);
+        for sample in (from..to).filter(|sample| !self.switching.contains(sample)) {
+            let angle = test.angle[sample];
+            force += test.force[sample];
+            count += 1;
+            for tooth in 0..test.teeth {
+                let phi = (angle + tooth as f64 * test.pitch()).rem_euclid(TAU);
+                if phi < test.start || phi >= test.exit {
+                    continue;
+                }
+                let thickness_m = test.feed_per_tooth_m * phi.sin() * test.edge_angle.sin();
+                for part in 0..3 {
+                    sums[part] += self.cutting[part].at(phi) * thickness_m;
+                    sums[part + 3] += self.edge[part].at(phi);
+                }
+            }
+        }
+        let count = f64::from(count.max(1));
+        (sums.map(|sum| sum / count), force / count)
+    }
+}
+
+struct Fitter<'a> {
+    tests: Vec<Prepared<'a>>,
+    teeth: usize,
+    has_axial: bool,
+}
+
+impl Fitter<'_> {
+    /// Which coefficients are fitted.
+    fn active(&self) -> Vec<usize> {
+        (0..6).filter(|index| self.has_axial || index % 3 != 2).collect()
+    }
+
+    /// Coefficients, then the runout of all teeth but the last.
+    fn size(&self) -> usize {
+        self.active().len() + self.teeth - 1
+    }
+
+    /// Force of a sample, and its derivative by coefficients and the runout of every tooth.
+    fn model(
+        &self,
+        prepared: &Prepared<'_>,
+        cut: &[Chip],
+        state: &State,
+        slopes: &mut [Vector3<f64>],
+    ) -> Vector3<f64> {
+        slopes.fill(Vector3::zeros());
+        let mut force = Vector3::zeros();
+        let sin_edge = prepared.test.edge_angle.sin();
+        for chip in cut {
+            let mut per_meter = Vector3::zeros();
+            for part in 0..3 {
+                let cutting = prepared.cutting[part].at(chip.phi);
+                let edge = prepared.edge[part].at(chip.phi);
+                slopes[part] += cutting * chip.thickness_m;
+                slopes[part + 3] += edge;
+                per_meter += cutting * state.coefficients[part];
+                force += edge * state.coefficients[part + 3];
+            }
+            force += per_meter * chip.thickness_m;
+            slopes[6 + chip.tooth] += per_meter * sin_edge;
+            slopes[6 + chip.ahead] -= per_meter * sin_edge;
+        }
+        force
+    }
+
+    fn sums(&self, state: &State) -> Sums {
+        let of_tests: Vec<Sums> = self
+            .tests
+            .par_iter()
+            .map(|prepared| self.sums_of(prepared, state))
+            .collect();
+        of_tests.iter().fold(Sums::new(self.size()), Sums::add)
+    }
+
+    fn sums_of(&self, prepared: &Prepared<'_>, state: &State) -> Sums {
+        let (active, size) = (self.active(), self.size());
+        let chips = chips(prepared.test, &state.runout_m);
+        let mut sums = Sums::new(size);
+        let mut slopes = vec![Vector3::zeros(); 6 + self.teeth];
+        let mut row = DVector::zeros(size);
+        let mut gradient = DVector::zeros(size);
+        for [from, to] in &prepared.revolutions {
+            gradient.fill(0.0);
+            for (sample, cut) in (*from..).zip(&chips[*from..*to]) {
+                if prepared.switching.contains(&sample) {
+                    continue;
+                }
+                let measured = prepared.test.force[sample];
+                let left = measured - self.model(prepared, cut, state, &mut slopes);
+                sums.samples += 1;
+                sums.left += left.component_mul(&left);
+                sums.all += measured.norm_squared();
+                if cut.is_empty() {
+                    continue;
+                }
+                for axis in 0..3 {
+                    let weight = prepared.weights[axis];
+                    for (place, index) in active.iter().enumerate() {
+                        row[place] = slopes[*index][axis];
+                    }
+                    // The last tooth stands out by less the sum of the others.
+                    for tooth in 0..self.teeth - 1 {
+                        row[active.len() + tooth] =
+                            slopes[6 + tooth][axis] - slopes[6 + self.teeth - 1][axis];
+                    }
+                    sums.matrix.ger(weight, &row, &row, 1.0);
+                    gradient.axpy(weight * left[axis], &row, 1.0);
+                }
+            }
+            sums.scatter.ger(1.0, &gradient, &gradient, 1.0);
+            sums.gradient += &gradient;
+            sums.revolutions += 1;
+        }
+        sums
+    }
+
+    /// The next state, and the length of the step in deviations.
+    fn step(&self, state: &State, sums: &Sums) -> Result<(State, f64), ForceCoefficientError> {
+        let active = self.active();
+        // Without any coefficient runout has no effect yet.
+        let known = if state.coefficients == [0.0; 6] {
+            active.len()
+        } else {
+            self.size()
+        };
+        let matrix = sums.matrix.view((0, 0), (known, known)).into_owned();
+        let gradient = sums.gradient.rows(0, known).into_owned();
+        let step = scaled_solve(&matrix, &gradient).ok_or(ForceCoefficientError::Undetermined)?;
+        let mut next = state.clone();
+        for (place, index) in active.iter().enumerate() {
+            next.coefficients[*index] += step[place];
+        }
+        if known > active.len() {
+            let mut last = 0.0;
+            for tooth in 0..self.teeth - 1 {
+                next.runout_m[tooth] += step[active.len() + tooth];
+                last -= next.runout_m[tooth];
+            }
+            next.runout_m[self.teeth - 1] = last;
+        }
+        Ok((next, step.dot(&(matrix * &step)).max(0.0).sqrt()))
+    }
+
+    fn settle(&self, mut state: State) -> Result<State, ForceCoefficientError> {
+        let mut length = f64::INFINITY;
+        for _ in 0..30 {
+            (state, length) = self.step(&state, &self.sums(&state))?;
+            if length < SETTLED {
+                return Ok(state);
+            }
+        }
+        if length < SETTLED_ENOUGH {
+            Ok(state)
+        } else {
+            Err(ForceCoefficientError::NotConverged)
+        }
+    }
+
+    /// Weighs each direction of each test with what is left of it.
+    fn weigh(&mut self, state: &State) {
+        let variances: Vec<Vector3<f64>> = self
+            .tests
+            .iter()
+            .map(|prepared| {
+                let sums = self.sums_of(prepared, state);
+                // A channel that is fitted exactly is no better than rounding.
+                let least = 1e-20 * sums.all / sums.samples.max(1) as f64;
+                (sums.left / sums.samples.max(1) as f64).map(|variance| variance.max(least))
+            })
+            .collect();
+        let axial = if self.has_axial { 1.0 } else { 0.0 };
+        for (prepared, variance) in self.tests.iter_mut().zip(variances) {
+            let weight = |axis: usize| {
+                if variance[axis] > 0.0 {
+                    1.0 / variance[axis]
+                } else {
+                    1.0
+                }
+            };
+            prepared.weights = [weight(0), weight(1), axial * weight(2)];
+        }
+    }
+
+    fn finish(&self, state: &State) -> Fit {
+        let sums = self.sums(state);
+        let (active, size) = (self.active(), self.size());
+        let covariance = scaled_inverse(&sums.matrix).map_or_else(
+            || DMatrix::from_element(size, size, f64::INFINITY),
+            |inverse| &inverse * &sums.scatter * &inverse,
+        );
+        let few = few(sums.revolutions, size);
+        let deviation = |variance: f64| few * variance.max(0.0).sqrt();
+        let coefficients = std::array::from_fn(|index| {
+            let place = active.iter().position(|known| *known == index)?;
+            Some(Value {
+                value: state.coefficients[index],
+                deviation: deviation(covariance[(place, place)]),
+            })
+        });
+        let of_runout = covariance.view((active.len(), active.len()), (self.teeth - 1, self.teeth - 1));
+        let runout_m = (0..self.teeth)
+            .map(|tooth| Value {
+                value: state.runout_m[tooth],
+                deviation: deviation(if tooth + 1 < self.teeth {
+                    of_runout[(tooth, tooth)]
+                } else {
+                    of_runout.sum()
+                }),
+            })
+            .collect();
+        let feeds = self.feeds();
+        Fit {
+            coefficients,
+            averaged: if feeds > 1 { self.averaged() } else { None },
+            runout_m,
+            relative_error: (sums.left.sum() / sums.all.max(f64::MIN_POSITIVE)).sqrt(),
+            revolutions: sums.revolutions,
+            feeds,
+            feed_per_tooth_m: self.mean_feed_m(),
+        }
+    }
+
+    fn mean_feed_m(&self) -> f64 {
+        let feeds = self.tests.iter().map(|prepared| prepared.test.feed_per_tooth_m);
+        feeds.sum::<f64>() / self.tests.len() as f64
+    }
+
+    fn feeds(&self) -> usize {
+        let mut feeds: Vec<f64> = self
+            .tests
+            .iter()
+            .map(|prepared| prepared.test.feed_per_tooth_m)
+            .collect();
+        feeds.sort_by(f64::total_cmp);
+        feeds.dedup_by(|next, known| *next <= *known * (1.0 + SAME_FEED));
+        feeds.len()
+    }
+
+    /// The coefficients by mean forces: three equations for each revolution.
+    fn averaged(&self) -> Option<[Option<Value>; 6]> {
+        let active = self.active();
+        let directions = if self.has_axial { 3 } else { 2 };
+        let (mut rows, mut right) = (Vec::new(), Vec::new());
+        let mut ends = Vec::new();
+        for prepared in &self.tests {
+            for [from, to] in &prepared.revolutions {
+                let (columns, force) = prepared.mean_forces([*from, *to]);
+                for axis in 0..directions {
+                    rows.extend(active.iter().map(|index| columns[*index][axis]));
+                    right.push(force[axis]);
+                }
+                ends.push(right.len());
+            }
+        }
+        let matrix = DMatrix::from_row_slice(right.len(), active.len(), &rows);
+        let right = DVector::from_vec(right);
+        let solution = scaled_least_squares(&matrix, &right)?;
+        let left = right - &matrix * &solution;
+        let inverse = scaled_inverse(&matrix.tr_mul(&matrix))?;
+        let mut scatter = DMatrix::zeros(active.len(), active.len());
+        for end in &ends {
+            let from = end - directions;
+            let gradient = matrix.rows(from, directions).tr_mul(&left.rows(from, directions));
+            scatter += &gradient * gradient.transpose();
+        }
+        let covariance = &inverse * scatter * &inverse;
+        let few = few(ends.len(), active.len());
+        Some(std::array::from_fn(|index| {
+            let place = active.iter().position(|known| *known == index)?;
+            Some(Value {
+                value: solution[place],
+                deviation: few * covariance[(place, place)].max(0.0).sqrt(),
+            })
+        }))
+    }
+}
+
+impl Fit {
+    /// The coefficients whose values by mean forces and over the arc differ by more than the sum of both half intervals and a
+    /// twentieth of the largest force of a chip: small coefficients may differ by much of their own.
+    pub fn apart(&self) -> Vec<&'static str> {
+        let averaged = self.averaged.unwrap_or_default();
+        let largest = |values: &[Option<Value>]| {
+            let sizes = values.iter().flatten().map(|value| value.value.abs());
+            sizes.fold(0.0, f64::max)
+        };
+        let cutting = largest(&self.coefficients[..3]);
+        // N/mm, from MPa and m.
+        let edge = largest(&self.coefficients[3..]).max(1e3 * self.feed_per_tooth_m * cutting);
+        let differs = |&(index, _): &(usize, &'static str)| {
+            let (Some(one), Some(other)) = (self.coefficients[index], averaged[index]) else {
+                return false;
+            };
+            let least = 0.05 * if index < 3 { cutting } else { edge };
+            (one.value - other.value).abs() > NINETY_PERCENT * (one.deviation + other.deviation) + least
+        };
+        KEYS.into_iter()
+            .enumerate()
+            .filter(differs)
+            .map(|(_, key)| key)
+            .collect()
+    }
+}
+
+/// The offset of the tool axis that explains how far the teeth stand out: r_j = e cos(ψ + 2πj/N).
+///
+/// `None` for one tooth, and where the offset lies within its 90 % interval of zero. Two teeth show the offset along their own
+/// line alone.
+pub fn runout(fit: &Fit) -> Option<Runout> {
+    let teeth = fit.runout_m.len();
+    let (mut cosine, mut sine) = (0.0, 0.0);
+    for (tooth, out) in fit.runout_m.iter().enumerate() {
+        let (sin, cos) = (TAU * tooth as f64 / teeth as f64).sin_cos();
+        cosine += out.value * cos;
+        sine -= out.value * sin;
+    }
+    let share = if teeth > 2 { 2.0 } else { 1.0 } / teeth as f64;
+    let (cosine, sine) = (share * cosine, if teeth > 2 { share * sine } else { 0.0 });
+    let offset_m = cosine.hypot(sine);
+    let largest = fit
+        .runout_m
+        .iter()
+        .map(|value| value.deviation)
+        .fold(0.0, f64::max);
+    (teeth > 1 && offset_m > NINETY_PERCENT * largest).then(|| Runout {
+        offset_um: 1e6 * offset_m,
+        angle_deg: sine.atan2(cosine).to_degrees(),
+    })
+}
+
+/// How much wider than a normal interval that of so many revolutions is, of which the parameters have taken their share of
+/// the scatter.
+fn few(revolutions: usize, parameters: usize) -> f64 {
+    let count = revolutions as f64;
+    let taken = count / (count - parameters as f64).max(1.0);
+    taken.sqrt() * ninety_percent(revolutions.saturating_sub(1)) / NINETY_PERCENT
+}

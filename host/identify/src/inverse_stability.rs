@@ -1,0 +1,490 @@
+//! Modes from cuts that chattered and cuts that did not: inverse stability, without a force sensor.
+//!
+//! A structure whose modes have the shapes of a first guess, and other natural frequencies, damping ratios and stiffnesses, has a
+//! dominant multiplier μ at every cut: a cut chatters where |μ| > 1, with the frequency that belongs to μ. Depths are set, and
+//! frequencies read, with errors that are known; so every structure has a likelihood. What the cuts say is the distribution of
+//! structures that it leaves of those which were thought possible before (log-uniform within [`Before`]): drawn by sequential
+//! Monte Carlo from the latter to the former (Del Moral, Doucet and Jasra 2006). Where cuts are few, much is left, and the
+//! intervals are wide; several islands of structures that explain the cuts are all kept.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use num_complex::Complex64;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use super::modes::IdentifiedMode;
+use super::modes::shape::{normalize, rank_one};
+use super::observed_cut::ObservedCut;
+use super::steady_fit::NINETY_PERCENT;
+use quietcut_model::structure::{Direction, FirstOrder, Mode};
+use quietcut_stability::{Problem, StabilityError, point};
+
+/// What was thought possible before: factors up and down from the first guess.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Before {
+    /// Of natural frequencies.
+    pub frequency: f64,
+    /// Of damping ratios.
+    pub damping: f64,
+    /// Of stiffnesses.
+    pub stiffness: f64,
+}
+
+impl Default for Before {
+    fn default() -> Self {
+        Self {
+            frequency: 1.25,
+            damping: 4.0,
+            stiffness: 4.0,
+        }
+    }
+}
+
+/// How well cuts are known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// Standard deviation of depths, relative.
+    pub depth: f64,
+    /// Standard deviation of chatter frequencies, relative.
+    pub frequency: f64,
+}
+
+/// A quantity before and after.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Median.
+    pub value: f64,
+    /// 5 % and 95 % of what is left.
+    pub ci90: [f64; 2],
+    /// The same of what was possible before.
+    pub before: [f64; 2],
+}
+
+impl Spread {
+    /// Standard deviation of the logarithm, if it were normal.
+    pub fn deviation(&self) -> f64 {
+        (self.ci90[1] / self.ci90[0]).ln() / (2.0 * NINETY_PERCENT)
+    }
+
+    /// True where the cuts have left more than half of what was possible before, on a logarithmic scale: they cannot tell.
+    pub fn is_vague(&self) -> bool {
+        let width = |[low, high]: [f64; 2]| (high / low).ln();
+        width(self.ci90) > 0.5 * width(self.before)
+    }
+}
+
+/// What is left of one mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InverseMode {
+    /// Natural frequency, Hz.
+    pub frequency_hz: Spread,
+    /// Damping ratio.
+    pub damping_ratio: Spread,
+    /// Stiffness of the mode in its softest direction, N/m: force over displacement at rest, of this mode alone.
+    pub stiffness_n_per_m: Spread,
+    /// That of the first guess, N/m.
+    pub start_stiffness_n_per_m: f64,
+}
+
+/// Why nothing can be said.
+#[derive(Debug, thiserror::Error)]
+pub enum InverseError {
+    /// The first guess has no modes that could move.
+    #[error("the first guess has no modes: every pole is real, or without a shape of its own")]
+    NoModes,
+    /// No structure that was thought possible explains the cuts.
+    #[error(
+        "no structure that was thought possible explains the cuts: {0} of {1} are told wrongly by the best; another first guess, or other force coefficients, are needed"
+    )]
+    Unexplained(usize, usize),
+    /// Stability cannot be computed.
+    #[error(transparent)]
+    Stability(#[from] StabilityError),
+}
+
+/// Structures that are drawn.
+const PARTICLES: usize = 192;
+
+/// From step to step so much of the particles' weight stays effective.
+const EFFECTIVE: f64 = 0.5;
+
+/// Moves of every particle after each step, and after the last one.
+const MOVES: [usize; 2] = [2, 4];
+
+/// ln |μ| changes by about its share of the depth, at most a few times as much: beyond so many errors of depth a verdict is sure.
+const SURE: f64 = 12.0;
+
+/// Share of cuts that are told wrongly for reasons of their own.
+const WRONG: f64 = 1e-3;
+
+/// The structures: logarithms of factors on the first guess, three for each mode.
+struct Family<'a> {
+    start: &'a Problem,
+    /// Pole and projector of each mode.
+    modes: Vec<(Complex64, DMatrix<Complex64>)>,
+    /// Those with a chatter frequency first: they tell the most.
+    cuts: Vec<ObservedCut>,
+    errors: Errors,
+    /// Logarithms of the factors of [`Before`], three for each mode.
+    half_widths: Vec<f64>,
+}
+
+/// Modes from cuts; `start` has the first guess and the force coefficients. The result depends on the seed alone.
+///
+/// # Errors
+/// See [`InverseError`].
+pub fn modes(
+    start: &Problem,
+    cuts: &[ObservedCut],
+    errors: Errors,
+    before: Before,
+    seed: u64,
+) -> Result<Vec<InverseMode>, InverseError> {
+    let modes: Vec<_> = start
+        .structure
+        .modal_parts()
+        .iter()
+        .map(|part| {
+            let (real, turned) = (part.moved(Complex64::ONE), part.moved(Complex64::I));
+            // 2 Re P and 2 Re iP = −2 Im P.
+            let projector = real.zip_map(&turned, |re, im| Complex64::new(0.5 * re, -0.5 * im));
+            (part.pole, projector)
+        })
+        .collect();
+    if modes.is_empty() {
+        return Err(InverseError::NoModes);
+    }
+    let of_mode = [before.frequency.ln(), before.damping.ln(), before.stiffness.ln()];
+    let mut ordered = cuts.to_vec();
+    ordered.sort_by_key(|cut| cut.chatter_hz.is_none());
+    let family = Family {
+        start,
+        half_widths: modes.iter().flat_map(|_| of_mode).collect(),
+        modes,
+        cuts: ordered,
+        errors,
+    };
+    // A first look says whether stability can be computed at all.
+    for cut in cuts {
+        point(start, cut.rpm, cut.depth_mm)?;
+    }
+    let particles = family.draw(seed);
+    family.check(&particles)?;
+    Ok(family.told(&particles))
+}
+
+/// The modes of `start`, in the machine's directions, with the medians that the cuts have left: for a case.
+///
+/// Shapes are those of the first guess. Left shapes carry the residue, which is about ω/2ik, and its deviation. Deviations are
+/// those of the logarithms; that the cuts tie the parameters to each other is lost.
+/// Modes of one pole, as those of a round tool, become several of one frequency.
+pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direction>, Vec<IdentifiedMode>) {
+    let axes: Vec<usize> = (0..3)
+        .filter(|&axis| start.c.row(axis).amax() > 0.0 && start.b.column(axis).amax() > 0.0)
+        .collect();
+    let names = [Direction::X, Direction::Y, Direction::Z];
+    let shared: Vec<(usize, usize)> = (0..axes.len()).map(|place| (place, place)).collect();
+    let mut modes = Vec::new();
+    for (part, told) in start.modal_parts().iter().zip(found) {
+        let at_start = (part.omega() / TAU, told.start_stiffness_n_per_m);
+        let scale = told.frequency_hz.value / at_start.0 / (told.stiffness_n_per_m.value / at_start.1);
+        let share = told
+            .frequency_hz
+            .deviation()
+            .hypot(told.stiffness_n_per_m.deviation());
+        let whole = part.residue(start) * Complex64::from(scale);
+        let mut rest = DMatrix::from_fn(axes.len(), axes.len(), |i, j| whole[(axes[i], axes[j])]);
+        let all = rest.norm();
+        while let Some((mut right, mut left, _)) = rank_one(&rest) {
+            let taken = DMatrix::from_fn(axes.len(), axes.len(), |i, j| right[i] * left[j]);
+            // What is left of a residue that was taken whole is rounding.
+            if taken.norm() <= 1e-9 * all {
+                break;
+            }
+            rest -= taken;
+            normalize(&mut right, &mut left, &shared);
+            modes.push(IdentifiedMode {
+                frequency_std_hz: told.frequency_hz.value * told.frequency_hz.deviation(),
+                damping_ratio_std: told.damping_ratio.value * told.damping_ratio.deviation(),
+                left_std: left
+                    .iter()
+                    .map(|z| [z.re, z.im].map(|x| share * x.abs()))
+                    .collect(),
+                right_std: vec![[0.0; 2]; right.len()],
+                mode: Mode {
+                    frequency_hz: told.frequency_hz.value,
+                    damping_ratio: told.damping_ratio.value,
+                    left,
+                    right,
+                },
+            });
+        }
+    }
+    (axes.into_iter().map(|axis| names[axis]).collect(), modes)
+}
+
+impl Family<'_> {
+    /// The problem of a structure.
+    fn problem(&self, theta: &[f64]) -> Problem {
+        let mut problem = self.start.clone();
+        for ((pole, projector), factors) in self.modes.iter().zip(theta.chunks_exact(3)) {
+            let [frequency, damping, stiffness] = [factors[0], factors[1], factors[2]].map(f64::exp);
+            let (omega, zeta) = (
+                pole.norm() * frequency,
+                (-pole.re / pole.norm() * damping).min(0.99),
+            );
+            let moved = Complex64::new(-zeta, (1.0 - zeta * zeta).sqrt()) * omega;
+            problem.structure.a += projector.map(|entry| 2.0 * ((moved - pole) * entry).re);
+            // The residue of a mode is about ω/2ik.
+            let residue = frequency / stiffness;
+            let part = projector.map(|entry| 2.0 * entry.re) * &self.start.structure.b;
+            problem.structure.b += part * (residue - 1.0);
+        }
+        problem
+    }
+
+    /// Logarithm of the likelihood, and how many cuts are told wrongly.
+    ///
+    /// No cut adds to the sum: once it has fallen to `least` it cannot rise above it again, and −∞ is the answer.
+    fn likelihood(&self, theta: &[f64], least: f64) -> (f64, usize) {
+        let problem = self.problem(theta);
+        let mut sum = 0.0;
+        let mut wrong = 0;
+        for cut in &self.cuts {
+            if sum <= least {
+                return (f64::NEG_INFINITY, self.cuts.len());
+            }
+            let step = 1.0 + self.errors.depth;
+            let Ok(high) = point(&problem, cut.rpm, cut.depth_mm * step) else {
+                return (f64::NEG_INFINITY, self.cuts.len());
+            };
+            let high_growth = high.multiplier_abs.ln();
+            let deviations = if high_growth.abs() > SURE * self.errors.depth {
+                high_growth.signum() * f64::INFINITY
+            } else {
+                let Ok(low) = point(&problem, cut.rpm, cut.depth_mm / step) else {
+                    return (f64::NEG_INFINITY, self.cuts.len());
+                };
+                // Depth as if growth were linear in it; a slope that vanishes says nothing about depth.
+                let low_growth = low.multiplier_abs.ln();
+                let slope = (0.5 * (high_growth - low_growth)).abs().max(1e-4);
+                0.5 * (low_growth + high_growth) / slope
+            };
+            let toward = if cut.chatters { deviations } else { -deviations };
+            sum += (WRONG + (1.0 - 2.0 * WRONG) * normal_share(toward)).ln();
+            wrong += usize::from(toward < -3.0);
+            if let (Some(measured), Some(predicted)) = (cut.chatter_hz, high.chatter_hz) {
+                let off = (measured / predicted - 1.0) / self.errors.frequency;
+                let density = (-0.5 * off * off).exp();
+                sum += (WRONG * self.errors.frequency + (1.0 - WRONG) * density).ln();
+                wrong += usize::from(off.abs() > 4.0 && toward >= -3.0);
+            }
+        }
+        (sum, wrong)
+    }
+
+    fn is_possible(&self, theta: &[f64]) -> bool {
+        theta
+            .iter()
+            .zip(&self.half_widths)
+            .all(|(value, half)| value.abs() <= *half)
+    }
+
+    /// Structures that the cuts have left, each as likely as any other.
+    fn draw(&self, seed: u64) -> Vec<Vec<f64>> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut particles: Vec<Vec<f64>> = (0..PARTICLES)
+            .map(|_| {
+                self.half_widths
+                    .iter()
+                    .map(|half| half * random.random_range(-1.0..1.0))
+                    .collect()
+            })
+            .collect();
+        let mut sums: Vec<f64> = particles
+            .par_iter()
+            .map(|theta| self.likelihood(theta, f64::NEG_INFINITY).0)
+            .collect();
+        let mut share = 0.0;
+        let mut stage = 0;
+        while share < 1.0 {
+            let step = next_step(&sums, share);
+            share += step;
+            let weights: Vec<f64> = weights(&sums, step);
+            // Systematic: one random number for all.
+            let first: f64 = random.random_range(0.0..1.0);
+            let chosen = systematic(&weights, first);
+            particles = chosen.iter().map(|&index| particles[index].clone()).collect();
+            sums = chosen.iter().map(|&index| sums[index]).collect();
+            let root = scatter_root(&particles);
+            let moves = MOVES[usize::from(share >= 1.0)];
+            (particles, sums) = particles
+                .par_iter()
+                .zip(&sums)
+                .enumerate()
+                .map(|(index, (theta, sum))| {
+                    let mut own = ChaCha8Rng::seed_from_u64(seed);
+                    own.set_stream(1 + (stage * PARTICLES + index) as u64);
+                    self.walk((theta.clone(), *sum), &root, share, moves, &mut own)
+                })
+                .unzip();
+            stage += 1;
+        }
+        particles
+    }
+
+    /// Metropolis steps of several lengths.
+    fn walk(
+        &self,
+        (mut theta, mut sum): (Vec<f64>, f64),
+        root: &DMatrix<f64>,
+        share: f64,
+        moves: usize,
+        random: &mut ChaCha8Rng,
+    ) -> (Vec<f64>, f64) {
+        let size = theta.len();
+        for step in 0..moves {
+            let length = if step % 2 == 0 { 1.6 } else { 0.5 } / (size as f64).sqrt();
+            let kick = DVector::from_fn(size, |_, _| -> f64 { StandardNormal.sample(random) });
+            let kick = root * kick * length;
+            let tried: Vec<f64> = theta
+                .iter()
+                .zip(kick.iter())
+                .map(|(theta, kick)| theta + kick)
+                .collect();
+            let luck: f64 = random.random_range(0.0..1.0);
+            if !self.is_possible(&tried) {
+                continue;
+            }
+            let least = sum + luck.ln() / share;
+            let (found, _) = self.likelihood(&tried, least);
+            if found > least {
+                (theta, sum) = (tried, found);
+            }
+        }
+        (theta, sum)
+    }
+
+    fn check(&self, particles: &[Vec<f64>]) -> Result<(), InverseError> {
+        let wrong = particles
+            .par_iter()
+            .map(|theta| self.likelihood(theta, f64::NEG_INFINITY).1)
+            .min()
+            .unwrap_or(0);
+        // One in twenty may be wrong for reasons of its own.
+        if wrong > self.cuts.len() / 20 {
+            Err(InverseError::Unexplained(wrong, self.cuts.len()))
+        } else {
+            Ok(())
+        }
+    }
+
+    fn told(&self, particles: &[Vec<f64>]) -> Vec<InverseMode> {
+        let structure = &self.start.structure;
+        self.modes
+            .iter()
+            .enumerate()
+            .map(|(mode, (pole, projector))| {
+                // −2 Re(C P B/λ): what this mode gives way at rest.
+                let at_rest = projector.map(|entry| -2.0 * (entry / pole).re);
+                let compliance = &structure.c * at_rest * &structure.b;
+                let stiffness = 1.0 / (0..3).map(|axis| compliance[(axis, axis)]).fold(0.0, f64::max);
+                let spread = |place: usize, at_start: f64| {
+                    let index = 3 * mode + place;
+                    let half = 0.9 * self.half_widths[index];
+                    let mut values: Vec<f64> = particles.iter().map(|theta| theta[index]).collect();
+                    values.sort_by(f64::total_cmp);
+                    let quantile = |share: f64| at_start * quantile(&values, share).exp();
+                    Spread {
+                        value: quantile(0.5),
+                        ci90: [quantile(0.05), quantile(0.95)],
+                        before: [at_start * (-half).exp(), at_start * half.exp()],
+                    }
+                };
+                InverseMode {
+                    frequency_hz: spread(0, pole.norm() / TAU),
+                    damping_ratio: spread(1, -pole.re / pole.norm()),
+                    stiffness_n_per_m: spread(2, stiffness),
+                    start_stiffness_n_per_m: stiffness,
+                }
+            })
+            .collect()
+    }
+}
+
+/// The share of a normal distribution below so many deviations.
+fn normal_share(deviations: f64) -> f64 {
+    0.5 * libm::erfc(-deviations * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+/// Weights after a step, with the sum 1.
+fn weights(sums: &[f64], step: f64) -> Vec<f64> {
+    let best = sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let raw: Vec<f64> = sums.iter().map(|sum| (step * (sum - best)).exp()).collect();
+    let total: f64 = raw.iter().sum();
+    raw.iter().map(|weight| weight / total).collect()
+}
+
+/// How much further the likelihood may be taken.
+fn next_step(sums: &[f64], share: f64) -> f64 {
+    let effective = |step: f64| 1.0 / weights(sums, step).iter().map(|w| w * w).sum::<f64>();
+    let enough = EFFECTIVE * sums.len() as f64;
+    let (mut low, mut high) = (0.0, 1.0 - share);
+    if effective(high) >= enough {
+        return high;
+    }
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if effective(middle) >= enough {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    // No step at all would go on for ever.
+    low.max(1e-6).min(1.0 - share)
+}
+
+/// Which particle each new one comes from.
+fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
+    let count = weights.len();
+    let (mut index, mut below) = (0, weights[0]);
+    (0..count)
+        .map(|number| {
+            let at = (number as f64 + first) / count as f64;
+            while below < at && index + 1 < count {
+                index += 1;
+                below += weights[index];
+            }
+            index
+        })
+        .collect()
+}
+
+/// A root of the covariance of the particles.
+fn scatter_root(particles: &[Vec<f64>]) -> DMatrix<f64> {
+    let size = particles.first().map_or(0, Vec::len);
+    let count = particles.len() as f64;
+    let mut mean = DVector::zeros(size);
+    for theta in particles {
+        mean += DVector::from_column_slice(theta) / count;
+    }
+    let mut covariance = DMatrix::identity(size, size) * 1e-12;
+    for theta in particles {
+        let off = DVector::from_column_slice(theta) - &mean;
+        covariance.ger(1.0 / count, &off, &off, 1.0);
+    }
+    Cholesky::new(covariance).map_or_else(|| DMatrix::identity(size, size) * 1e-3, |cholesky| cholesky.l())
+}
+
+/// The value below which a share of all lies, between neighbours.
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let position = (share * sorted.len() as f64 - 0.5).max(0.0);
+    let (below, rest) = (position.floor() as usize, position.fract());
+    let at = |index: usize| sorted.get(index).or(sorted.last()).copied().unwrap_or(f64::NAN);
+    at(below) + rest * (at(below + 1) - at(below))
+}

@@ -1,0 +1,510 @@
+//! Stiffness and damping of a robot's joints from receptances at several postures.
+//!
+//! Geometry and inertia of the links are known (drawings, CAD), but for the mass of the last one if asked: tool and payload. At
+//! each posture H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (eqs 3.14, 3.15 without the inverse of J). What is fitted are the
+//! logarithms of the parameters; weights are the errors of the measured receptances. A first guess of the stiffnesses comes
+//! from the lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in compliance. Cubic terms, which need several levels of force:
+//! [`cubic_joints`](super::cubic_joints).
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::least_squares::{FitError, scaled_inverse, scaled_least_squares, scaled_solve};
+use super::steady_fit::NINETY_PERCENT;
+use super::student::ninety_percent;
+use quietcut_frf::FrfTable;
+use quietcut_model::structure::Robot;
+
+/// Receptances at one posture.
+#[derive(Clone, Debug)]
+pub struct PostureFrf {
+    /// Joint angles, rad.
+    pub angles_rad: Vec<f64>,
+    /// The receptances.
+    pub table: FrfTable,
+    /// Standard deviation of each entry at each frequency, m/N.
+    pub deviation: Vec<Vec<f64>>,
+}
+
+/// What is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointParameter {
+    /// Stiffness of a joint, from 0.
+    Stiffness(usize),
+    /// Damping of a joint, from 0.
+    Damping(usize),
+    /// Cubic stiffness of a joint, from 0.
+    CubicStiffness(usize),
+    /// Cubic damping of a joint, from 0.
+    CubicDamping(usize),
+    /// Mass of the last link.
+    Payload,
+}
+
+/// A robot whose joints were identified.
+#[derive(Clone, Debug)]
+pub struct JointFit {
+    /// The robot; its posture is that of the start.
+    pub robot: Robot,
+    /// What was fitted.
+    pub parameters: Vec<JointParameter>,
+    /// Covariance of the logarithms of the parameters, from the scatter between receptances and their least error.
+    pub covariance: DMatrix<f64>,
+    /// Sum of squares over degrees of freedom, in units of the errors of the receptances.
+    pub misfit: f64,
+    /// Root mean square of what is left over that of the receptances.
+    pub relative_error: f64,
+}
+
+/// Why there is none.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum JointFitError {
+    /// Angles for another number of joints.
+    #[error("a posture has {found} joint angles; the robot has {joints} joints")]
+    Angles {
+        /// Angles.
+        found: usize,
+        /// Joints.
+        joints: usize,
+    },
+    /// Parameters that the receptances do not depend on.
+    #[error(
+        "the receptances do not determine {0}; postures in which that joint moves the tool, and frequencies up to the modes that it has a part in, are needed"
+    )]
+    Undetermined(String),
+    /// No minimum was found.
+    #[error(
+        "the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}: geometry or inertia of the links may be wrong"
+    )]
+    NotConverged(f64),
+    /// Steady tones do not give the cubic terms.
+    #[error(transparent)]
+    Tones(#[from] FitError),
+}
+
+/// Receptances are never known better than this share of them: noise of the force in H1, sensors, windows, sample rates. No
+/// scatter shows an error that all have in common.
+const LEAST_ERROR: f64 = 3e-3;
+
+/// The lowest frequencies, as a share of that of the highest peak, are nearly static.
+const STATIC: f64 = 0.4;
+
+impl JointParameter {
+    /// The key in a case.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Stiffness(_) => "stiffness_nm_per_rad",
+            Self::Damping(_) => "damping_nms_per_rad",
+            Self::CubicStiffness(_) => "cubic_stiffness_nm_per_rad3",
+            Self::CubicDamping(_) => "cubic_damping_nms3_per_rad3",
+            Self::Payload => "mass_kg",
+        }
+    }
+
+    /// The joint, from 0, that it belongs to in a robot of so many.
+    pub fn joint(self, joints: usize) -> usize {
+        match self {
+            Self::Stiffness(joint)
+            | Self::Damping(joint)
+            | Self::CubicStiffness(joint)
+            | Self::CubicDamping(joint) => joint,
+            Self::Payload => joints.saturating_sub(1),
+        }
+    }
+
+    /// True for terms that do not act at vanishing force; they may be negative.
+    pub fn is_cubic(self) -> bool {
+        matches!(self, Self::CubicStiffness(_) | Self::CubicDamping(_))
+    }
+
+    /// The name for people, with the joint counted from 1.
+    pub fn name(self) -> String {
+        match self {
+            Self::Payload => format!("payload {}", self.key()),
+            Self::Stiffness(joint)
+            | Self::Damping(joint)
+            | Self::CubicStiffness(joint)
+            | Self::CubicDamping(joint) => format!("joint {} {}", joint + 1, self.key()),
+        }
+    }
+
+    fn slot(self, robot: &mut Robot) -> Option<&mut f64> {
+        Some(match self {
+            Self::Stiffness(joint) => &mut robot.joints.get_mut(joint)?.stiffness_nm_per_rad,
+            Self::Damping(joint) => &mut robot.joints.get_mut(joint)?.damping_nms_per_rad,
+            Self::CubicStiffness(joint) => &mut robot.joints.get_mut(joint)?.cubic_stiffness_nm_per_rad3,
+            Self::CubicDamping(joint) => &mut robot.joints.get_mut(joint)?.cubic_damping_nms3_per_rad3,
+            Self::Payload => &mut robot.joints.last_mut()?.mass_kg,
+        })
+    }
+
+    /// Its value.
+    pub fn value(self, robot: &Robot) -> f64 {
+        self.slot(&mut robot.clone()).map_or(f64::NAN, |value| *value)
+    }
+
+    /// Gives it another value.
+    pub(super) fn set(self, robot: &mut Robot, value: f64) {
+        if let Some(slot) = self.slot(robot) {
+            *slot = value;
+        }
+    }
+}
+
+/// A posture with what does not depend on the parameters.
+struct Placed<'a> {
+    frf: &'a PostureFrf,
+    jacobian: Matrix3xX<f64>,
+    payload: Matrix3xX<f64>,
+    /// Mass matrix without that of the payload.
+    mass: DMatrix<f64>,
+    /// One over the error of each entry at each frequency, N/m.
+    weights: Vec<Vec<f64>>,
+}
+
+struct Normal {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// Σ g gᵀ over the entries of all postures: errors of one receptance hang together, those of several do not.
+    scatter: DMatrix<f64>,
+    entries: usize,
+    sum: f64,
+    left: f64,
+    all: f64,
+    rows: usize,
+}
+
+/// Fits a robot, whose stiffness and damping are a first guess, to receptances at several postures.
+///
+/// # Errors
+/// See [`JointFitError`].
+pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<JointFit, JointFitError> {
+    let joints = start.joints.len();
+    if let Some(other) = postures.iter().find(|frf| frf.angles_rad.len() != joints) {
+        return Err(JointFitError::Angles {
+            found: other.angles_rad.len(),
+            joints,
+        });
+    }
+    let mut parameters: Vec<JointParameter> = (0..joints).map(JointParameter::Stiffness).collect();
+    parameters.extend((0..joints).map(JointParameter::Damping));
+    if payload {
+        parameters.push(JointParameter::Payload);
+    }
+    let placed: Vec<Placed<'_>> = postures.iter().map(|frf| place(start, frf)).collect();
+    let mut robot = start.clone();
+    first_guess(&mut robot, &placed);
+    let mut normal = sums(&robot, &placed, &parameters);
+    for (index, parameter) in parameters.iter().enumerate() {
+        if normal.matrix[(index, index)] <= 0.0 {
+            return Err(JointFitError::Undetermined(parameter.name()));
+        }
+    }
+    let mut damping = 1e-2;
+    for _ in 0..200 {
+        let mut matrix = normal.matrix.clone();
+        for i in 0..matrix.nrows() {
+            matrix[(i, i)] *= 1.0 + damping;
+        }
+        let step = scaled_solve(&matrix, &normal.gradient)
+            .ok_or_else(|| JointFitError::Undetermined("all parameters".into()))?;
+        // No parameter more than doubles at a time.
+        let step = &step * (0.7 / step.amax().max(0.7));
+        let tried = moved(&robot, &parameters, &step);
+        let next = sums(&tried, &placed, &parameters);
+        let length = step.dot(&(&normal.matrix * &step)).max(0.0).sqrt();
+        if next.sum <= normal.sum * (1.0 + 1e-12) {
+            (robot, normal) = (tried, next);
+            damping = (0.2 * damping).max(1e-12);
+            if length < 1e-3 {
+                return finish(robot, parameters, &normal);
+            }
+        } else if length < 1e-3 {
+            return finish(robot, parameters, &normal);
+        } else {
+            damping *= 8.0;
+        }
+    }
+    Err(JointFitError::NotConverged(
+        normal.sum / normal.rows.max(1) as f64,
+    ))
+}
+
+impl JointFit {
+    /// The receptance at a posture and frequency, and the standard deviation of the absolute value of each entry, m/N.
+    ///
+    /// `None` where an undamped robot resonates.
+    pub fn receptance(
+        &self,
+        angles_rad: &[f64],
+        frequency_hz: f64,
+    ) -> Option<(Matrix3<Complex64>, Matrix3<f64>)> {
+        let robot = self.robot.at(angles_rad);
+        let model = Model::new(&robot, &robot.mass(), TAU * frequency_hz)?;
+        let payload = robot.payload_jacobian();
+        let slopes: Vec<Matrix3<Complex64>> = self
+            .parameters
+            .iter()
+            .map(|parameter| model.slope(*parameter, &robot, &payload))
+            .collect();
+        let deviation = Matrix3::from_fn(|i, j| {
+            let h = model.receptance[(i, j)];
+            // d|H| = Re(H* dH)/|H|.
+            let gradient = DVector::from_iterator(
+                slopes.len(),
+                slopes
+                    .iter()
+                    .map(|slope| (h.conj() * slope[(i, j)]).re / h.norm().max(f64::MIN_POSITIVE)),
+            );
+            let scatter = gradient.dot(&(&self.covariance * &gradient)).max(0.0);
+            (scatter + (LEAST_ERROR * h.norm()).powi(2)).sqrt()
+        });
+        Some((model.receptance, deviation))
+    }
+}
+
+fn place<'a>(robot: &Robot, frf: &'a PostureFrf) -> Placed<'a> {
+    let robot = robot.at(&frf.angles_rad);
+    let payload = robot.payload_jacobian();
+    let carried = robot.joints.last().map_or(0.0, |joint| joint.mass_kg);
+    Placed {
+        jacobian: robot.jacobian(),
+        mass: robot.mass() - payload.tr_mul(&payload) * carried,
+        payload,
+        weights: frf
+            .table
+            .entries()
+            .iter()
+            .zip(&frf.deviation)
+            .map(|(entry, deviation)| weights(&entry.receptance, deviation))
+            .collect(),
+        frf,
+    }
+}
+
+/// Few averages know an error badly; it is smooth over frequency, so that of neighbours is taken together.
+fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
+    const NEIGHBOURS: usize = 8;
+    (0..deviation.len())
+        .map(|line| {
+            let around =
+                &deviation[line.saturating_sub(NEIGHBOURS)..deviation.len().min(line + NEIGHBOURS + 1)];
+            let variance = around.iter().map(|error| error * error).sum::<f64>() / around.len() as f64;
+            let error = variance.sqrt().max(LEAST_ERROR * receptance[line].norm());
+            if error > 0.0 { 1.0 / error } else { 0.0 }
+        })
+        .collect()
+}
+
+/// Stiffnesses from nearly static receptances; damping as if every joint had one of the tangent.
+fn first_guess(robot: &mut Robot, placed: &[Placed<'_>]) {
+    let joints = robot.joints.len();
+    let (mut rows, mut right) = (Vec::new(), Vec::new());
+    for posture in placed {
+        let table = &posture.frf.table;
+        let size = |line: usize| -> f64 {
+            table
+                .entries()
+                .iter()
+                .map(|entry| entry.receptance[line].norm_sqr())
+                .sum()
+        };
+        let frequencies = table.frequency_hz();
+        let peak = (0..frequencies.len()).max_by(|&a, &b| size(a).total_cmp(&size(b)));
+        let Some(last) = peak.map(|peak| STATIC * frequencies[peak]) else {
+            continue;
+        };
+        for (line, frequency) in frequencies.iter().enumerate().filter(|(_, f)| **f <= last) {
+            // Below a resonance receptance has grown by 1/(1 − r²) of the static one.
+            let grown = 1.0 / (1.0 - (STATIC * frequency / last).powi(2));
+            for (entry, deviation) in table.entries().iter().zip(&posture.frf.deviation) {
+                let (Some(i), Some(j)) = (entry.response.axis(), entry.force.axis()) else {
+                    continue;
+                };
+                let weight = 1.0 / (deviation[line] + 0.05 * size(line).sqrt());
+                rows.extend(
+                    posture
+                        .jacobian
+                        .column_iter()
+                        .map(|column| weight * grown * column[i] * column[j]),
+                );
+                right.push(weight * entry.receptance[line].re);
+            }
+        }
+    }
+    if right.len() < joints {
+        return;
+    }
+    let matrix = DMatrix::from_row_slice(right.len(), joints, &rows);
+    if let Some(compliance) = scaled_least_squares(&matrix, &DVector::from_vec(right)) {
+        for (joint, compliance) in robot.joints.iter_mut().zip(compliance.iter()) {
+            let guess = 1.0 / compliance;
+            // A compliance that is hardly seen comes out of noise, or negative: the case knows better.
+            let known = joint.stiffness_nm_per_rad;
+            if guess > 0.1 * known && guess < 10.0 * known {
+                joint.stiffness_nm_per_rad = guess;
+            }
+        }
+    }
+}
+
+fn moved(robot: &Robot, parameters: &[JointParameter], step: &DVector<f64>) -> Robot {
+    let mut moved = robot.clone();
+    for (parameter, step) in parameters.iter().zip(step.iter()) {
+        if let Some(value) = parameter.slot(&mut moved) {
+            *value *= step.exp();
+        }
+    }
+    moved
+}
+
+fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Result<JointFit, JointFitError> {
+    let misfit = normal.sum / normal.rows.saturating_sub(parameters.len()).max(1) as f64;
+    let inverse =
+        scaled_inverse(&normal.matrix).ok_or_else(|| JointFitError::Undetermined("all parameters".into()))?;
+    let count = normal.entries as f64;
+    let few = ninety_percent(normal.entries.saturating_sub(1)) / NINETY_PERCENT;
+    let taken = count / (count - parameters.len() as f64).max(1.0);
+    let scatter = &inverse * &normal.scatter * &inverse * (taken * few * few);
+    Ok(JointFit {
+        robot,
+        // What scales all receptances scales all parameters.
+        covariance: scatter.add_scalar(LEAST_ERROR * LEAST_ERROR),
+        parameters,
+        misfit,
+        relative_error: (normal.left / normal.all.max(f64::MIN_POSITIVE)).sqrt(),
+    })
+}
+
+/// Receptance at one posture and frequency.
+struct Model {
+    omega: f64,
+    /// Z⁻¹Jᵀ, n × 3.
+    angles: DMatrix<Complex64>,
+    receptance: Matrix3<Complex64>,
+}
+
+impl Model {
+    fn new(robot: &Robot, mass: &DMatrix<f64>, omega: f64) -> Option<Self> {
+        Self::with(robot, &robot.jacobian(), mass, omega)
+    }
+
+    fn with(robot: &Robot, jacobian: &Matrix3xX<f64>, mass: &DMatrix<f64>, omega: f64) -> Option<Self> {
+        let mut dynamic = mass.map(|entry| Complex64::new(-omega * omega * entry, 0.0));
+        for (index, joint) in robot.joints.iter().enumerate() {
+            dynamic[(index, index)] +=
+                Complex64::new(joint.stiffness_nm_per_rad, omega * joint.damping_nms_per_rad);
+        }
+        let jacobian = jacobian.map(Complex64::from);
+        let angles = dynamic.lu().solve(&jacobian.transpose())?;
+        let h = &jacobian * &angles;
+        let angles = DMatrix::from_fn(angles.nrows(), 3, |i, j| angles[(i, j)]);
+        Some(Self {
+            omega,
+            angles,
+            receptance: Matrix3::from_fn(|i, j| h[(i, j)]),
+        })
+    }
+
+    /// dH per change of the logarithm of a parameter: −(Z⁻¹Jᵀ)ᵀ dZ (Z⁻¹Jᵀ).
+    fn slope(
+        &self,
+        parameter: JointParameter,
+        robot: &Robot,
+        payload: &Matrix3xX<f64>,
+    ) -> Matrix3<Complex64> {
+        let value = parameter.value(robot);
+        let of_joint = |joint: usize, factor: Complex64| {
+            Matrix3::from_fn(|i, j| factor * self.angles[(joint, i)] * self.angles[(joint, j)])
+        };
+        match parameter {
+            JointParameter::Stiffness(joint) => of_joint(joint, Complex64::from(-value)),
+            JointParameter::Damping(joint) => of_joint(joint, Complex64::new(0.0, -self.omega * value)),
+            // No part in receptances at vanishing force.
+            JointParameter::CubicStiffness(_) | JointParameter::CubicDamping(_) => Matrix3::zeros(),
+            JointParameter::Payload => {
+                let moved = payload.map(Complex64::from) * &self.angles;
+                let product = moved.tr_mul(&moved) * Complex64::from(self.omega * self.omega * value);
+                Matrix3::from_fn(|i, j| product[(i, j)])
+            }
+        }
+    }
+}
+
+fn sums(robot: &Robot, placed: &[Placed<'_>], parameters: &[JointParameter]) -> Normal {
+    let of_postures: Vec<Normal> = placed
+        .par_iter()
+        .map(|posture| sums_of(robot, posture, parameters))
+        .collect();
+    let size = parameters.len();
+    of_postures.into_iter().fold(empty(size), |mut all, part| {
+        all.matrix += part.matrix;
+        all.gradient += part.gradient;
+        all.scatter += part.scatter;
+        all.entries += part.entries;
+        all.sum += part.sum;
+        all.left += part.left;
+        all.all += part.all;
+        all.rows += part.rows;
+        all
+    })
+}
+
+fn empty(size: usize) -> Normal {
+    Normal {
+        matrix: DMatrix::zeros(size, size),
+        gradient: DVector::zeros(size),
+        scatter: DMatrix::zeros(size, size),
+        entries: 0,
+        sum: 0.0,
+        left: 0.0,
+        all: 0.0,
+        rows: 0,
+    }
+}
+
+fn sums_of(robot: &Robot, posture: &Placed<'_>, parameters: &[JointParameter]) -> Normal {
+    let table = &posture.frf.table;
+    let mut normal = empty(parameters.len());
+    let carried = robot.joints.last().map_or(0.0, |joint| joint.mass_kg);
+    let mass = &posture.mass + posture.payload.tr_mul(&posture.payload) * carried;
+    let mut row = DVector::zeros(parameters.len());
+    let mut gradients = vec![row.clone(); table.entries().len()];
+    for (line, frequency) in table.frequency_hz().iter().enumerate() {
+        let Some(model) = Model::with(robot, &posture.jacobian, &mass, TAU * frequency) else {
+            continue;
+        };
+        let slopes: Vec<Matrix3<Complex64>> = parameters
+            .iter()
+            .map(|parameter| model.slope(*parameter, robot, &posture.payload))
+            .collect();
+        for ((entry, weights), gradient) in table.entries().iter().zip(&posture.weights).zip(&mut gradients) {
+            let (Some(i), Some(j)) = (entry.response.axis(), entry.force.axis()) else {
+                continue;
+            };
+            let measured = entry.receptance[line];
+            let left = measured - model.receptance[(i, j)];
+            let weight = weights[line];
+            normal.left += left.norm_sqr();
+            normal.all += measured.norm_sqr();
+            normal.sum += left.norm_sqr() * weight * weight;
+            normal.rows += 2;
+            for part in [|value: Complex64| value.re, |value: Complex64| value.im] {
+                for (row, slope) in row.iter_mut().zip(&slopes) {
+                    *row = weight * part(slope[(i, j)]);
+                }
+                normal.matrix.ger(1.0, &row, &row, 1.0);
+                gradient.axpy(weight * part(left), &row, 1.0);
+            }
+        }
+    }
+    for gradient in &gradients {
+        normal.scatter.ger(1.0, gradient, gradient, 1.0);
+        normal.gradient += gradient;
+        normal.entries += 1;
+    }
+    normal
+}

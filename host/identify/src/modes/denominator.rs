@@ -1,0 +1,146 @@
+//! Poles of every order of model: least squares in frequency with a common denominator (LSCF).
+//!
+//! Guillaume, Verboven and Vanlanduit (1998): H_k(f) = B_k(z)/A(z) with z = exp(i2π(f − f₁)T), complex coefficients, and
+//! the arc of the band nearly a whole turn. A(0) = 1: poles that only follow noise then lie outside the unit circle, that
+//! is, they have negative damping (Cauberghe, Guillaume, Verboven, Parloo and Vanlanduit, 2004).
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+use super::Receptances;
+use quietcut_numerics::complex_eigenvalues::eigenvalues;
+
+/// Part of the unit circle that the band takes: the receptances need not close to a circle.
+const ARC: f64 = 0.9;
+
+/// What is added to the diagonal, as a part of it: powers of z on an arc are not quite independent.
+const RIDGE: f64 = 1e-13;
+
+/// Sums Σ_f w² conj(z)^i z^j … of one receptance, which depend on j − i alone.
+struct Sums {
+    /// Σ w² z^m, m = 0 … n.
+    numerator: Vec<Complex64>,
+    /// Σ w² H z^m, m = −n … n.
+    mixed: Vec<Complex64>,
+    /// Σ w² |H|² z^m, m = 0 … n.
+    denominator: Vec<Complex64>,
+}
+
+/// Poles λ in rad/s of the models of order 1 to `highest`, by order.
+pub(super) fn poles(data: &Receptances, highest: usize) -> Vec<Vec<Complex64>> {
+    let [from_hz, to_hz] = data.band_hz();
+    let period_s = ARC / (to_hz - from_hz);
+    let powers: Vec<Vec<Complex64>> = data
+        .frequency_hz
+        .iter()
+        .map(|hertz| {
+            let angle = TAU * (hertz - from_hz) * period_s;
+            (0..=highest)
+                .map(|m| Complex64::from_polar(1.0, angle * m as f64))
+                .collect()
+        })
+        .collect();
+    let sums: Vec<Sums> = (0..data.values.len())
+        .map(|k| sums(data, k, &powers, highest))
+        .collect();
+    (1..=highest)
+        .map(|order| {
+            let roots = denominator(&sums, order, highest)
+                .and_then(|a| roots(&a))
+                .unwrap_or_default();
+            roots
+                .into_iter()
+                .filter(|z| z.norm() > 0.0)
+                .map(|z| {
+                    // The band lies from angle 0 to ARC turns; what is beyond its middle gap is below the band.
+                    let turn = z.arg().rem_euclid(TAU);
+                    let turn = if turn > 0.5 * (1.0 + ARC) * TAU {
+                        turn - TAU
+                    } else {
+                        turn
+                    };
+                    Complex64::new(z.norm().ln(), turn) / period_s + Complex64::new(0.0, TAU * from_hz)
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn sums(data: &Receptances, k: usize, powers: &[Vec<Complex64>], highest: usize) -> Sums {
+    let mut sums = Sums {
+        numerator: vec![Complex64::ZERO; highest + 1],
+        mixed: vec![Complex64::ZERO; 2 * highest + 1],
+        denominator: vec![Complex64::ZERO; highest + 1],
+    };
+    for ((h, deviation), powers) in data.values[k].iter().zip(&data.deviation[k]).zip(powers) {
+        let weight = (deviation * deviation).recip();
+        for (m, power) in powers.iter().enumerate() {
+            sums.numerator[m] += weight * power;
+            sums.denominator[m] += weight * h.norm_sqr() * power;
+            sums.mixed[highest + m] += weight * h * power;
+            if m > 0 {
+                sums.mixed[highest - m] += weight * h * power.conj();
+            }
+        }
+    }
+    sums
+}
+
+/// a₀ = 1, a₁ … a_n of the common denominator; `None` where the equations break down.
+fn denominator(sums: &[Sums], order: usize, highest: usize) -> Option<Vec<Complex64>> {
+    let size = order + 1;
+    let hermitian = |of: &[Complex64]| {
+        DMatrix::from_fn(
+            size,
+            size,
+            |i, j| if j >= i { of[j - i] } else { of[i - j].conj() },
+        )
+    };
+    let mut reduced = DMatrix::<Complex64>::zeros(size, size);
+    for sums in sums {
+        let mut numerator = hermitian(&sums.numerator);
+        ridge(&mut numerator);
+        let mixed = DMatrix::from_fn(size, size, |i, j| -sums.mixed[highest + j - i]);
+        let eliminated = mixed.adjoint() * Cholesky::new(numerator)?.solve(&mixed);
+        reduced += hermitian(&sums.denominator) - eliminated;
+    }
+    let mut inner = reduced.view((1, 1), (order, order)).into_owned();
+    ridge(&mut inner);
+    let right: DVector<Complex64> = -reduced.view((1, 0), (order, 1)).column(0).into_owned();
+    let solution = Cholesky::new(inner)?.solve(&right);
+    Some(
+        std::iter::once(Complex64::ONE)
+            .chain(solution.iter().copied())
+            .collect(),
+    )
+}
+
+fn ridge(matrix: &mut DMatrix<Complex64>) {
+    let size = matrix.nrows();
+    let mean = matrix.diagonal().iter().map(|entry| entry.re).sum::<f64>() / size.max(1) as f64;
+    for i in 0..size {
+        matrix[(i, i)] += RIDGE * mean;
+    }
+}
+
+/// Roots of a₀ + a₁z + … + a_n zⁿ: inverses of the eigenvalues of the companion matrix of the reversed polynomial, whose
+/// leading coefficient is a₀ = 1.
+fn roots(a: &[Complex64]) -> Option<Vec<Complex64>> {
+    let order = a.len() - 1;
+    let mut companion = DMatrix::<Complex64>::zeros(order, order);
+    for i in 0..order {
+        companion[(0, i)] = -a[i + 1];
+        if i + 1 < order {
+            companion[(i + 1, i)] = Complex64::ONE;
+        }
+    }
+    let inverses = eigenvalues(companion)?;
+    Some(
+        inverses
+            .into_iter()
+            .filter(|value| value.norm() > 1e-12)
+            .map(|value| value.inv())
+            .collect(),
+    )
+}

@@ -1,0 +1,188 @@
+//! The receptances that modes are fitted to, with the deviation of every value.
+
+use num_complex::Complex64;
+
+use super::ModesError;
+use quietcut_frf::FrfTable;
+use quietcut_model::structure::Direction;
+
+/// Receptances over common frequencies, in a band.
+#[derive(Clone, Debug)]
+pub struct Receptances {
+    /// Hz, ascending.
+    pub frequency_hz: Vec<f64>,
+    /// Directions of displacements.
+    pub responses: Vec<Direction>,
+    /// Directions of forces.
+    pub forces: Vec<Direction>,
+    /// Response and force of each receptance, by index.
+    pub places: Vec<(usize, usize)>,
+    /// The receptances, m/N.
+    pub values: Vec<Vec<Complex64>>,
+    /// Standard deviation of real and of imaginary part of every value, m/N; up to a common factor where it comes from
+    /// coherence alone.
+    pub deviation: Vec<Vec<f64>>,
+    /// Whether the deviations are stated, not only relative.
+    pub has_deviation: bool,
+}
+
+/// Lines on each side over which variances are averaged: one from a handful of averages scatters by half of itself.
+const NEIGHBOURS: usize = 4;
+
+/// A deviation below this part of a receptance's root mean square is taken for that: nothing is measured better.
+const LEAST_DEVIATION: f64 = 1e-5;
+
+/// Fewest lines for a fit.
+const LINES_MIN: usize = 16;
+
+impl Receptances {
+    /// The receptances of a table from `band_hz[0]` to `band_hz[1]`.
+    ///
+    /// `deviation` has the standard deviation of |H| of every value, as [`quietcut_frf::Measurement`] states it. Without it
+    /// the coherence of each response says how it goes over the lines, and how large it is what is left of the fit.
+    ///
+    /// # Errors
+    /// Too few lines in the band, a receptance that is zero throughout or that is missing.
+    pub fn new(
+        table: &FrfTable,
+        deviation: Option<&[Vec<f64>]>,
+        band_hz: Option<[f64; 2]>,
+    ) -> Result<Self, ModesError> {
+        let [from_hz, to_hz] = band_hz.unwrap_or([0.0, f64::INFINITY]);
+        let lines: Vec<usize> = (0..table.frequency_hz().len())
+            .filter(|&line| {
+                let hertz = table.frequency_hz()[line];
+                hertz > 0.0 && (from_hz..=to_hz).contains(&hertz)
+            })
+            .collect();
+        if lines.len() < LINES_MIN {
+            return Err(ModesError::Data(format!(
+                "{} frequencies lie in the band; at least {LINES_MIN} are needed",
+                lines.len()
+            )));
+        }
+        let mut data = Self {
+            frequency_hz: lines.iter().map(|&line| table.frequency_hz()[line]).collect(),
+            responses: Vec::new(),
+            forces: Vec::new(),
+            places: Vec::new(),
+            values: Vec::new(),
+            deviation: Vec::new(),
+            has_deviation: deviation.is_some(),
+        };
+        for entry in table.entries() {
+            let place = (
+                index_of(&mut data.responses, entry.response),
+                index_of(&mut data.forces, entry.force),
+            );
+            let values: Vec<Complex64> = lines.iter().map(|&line| entry.receptance[line]).collect();
+            if values.iter().all(|value| value.norm() == 0.0) {
+                return Err(ModesError::Data(format!(
+                    "h{} is zero in the whole band; leave it out of the table",
+                    entry.name()
+                )));
+            }
+            data.places.push(place);
+            data.values.push(values);
+        }
+        data.sort_directions();
+        data.is_whole()?;
+        for (index, entry) in table.entries().iter().enumerate() {
+            let stated: Vec<f64> = match (deviation, &entry.coherence) {
+                (Some(deviation), _) => lines.iter().map(|&line| deviation[index][line]).collect(),
+                (None, Some(coherence)) => data.by_coherence(index, &lines, coherence),
+                (None, None) => vec![0.0; lines.len()],
+            };
+            let smooth = data.smoothed(index, &stated);
+            data.deviation.push(smooth);
+        }
+        Ok(data)
+    }
+
+    /// First and last frequency, Hz.
+    pub fn band_hz(&self) -> [f64; 2] {
+        // There are at least LINES_MIN lines.
+        [
+            self.frequency_hz[0],
+            self.frequency_hz[self.frequency_hz.len() - 1],
+        ]
+    }
+
+    /// Mean distance of the lines, Hz.
+    pub fn spacing_hz(&self) -> f64 {
+        let [from_hz, to_hz] = self.band_hz();
+        (to_hz - from_hz) / (self.frequency_hz.len() - 1) as f64
+    }
+
+    /// Residues have a rank only where every response has every force.
+    fn is_whole(&self) -> Result<(), ModesError> {
+        for (p, response) in self.responses.iter().enumerate() {
+            for (q, force) in self.forces.iter().enumerate() {
+                if !self.places.contains(&(p, q)) {
+                    return Err(ModesError::Data(format!(
+                        "h{response}{force} is missing; every response needs its receptance by every force"
+                    )));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Directions in the order x, y, z.
+    fn sort_directions(&mut self) {
+        let order = |directions: &[Direction]| {
+            let mut sorted = directions.to_vec();
+            sorted.sort_unstable();
+            sorted
+        };
+        let (responses, forces) = (order(&self.responses), order(&self.forces));
+        let moved = |old: &[Direction], new: &[Direction], index: usize| {
+            new.iter()
+                .position(|direction| *direction == old[index])
+                .unwrap_or(index)
+        };
+        for (p, q) in &mut self.places {
+            *p = moved(&self.responses, &responses, *p);
+            *q = moved(&self.forces, &forces, *q);
+        }
+        (self.responses, self.forces) = (responses, forces);
+    }
+
+    /// √((1 − γ²)/γ²) of the response's power under equal independent forces: with one force Bendat and Piersol's error
+    /// up to the number of averages.
+    fn by_coherence(&self, index: usize, lines: &[usize], coherence: &[f64]) -> Vec<f64> {
+        let response = self.places[index].0;
+        let row = || (0..self.values.len()).filter(|&other| self.places[other].0 == response);
+        (0..lines.len())
+            .map(|k| {
+                let power: f64 = row().map(|other| self.values[other][k].norm_sqr()).sum();
+                let explained = coherence[lines[k]].max(1e-6);
+                ((1.0 - explained).max(0.0) / explained * power).sqrt()
+            })
+            .collect()
+    }
+
+    fn smoothed(&self, index: usize, stated: &[f64]) -> Vec<f64> {
+        let values = &self.values[index];
+        let power: f64 = values.iter().map(|value| value.norm_sqr()).sum::<f64>() / values.len() as f64;
+        let least = LEAST_DEVIATION * power.sqrt();
+        (0..stated.len())
+            .map(|k| {
+                let near = &stated[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(stated.len())];
+                let variance =
+                    near.iter().map(|deviation| deviation * deviation).sum::<f64>() / near.len() as f64;
+                variance.sqrt().max(least)
+            })
+            .collect()
+    }
+}
+
+fn index_of(directions: &mut Vec<Direction>, direction: Direction) -> usize {
+    directions
+        .iter()
+        .position(|known| *known == direction)
+        .unwrap_or_else(|| {
+            directions.push(direction);
+            directions.len() - 1
+        })
+}

@@ -1,0 +1,124 @@
+//! One line of a record: what is left of it, its covariance, and the forces that are most likely.
+
+use nalgebra::{Cholesky, Matrix3, Vector3};
+use num_complex::Complex64;
+
+use super::{Data, SMOOTH, Unknowns, Variances};
+use crate::modes::shape;
+
+/// Responses and forces beyond those of the record are zero, with a variance of one.
+pub(super) struct Line {
+    pub(super) s: Complex64,
+    /// sⁿ H, responses by forces of the record.
+    pub(super) gain: Matrix3<Complex64>,
+    /// e = X − sⁿ H F − T.
+    pub(super) left: Vector3<Complex64>,
+    /// C⁻¹ e.
+    pub(super) weighted: Vector3<Complex64>,
+    /// eᴴ C⁻¹ e.
+    pub(super) square: f64,
+    /// L⁻¹ of C = L Lᴴ.
+    pub(super) whitening: Matrix3<Complex64>,
+    /// F + V_f Hᴴ s̄ⁿ C⁻¹ e: the gradient of the squares is that of a fit to these forces.
+    pub(super) force: Vector3<Complex64>,
+}
+
+impl Line {
+    /// `None` where the covariance is not positive definite.
+    pub(super) fn of(
+        data: &Data<'_>,
+        record: usize,
+        unknowns: &Unknowns,
+        variances: &Variances,
+        k: usize,
+    ) -> Option<Self> {
+        let spectra = &data.records[record];
+        let s = spectra.s(k);
+        let gain = gain(data, record, unknowns, s);
+        let mut force = Vector3::zeros();
+        for (force, channel) in force.iter_mut().zip(&spectra.forces) {
+            *force = channel.lines[k];
+        }
+        let mut left = -(gain * force);
+        for (p, channel) in spectra.responses.iter().enumerate() {
+            left[p] += channel.lines[k] - transient(data, record, unknowns, p, s);
+        }
+        let noise = of_forces(variances);
+        let mut covariance = gain * Matrix3::from_diagonal(&noise) * gain.adjoint();
+        covariance += variances.disturbance[k];
+        for p in 0..3 {
+            let own = variances.responses.get(p).copied().unwrap_or(1.0);
+            covariance[(p, p)] += own;
+        }
+        let lower = Cholesky::new(covariance)?.l();
+        let whitening = lower.solve_lower_triangular(&Matrix3::identity())?;
+        let white = whitening * left;
+        let weighted = whitening.adjoint() * white;
+        let correction = gain.adjoint() * weighted;
+        Some(Self {
+            s,
+            gain,
+            left,
+            weighted,
+            square: white.norm_squared(),
+            whitening,
+            force: force + noise.component_mul(&correction),
+        })
+    }
+}
+
+/// V_f as complex numbers; zero beyond the forces of the record.
+pub(super) fn of_forces(variances: &Variances) -> Vector3<Complex64> {
+    Vector3::from_fn(|q, _| Complex64::from(variances.measured.get(q).copied().unwrap_or(0.0)))
+}
+
+/// sⁿ H at a line.
+pub(super) fn gain(data: &Data<'_>, record: usize, unknowns: &Unknowns, s: Complex64) -> Matrix3<Complex64> {
+    let (responses, forces) = &data.axes[record];
+    let mut gain = Matrix3::zeros();
+    for mode in &unknowns.structure.modes {
+        for (i, &p) in responses.iter().enumerate() {
+            for (j, &q) in forces.iter().enumerate() {
+                gain[(i, j)] += shape::pair(mode.right[p] * mode.left[q], s, mode.pole);
+            }
+        }
+    }
+    for (&(p, q), [above, below]) in data.places.iter().zip(&unknowns.structure.outside) {
+        let at = (
+            responses.iter().position(|&index| index == p),
+            forces.iter().position(|&index| index == q),
+        );
+        if let (Some(i), Some(j)) = at {
+            gain[(i, j)] += above + below / (s * s);
+        }
+    }
+    for (i, channel) in data.records[record].responses.iter().enumerate() {
+        let derivative = s.powi(channel.derivatives);
+        for j in 0..forces.len() {
+            gain[(i, j)] *= derivative;
+        }
+    }
+    gain
+}
+
+/// (s/is₀)ʲ iʲ, which is real or imaginary in turn: the transform of a real signal has such.
+pub(super) fn powers(data: &Data<'_>, s: Complex64) -> [Complex64; SMOOTH] {
+    std::array::from_fn(|j| (s / data.omega).powi(j as i32))
+}
+
+fn transient(data: &Data<'_>, record: usize, unknowns: &Unknowns, p: usize, s: Complex64) -> Complex64 {
+    let transient = &unknowns.transients[record];
+    let modes: Complex64 = unknowns
+        .structure
+        .modes
+        .iter()
+        .zip(&transient.residues[p])
+        .map(|(mode, residue)| shape::pair(*residue, s, mode.pole))
+        .sum();
+    let smooth: Complex64 = powers(data, s)
+        .iter()
+        .zip(transient.smooth[p])
+        .map(|(power, factor)| power * factor)
+        .sum();
+    modes + smooth
+}

@@ -1,0 +1,233 @@
+//! The variances of the noise, from what is left of a fit.
+//!
+//! What is left is normal with C = Σ_c v_c B_c: B is one entry of the diagonal for the noise of a response and g gᴴ for
+//! that of a force with the column g of sⁿ H. Resonances in what is left come of forces, the rest of responses. The
+//! likelihood is climbed by Fisher's scoring: v = A⁻¹ b, A_cd = Σ tr(C⁻¹B_cC⁻¹B_d), b_c = Σ eᴴC⁻¹B_cC⁻¹e over the lines.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use num_complex::Complex64;
+
+use super::line::{Line, gain};
+use super::{Data, Transient, Unknowns, Variances};
+use quietcut_frf::ChannelLines;
+
+/// Steps of scoring in one round.
+const STEPS: usize = 10;
+
+/// The least that a step leaves of a variance.
+const SHRINK: f64 = 0.1;
+
+/// Noise below this part of a channel's root mean square is taken for that: nothing is measured better.
+const LEAST: f64 = 1e-5;
+
+/// Lines of a band over which forces are looked at together. Of so many the least eigenvalue of the noise of three channels
+/// is hardly ever below [`EIGENVALUE`] of its variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
+const BAND: usize = 64;
+const EIGENVALUE: f64 = 0.5;
+
+/// What is added to the diagonal of the scores, as a part of their trace.
+const RIDGE: f64 = 1e-12;
+
+/// Force noise that fits begin with, as a part of the power of the force in the band.
+const FORCE_START: f64 = 1e-6;
+
+/// All of what is left is noise of the responses.
+pub(super) fn start(data: &Data<'_>, record: usize, unknowns: &Unknowns) -> Variances {
+    let spectra = &data.records[record];
+    let mut variances = Variances {
+        responses: data.sizes(record),
+        forces: spectra
+            .forces
+            .iter()
+            .map(|channel| lowest(channel).max(FORCE_START * mean_square(&channel.lines)))
+            .collect(),
+        measured: vec![0.0; spectra.forces.len()],
+        disturbance: vec![Matrix3::zeros(); spectra.frequency_hz.len()],
+    };
+    let count = spectra.frequency_hz.len();
+    let mut sums = vec![0.0; variances.responses.len()];
+    for k in 0..count {
+        if let Some(line) = Line::of(data, record, unknowns, &variances, k) {
+            for (p, sum) in sums.iter_mut().enumerate() {
+                *sum += line.left[p].norm_sqr();
+            }
+        }
+    }
+    for ((variance, sum), channel) in variances.responses.iter_mut().zip(sums).zip(&spectra.responses) {
+        *variance = (sum / count as f64).max(least(channel));
+    }
+    variances
+}
+
+fn least(channel: &ChannelLines) -> f64 {
+    (LEAST * channel.root_mean_square).powi(2)
+}
+
+/// The least that the noise of a force can be: its plateau, where it has one.
+fn lowest(channel: &ChannelLines) -> f64 {
+    channel.plateau.unwrap_or(0.0).max(least(channel))
+}
+
+fn mean_square(lines: &[Complex64]) -> f64 {
+    lines.iter().map(|line| line.norm_sqr()).sum::<f64>() / lines.len().max(1) as f64
+}
+
+/// Improves the variances of a record; the largest relative change that matters: of the covariance of what is left.
+pub(super) fn again(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) -> f64 {
+    let before = variances.clone();
+    let responses = variances.responses.len();
+    let spectra = &data.records[record];
+    let values = 2.0 * (spectra.frequency_hz.len() * responses) as f64;
+    // What the transient and the structure take along.
+    let unknown = unknowns.transients.iter().map(Transient::width).sum::<usize>() / data.records.len()
+        + unknowns.structure.parameters().len() / data.records.len();
+    let unbiased = values / (values - unknown as f64).max(1.0);
+    let mut change = 0.0;
+    for _ in 0..STEPS {
+        let Some((normal, right)) = scores(data, record, unknowns, variances) else {
+            break;
+        };
+        let current: Vec<f64> = variances
+            .responses
+            .iter()
+            .chain(&variances.forces)
+            .copied()
+            .collect();
+        let bounds: Vec<f64> = spectra
+            .responses
+            .iter()
+            .map(least)
+            .chain(spectra.forces.iter().map(lowest))
+            .collect();
+        let Some(next) = scored(&normal, &(right * unbiased), &current, &bounds) else {
+            break;
+        };
+        for (index, value) in next.into_iter().enumerate() {
+            if index < responses {
+                let most = mean_square(&spectra.responses[index].lines);
+                variances.responses[index] = value.min(most.max(bounds[index]));
+            } else {
+                let most = mean_square(&spectra.forces[index - responses].lines);
+                variances.forces[index - responses] = value.min(most.max(bounds[index]));
+            }
+        }
+        divide(data, record, unknowns, variances);
+    }
+    // A variance that others hide may wander without a trace: what counts is the sum at each line.
+    for k in (0..spectra.frequency_hz.len()).step_by(16) {
+        let pair = (
+            Line::of(data, record, unknowns, &before, k),
+            Line::of(data, record, unknowns, variances, k),
+        );
+        if let (Some(old), Some(new)) = pair {
+            // tr(C_old C_new⁻¹) of each pair of whitenings.
+            let mixed = new.whitening * old.whitening.try_inverse().unwrap_or_else(Matrix3::identity);
+            let part = mixed.norm_squared() / 3.0;
+            change = f64::max(change, (part - 1.0).abs());
+        }
+    }
+    change
+}
+
+/// A⁻¹ b, where it is not below the bounds: what is stays there while the others are sought again.
+fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: &[f64]) -> Option<Vec<f64>> {
+    let mut next = current.to_vec();
+    let mut free: Vec<usize> = (0..current.len()).collect();
+    loop {
+        // In units of the present values.
+        let size = free.len();
+        let mut scaled = DMatrix::from_fn(size, size, |i, j| {
+            normal[(free[i], free[j])] * current[free[i]] * current[free[j]]
+        });
+        let trace = scaled.trace();
+        let target = DVector::from_fn(size, |i, _| {
+            let fixed = (0..current.len()).filter(|c| !free.contains(c));
+            let known: f64 = fixed.map(|c| normal[(free[i], c)] * next[c]).sum();
+            (right[free[i]] - known) * current[free[i]]
+        });
+        for i in 0..size {
+            scaled[(i, i)] += RIDGE * trace;
+        }
+        let ratio = scaled.cholesky()?.solve(&target);
+        let below: Vec<usize> = (0..size)
+            .filter(|&i| ratio[i] * current[free[i]] < bounds[free[i]])
+            .map(|i| free[i])
+            .collect();
+        for (&c, ratio) in free.iter().zip(ratio.iter()) {
+            next[c] = (current[c] * ratio.max(SHRINK)).max(bounds[c]);
+        }
+        if below.is_empty() || below.len() == free.len() {
+            return Some(next);
+        }
+        free.retain(|c| !below.contains(c));
+    }
+}
+
+/// Which part of the forces' noise is in the measured forces: their plateau; without one, as much as leaves S_ff − V_f
+/// positive in every direction. The rest acts without being measured.
+fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) {
+    let spectra = &data.records[record];
+    let count = spectra.frequency_hz.len();
+    let forces = variances.forces.len();
+    let bands = (count / BAND).max(1);
+    let eigenvalue = |band: usize| -> f64 {
+        let lines = band * count / bands..(band + 1) * count / bands;
+        let power = DMatrix::from_fn(forces, forces, |i, j| {
+            let (a, b) = (&spectra.forces[i].lines, &spectra.forces[j].lines);
+            let sum: Complex64 = lines.clone().map(|k| a[k] * b[k].conj()).sum();
+            sum / (lines.len() as f64 * (variances.forces[i] * variances.forces[j]).sqrt())
+        });
+        power.symmetric_eigenvalues().min()
+    };
+    let least = (0..bands).map(eigenvalue).fold(f64::INFINITY, f64::min);
+    let part = (least / EIGENVALUE).clamp(0.0, 1.0);
+    for (q, channel) in spectra.forces.iter().enumerate() {
+        let all = variances.forces[q];
+        variances.measured[q] = channel.plateau.map_or(part * all, |plateau| plateau.min(all));
+    }
+    let unmeasured = Vector3::from_fn(|q, _| {
+        let all = variances.forces.get(q).copied().unwrap_or(0.0);
+        Complex64::from(all - variances.measured.get(q).copied().unwrap_or(0.0))
+    });
+    for (k, disturbance) in variances.disturbance.iter_mut().enumerate() {
+        let gain = gain(data, record, unknowns, spectra.s(k));
+        *disturbance = gain * Matrix3::from_diagonal(&unmeasured) * gain.adjoint();
+    }
+}
+
+/// A and b.
+fn scores(
+    data: &Data<'_>,
+    record: usize,
+    unknowns: &Unknowns,
+    variances: &Variances,
+) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    let (responses, forces) = (variances.responses.len(), variances.forces.len());
+    let size = responses + forces;
+    let (mut normal, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
+    for k in 0..data.records[record].frequency_hz.len() {
+        let line = Line::of(data, record, unknowns, variances, k)?;
+        // Every B is a column times its adjoint.
+        let column = |c: usize| -> Vector3<Complex64> {
+            if c < responses {
+                Vector3::from_fn(|p, _| if p == c { Complex64::ONE } else { Complex64::ZERO })
+            } else {
+                line.gain.column(c - responses).into_owned()
+            }
+        };
+        let white: [Vector3<Complex64>; 6] = std::array::from_fn(|c| {
+            if c < size {
+                line.whitening * column(c)
+            } else {
+                Vector3::zeros()
+            }
+        });
+        for c in 0..size {
+            right[c] += column(c).dotc(&line.weighted).norm_sqr();
+            for d in 0..size {
+                normal[(c, d)] += white[c].dotc(&white[d]).norm_sqr();
+            }
+        }
+    }
+    Some((normal, right))
+}

@@ -1,0 +1,270 @@
+//! The stabilization diagram: which poles come again, with the same shape, as the order of the model grows.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+use super::{ModesError, OVERDAMPED, Receptances, Rejected, denominator, reject};
+use quietcut_frf::rational_fit::residues;
+
+/// A pole is the same as one of the order before within these parts of frequency and damping ratio, and this modal
+/// assurance criterion of the residues.
+const SAME_FREQUENCY: f64 = 0.01;
+const SAME_DAMPING: f64 = 0.1;
+const SAME_SHAPE: f64 = 0.95;
+
+/// Orders in a row over which a pole must come again, as a part of all orders, and at least.
+const ORDERS_PART: f64 = 0.25;
+const ORDERS_MIN: usize = 4;
+
+/// Part of the largest height of a mode below which a stable pole counts as none.
+const WEAK: f64 = 3e-3;
+
+/// A pole of a model of some order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Order of the model.
+    pub order: usize,
+    /// λ, rad/s.
+    pub pole: Complex64,
+    /// What it adds at its resonance: norm of its residues, each receptance counting by its root mean square, over −Re λ.
+    pub height: f64,
+    /// Frequency, damping and shape are those of a pole of the order before.
+    pub is_stable: bool,
+    /// The line of poles that it continues.
+    line: usize,
+    /// How far it is from the pole before, relative.
+    change: f64,
+    /// All its residues as a vector of norm 1.
+    shape: Vec<Complex64>,
+}
+
+impl Candidate {
+    /// |λ|/2π, Hz.
+    pub fn frequency_hz(&self) -> f64 {
+        self.pole.norm() / TAU
+    }
+
+    /// ζ.
+    pub fn damping_ratio(&self) -> f64 {
+        -self.pole.re / self.pole.norm()
+    }
+}
+
+/// Poles of all orders, and those that are modes.
+#[derive(Clone, Debug)]
+pub struct Stabilization {
+    /// Poles in the band with positive damping, by order.
+    pub candidates: Vec<Candidate>,
+    /// The highest order.
+    pub highest_order: usize,
+    /// Poles taken as modes, strongest first, rad/s.
+    pub selected: Vec<Complex64>,
+    /// Poles of the highest order in the band that have no positive damping, rad/s.
+    unstable: Vec<Complex64>,
+    /// Lines that end before they are long enough or are too weak: their pole and why.
+    discarded: Vec<(Complex64, String)>,
+}
+
+impl Stabilization {
+    /// Poles that are no modes, and why.
+    pub(super) fn rejected(&self) -> Vec<Rejected> {
+        let unstable = self
+            .unstable
+            .iter()
+            .map(|pole| reject(*pole, "negative damping".into()));
+        let discarded = self
+            .discarded
+            .iter()
+            .map(|(pole, why)| reject(*pole, why.clone()));
+        unstable.chain(discarded).collect()
+    }
+}
+
+/// Looks at the models of order 1 to `highest_order`, or as many as the lines allow.
+///
+/// # Errors
+/// Fewer lines than three for each unknown of the lowest orders.
+pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stabilization, ModesError> {
+    let lines = data.frequency_hz.len();
+    let highest = highest_order.min((lines - 1) / 3);
+    if highest <= ORDERS_MIN {
+        return Err(ModesError::Data(format!(
+            "order {highest} is the highest that {lines} frequencies and --order allow; more than {ORDERS_MIN} are needed"
+        )));
+    }
+    let [from_hz, to_hz] = data.band_hz();
+    let in_band = |pole: &Complex64| (from_hz..=to_hz).contains(&(pole.norm() / TAU)) && pole.im > 0.0;
+    let mut found = Stabilization {
+        candidates: Vec::new(),
+        highest_order: highest,
+        selected: Vec::new(),
+        unstable: Vec::new(),
+        discarded: Vec::new(),
+    };
+    let mut lines = 0;
+    let mut before: Vec<Candidate> = Vec::new();
+    for (index, mut poles) in denominator::poles(data, highest).into_iter().enumerate() {
+        let order = index + 1;
+        poles.retain(in_band);
+        if order == highest {
+            found.unstable = poles.iter().copied().filter(|pole| pole.re >= 0.0).collect();
+        }
+        poles.retain(|pole| pole.re < 0.0 && -pole.re < OVERDAMPED * pole.norm());
+        let mut now = candidates(data, order, &poles);
+        connect(&mut now, &before, &mut lines);
+        found.candidates.extend(now.iter().cloned());
+        before = now;
+    }
+    select(&mut found, lines);
+    Ok(found)
+}
+
+fn candidates(data: &Receptances, order: usize, poles: &[Complex64]) -> Vec<Candidate> {
+    let functions: Vec<&[Complex64]> = data.values.iter().map(Vec::as_slice).collect();
+    let Some(fit) = residues(&data.frequency_hz, &functions, poles.to_vec()) else {
+        return Vec::new();
+    };
+    let sizes: Vec<f64> = data
+        .values
+        .iter()
+        .map(|values| (values.iter().map(|h| h.norm_sqr()).sum::<f64>() / values.len() as f64).sqrt())
+        .collect();
+    poles
+        .iter()
+        .enumerate()
+        .map(|(r, &pole)| {
+            let mut shape: Vec<Complex64> = fit
+                .residues
+                .iter()
+                .zip(&sizes)
+                .map(|(row, size)| row[r] / *size)
+                .collect();
+            let norm = shape.iter().map(|entry| entry.norm_sqr()).sum::<f64>().sqrt();
+            if norm > 0.0 {
+                for entry in &mut shape {
+                    *entry /= norm;
+                }
+            }
+            Candidate {
+                order,
+                pole,
+                height: norm / -pole.re,
+                is_stable: false,
+                line: 0,
+                change: f64::INFINITY,
+                shape,
+            }
+        })
+        .collect()
+}
+
+/// How far two poles are from each other in units of what counts as the same: 1 and below is the same.
+fn distance(a: &Candidate, b: &Candidate) -> f64 {
+    let frequency = (a.frequency_hz() / b.frequency_hz() - 1.0).abs() / SAME_FREQUENCY;
+    let damping = (a.damping_ratio() / b.damping_ratio() - 1.0).abs() / SAME_DAMPING;
+    frequency.max(damping)
+}
+
+/// Modal assurance criterion of two vectors of norm 1.
+fn assurance(a: &[Complex64], b: &[Complex64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| a.conj() * b)
+        .sum::<Complex64>()
+        .norm_sqr()
+}
+
+/// Continues the lines of the order before; each by the nearest pole, a pole without one begins its own.
+fn connect(now: &mut [Candidate], before: &[Candidate], lines: &mut usize) {
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+    for (i, a) in now.iter().enumerate() {
+        for (j, b) in before.iter().enumerate() {
+            let distance = distance(a, b);
+            if distance <= 1.0 && assurance(&a.shape, &b.shape) >= SAME_SHAPE {
+                pairs.push((distance, i, j));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut taken = vec![false; before.len()];
+    for (distance, i, j) in pairs {
+        if !(now[i].is_stable || taken[j]) {
+            taken[j] = true;
+            now[i].is_stable = true;
+            now[i].line = before[j].line;
+            now[i].change = distance;
+        }
+    }
+    for candidate in now.iter_mut().filter(|candidate| !candidate.is_stable) {
+        candidate.line = *lines;
+        *lines += 1;
+    }
+}
+
+/// Takes the long and strong lines: of each the pole that moved least.
+fn select(found: &mut Stabilization, lines: usize) {
+    let needed = ((ORDERS_PART * found.highest_order as f64).ceil() as usize).max(ORDERS_MIN);
+    let mut of_line: Vec<Vec<&Candidate>> = vec![Vec::new(); lines];
+    for candidate in &found.candidates {
+        of_line[candidate.line].push(candidate);
+    }
+    let mut long: Vec<(&Candidate, usize)> = Vec::new();
+    let mut discarded = Vec::new();
+    for line in &of_line {
+        let Some(best) = line.iter().min_by(|a, b| a.change.total_cmp(&b.change)) else {
+            continue;
+        };
+        if line.len() > needed {
+            long.push((best, line.len()));
+        } else if line
+            .iter()
+            .any(|candidate| candidate.order == found.highest_order)
+        {
+            discarded.push((
+                best.pole,
+                format!(
+                    "the same over {} orders only; more than {needed} are needed",
+                    line.len()
+                ),
+            ));
+        }
+    }
+    // Two lines of one pole, one broken off and begun again, are one mode: the longer stands for it.
+    long.sort_by_key(|(_, length)| std::cmp::Reverse(*length));
+    let mut kept: Vec<&Candidate> = Vec::new();
+    for (candidate, _) in long {
+        let is_known = |other: &&Candidate| {
+            distance(candidate, other) <= 3.0 && assurance(&candidate.shape, &other.shape) > 0.9
+        };
+        if !kept.iter().any(is_known) {
+            kept.push(candidate);
+        }
+    }
+    kept.sort_by(|a, b| b.height.total_cmp(&a.height));
+    let highest = kept.first().map_or(0.0, |candidate| candidate.height);
+    for candidate in kept {
+        if candidate.height > WEAK * highest {
+            found.selected.push(candidate.pole);
+        } else {
+            let part = 100.0 * candidate.height / highest;
+            discarded.push((
+                candidate.pole,
+                format!(
+                    "{part:.2} % of the strongest mode; {:.1} % are needed",
+                    100.0 * WEAK
+                ),
+            ));
+        }
+    }
+    found.discarded = discarded;
+}
+
+/// The residues of a pole as a matrix, responses by forces.
+pub(super) fn matrix_of(data: &Receptances, residues: &[Vec<Complex64>], mode: usize) -> DMatrix<Complex64> {
+    let mut matrix = DMatrix::zeros(data.responses.len(), data.forces.len());
+    for (&place, row) in data.places.iter().zip(residues) {
+        matrix[place] = row[mode];
+    }
+    matrix
+}

@@ -1,0 +1,303 @@
+//! Modes from receptances of known structures.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::*;
+use quietcut_frf::{Frf, FrfTable};
+use quietcut_model::structure::{Form, Structure};
+use quietcut_testkit::case;
+
+const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
+
+/// H of a structure over `frequency_hz`, with noise of `noise` of each receptance's root mean square.
+fn table(
+    structure: &Structure,
+    frequency_hz: &[f64],
+    forces: &[Direction],
+    noise: f64,
+    seed: u64,
+) -> (FrfTable, Vec<Vec<f64>>) {
+    let first_order = structure.first_order().unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut entries = Vec::new();
+    let mut deviation = Vec::new();
+    for response in AXES
+        .into_iter()
+        .filter(|axis| structure.directions.contains(axis))
+    {
+        for &force in forces {
+            let (p, q) = (response.axis().unwrap(), force.axis().unwrap());
+            let clean: Vec<Complex64> = frequency_hz
+                .iter()
+                .map(|hertz| first_order.receptance(TAU * hertz).unwrap()[(p, q)])
+                .collect();
+            let size = (clean.iter().map(|h| h.norm_sqr()).sum::<f64>() / clean.len() as f64).sqrt();
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let receptance = clean
+                .iter()
+                .map(|h| h + noise * size * Complex64::new(normal(), normal()))
+                .collect();
+            deviation.push(vec![noise * size; frequency_hz.len()]);
+            entries.push(Frf {
+                response,
+                force,
+                receptance,
+                coherence: None,
+            });
+        }
+    }
+    (
+        FrfTable::new(Path::new("a.csv"), frequency_hz.to_vec(), entries).unwrap(),
+        deviation,
+    )
+}
+
+fn grid(first: f64, last: f64, count: usize) -> Vec<f64> {
+    (0..count)
+        .map(|k| first + (last - first) * k as f64 / (count - 1) as f64)
+        .collect()
+}
+
+fn modes_of(structure: &Structure) -> Vec<Mode> {
+    let Form::Modes(modes) = &structure.form else {
+        panic!("no modes")
+    };
+    modes.clone()
+}
+
+/// The shapes of a mode with the scale and phase that identification gives them.
+fn normalized(mode: &Mode) -> (Vec<Complex64>, Vec<Complex64>) {
+    let (mut right, mut left) = (mode.right.clone(), mode.left.clone());
+    let shared: Vec<(usize, usize)> = (0..right.len()).map(|i| (i, i)).collect();
+    shape::normalize(&mut right, &mut left, &shared);
+    (right, left)
+}
+
+#[test]
+fn the_modes_of_table_7_1_come_back_from_their_receptances() {
+    let structure = case("kuka-kr90-acetal").structure.unwrap();
+    let (table, _) = table(&structure, &grid(10.0, 28.0, 181), &AXES, 0.0, 1);
+    let data = Receptances::new(&table, None, None).unwrap();
+    let found = identify(&data, &Options::default()).unwrap();
+    let truth = modes_of(&structure);
+    assert_eq!(found.modes.len(), truth.len(), "{:?}", found.rejected);
+    for (mode, truth) in found.modes.iter().zip(&truth) {
+        // Nothing but rounding, and the end of the iteration.
+        assert!((mode.mode.frequency_hz / truth.frequency_hz - 1.0).abs() < 1e-6);
+        assert!((mode.mode.damping_ratio / truth.damping_ratio - 1.0).abs() < 1e-5);
+        let (right, left) = normalized(truth);
+        for (a, b) in mode
+            .mode
+            .right
+            .iter()
+            .zip(&right)
+            .chain(mode.mode.left.iter().zip(&left))
+        {
+            assert!((a - b).norm() < 1e-4 * right[1].norm(), "{a} {b}");
+        }
+    }
+    assert!(found.fit_error < 1e-5, "{}", found.fit_error);
+}
+
+#[test]
+fn intervals_cover_the_truth_as_often_as_they_say() {
+    let structure = case("kuka-kr90-acetal").structure.unwrap();
+    let truth = modes_of(&structure);
+    let (mut covered, mut all, mut missed) = (0, 0, 0);
+    const SEEDS: u64 = 60;
+    for seed in 0..SEEDS {
+        let (table, deviation) = table(&structure, &grid(10.0, 28.0, 145), &AXES, 0.03, seed);
+        // Every second time the deviations are not stated.
+        let stated = (seed % 2 == 0).then_some(deviation.as_slice());
+        let data = Receptances::new(&table, stated, None).unwrap();
+        let found = identify(&data, &Options::default()).unwrap();
+        if found.modes.len() != truth.len() {
+            missed += 1;
+            continue;
+        }
+        for (mode, truth) in found.modes.iter().zip(&truth) {
+            let (right, left) = normalized(truth);
+            let mut count = |value: f64, truth: f64, deviation: f64| {
+                all += 1;
+                covered += usize::from((value - truth).abs() < 1.644_85 * deviation);
+            };
+            count(mode.mode.frequency_hz, truth.frequency_hz, mode.frequency_std_hz);
+            count(
+                mode.mode.damping_ratio,
+                truth.damping_ratio,
+                mode.damping_ratio_std,
+            );
+            let shapes = [
+                (&mode.mode.right, &right, &mode.right_std),
+                (&mode.mode.left, &left, &mode.left_std),
+            ];
+            for (values, truth, deviations) in shapes {
+                for ((value, truth), [re, im]) in values.iter().zip(truth).zip(deviations) {
+                    count(value.re, truth.re, *re);
+                    count(value.im, truth.im, *im);
+                }
+            }
+        }
+        if let Some(misfit) = found.misfit {
+            // 2 × 9 × 145 values: a standard deviation of 3 %.
+            assert!((misfit - 1.0).abs() < 0.12, "seed {seed}: {misfit}");
+        }
+    }
+    let share = f64::from(covered as u32) / f64::from(all as u32);
+    // The 28 numbers of a seed depend on each other; 60 seeds alone would scatter by 0.04.
+    assert!(
+        missed <= 1 && (0.85..0.95).contains(&share),
+        "{share} of {all}, {missed} missed"
+    );
+}
+
+fn mode(hertz: f64, damping: f64, right: [[f64; 2]; 3], left: [[f64; 2]; 3]) -> Mode {
+    let shape = |entries: [[f64; 2]; 3]| {
+        entries
+            .map(|[re, im]| Complex64::new(1e-3 * re, 1e-3 * im))
+            .to_vec()
+    };
+    Mode {
+        frequency_hz: hertz,
+        damping_ratio: damping,
+        right: shape(right),
+        left: shape(left),
+    }
+}
+
+fn structure(modes: Vec<Mode>) -> Structure {
+    Structure {
+        directions: AXES.to_vec(),
+        form: Form::Modes(modes),
+    }
+}
+
+#[test]
+fn close_modes_are_told_apart_and_modes_outside_the_band_are_residuals() {
+    // A third of a width apart, the shapes of one neither left nor right those of the other; one far below, one far above.
+    let close = [
+        mode(
+            17.2,
+            0.02,
+            [[3.0, -3.0], [1.0, 0.5], [0.4, 0.1]],
+            [[2.5, -2.0], [1.5, 0.0], [0.2, 0.3]],
+        ),
+        mode(
+            17.45,
+            0.025,
+            [[0.5, 0.2], [4.0, -4.5], [1.0, -0.5]],
+            [[-0.3, 0.5], [3.5, -4.0], [0.6, -1.0]],
+        ),
+    ];
+    let mut all = close.to_vec();
+    all.push(mode(4.0, 0.03, [[2.0, -2.0]; 3], [[2.0, -2.0]; 3]));
+    all.push(mode(70.0, 0.03, [[9.0, -9.0]; 3], [[9.0, -9.0]; 3]));
+    for seed in 0..10 {
+        let (table, deviation) = table(
+            &structure(all.clone()),
+            &grid(12.0, 24.0, 241),
+            &AXES,
+            0.005,
+            seed,
+        );
+        let data = Receptances::new(&table, Some(&deviation), None).unwrap();
+        let found = identify(&data, &Options::default()).unwrap();
+        assert_eq!(found.modes.len(), 2, "seed {seed}: {:?}", found.modes);
+        for (found, truth) in found.modes.iter().zip(&close) {
+            let off = (found.mode.frequency_hz - truth.frequency_hz).abs();
+            // Five standard deviations, and what real constants leave of the modes outside.
+            assert!(
+                off < 5.0 * found.frequency_std_hz + 1e-3,
+                "seed {seed}: {off} {found:?}"
+            );
+            let off = (found.mode.damping_ratio - truth.damping_ratio).abs();
+            assert!(
+                off < 5.0 * found.damping_ratio_std + 1e-4,
+                "seed {seed}: {off} {found:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn noise_is_no_mode_and_it_is_said_why() {
+    let lone = [mode(17.0, 0.03, [[3.0, -3.0]; 3], [[3.0, -3.0]; 3])];
+    for seed in 0..20 {
+        let (table, deviation) = table(
+            &structure(lone.to_vec()),
+            &grid(10.0, 26.0, 161),
+            &AXES,
+            0.1,
+            seed,
+        );
+        let data = Receptances::new(&table, Some(&deviation), None).unwrap();
+        let found = identify(&data, &Options::default()).unwrap();
+        assert_eq!(found.modes.len(), 1, "seed {seed}: {:?}", found.modes);
+        assert!(
+            found
+                .rejected
+                .iter()
+                .any(|pole| pole.why.contains("negative damping")),
+            "seed {seed}"
+        );
+        let said = found.rejected.iter().all(|pole| !pole.why.is_empty());
+        assert!(
+            said && found.rejected.len() > 3,
+            "seed {seed}: {:?}",
+            found.rejected
+        );
+    }
+}
+
+#[test]
+fn one_force_gives_right_shapes_and_its_entry_of_the_left_ones() {
+    let structure = case("kuka-kr90-acetal").structure.unwrap();
+    let (table, _) = table(&structure, &grid(10.0, 28.0, 181), &[Direction::Y], 0.0, 1);
+    let data = Receptances::new(&table, None, Some([11.0, 27.0])).unwrap();
+    let found = identify(&data, &Options::default()).unwrap();
+    assert_eq!(found.directions(), [Direction::Y]);
+    for (mode, truth) in found.modes.iter().zip(modes_of(&structure)) {
+        assert!((mode.mode.frequency_hz / truth.frequency_hz - 1.0).abs() < 1e-5);
+        let residue = mode.mode.right[2] * mode.mode.left[0];
+        let expected = truth.right[2] * truth.left[1];
+        assert!(
+            (residue - expected).norm() < 1e-3 * expected.norm(),
+            "{residue} {expected}"
+        );
+        assert!((mode.mode.right[1].norm() / mode.mode.left[0].norm() - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn what_holds_no_mode_is_refused() {
+    let structure = case("kuka-kr90-acetal").structure.unwrap();
+    let (whole, _) = table(&structure, &grid(10.0, 28.0, 181), &AXES, 0.0, 1);
+    let refused = |table: &FrfTable, band, options: &Options| {
+        Receptances::new(table, None, band)
+            .and_then(|data| identify(&data, options))
+            .unwrap_err()
+            .to_string()
+    };
+    let said = refused(&whole, Some([17.0, 17.5]), &Options::default());
+    assert!(said.contains("6 frequencies lie in the band"), "{said}");
+    let wanted = Options {
+        modes: Some(9),
+        ..Options::default()
+    };
+    let said = refused(&whole, None, &wanted);
+    assert!(said.contains("9 modes are asked for"), "{said}");
+    let mut entries = whole.entries().to_vec();
+    entries.remove(4);
+    let holed = FrfTable::new(Path::new("a.csv"), whole.frequency_hz().to_vec(), entries).unwrap();
+    let said = refused(&holed, None, &Options::default());
+    assert!(said.contains("hyy is missing"), "{said}");
+    // Far from any resonance there is nothing but noise on a constant.
+    let (far, _) = table(&structure, &grid(200.0, 220.0, 101), &AXES, 0.3, 3);
+    let said = refused(&far, None, &Options::default());
+    assert!(said.contains("no pole is stable"), "{said}");
+}

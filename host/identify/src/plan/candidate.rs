@@ -1,0 +1,312 @@
+//! Tests that can be done, and what each tells of the unknowns: its Fisher information.
+
+use std::f64::consts::{FRAC_2_PI, PI};
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::Means;
+use super::chart::{KnownChart, KnownLimit};
+use super::unknowns::Unknowns;
+use quietcut_model::case::Case;
+use quietcut_model::structure::{Direction, FirstOrder, Structure};
+use quietcut_simulate::STANDARD_GRAVITY;
+use quietcut_stability::{CubicTerms, Problem, Variable};
+
+/// Half the difference, in standard deviations, over which responses are differenced.
+const STEP: f64 = 0.05;
+
+/// Phases at which the force of a cut is looked at, in each part of the tooth period with the same teeth.
+const PHASES: usize = 90;
+
+/// Most speeds at which a limit may be bracketed.
+const BRACKETS: usize = 40;
+
+/// Something to do at the machine.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Test {
+    /// Blows of a hammer at the tool tip at standstill, the acceleration measured in every direction there.
+    Hammer {
+        /// Where the hammer strikes to.
+        direction: String,
+        /// Number of blows.
+        blows: usize,
+    },
+    /// A stable cut on a dynamometer.
+    Force {
+        /// Spindle speed, rev/min.
+        rpm: f64,
+        /// Axial depth, mm.
+        depth_mm: f64,
+        /// How long the forces are recorded, s.
+        seconds: f64,
+    },
+    /// Cuts at one speed that bracket the limit, each halving the interval; the chatter frequency is read from those that
+    /// chatter.
+    Cuts {
+        /// Spindle speed, rev/min.
+        rpm: f64,
+        /// Where the limit is expected, mm.
+        about_mm: f64,
+        /// How narrow the bracket is to become, mm.
+        bracket_mm: f64,
+    },
+}
+
+/// A test and its information.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub(super) test: Test,
+    /// J: the inverse of the covariance that the test alone leaves, in units of the deviations before.
+    pub(super) information: DMatrix<f64>,
+    /// Which limit of the chart it brackets.
+    pub(super) limit: Option<usize>,
+}
+
+/// All tests that are thought of.
+pub(super) fn candidates(
+    case: &Case,
+    problem: &Problem,
+    unknowns: &Unknowns,
+    chart: &KnownChart,
+    means: &Means,
+) -> Vec<Candidate> {
+    let mut candidates = hammers(case, unknowns, means);
+    candidates.extend(force(case, problem, unknowns, chart, means));
+    let count = chart.limits.len();
+    let step = count.div_ceil(BRACKETS).max(1);
+    candidates.extend(
+        chart
+            .limits
+            .iter()
+            .enumerate()
+            .step_by(step)
+            .map(|(index, limit)| cuts(index, limit, means)),
+    );
+    candidates
+}
+
+/// A depth that is known to lie anywhere in the bracket has the variance w²/12; beside it a frequency.
+fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
+    let plane = &limit.planes[0];
+    let bracket_mm = means.bracket * plane.depth_mm;
+    let depth = &plane.gradient * (12.0_f64.sqrt() / bracket_mm);
+    let mut information = &depth * depth.transpose();
+    if let Some((hz, gradient)) = &plane.chatter_hz {
+        let frequency = gradient / (means.chatter_frequency * hz);
+        information += &frequency * frequency.transpose();
+    }
+    Candidate {
+        test: Test::Cuts {
+            rpm: limit.rpm,
+            about_mm: plane.depth_mm,
+            bracket_mm,
+        },
+        information,
+        limit: Some(index),
+    }
+}
+
+/// The cases at ± a step along a variable; `None` where one of them cannot be.
+fn shifted(case: &Case, variable: &Variable) -> Option<[Case; 2]> {
+    let at = |deviations: f64| {
+        let mut moved = case.clone();
+        variable.shift(&mut moved, deviations).then_some(moved)
+    };
+    Some([at(-STEP)?, at(STEP)?])
+}
+
+/// A hammer in every direction of the machine.
+///
+/// A response a = −ω²H(ω)F(ω) in white noise of one-sided density S holds the information
+/// J_ij = 4/S ∫₀^∞ Re(∂_i a* ∂_j a) dω/2π per blow, with F the transform of a half sine.
+fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
+    let Some(structure) = &case.structure else {
+        return Vec::new();
+    };
+    let Ok(nominal) = structure.first_order() else {
+        return Vec::new();
+    };
+    let grid = frequency_grid(&nominal);
+    let Some(&(highest_hz, _)) = grid.last() else {
+        return Vec::new();
+    };
+    // Up to the highest mode a half sine of this length excites without a gap: its first zero is at 1.5/pulse.
+    let pulse_s = 0.75 / highest_hz;
+    let structures: Vec<Option<[FirstOrder; 2]>> = unknowns
+        .variables
+        .iter()
+        .chain(&unknowns.standstill)
+        .map(|variable| {
+            let [low, high] = shifted(case, variable)?;
+            let of = |case: &Case| {
+                case.structure
+                    .as_ref()
+                    .and_then(|s: &Structure| s.first_order().ok())
+            };
+            Some([of(&low)?, of(&high)?])
+        })
+        .collect();
+    let density = (means.accelerometer_g_per_root_hertz * STANDARD_GRAVITY).powi(2);
+    let axes = Direction::ALL.into_iter().filter_map(|direction| {
+        let axis = direction.axis()?;
+        structure
+            .directions
+            .contains(&direction)
+            .then_some((direction, axis))
+    });
+    let axes: Vec<(Direction, usize)> = axes.collect();
+    axes.par_iter()
+        .map(|&(direction, axis)| {
+            let mut information = DMatrix::zeros(unknowns.len(), unknowns.len());
+            for &(hz, weight_hz) in &grid {
+                let omega = 2.0 * PI * hz;
+                let Some(response) = nominal.receptance(omega) else {
+                    continue;
+                };
+                let force = half_sine(means.peak_n, pulse_s, hz);
+                let scale = omega * omega * force * (4.0 * means.blows as f64 * weight_hz / density).sqrt();
+                for output in axes.iter().map(|&(_, axis)| axis) {
+                    let slope = |index: usize| match structures.get(index) {
+                        Some(Some([low, high])) => {
+                            let of = |structure: &FirstOrder| {
+                                structure.receptance(omega).map(|h| h[(output, axis)])
+                            };
+                            match (of(low), of(high)) {
+                                (Some(low), Some(high)) => (high - low) / (2.0 * STEP),
+                                _ => Complex64::ZERO,
+                            }
+                        }
+                        _ if index == unknowns.hammer_gain() => response[(output, axis)] * means.calibration,
+                        _ => Complex64::ZERO,
+                    };
+                    let slopes: Vec<Complex64> =
+                        (0..unknowns.len()).map(|index| slope(index) * scale).collect();
+                    let part = |of: fn(&Complex64) -> f64| {
+                        DVector::from_iterator(slopes.len(), slopes.iter().map(of))
+                    };
+                    for row in [part(|slope| slope.re), part(|slope| slope.im)] {
+                        information.ger(1.0, &row, &row, 1.0);
+                    }
+                }
+            }
+            Candidate {
+                test: Test::Hammer {
+                    direction: direction.name().into(),
+                    blows: means.blows,
+                },
+                information,
+                limit: None,
+            }
+        })
+        .collect()
+}
+
+/// Frequencies and the width that each stands for, Hz: fine within the resonances, from half the lowest to twice the
+/// highest of the modes.
+fn frequency_grid(structure: &FirstOrder) -> Vec<(f64, f64)> {
+    let modes: Vec<(f64, f64)> = structure
+        .poles()
+        .iter()
+        .filter(|pole| pole.im > 0.0)
+        .map(|pole| (pole.norm() / (2.0 * PI), -pole.re / (2.0 * PI)))
+        .collect();
+    let (Some(lowest), Some(highest)) = (
+        modes.iter().map(|mode| mode.0).reduce(f64::min),
+        modes.iter().map(|mode| mode.0).reduce(f64::max),
+    ) else {
+        return Vec::new();
+    };
+    let coarse = (0..=200).map(|i| lowest * 0.5 * (4.0 * highest / lowest).powf(f64::from(i) / 200.0));
+    // The tangent spaces points evenly in the phase of a resonance.
+    let fine = modes.iter().flat_map(|&(hz, half_width_hz)| {
+        (-60..=60).map(move |i| hz + half_width_hz * (PI / 2.0 * f64::from(i) / 61.0).tan())
+    });
+    let mut frequencies: Vec<f64> = coarse
+        .chain(fine)
+        .filter(|&hz| hz >= 0.5 * lowest && hz <= 2.0 * highest)
+        .collect();
+    frequencies.sort_by(f64::total_cmp);
+    let last = frequencies.len().saturating_sub(1);
+    (0..frequencies.len())
+        .map(|i| {
+            let width = frequencies[(i + 1).min(last)] - frequencies[i.saturating_sub(1)];
+            (frequencies[i], 0.5 * width)
+        })
+        .collect()
+}
+
+/// |F(f)|, N s, of half a sine.
+fn half_sine(peak_n: f64, pulse_s: f64, hz: f64) -> f64 {
+    let turns = hz * pulse_s;
+    let from_pole = 1.0 - 4.0 * turns * turns;
+    if from_pole.abs() < 1e-6 {
+        // Between numerator and denominator both zero.
+        return peak_n * pulse_s * 0.5;
+    }
+    peak_n * pulse_s * FRAC_2_PI * ((PI * turns).cos() / from_pole).abs()
+}
+
+/// A cut at half the lowest limit of the chart, where it is: stable, so that chips are as thick as the feed makes them.
+///
+/// J_ij = 2T/S · mean over the period of ∂_i F · ∂_j F.
+fn force(
+    case: &Case,
+    problem: &Problem,
+    unknowns: &Unknowns,
+    chart: &KnownChart,
+    means: &Means,
+) -> Option<Candidate> {
+    let lowest = chart
+        .limits
+        .iter()
+        .min_by(|a, b| a.depth_mm().total_cmp(&b.depth_mm()))?;
+    let depth_m = 0.5e-3 * lowest.depth_mm();
+    let problems: Vec<Option<[Problem; 2]>> = unknowns
+        .variables
+        .iter()
+        .map(|variable| {
+            let [low, high] = shifted(case, variable)?;
+            let of = |case: &Case| Problem::new(case, CubicTerms::LeaveOut).ok();
+            Some([of(&low)?, of(&high)?])
+        })
+        .collect();
+    let engagement = problem.process.engagement;
+    let density = means.dynamometer_n_per_root_hertz.powi(2);
+    let mut information = DMatrix::zeros(unknowns.len(), unknowns.len());
+    let intervals = engagement.intervals();
+    let phases = intervals
+        .iter()
+        .filter(|interval| interval.teeth > 0)
+        .flat_map(|interval| {
+            let length = interval.to - interval.from;
+            let phase = move |index: usize| interval.from + (index as f64 + 0.5) / PHASES as f64 * length;
+            (0..PHASES).map(move |index| (interval.teeth, phase(index), length / PHASES as f64))
+        });
+    for (teeth, phase, width) in phases {
+        let scale = (2.0 * means.seconds / density * width / engagement.pitch).sqrt();
+        let of = |problem: &Problem| problem.process.forced(teeth, phase) * depth_m;
+        let nominal = of(problem);
+        for axis in 0..3 {
+            let slope = |index: usize| match problems.get(index) {
+                Some(Some([low, high])) => (of(high)[axis] - of(low)[axis]) / (2.0 * STEP),
+                _ if index == unknowns.dynamometer_gain() => nominal[axis] * means.calibration,
+                _ => 0.0,
+            };
+            let row = DVector::from_fn(unknowns.len(), |index, _| scale * slope(index));
+            information.ger(1.0, &row, &row, 1.0);
+        }
+    }
+    Some(Candidate {
+        test: Test::Force {
+            rpm: lowest.rpm,
+            depth_mm: 1e3 * depth_m,
+            seconds: means.seconds,
+        },
+        information,
+        limit: None,
+    })
+}

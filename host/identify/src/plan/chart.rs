@@ -1,0 +1,166 @@
+//! How well the limits of a chart are known, given what is known of the parameters.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::steady_fit::NINETY_PERCENT;
+use quietcut_stability::sampling::Basis;
+use quietcut_stability::{Linearized, Plane, SpeedLine};
+
+/// Lobes that are looked at at each speed.
+const LOBES: usize = 4;
+
+/// Points of the distribution of several lobes: a power of 2.
+const POINTS: u32 = 256;
+
+/// A lobe farther above the lowest than so many deviations of their distance never is the lowest.
+const FAR: f64 = 4.0;
+
+/// The first limit at a speed, as the lowest of several planes over the unknowns.
+#[derive(Clone, Debug)]
+pub(super) struct KnownLimit {
+    /// Spindle speed, rev/min.
+    pub(super) rpm: f64,
+    /// The lobes from below; at least one.
+    pub(super) planes: Vec<Plane>,
+}
+
+impl KnownLimit {
+    /// `None` where nothing is lost, or the limit does not follow the unknowns.
+    ///
+    /// Gradients are filled up with zeros to `size` unknowns: those that only tests see.
+    pub(super) fn new(line: &SpeedLine, linearized: &Linearized, size: usize) -> Option<Self> {
+        let first_mm = line.first_limit?.depth_mm;
+        let mut planes = linearized.planes(line);
+        planes.retain(|plane| plane.depth_mm >= first_mm);
+        planes.truncate(LOBES);
+        for plane in &mut planes {
+            plane.gradient.resize_vertically_mut(size, 0.0);
+            if let Some((_, gradient)) = &mut plane.chatter_hz {
+                gradient.resize_vertically_mut(size, 0.0);
+            }
+        }
+        (planes.first()?.depth_mm == first_mm).then_some(Self {
+            rpm: line.rpm,
+            planes,
+        })
+    }
+
+    /// The limit of the case as it stands, mm.
+    pub(super) fn depth_mm(&self) -> f64 {
+        self.planes[0].depth_mm
+    }
+
+    /// The planes that may be the lowest.
+    fn rivals(&self, roots: &[DVector<f64>]) -> Vec<usize> {
+        let is_near = |index: &usize| {
+            let apart = self.planes[*index].depth_mm - self.depth_mm();
+            apart <= FAR * (&roots[*index] - &roots[0]).norm()
+        };
+        (0..self.planes.len())
+            .filter(|index| *index == 0 || is_near(index))
+            .collect()
+    }
+}
+
+/// The limits of a chart.
+#[derive(Clone, Debug)]
+pub(super) struct KnownChart {
+    pub(super) limits: Vec<KnownLimit>,
+    /// Points of the standard normal distribution in 1 … LOBES dimensions.
+    points: Vec<Vec<DVector<f64>>>,
+}
+
+impl KnownChart {
+    pub(super) fn new(limits: Vec<KnownLimit>) -> Self {
+        let points = |size: usize| Basis::new(size, &[]).points(POINTS, 1, size as u64, 0);
+        Self {
+            limits,
+            points: (1..=LOBES).map(points).collect(),
+        }
+    }
+
+    /// The 90 % interval of every limit, mm, where unknowns have the inverse covariance `information`.
+    pub(super) fn intervals(&self, information: &DMatrix<f64>) -> Vec<[f64; 2]> {
+        // Λ starts as the identity and only grows: it is positive definite but for numbers out of range.
+        let Some(root) = Cholesky::new(information.clone()) else {
+            return vec![[f64::NEG_INFINITY, f64::INFINITY]; self.limits.len()];
+        };
+        self.limits
+            .iter()
+            .map(|limit| self.interval(limit, &root))
+            .collect()
+    }
+
+    /// Width of the 90 % interval of every limit, relative to the limit.
+    pub(super) fn widths(&self, information: &DMatrix<f64>) -> Vec<f64> {
+        let intervals = self.intervals(information);
+        let pairs = intervals.iter().zip(&self.limits);
+        pairs
+            .map(|([from, to], limit)| (to - from) / limit.depth_mm())
+            .collect()
+    }
+
+    fn interval(&self, limit: &KnownLimit, root: &Cholesky<f64, Dyn>) -> [f64; 2] {
+        // Λ = L Lᵀ: a gradient g has the variance |L⁻¹g|².
+        let roots: Vec<DVector<f64>> = limit
+            .planes
+            .iter()
+            .map(|plane| solved(root, &plane.gradient))
+            .collect();
+        let rivals = limit.rivals(&roots);
+        if rivals.len() == 1 {
+            let half = NINETY_PERCENT * roots[0].norm();
+            return [limit.depth_mm() - half, limit.depth_mm() + half];
+        }
+        // Only the rivals' own joint distribution matters: as many coordinates as rivals, the first along the lowest.
+        let vectors: Vec<DVector<f64>> = rivals.iter().map(|&index| roots[index].clone()).collect();
+        let coordinates = triangular(&vectors);
+        let mut lowest: Vec<f64> = self.points[rivals.len() - 1]
+            .iter()
+            .map(|point| {
+                let depths = rivals
+                    .iter()
+                    .zip(&coordinates)
+                    .map(|(&index, along)| limit.planes[index].depth_mm + along.dot(point));
+                depths.fold(f64::INFINITY, f64::min)
+            })
+            .collect();
+        lowest.sort_by(f64::total_cmp);
+        [0.05, 0.95].map(|share| quantile(&lowest, share))
+    }
+}
+
+fn solved(root: &Cholesky<f64, Dyn>, gradient: &DVector<f64>) -> DVector<f64> {
+    root.l_dirty()
+        .solve_lower_triangular(gradient)
+        .unwrap_or_else(|| gradient.clone())
+}
+
+/// The vectors in coordinates of an orthonormal basis of their span, the first along the first.
+fn triangular(vectors: &[DVector<f64>]) -> Vec<DVector<f64>> {
+    let size = vectors.len();
+    let mut basis: Vec<DVector<f64>> = Vec::with_capacity(size);
+    vectors
+        .iter()
+        .map(|vector| {
+            let mut rest = vector.clone();
+            let mut along = DVector::zeros(size);
+            for (index, axis) in basis.iter().enumerate() {
+                along[index] = axis.dot(&rest);
+                rest.axpy(-along[index], axis, 1.0);
+            }
+            let length = rest.norm();
+            along[basis.len()] = length;
+            basis.push(if length > 0.0 { rest / length } else { rest });
+            along
+        })
+        .collect()
+}
+
+/// The value below which a share of all lies, between the neighbours at (i + 1/2)/n (Hazen).
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let position = (share * sorted.len() as f64 - 0.5).max(0.0);
+    let below = (position as usize).min(sorted.len() - 1);
+    let above = (below + 1).min(sorted.len() - 1);
+    sorted[below] + (sorted[above] - sorted[below]) * position.fract()
+}

@@ -1,0 +1,360 @@
+//! The fewest tests that make a chart trustworthy.
+//!
+//! What is not known of a machine is a normal distribution over its parameters (`unknowns`). Exact derivatives make of it
+//! the distribution of every limit (`chart`), and of every test what it tells of the parameters: its Fisher information
+//! (`candidate`). Where tests add up, Λ = I + Σ J_t is the inverse of the covariance that they leave, in units of the deviations
+//! before them. `selection` looks for the cheapest set of tests with which all limits are known well enough.
+
+mod candidate;
+mod chart;
+mod selection;
+mod unknowns;
+
+#[cfg(test)]
+mod tests;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use serde::Serialize;
+
+pub use candidate::Test;
+pub use unknowns::Prior;
+
+use candidate::{Candidate, candidates};
+use chart::{KnownChart, KnownLimit};
+use quietcut_model::case::Case;
+use quietcut_stability::{CubicTerms, Linearized, Problem, SpeedLine, StabilityError, line};
+use selection::{Chosen, Selection};
+use unknowns::Unknowns;
+
+/// What is wanted, and with what it can be had.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// Spindle speeds of the chart, rev/min.
+    pub speeds_rpm: Vec<f64>,
+    /// The largest axial depth of interest, mm.
+    pub depth_mm: f64,
+    /// Steps in depth at which multipliers are followed.
+    pub samples: usize,
+    /// Every limit is to have a 90 % interval no wider than this share of it.
+    pub width: f64,
+    /// What is not known where the case does not say it.
+    pub prior: Prior,
+    /// What tests are like.
+    pub means: Means,
+    /// True where cubic terms of the structure are left out.
+    pub linear: bool,
+}
+
+/// What tests are like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Means {
+    /// Width of the interval to which cuts bracket a limit, relative to it.
+    pub bracket: f64,
+    /// Standard deviation of a measured chatter frequency, relative to it.
+    pub chatter_frequency: f64,
+    /// Blows of a hammer test.
+    pub blows: usize,
+    /// Peak force of a blow, N.
+    pub peak_n: f64,
+    /// Noise of the accelerometer, g/√Hz.
+    pub accelerometer_g_per_root_hertz: f64,
+    /// Standard deviation of the gain of hammer and accelerometer, and of that of the dynamometer.
+    pub calibration: f64,
+    /// Noise of the dynamometer, N/√Hz.
+    pub dynamometer_n_per_root_hertz: f64,
+    /// How long a cut is measured, s.
+    pub seconds: f64,
+    /// Standard deviation of how much natural frequencies differ between standstill and cutting, relative.
+    pub standstill_frequency: f64,
+    /// The same of damping ratios.
+    pub standstill_damping: f64,
+}
+
+impl Default for Means {
+    /// A 500 N hammer and an accelerometer of 75 µg/√Hz; sensors calibrated to 2 %, brackets of 5 %.
+    fn default() -> Self {
+        Self {
+            bracket: 0.05,
+            chatter_frequency: 0.002,
+            blows: 5,
+            peak_n: 500.0,
+            accelerometer_g_per_root_hertz: 75e-6,
+            calibration: 0.02,
+            dynamometer_n_per_root_hertz: 0.1,
+            seconds: 2.0,
+            standstill_frequency: 0.005,
+            standstill_damping: 0.1,
+        }
+    }
+}
+
+/// Why nothing can be planned.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The case, or a line of the chart.
+    #[error(transparent)]
+    Stability(#[from] StabilityError),
+    /// No limit in the chart.
+    #[error(
+        "{case}: at none of the {speeds} speeds is stability lost up to {depth_mm} mm; ask for a greater --depth-mm"
+    )]
+    NoLimit {
+        /// The case file.
+        case: String,
+        /// Number of speeds.
+        speeds: usize,
+        /// The largest depth asked for, mm.
+        depth_mm: f64,
+    },
+    /// A case without derivatives.
+    #[error("{case}: limits have no derivatives by what is not known: {what}")]
+    NoDerivatives {
+        /// The case file.
+        case: String,
+        /// What is in the way.
+        what: &'static str,
+    },
+}
+
+/// A width over the chart, percent of the limits.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Width {
+    /// The widest 90 % interval.
+    pub widest_percent: f64,
+    /// Where it is.
+    pub at_rpm: f64,
+    /// The median over the speeds.
+    pub median_percent: f64,
+}
+
+/// A speed of the chart.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Speed {
+    /// Spindle speed, rev/min.
+    pub rpm: f64,
+    /// First limit of the case as it stands, mm.
+    pub limit_mm: f64,
+    /// 90 % interval before any test, mm.
+    pub before_mm: [f64; 2],
+    /// 90 % interval after all tests, mm, if they find the case as it stands.
+    pub after_mm: [f64; 2],
+}
+
+/// A test of the plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Step {
+    /// What to do.
+    #[serde(flatten)]
+    pub test: Test,
+    /// Number of cuts, or 1.
+    pub cuts_or_tests: usize,
+    /// What is known after it.
+    pub after: Width,
+}
+
+/// What keeps a chart from becoming as narrow as wanted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Obstacle {
+    /// What is known if every test is done a thousand times.
+    pub at_best: Width,
+    /// What would narrow the widest interval most if it were known; empty where more tests than anyone does would suffice.
+    pub if_known: Vec<IfKnown>,
+}
+
+/// An unknown, and what its knowledge would be worth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct IfKnown {
+    /// The unknown.
+    pub name: String,
+    /// The widest interval if it were known, percent.
+    pub widest_percent: f64,
+}
+
+/// A plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// The width that is wanted, percent.
+    pub wanted_percent: f64,
+    /// True where the tests reach it.
+    pub reached: bool,
+    /// Cuts and other tests, counted alike.
+    pub cuts_and_tests: usize,
+    /// What is not known: names, with standard deviations in percent where they are assumed.
+    pub unknowns: Vec<String>,
+    /// True where the case says how well its parameters are known; else defaults are assumed.
+    pub stated: bool,
+    /// Before any test.
+    pub before: Width,
+    /// The tests, in the order in which to do them.
+    pub tests: Vec<Step>,
+    /// What is known after all of them.
+    pub after: Width,
+    /// Why the width is not reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<Obstacle>,
+    /// Speeds at which nothing is lost up to the last depth: they do not count.
+    pub without_limit_rpm: Vec<f64>,
+    /// Every speed that counts.
+    pub chart: Vec<Speed>,
+}
+
+/// How often a test is repeated to see what tests can do at best.
+const AT_BEST: f64 = 1000.0;
+
+/// The fewest tests with which the chart is as narrow as wanted; `progress` is told when a speed is done.
+///
+/// Intervals are those of the linearized limits: of a machine whose parameters lie within a few deviations of the case.
+/// At each speed the lowest of several lobes counts.
+///
+/// # Errors
+/// The chart cannot be computed, has no limits, or its limits no derivatives.
+pub fn plan(case: &Case, request: &Request, progress: impl Fn() + Sync) -> Result<Plan, PlanError> {
+    let basis = Basis::new(case, request, progress)?;
+    let selection = Selection::new(&basis.chart, &basis.candidates, request.width);
+    let chosen = selection.fewest();
+    Ok(basis.plan(request, &selection, &chosen))
+}
+
+/// What a plan is made from.
+struct Basis {
+    unknowns: Unknowns,
+    chart: KnownChart,
+    candidates: Vec<Candidate>,
+    without_limit_rpm: Vec<f64>,
+}
+
+impl Basis {
+    fn new(case: &Case, request: &Request, progress: impl Fn() + Sync) -> Result<Self, PlanError> {
+        let cubic = if request.linear {
+            CubicTerms::LeaveOut
+        } else {
+            CubicTerms::Refuse
+        };
+        let problem = Problem::new(case, cubic)?;
+        let no_derivatives = |what| PlanError::NoDerivatives {
+            case: case.path.display().to_string(),
+            what,
+        };
+        let unknowns = Unknowns::new(case, &request.prior, &request.means)
+            .ok_or_else(|| no_derivatives("nothing is unknown; larger deviations are needed"))?;
+        let linearized = Linearized::new(case, &unknowns.variables).ok_or_else(|| {
+            no_derivatives("a twentieth of a deviation makes a structure or a cut that cannot be")
+        })?;
+        let lines: Vec<Result<SpeedLine, StabilityError>> = request
+            .speeds_rpm
+            .par_iter()
+            .map(|&rpm| {
+                let found = line(&problem, rpm, request.depth_mm, request.samples);
+                progress();
+                found
+            })
+            .collect();
+        let lines = lines.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let limits: Vec<Option<KnownLimit>> = lines
+            .par_iter()
+            .map(|line| KnownLimit::new(line, &linearized, unknowns.len()))
+            .collect();
+        let without_limit_rpm = lines
+            .iter()
+            .zip(&limits)
+            .filter(|(_, limit)| limit.is_none())
+            .map(|(line, _)| line.rpm)
+            .collect();
+        let chart = KnownChart::new(limits.into_iter().flatten().collect());
+        if chart.limits.is_empty() {
+            return Err(PlanError::NoLimit {
+                case: case.path.display().to_string(),
+                speeds: request.speeds_rpm.len(),
+                depth_mm: request.depth_mm,
+            });
+        }
+        let candidates = candidates(case, &problem, &unknowns, &chart, &request.means);
+        Ok(Self {
+            unknowns,
+            chart,
+            candidates,
+            without_limit_rpm,
+        })
+    }
+
+    fn plan(&self, request: &Request, selection: &Selection<'_>, chosen: &[Chosen]) -> Plan {
+        let nothing = selection.information(&[]);
+        let everything = selection.information(chosen);
+        let mut tests = Vec::new();
+        for (index, one) in chosen.iter().enumerate() {
+            let information = selection.information(&chosen[..=index]);
+            tests.push(Step {
+                test: self.candidates[one.candidate].test.clone(),
+                cuts_or_tests: one.cost,
+                after: self.width(&information),
+            });
+        }
+        let after = self.width(&everything);
+        let reached = selection.is_reached(&everything);
+        let obstacle = (!reached).then(|| self.obstacle(selection));
+        let (before_mm, after_mm) = (self.chart.intervals(&nothing), self.chart.intervals(&everything));
+        let speeds = self.chart.limits.iter().zip(before_mm).zip(after_mm);
+        Plan {
+            wanted_percent: 100.0 * request.width,
+            reached,
+            cuts_and_tests: chosen.iter().map(|one| one.cost).sum(),
+            unknowns: self.unknowns.names.clone(),
+            stated: self.unknowns.stated,
+            before: self.width(&nothing),
+            tests,
+            after,
+            obstacle,
+            without_limit_rpm: self.without_limit_rpm.clone(),
+            chart: speeds
+                .map(|((limit, before_mm), after_mm)| Speed {
+                    rpm: limit.rpm,
+                    limit_mm: limit.depth_mm(),
+                    before_mm,
+                    after_mm,
+                })
+                .collect(),
+        }
+    }
+
+    fn width(&self, information: &DMatrix<f64>) -> Width {
+        let widths = self.chart.widths(information);
+        let widest = widths
+            .iter()
+            .zip(&self.chart.limits)
+            .max_by(|a, b| a.0.total_cmp(b.0));
+        let mut sorted = widths.clone();
+        sorted.sort_by(f64::total_cmp);
+        Width {
+            widest_percent: widest.map_or(0.0, |(width, _)| 100.0 * width),
+            at_rpm: widest.map_or(0.0, |(_, limit)| limit.rpm),
+            median_percent: sorted.get(sorted.len() / 2).map_or(0.0, |width| 100.0 * width),
+        }
+    }
+
+    /// Every test a thousand times, and what would help most then.
+    fn obstacle(&self, selection: &Selection<'_>) -> Obstacle {
+        let size = self.unknowns.len();
+        let mut information = DMatrix::identity(size, size);
+        for candidate in &self.candidates {
+            information += &candidate.information * AT_BEST;
+        }
+        let mut if_known: Vec<IfKnown> = (0..size)
+            .map(|index| {
+                let mut known = information.clone();
+                // A millionth of the deviation that it had.
+                known[(index, index)] += 1e12;
+                IfKnown {
+                    name: self.unknowns.names[index].clone(),
+                    widest_percent: self.width(&known).widest_percent,
+                }
+            })
+            .collect();
+        if_known.sort_by(|a, b| a.widest_percent.total_cmp(&b.widest_percent));
+        if_known.truncate(if selection.is_reached(&information) { 0 } else { 3 });
+        Obstacle {
+            at_best: self.width(&information),
+            if_known,
+        }
+    }
+}

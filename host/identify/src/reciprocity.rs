@@ -1,0 +1,87 @@
+//! Reciprocity: of a linear structure without gyroscopic forces H_ij = H_ji.
+
+use num_complex::Complex64;
+
+use super::dwell::Dwell;
+use super::steady_fit::derivative;
+use quietcut_model::structure::Direction;
+
+/// How H_ij and H_ji compare.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Reciprocity {
+    /// The two directions.
+    pub directions: [&'static str; 2],
+    /// Mean square of H_ij − H_ji over its variance: near 1 where they are the same.
+    pub misfit: f64,
+    /// The largest difference as a share of the largest of them.
+    pub largest_change: f64,
+    /// True where nothing speaks against reciprocity.
+    pub reciprocal: bool,
+}
+
+/// H of `to` under a force in `from` (m/N), its variance, and the force.
+fn receptance(dwell: &Dwell, from: Direction, to: Direction) -> Option<(Complex64, f64, f64)> {
+    let force = dwell.force().filter(|line| line.direction == from)?;
+    let motion = dwell.motions.iter().find(|line| line.direction == to)?;
+    let per_unit = dwell.gram_inverse[(1, 1)];
+    let (f, y) = (force.phasor(1), motion.phasor(1));
+    let order = Complex64::new(0.0, dwell.omega).powi(i32::from(derivative(motion.quantity)));
+    let h = y / order / f;
+    let own = motion.variance / (order * f).norm_sqr();
+    let of_force = h.norm_sqr() * force.variance / f.norm_sqr();
+    // Real and imaginary part together.
+    Some((h, 2.0 * per_unit * (own + of_force), f.norm()))
+}
+
+/// Compares the two cross receptances at every frequency at which both were measured, each at its lowest force: there a
+/// nonlinear structure is closest to its linear part. `None` where there is no such frequency.
+pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> {
+    let of = |from, to| -> Vec<(f64, Complex64, f64)> {
+        let mut found: Vec<(f64, Complex64, f64, f64)> = dwells
+            .iter()
+            .filter_map(|dwell| {
+                let (h, variance, force) = receptance(dwell, from, to)?;
+                Some((dwell.omega, h, variance, force))
+            })
+            .collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.3.total_cmp(&b.3)));
+        let mut lowest: Vec<(f64, Complex64, f64, f64)> = Vec::new();
+        for point in found {
+            match lowest.last_mut() {
+                Some(last) if point.0 <= last.0 * 1.001 => {
+                    if point.3 < last.3 {
+                        *last = point;
+                    }
+                }
+                _ => lowest.push(point),
+            }
+        }
+        lowest
+            .into_iter()
+            .map(|(omega, h, variance, _)| (omega, h, variance))
+            .collect()
+    };
+    let (one, other) = (of(i, j), of(j, i));
+    let (mut sum, mut count, mut change, mut largest) = (0.0, 0.0, 0.0_f64, 0.0_f64);
+    for (omega, h, variance) in &one {
+        let Some((_, g, of_g)) = other.iter().find(|(w, ..)| (w / omega - 1.0).abs() < 1e-3) else {
+            continue;
+        };
+        sum += (h - g).norm_sqr() / (variance + of_g);
+        count += 1.0;
+        change = change.max((h - g).norm());
+        largest = largest.max(h.norm());
+    }
+    if count == 0.0 {
+        return None;
+    }
+    let misfit = sum / count;
+    let largest_change = change / largest;
+    Some(Reciprocity {
+        directions: [i.name(), j.name()],
+        misfit,
+        largest_change,
+        // A mean of exponentials of mean 1: five deviations above it; and a percent is what a shaker's placing is good to.
+        reciprocal: misfit < 1.0 + 5.0 / f64::sqrt(count) || largest_change < 0.01,
+    })
+}

@@ -1,0 +1,404 @@
+//! The restoring-force surface f_r(q̇, q) = f − m q̈ (thesis eq. 5.4), its slices, and the law that it follows.
+//!
+//! The law is found by least squares between force and motion *within a band*: force and every term of the law, nonlinear
+//! ones too, go through the same filter, so that the equation still holds for what is left, and noise of derivatives
+//! outside the band does not count. Where the law has a spring, its errors are weighed by its receptance: they are errors
+//! of the *motion* then, where the noise is (Sanathanan and Koerner's weighting). One channel of motion is enough; the others are its derivatives or integrals.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::least_squares::{scaled_inverse, scaled_least_squares};
+use super::spectrum::{Spectral, band_of, loudest_hz};
+use super::steady_fit::NINETY_PERCENT;
+use quietcut_recording::Quantity;
+
+/// A term of the law along one direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Term {
+    /// m q̈.
+    Mass,
+    /// c q̇.
+    Damping,
+    /// k q.
+    Stiffness,
+    /// k2 q².
+    QuadraticStiffness,
+    /// k3 q³.
+    CubicStiffness,
+    /// k5 q⁵.
+    QuinticStiffness,
+    /// c3 q̇³.
+    CubicDamping,
+    /// fc sign(q̇).
+    CoulombFriction,
+    /// A constant force.
+    Offset,
+}
+
+impl Term {
+    /// Its key in answers and cases.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Mass => "mass_kg",
+            Self::Damping => "damping_ns_per_m",
+            Self::Stiffness => "stiffness_n_per_m",
+            Self::QuadraticStiffness => "k2_n_per_m2",
+            Self::CubicStiffness => "k3_n_per_m3",
+            Self::QuinticStiffness => "k5_n_per_m5",
+            Self::CubicDamping => "c3_ns3_per_m3",
+            Self::CoulombFriction => "fc_n",
+            Self::Offset => "offset_n",
+        }
+    }
+
+    /// What it multiplies.
+    pub fn value(self, x: f64, v: f64, a: f64) -> f64 {
+        match self {
+            Self::Mass => a,
+            Self::Damping => v,
+            Self::Stiffness => x,
+            Self::QuadraticStiffness => x * x,
+            Self::CubicStiffness => x * x * x,
+            Self::QuinticStiffness => x.powi(5),
+            Self::CubicDamping => v * v * v,
+            Self::CoulombFriction => {
+                if v == 0.0 {
+                    0.0
+                } else {
+                    v.signum()
+                }
+            }
+            Self::Offset => 1.0,
+        }
+    }
+}
+
+/// A record of force and motion along one direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Record<'a> {
+    /// Force on the structure, N.
+    pub force: &'a [f64],
+    /// What was measured of the motion, SI.
+    pub motion: &'a [f64],
+    /// Which quantity that is: displacement, velocity or acceleration.
+    pub quantity: Quantity,
+    /// Samples per second.
+    pub rate_hz: f64,
+}
+
+/// How to take a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// The terms of the law.
+    pub terms: Vec<Term>,
+    /// The mass, where it is known (kg): needed where no force acts.
+    pub mass_kg: Option<f64>,
+    /// The band, Hz; `None` takes where the motion stands out of its noise.
+    pub band_hz: Option<[f64; 2]>,
+    /// Left out at both ends, s.
+    pub trim_s: f64,
+}
+
+/// Displacement, velocity and acceleration of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// m.
+    pub x: Vec<f64>,
+    /// m/s.
+    pub v: Vec<f64>,
+    /// m/s².
+    pub a: Vec<f64>,
+}
+
+/// The law that a record follows.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// The terms.
+    pub terms: Vec<Term>,
+    /// Their coefficients, SI.
+    pub theta: DVector<f64>,
+    /// Standard deviations: from the scatter of what is left, with its correlation in time.
+    pub deviations: DVector<f64>,
+    /// Root mean square of what is left over that of the force (or of m q̈ where no force acts), within the band.
+    pub force_error: f64,
+    /// The band that was used, Hz.
+    pub band_hz: [f64; 2],
+    /// Motion and f_r of the samples that were used.
+    pub motion: Motion,
+    /// f_r = f − m q̈, N.
+    pub restoring_n: Vec<f64>,
+}
+
+/// Why there is no surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// No force and no mass.
+    #[error(
+        "no force acts in the record, so that only ratios to the mass can be found; give the mass (--mass-kg)"
+    )]
+    NoForce,
+    /// Too short.
+    #[error("{samples} samples are too few for {terms} terms; at least {needed} are needed")]
+    TooShort {
+        /// Samples after trimming.
+        samples: usize,
+        /// Terms.
+        terms: usize,
+        /// Needed.
+        needed: usize,
+    },
+    /// Data that do not determine the terms.
+    #[error("the record does not determine all terms; leave some out, or excite more strongly")]
+    Undetermined,
+}
+
+/// Rounds of weighting by the receptance found before; the fourth moves nothing any more.
+const REWEIGHTINGS: usize = 4;
+
+/// In power: the motion must stand this far out of its noise to count for the band.
+const MARGIN: f64 = 1e3;
+
+impl Record<'_> {
+    /// The motion within `band_hz`.
+    pub fn motion(&self, band_hz: [f64; 2]) -> Motion {
+        let spectral = Spectral::new(self.motion.len(), self.rate_hz);
+        let measured = match self.quantity {
+            Quantity::Velocity => 1,
+            Quantity::Acceleration => 2,
+            _ => 0,
+        };
+        let of = |order: i32| spectral.derivative(self.motion, order, band_hz);
+        Motion {
+            x: of(-measured),
+            v: of(1 - measured),
+            a: of(2 - measured),
+        }
+    }
+
+    /// The law of the record.
+    ///
+    /// # Errors
+    /// See [`SurfaceError`].
+    pub fn surface(&self, options: &Options) -> Result<Surface, SurfaceError> {
+        let mut band_hz = options
+            .band_hz
+            .unwrap_or_else(|| band_of(self.motion, self.rate_hz, MARGIN));
+        let loudest_hz = loudest_hz(self.motion, self.rate_hz);
+        // Noise that is integrated has no end towards frequency 0.
+        let integrated = matches!(self.quantity, Quantity::Velocity | Quantity::Acceleration);
+        let lowest_hz = if integrated { 0.25 * loudest_hz } else { 0.0 };
+        band_hz[0] = band_hz[0].max(lowest_hz);
+        let driven = self.force.iter().any(|force| *force != 0.0);
+        if !driven && options.mass_kg.is_none() {
+            return Err(SurfaceError::NoForce);
+        }
+        // Harmonics that a nonlinear term makes stand above the band of what is fitted, and belong to the surface.
+        let highest_hz = (1.5 * band_hz[1]).max(3.5 * loudest_hz).min(0.5 * self.rate_hz);
+        let motion = self.motion([lowest_hz, highest_hz]);
+        // With a known mass the left side is f − m q̈, and mass is no term.
+        let mass = options.mass_kg.unwrap_or(0.0);
+        let known: Vec<f64> = self
+            .force
+            .iter()
+            .zip(&motion.a)
+            .map(|(f, a)| f - mass * a)
+            .collect();
+        let terms: Vec<Term> = options
+            .terms
+            .iter()
+            .copied()
+            .filter(|term| options.mass_kg.is_none() || *term != Term::Mass)
+            .collect();
+        let range = self.kept(options.trim_s);
+        let needed = 20 * terms.len();
+        if range.len() < needed {
+            return Err(SurfaceError::TooShort {
+                samples: range.len(),
+                terms: terms.len(),
+                needed,
+            });
+        }
+        let columns: Vec<Vec<f64>> = terms
+            .iter()
+            .map(|term| {
+                (0..self.motion.len())
+                    .map(|i| term.value(motion.x[i], motion.v[i], motion.a[i]))
+                    .collect()
+            })
+            .collect();
+        let spectral = Spectral::new(self.motion.len(), self.rate_hz);
+        let within = |frequency: f64| (band_hz[0]..=band_hz[1]).contains(&frequency);
+        let regress = |weight: &dyn Fn(f64) -> f64| {
+            let filtered = |samples: &[f64]| {
+                let whole = spectral.weighted(samples, |f| if within(f) { weight(f) } else { 0.0 });
+                DVector::from_column_slice(&whole[range.clone()])
+            };
+            let columns: Vec<DVector<f64>> = columns.iter().map(|column| filtered(column)).collect();
+            let (matrix, right) = (DMatrix::from_columns(&columns), filtered(&known));
+            let theta = scaled_least_squares(&matrix, &right).ok_or(SurfaceError::Undetermined)?;
+            let left = &right - &matrix * &theta;
+            Ok((matrix, theta, left, right))
+        };
+        let (mut matrix, mut theta, mut left, right) = regress(&|_| 1.0)?;
+        let scale = if driven {
+            let whole = spectral.weighted(self.force, |f| f64::from(u8::from(within(f))));
+            DVector::from_column_slice(&whole[range.clone()]).norm()
+        } else {
+            right.norm()
+        };
+        let mut force_error = left.norm() / scale;
+        // A free record is one transient, which a weight as sharp as the resonance would smear over its ends.
+        if driven && terms.contains(&Term::Stiffness) {
+            for _ in 0..REWEIGHTINGS {
+                let receptance = receptance(&terms, &theta, mass);
+                let weighted = regress(&receptance)?;
+                (matrix, theta, left) = (weighted.0, weighted.1, weighted.2);
+            }
+            let (plain, _, _, right) = regress(&|_| 1.0)?;
+            force_error = (right - plain * &theta).norm() / scale;
+        }
+        let deviations = deviations(&matrix, &left).ok_or(SurfaceError::Undetermined)?;
+        let found_mass = terms
+            .iter()
+            .position(|term| *term == Term::Mass)
+            .map_or(mass, |index| theta[index]);
+        let kept = |samples: &[f64]| samples[range.clone()].to_vec();
+        let motion = Motion {
+            x: kept(&motion.x),
+            v: kept(&motion.v),
+            a: kept(&motion.a),
+        };
+        let restoring_n = self.force[range.clone()]
+            .iter()
+            .zip(&motion.a)
+            .map(|(f, a)| f - found_mass * a)
+            .collect();
+        Ok(Surface {
+            terms,
+            theta,
+            deviations,
+            force_error,
+            band_hz,
+            motion,
+            restoring_n,
+        })
+    }
+
+    /// What a given law leaves of the force, ‖f − Σ θ·term‖/‖f‖ within `band_hz`: [`Surface::force_error`] of a law that was not
+    /// fitted here.
+    pub fn force_error(&self, law: &[(Term, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
+        let motion = self.motion([0.0, 0.5 * self.rate_hz]);
+        let left: Vec<f64> = (0..self.motion.len())
+            .map(|i| {
+                let of =
+                    |(term, theta): &(Term, f64)| theta * term.value(motion.x[i], motion.v[i], motion.a[i]);
+                self.force[i] - law.iter().map(of).sum::<f64>()
+            })
+            .collect();
+        let spectral = Spectral::new(self.motion.len(), self.rate_hz);
+        let within = |frequency: f64| f64::from(u8::from((band_hz[0]..=band_hz[1]).contains(&frequency)));
+        let size = |samples: &[f64]| {
+            let whole = spectral.weighted(samples, within);
+            DVector::from_column_slice(&whole[self.kept(trim_s)]).norm()
+        };
+        size(&left) / size(self.force)
+    }
+
+    fn kept(&self, trim_s: f64) -> std::ops::Range<usize> {
+        let trim = (trim_s * self.rate_hz).ceil() as usize;
+        let trim = trim.min(self.motion.len() / 4);
+        trim..self.motion.len() - trim
+    }
+}
+
+/// |H(f)| of the linear part, of size 1 at its largest over the band of a spring and a mass.
+fn receptance(terms: &[Term], theta: &DVector<f64>, mass: f64) -> impl Fn(f64) -> f64 + use<> {
+    let of = |term: Term| {
+        let place = terms.iter().position(|known| *known == term);
+        place.map_or(0.0, |index| theta[index])
+    };
+    let mass = if mass > 0.0 { mass } else { of(Term::Mass) };
+    let (damping, stiffness) = (of(Term::Damping), of(Term::Stiffness));
+    move |frequency: f64| {
+        let omega = TAU * frequency;
+        let stiff = stiffness - mass * omega * omega;
+        // A mode without damping would put all weight on one line.
+        let lossy = (damping * omega).abs().max(1e-3 * stiffness.abs());
+        stiffness.abs() / stiff.hypot(lossy)
+    }
+}
+
+/// Standard deviations with the correlation of the residual in time: sums over blocks (Newey–West in its block form).
+pub(super) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<DVector<f64>> {
+    let inverse = scaled_inverse(&matrix.tr_mul(matrix))?;
+    let blocks = 40.min(matrix.nrows() / (2 * matrix.ncols()).max(1)).max(1);
+    let size = matrix.nrows().div_ceil(blocks);
+    let mut scatter = DMatrix::zeros(matrix.ncols(), matrix.ncols());
+    for from in (0..matrix.nrows()).step_by(size) {
+        let rows = size.min(matrix.nrows() - from);
+        let gradient = matrix.rows(from, rows).tr_mul(&left.rows(from, rows));
+        scatter += &gradient * gradient.transpose();
+    }
+    let covariance = &inverse * scatter * &inverse;
+    Some(covariance.diagonal().map(|variance| variance.max(0.0).sqrt()))
+}
+
+/// A polynomial in one variable along a slice of the surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slice {
+    /// (x or v, f_r) of the samples in the slice.
+    pub points: Vec<(f64, f64)>,
+    /// Coefficient of the first power and its deviation.
+    pub linear: (f64, f64),
+    /// Coefficient of the third power and its deviation.
+    pub cubic: (f64, f64),
+}
+
+impl Surface {
+    /// f_r over x where |v| is below `share` of its largest: stiffness. A small velocity that is left is regressed out.
+    pub fn stiffness_slice(&self, share: f64) -> Option<Slice> {
+        slice(&self.motion.x, &self.motion.v, &self.restoring_n, share)
+    }
+
+    /// f_r over v where |x| is below `share` of its largest: damping.
+    pub fn damping_slice(&self, share: f64) -> Option<Slice> {
+        slice(&self.motion.v, &self.motion.x, &self.restoring_n, share)
+    }
+
+    /// Half the width of the 90 % interval of a term.
+    pub fn half_width(&self, index: usize) -> f64 {
+        NINETY_PERCENT * self.deviations[index]
+    }
+
+    /// The coefficient of a term.
+    pub fn value(&self, term: Term) -> Option<f64> {
+        self.terms
+            .iter()
+            .position(|known| *known == term)
+            .map(|index| self.theta[index])
+    }
+}
+
+fn slice(along: &[f64], across: &[f64], restoring: &[f64], share: f64) -> Option<Slice> {
+    let largest = across.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+    let chosen: Vec<usize> = (0..along.len())
+        .filter(|&i| across[i].abs() <= share * largest)
+        .collect();
+    if chosen.len() < 12 {
+        return None;
+    }
+    let matrix = DMatrix::from_fn(chosen.len(), 3, |row, column| {
+        let i = chosen[row];
+        [along[i], along[i].powi(3), across[i]][column]
+    });
+    let right = DVector::from_iterator(chosen.len(), chosen.iter().map(|&i| restoring[i]));
+    let solution = scaled_least_squares(&matrix, &right)?;
+    let deviations = deviations(&matrix, &(&right - &matrix * &solution))?;
+    Some(Slice {
+        points: chosen.iter().map(|&i| (along[i], restoring[i])).collect(),
+        linear: (solution[0], deviations[0]),
+        cubic: (solution[1], deviations[1]),
+    })
+}

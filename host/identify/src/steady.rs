@@ -1,0 +1,246 @@
+//! From recordings of harmonic tests to steady periodic motions.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Vector3};
+use num_complex::Complex64;
+
+use super::dwell::{Dwell, Stretch, direction_of, pool_variances, stretches};
+use quietcut_recording::Recording;
+
+/// How much of each dwell is transient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Settling {
+    /// So many seconds, the user says.
+    Seconds(f64),
+    /// The first half.
+    Half,
+    /// What a motion that decays like e^{−σt} needs until it is below the noise; σ in 1/s.
+    Decay(f64),
+}
+
+/// Steady motions, and what was wrong with the rest.
+#[derive(Clone, Debug, Default)]
+pub struct Steady {
+    /// The dwells.
+    pub dwells: Vec<Dwell>,
+    /// For people.
+    pub warnings: Vec<String>,
+}
+
+/// Fewest periods of a dwell.
+const PERIODS: f64 = 10.0;
+
+/// Every dwell of every recording, with `harmonics` harmonics.
+pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) -> Steady {
+    let mut steady = Steady::default();
+    for recording in recordings {
+        let name = recording.path.display();
+        let found = stretches(recording);
+        if found.is_empty() {
+            steady.warnings.push(format!(
+                "{name}: no frequency is held; a step-sine test is needed"
+            ));
+        }
+        let (mut settled_dwells, mut moving, mut short, mut unsettled) = (Vec::new(), Vec::new(), 0, 0);
+        for stretch in found {
+            match settled(recording, stretch, harmonics, settling) {
+                Some(Settled { dwell, whole, still }) => {
+                    unsettled += usize::from(!whole);
+                    if still {
+                        settled_dwells.push(dwell);
+                    } else {
+                        moving.push(dwell);
+                    }
+                }
+                None => short += 1,
+            }
+        }
+        let mut dwells = settled_dwells;
+        if moving.len() > dwells.len() {
+            steady.warnings.push(format!(
+                "{name}: the motion of {} dwells still changes at their ends; parameters are off by what their transients are: dwell longer",
+                moving.len()
+            ));
+            dwells.extend(moving);
+        } else if !moving.is_empty() {
+            steady.warnings.push(format!(
+                "{name}: the motion of {} dwells still changes at their ends, and they are left out: near a jump a motion settles more slowly than elsewhere; dwell longer",
+                moving.len()
+            ));
+        }
+        pool_variances(&mut dwells);
+        if short > 0 {
+            steady.warnings.push(format!(
+                "{name}: {short} dwells are too short for {harmonics} harmonics after settling and are left out"
+            ));
+        }
+        if unsettled > 0 {
+            steady.warnings.push(format!(
+                "{name}: {unsettled} dwells are too short to settle below the noise; what is left of their transients makes intervals too narrow: dwell longer"
+            ));
+        }
+        steady.dwells.extend(dwells);
+    }
+    steady
+}
+
+/// The settled part of a stretch.
+struct Settled {
+    dwell: Dwell,
+    /// True where it is long enough to have settled, by the decay of the structure.
+    whole: bool,
+    /// True where its motion no longer changes.
+    still: bool,
+}
+
+/// The settled part of a stretch; where its motion still changes, its last half, or the half of that, as long as it has the periods.
+fn settled(recording: &Recording, stretch: Stretch, harmonics: usize, settling: Settling) -> Option<Settled> {
+    let (dwell, whole) = first_settled(recording, stretch, harmonics, settling)?;
+    let least = (PERIODS * recording.sample_rate_hz / stretch.frequency_hz).ceil() as usize;
+    let last = |samples: usize| Stretch {
+        from: stretch.to - samples,
+        ..stretch
+    };
+    let mut found = dwell;
+    loop {
+        let still = is_still(recording, last(found.samples), &found);
+        // A user who says how much is transient is believed.
+        if still || matches!(settling, Settling::Seconds(_)) {
+            return Some(Settled {
+                dwell: found,
+                whole,
+                still: true,
+            });
+        }
+        let half = found.samples / 2;
+        match (half >= least)
+            .then(|| Dwell::fit(recording, last(half), harmonics))
+            .flatten()
+        {
+            Some(shorter) => found = shorter,
+            None => {
+                return Some(Settled {
+                    dwell: found,
+                    whole,
+                    still: false,
+                });
+            }
+        }
+    }
+}
+
+/// A motion whose fundamental differs by less than this share between the halves of a dwell is still: transients that are left of
+/// it move parameters by less than noise of a percent does.
+const STILL: f64 = 1e-3;
+
+/// Chance differs by more than so many deviations once in ten thousand times.
+const CHANCE: f64 = 4.0;
+
+/// True where no motion changes from the first half of a dwell to the second.
+fn is_still(recording: &Recording, part: Stretch, dwell: &Dwell) -> bool {
+    let middle = (part.from + part.to) / 2;
+    let halves = [part.from..middle, middle..part.to];
+    dwell.motions.iter().all(|line| {
+        let channel = recording.channels.iter().find(|channel| {
+            channel.quantity == line.quantity && direction_of(channel) == Some(line.direction)
+        });
+        let Some(channel) = channel else { return true };
+        let phasors = halves
+            .clone()
+            .map(|half| phasor(&channel.samples, half, dwell.omega / recording.sample_rate_hz));
+        let [Some(first), Some(second)] = phasors else {
+            return true;
+        };
+        let change = (second - first).norm();
+        // Each part of a half has the variance 2σ²/n, n half the samples.
+        let noise = (8.0 * line.variance / dwell.samples as f64).sqrt();
+        // An error of the frequency turns the phase between the middles of the halves.
+        let turned = line.amplitude(1)
+            * dwell.omega_variance.sqrt()
+            * (0.5 * dwell.samples as f64 / recording.sample_rate_hz);
+        change < (STILL * line.amplitude(1)).max(CHANCE * noise.hypot(turned))
+    })
+}
+
+/// X of Re X e^{iφk} + a constant over some samples, k counted from the first of the channel, by least squares.
+fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f64) -> Option<Complex64> {
+    let mut normal = Matrix3::<f64>::zeros();
+    let mut right = Vector3::<f64>::zeros();
+    for k in range {
+        let (sin, cos) = (radians_per_sample * k as f64).sin_cos();
+        let row = Vector3::new(cos, -sin, 1.0);
+        normal += row * row.transpose();
+        right += row * *samples.get(k)?;
+    }
+    let solution = normal.cholesky()?.solve(&right);
+    Some(Complex64::new(solution[0], solution[1]))
+}
+
+/// The settled part of a stretch, and whether it is long enough to have settled.
+fn first_settled(
+    recording: &Recording,
+    stretch: Stretch,
+    harmonics: usize,
+    settling: Settling,
+) -> Option<(Dwell, bool)> {
+    let count = (stretch.to - stretch.from) as f64;
+    let least = PERIODS * recording.sample_rate_hz / stretch.frequency_hz;
+    let from = |seconds: f64| Stretch {
+        from: stretch.from + (seconds * recording.sample_rate_hz).ceil() as usize,
+        ..stretch
+    };
+    let half = 0.5 * count / recording.sample_rate_hz;
+    let last = |seconds: f64| {
+        let part = from(seconds);
+        let enough = part.to > part.from && (part.to - part.from) as f64 >= least;
+        enough.then(|| Dwell::fit(recording, part, harmonics)).flatten()
+    };
+    match settling {
+        Settling::Seconds(seconds) => Some((last(seconds)?, true)),
+        Settling::Half => Some((last(half)?, true)),
+        Settling::Decay(rate) => {
+            let first = last(half)?;
+            // Transient and steady motion begin equally large; a fifth of the noise of a coefficient may be left.
+            let clearest = first
+                .motions
+                .iter()
+                .map(|line| line.amplitude(1) / (line.variance * first.gram_inverse[(1, 1)]).sqrt())
+                .fold(1.0, f64::max);
+            let needed = (5.0 * clearest.min(1e8)).ln() / rate;
+            match last(needed) {
+                Some(dwell) => Some((dwell, true)),
+                None => Some((last(0.7 * 2.0 * half).unwrap_or(first), false)),
+            }
+        }
+    }
+}
+
+/// Windows of a tone whose force changes slowly: each is a dwell of its own, of `periods` periods.
+pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
+    let mut dwells = Vec::new();
+    for stretch in stretches(recording) {
+        let length = (periods * recording.sample_rate_hz / stretch.frequency_hz).round() as usize;
+        let mut from = stretch.from;
+        while length > 0 && from + length <= stretch.to {
+            let part = Stretch {
+                from,
+                to: from + length,
+                ..stretch
+            };
+            dwells.extend(Dwell::fit(recording, part, harmonics));
+            from += length;
+        }
+    }
+    dwells
+}
+
+/// The slowest decay of mass, damping and stiffness with these values, 1/s: c/(2m) below critical damping.
+pub fn slowest_decay(masses: &[f64], dampings: &[f64]) -> f64 {
+    masses
+        .iter()
+        .zip(dampings)
+        .map(|(mass, damping)| (0.5 * damping / mass).abs())
+        .fold(f64::INFINITY, f64::min)
+        .clamp(1e-3, TAU * 1e3)
+}

@@ -1,0 +1,225 @@
+//! Parameters of a law from measured periodic motions, by harmonic balance.
+//!
+//! The motion that the law predicts under the *measured* force is fitted to the measured motion. What is left is weighed
+//! with its covariance: noise of the motion, noise of the force and of the frequency carried through the law by its
+//! exact derivatives. Intervals are those of the normal distribution; where the law does not reach the noise they come
+//! from the scatter of the dwells themselves (sandwich).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dwell::{Dwell, Line};
+use super::harmonic_balance::{Grid, Problem, Solution};
+use super::law::Law;
+pub use super::least_squares::FitError;
+use super::least_squares::{Normal, Spread, minimum, scaled_least_squares};
+use super::whitening::Seen;
+use quietcut_model::structure::Direction;
+use quietcut_recording::Quantity;
+
+/// A fit of a law.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The parameters.
+    pub theta: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Sum of squares over degrees of freedom, in units of the noise: near 1 where the law explains the data.
+    pub misfit: f64,
+    /// Root mean square of what is left over that of the data, at the fundamental.
+    pub relative_error: f64,
+    /// True where the covariance is the sandwich.
+    pub robust: bool,
+}
+
+/// 90 % of a normal distribution lie within this many deviations.
+pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_2;
+
+/// Data of a fit: dwells and the directions that are the degrees of freedom of the law.
+#[derive(Clone, Copy)]
+pub struct Data<'a> {
+    /// The law.
+    pub law: &'a Law,
+    /// Direction of each degree of freedom.
+    pub directions: &'a [Direction],
+    /// The dwells, all with the grid's number of harmonics.
+    pub dwells: &'a [Dwell],
+    /// The grid.
+    pub grid: &'a Grid,
+}
+
+impl Data<'_> {
+    fn degree_of(&self, line: &Line) -> Option<usize> {
+        self.directions
+            .iter()
+            .position(|direction| *direction == line.direction)
+    }
+
+    /// Every degree of freedom is the displacement in its direction.
+    fn unit(&self) -> DMatrix<f64> {
+        DMatrix::identity(self.law.dofs, self.law.dofs)
+    }
+
+    fn seen<'b>(&'b self, shape: &'b DMatrix<f64>) -> Seen<'b> {
+        Seen {
+            directions: self.directions,
+            shape,
+        }
+    }
+
+    fn force(&self, dwell: &Dwell) -> DVector<f64> {
+        self.seen(&self.unit()).force(dwell, self.grid.width())
+    }
+
+    /// The measured displacement of every degree of freedom; `None` where one is not measured.
+    fn displacement(&self, dwell: &Dwell) -> Option<DVector<f64>> {
+        let width = self.grid.width();
+        let mut x = DVector::zeros(self.law.dofs * width);
+        for dof in 0..self.law.dofs {
+            let line = dwell
+                .motions
+                .iter()
+                .find(|line| self.degree_of(line) == Some(dof))?;
+            let motion = undo(&line.coefficients, derivative(line.quantity), dwell.omega);
+            x.rows_mut(dof * width, width).copy_from(&motion);
+            x[dof * width] = 0.0;
+        }
+        Some(x)
+    }
+
+    /// Parameters of the balance at the fundamental with the measured motion in it: linear least squares.
+    ///
+    /// # Errors
+    /// Too few dwells, or data that do not determine them.
+    pub fn first_guess(&self) -> Result<DVector<f64>, FitError> {
+        let parameters = self.law.parameters.len();
+        let width = self.grid.width();
+        let usable: Vec<_> = self
+            .dwells
+            .iter()
+            .filter_map(|dwell| Some((dwell, self.displacement(dwell)?)))
+            .collect();
+        let needed = parameters.div_ceil(2 * self.law.dofs) + 1;
+        if usable.len() < needed {
+            return Err(FitError::TooFew {
+                found: usable.len(),
+                parameters,
+                needed,
+            });
+        }
+        let rows = 2 * self.law.dofs;
+        let mut matrix = DMatrix::zeros(rows * usable.len(), parameters);
+        let mut right = DVector::zeros(rows * usable.len());
+        for (index, (dwell, x)) in usable.iter().enumerate() {
+            let features = self.grid.features(self.law, dwell.omega, x);
+            let force = self.force(dwell);
+            for dof in 0..self.law.dofs {
+                for part in 0..2 {
+                    let (row, from) = (index * rows + 2 * dof + part, dof * width + 1 + part);
+                    matrix.row_mut(row).copy_from(&features.row(from));
+                    right[row] = force[from];
+                }
+            }
+        }
+        scaled_least_squares(&matrix, &right).ok_or(FitError::Undetermined)
+    }
+
+    /// Residual of a dwell over its noise, and its derivative by θ.
+    fn whitened(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let solution = self.solve(dwell, theta, &self.displacement(dwell)?)?;
+        self.seen(&self.unit())
+            .whitened(dwell, &solution, self.grid.width())
+    }
+
+    fn solve(&self, dwell: &Dwell, theta: &DVector<f64>, start: &DVector<f64>) -> Option<Solution> {
+        let force = self.force(dwell);
+        let problem = Problem {
+            law: self.law,
+            theta: theta.as_slice(),
+            omega: dwell.omega,
+            force: &force,
+        };
+        self.grid.solve(problem, start).ok()
+    }
+
+    /// The displacement that the law predicts at a dwell, near the measured one; degree after degree.
+    pub fn predicted(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<DVector<f64>> {
+        let start = self.displacement(dwell)?;
+        Some(self.solve(dwell, theta, &start)?.x)
+    }
+
+    /// Root mean square of prediction less measurement over that of the measurement, at the fundamental.
+    pub fn relative_error(&self, theta: &DVector<f64>) -> f64 {
+        let (mut left, mut all) = (0.0, 0.0);
+        for dwell in self.dwells {
+            let Some(measured) = self.displacement(dwell) else {
+                continue;
+            };
+            let predicted = self.predicted(dwell, theta);
+            for dof in 0..self.law.dofs {
+                for place in [1, 2].map(|part| dof * self.grid.width() + part) {
+                    // No motion at all is predicted where there is none near the measured one.
+                    let found = predicted.as_ref().map_or(0.0, |x| x[place]);
+                    left += (found - measured[place]).powi(2);
+                    all += measured[place].powi(2);
+                }
+            }
+        }
+        if all > 0.0 { (left / all).sqrt() } else { 0.0 }
+    }
+
+    /// The fit from a first guess.
+    ///
+    /// # Errors
+    /// See [`FitError`].
+    pub fn fit(&self, start: DVector<f64>) -> Result<Fit, FitError> {
+        let (theta, normal) = minimum(start, 0.0, |theta| {
+            let mut normal = Normal::new(theta.len());
+            for dwell in self.dwells {
+                normal.add(self.whitened(dwell, theta));
+            }
+            normal
+        })?;
+        let Spread {
+            covariance,
+            misfit,
+            robust,
+        } = normal.spread()?;
+        Ok(Fit {
+            relative_error: self.relative_error(&theta),
+            theta,
+            covariance,
+            misfit,
+            robust,
+        })
+    }
+}
+
+impl Fit {
+    /// Half the width of the 90 % interval of a parameter.
+    pub fn half_width(&self, parameter: usize) -> f64 {
+        NINETY_PERCENT * self.covariance[(parameter, parameter)].max(0.0).sqrt()
+    }
+}
+
+/// How often a channel is differentiated.
+pub(super) fn derivative(quantity: Quantity) -> u8 {
+    match quantity {
+        Quantity::Velocity => 1,
+        Quantity::Acceleration => 2,
+        _ => 0,
+    }
+}
+
+/// Coefficients of the integral.
+pub(super) fn undo(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
+    let mut integral = x.clone();
+    for _ in 0..order {
+        integral[0] = 0.0;
+        for h in 1..=x.len() / 2 {
+            let (c, s) = (integral[2 * h - 1], integral[2 * h]);
+            let factor = 1.0 / (h as f64 * omega);
+            (integral[2 * h - 1], integral[2 * h]) = (-factor * s, factor * c);
+        }
+    }
+    integral
+}

@@ -1,0 +1,191 @@
+//! Modes from motion alone, of structures that white noise drives.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use crate::ambient::Ambient;
+use crate::steady_fit::NINETY_PERCENT;
+use crate::subspace::{AmbientError, modes};
+use quietcut_recording::{Channel, Kind, Quantity, RecordedCut, Recording, Sidecar};
+
+/// Natural frequencies, Hz, damping ratios and shapes in x and y of a robot-like structure of unit modal masses.
+const MODES: [(f64, f64, [f64; 2]); 3] = [
+    (9.1, 0.03, [1.0, 0.3]),
+    (17.4, 0.015, [-0.4, 1.0]),
+    (29.0, 0.02, [0.8, 0.7]),
+];
+
+const RPM: f64 = 900.0;
+
+/// Displacements in x and y under white forces, exact from sample to sample; sensors with noise, and a spindle whose unbalance
+/// shakes at every harmonic, one of them within 0.4 Hz of the last mode.
+fn recording(seconds: f64, seed: u64) -> Recording {
+    const RATE_HZ: f64 = 256.0;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let size = 2 * MODES.len();
+    let mut flow = DMatrix::zeros(size, size);
+    let mut root = DMatrix::zeros(size, size);
+    for (mode, (hz, damping, _)) in MODES.iter().enumerate() {
+        let omega = TAU * hz;
+        let a = nalgebra::Matrix2::new(0.0, omega, -omega, -2.0 * damping * omega) / RATE_HZ;
+        // Van Loan: the covariance of what noise adds within a sample.
+        let mut joint = DMatrix::zeros(4, 4);
+        joint.view_mut((0, 0), (2, 2)).copy_from(&(-a));
+        joint[(1, 3)] = 1.0;
+        joint.view_mut((2, 2), (2, 2)).copy_from(&a.transpose());
+        let joint = joint.exp();
+        let step = joint.view((2, 2), (2, 2)).transpose();
+        let noise = &step * joint.view((0, 2), (2, 2));
+        let noise = 0.5 * (&noise + noise.transpose());
+        flow.view_mut((2 * mode, 2 * mode), (2, 2)).copy_from(&step);
+        let cholesky = nalgebra::Cholesky::new(noise).unwrap().l();
+        root.view_mut((2 * mode, 2 * mode), (2, 2)).copy_from(&cholesky);
+    }
+    let mut state = DVector::zeros(size);
+    let count = (seconds * RATE_HZ) as usize;
+    let mut samples = [Vec::with_capacity(count), Vec::with_capacity(count)];
+    // Ten seconds are let pass: then the motion is that of always.
+    for sample in 0..count + 2560 {
+        let kick = DVector::from_fn(size, |_, _| normal());
+        state = &flow * &state + &root * kick;
+        if sample < 2560 {
+            continue;
+        }
+        let turned = TAU * RPM / 60.0 * sample as f64 / RATE_HZ;
+        for axis in 0..2 {
+            let motion: f64 = MODES
+                .iter()
+                .enumerate()
+                .map(|(mode, (.., shape))| shape[axis] * state[2 * mode])
+                .sum();
+            let unbalance: f64 = (1..=6)
+                .map(|k| 6.0 / f64::from(k) * (f64::from(k) * turned + 0.7 * axis as f64).cos())
+                .sum();
+            samples[axis].push(1e-6 * (motion + unbalance + 0.5 * normal()));
+        }
+    }
+    let [x, y] = samples;
+    let channel = |name: &str, samples| Channel {
+        name: name.into(),
+        quantity: Quantity::Displacement,
+        samples,
+    };
+    Recording {
+        path: Path::new("idle.csv").into(),
+        sample_rate_hz: RATE_HZ,
+        start_s: 0.0,
+        since_s: 0.0,
+        channels: vec![channel("x", x), channel("y", y)],
+        sidecar: Sidecar {
+            kind: Some(Kind::Idle),
+            cut: Some(RecordedCut {
+                spindle_rpm: Some(RPM),
+                ..RecordedCut::default()
+            }),
+            ..Sidecar::default()
+        },
+    }
+}
+
+const BAND_HZ: [f64; 2] = [5.0, 40.0];
+
+/// Of every mode the shares of seeds whose intervals hold frequency and damping ratio, and of seeds that found it at all.
+fn coverage(seconds: f64, seeds: u64) -> [[f64; 3]; 3] {
+    let of_seed = |seed: u64| {
+        let ambient = Ambient::new(&recording(seconds, seed), BAND_HZ[1]).unwrap();
+        let found = modes(&ambient, BAND_HZ).map_or_else(|_| Vec::new(), |found| found.modes);
+        MODES.map(|(hz, damping, _)| {
+            let near = found
+                .iter()
+                .filter(|mode| (mode.frequency_hz - hz).abs() < 0.05 * hz)
+                .min_by(|a, b| {
+                    (a.frequency_hz - hz)
+                        .abs()
+                        .total_cmp(&(b.frequency_hz - hz).abs())
+                });
+            near.map_or([false; 3], |mode| {
+                [
+                    (mode.frequency_hz - hz).abs() <= NINETY_PERCENT * mode.frequency_deviation_hz,
+                    (mode.damping_ratio - damping).abs() <= NINETY_PERCENT * mode.damping_deviation,
+                    true,
+                ]
+            })
+        })
+    };
+    let all: Vec<[[bool; 3]; 3]> = (0..seeds).into_par_iter().map(of_seed).collect();
+    std::array::from_fn(|mode| {
+        let count = |what: usize| all.iter().filter(|held| held[mode][what]).count() as f64;
+        let found = count(2).max(1.0);
+        [count(0) / found, count(1) / found, count(2) / seeds as f64]
+    })
+}
+
+fn check(seconds: f64, seeds: u64, pooled: std::ops::RangeInclusive<f64>) {
+    let shares = coverage(seconds, seeds);
+    for ((hz, ..), [frequency, damping, found]) in MODES.iter().zip(shares) {
+        println!(
+            "seeds 0 to {}, {seconds} s, mode of {hz} Hz: found {:.0} %, frequency held {:.0} %, damping held {:.0} %",
+            seeds - 1,
+            100.0 * found,
+            100.0 * frequency,
+            100.0 * damping
+        );
+        // A minute may be too short to tell a mode from noise: then it is not told.
+        assert!(found >= 0.9, "{found}");
+    }
+    let mean = shares.iter().map(|[f, d, _]| 0.5 * (f + d)).sum::<f64>() / 3.0;
+    println!("all {:.1} %", 100.0 * mean);
+    assert!(pooled.contains(&mean), "{mean}");
+}
+
+#[test]
+fn intervals_hold_the_modes_nine_times_of_ten() {
+    check(200.0, 12, 0.75..=1.0);
+}
+
+#[test]
+#[ignore = "a campaign: QUIETCUT_SEEDS seeds, a hundred without it"]
+fn coverage_of_output_only() {
+    let seeds = std::env::var("QUIETCUT_SEEDS")
+        .ok()
+        .and_then(|seeds| seeds.parse().ok());
+    check(200.0, seeds.unwrap_or(100), 0.85..=0.95);
+    check(60.0, seeds.unwrap_or(100), 0.85..=0.95);
+}
+
+#[test]
+fn what_the_record_cannot_tell_is_said() {
+    let short = Ambient::new(&recording(10.0, 1), BAND_HZ[1]).unwrap();
+    let error = modes(&short, BAND_HZ).unwrap_err();
+    assert!(matches!(error, AmbientError::TooShort { .. }), "{error}");
+    // Noise of sensors alone.
+    let mut noise = recording(100.0, 2);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    for sample in noise.channels.iter_mut().flat_map(|channel| &mut channel.samples) {
+        *sample = StandardNormal.sample(&mut random);
+    }
+    let ambient = Ambient::new(&noise, BAND_HZ[1]).unwrap();
+    match modes(&ambient, BAND_HZ) {
+        Err(error) => assert!(matches!(error, AmbientError::Nothing(..)), "{error}"),
+        Ok(found) => assert!(found.modes.iter().all(|mode| mode.is_vague()), "{found:?}"),
+    }
+    // Intervals of a short record are wide.
+    let width = |seconds: f64| {
+        let ambient = Ambient::new(&recording(seconds, 4), BAND_HZ[1]).unwrap();
+        let found = modes(&ambient, BAND_HZ).unwrap().modes;
+        let second = found
+            .iter()
+            .find(|mode| (mode.frequency_hz - MODES[1].0).abs() < 1.0);
+        second.unwrap().frequency_deviation_hz
+    };
+    let (short, long) = (width(50.0), width(400.0));
+    // Eight times the length: 2.8 times the width, which a dozen blocks know to a quarter.
+    assert!(short > 1.5 * long, "{short} {long}");
+}

@@ -1,0 +1,347 @@
+//! A robot's joints from virtual hammer tests at some postures, and what that says at others.
+//!
+//! The truth is simulated with the tool-space matrices of thesis eq. 3.14, which exist away from straight wrists; what is fitted
+//! works in joint angles.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use num_complex::Complex64;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::joints::{JointFit, PostureFrf, fit};
+use crate::steady_fit::NINETY_PERCENT;
+use quietcut_frf::{MeasurementSettings, measure};
+use quietcut_model::case::Case;
+use quietcut_model::structure::{Direction, FirstOrder, Form, Matrices, Robot, Structure};
+use quietcut_recording::{Quantity, Recording};
+use quietcut_simulate::rig::{Noise, Rig, Signal};
+use quietcut_stability::{CubicTerms, Problem, line};
+use quietcut_testkit::case;
+use quietcut_testkit::robot;
+
+const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
+
+/// J, 6 × 6: displacement and turn of the tool per joint angle.
+pub(super) fn whole_jacobian(robot: &Robot) -> DMatrix<f64> {
+    let moved = robot.jacobian();
+    // What three more points of the tool do beyond the tool centre point.
+    let point = |offset: Vector3<f64>| {
+        let mut other = robot.clone();
+        other.tool_m += offset;
+        other.jacobian()
+    };
+    let (dx, dy, dz) = (
+        point(Vector3::x()) - &moved,
+        point(Vector3::y()) - &moved,
+        point(Vector3::z()) - &moved,
+    );
+    let mut j = DMatrix::zeros(6, 6);
+    j.rows_mut(0, 3).copy_from(&moved);
+    // ω from three vectors e of the tool and their velocities ω × e: ω = ½ Σ e × ė.
+    let place = |offset: Vector3<f64>| {
+        let mut other = robot.clone();
+        other.tool_m += offset;
+        other.tool_place_m() - robot.tool_place_m()
+    };
+    let e = [place(Vector3::x()), place(Vector3::y()), place(Vector3::z())];
+    for joint in 0..6 {
+        let spin: Vector3<f64> = e
+            .iter()
+            .zip([&dx, &dy, &dz])
+            .map(|(e, change)| e.cross(&change.column(joint).into_owned()))
+            .sum();
+        j.view_mut((3, joint), (3, 1)).copy_from(&(0.5 * spin));
+    }
+    j
+}
+
+/// The robot in the six directions of the tool, by thesis eq. 3.14, without cubic terms; `more` is added to the stiffness of the
+/// joints.
+fn tool_space_with(robot: &Robot, more: &DMatrix<f64>) -> Structure {
+    let inverse = whole_jacobian(robot).try_inverse().unwrap();
+    let own = robot.matrices();
+    let turned = |matrix: &DMatrix<f64>| {
+        let there = inverse.transpose() * matrix * &inverse;
+        0.5 * (&there + there.transpose())
+    };
+    Structure {
+        directions: Direction::ALL.to_vec(),
+        form: Form::Matrices(Matrices {
+            mass: turned(&own.mass),
+            damping: turned(&own.damping),
+            stiffness: turned(&(&own.stiffness + more)),
+            cubic_damping: None,
+            cubic_stiffness: None,
+        }),
+    }
+}
+
+pub(super) fn tool_space(robot: &Robot) -> Structure {
+    tool_space_with(robot, &DMatrix::zeros(6, 6))
+}
+
+/// Torque of gravity on the joints, N m, with z up.
+fn gravity(robot: &Robot) -> DVector<f64> {
+    let mut torque = DVector::zeros(robot.joints.len());
+    for link in 0..robot.joints.len() {
+        let mut below = robot.clone();
+        below.joints.truncate(link + 1);
+        below.angles_rad.truncate(link + 1);
+        let lift = below.payload_jacobian();
+        for joint in 0..=link {
+            torque[joint] -= 9.806_65 * robot.joints[link].mass_kg * lift[(2, joint)];
+        }
+    }
+    torque
+}
+
+/// The robot where it hangs: links sag by the torque of gravity over the stiffness of the joints, which their encoders on the
+/// motor's side do not see, and lifting the links is work, too.
+fn sagged(robot: &Robot) -> Structure {
+    let at = |angles: &DVector<f64>| robot.at(angles.as_slice());
+    let commanded = DVector::from_column_slice(&robot.angles_rad);
+    let stiffness = robot.matrices().stiffness;
+    let mut angles = commanded.clone();
+    for _ in 0..20 {
+        angles = &commanded + stiffness.clone().lu().solve(&gravity(&at(&angles))).unwrap();
+    }
+    let step = 1e-4;
+    let slope = DMatrix::from_fn(6, 6, |i, j| {
+        let torque = |by: f64| {
+            let mut moved = angles.clone();
+            moved[j] += by;
+            gravity(&at(&moved))[i]
+        };
+        -(torque(step) - torque(-step)) / (2.0 * step)
+    });
+    tool_space_with(&at(&angles), &slope)
+}
+
+/// A posture in which a robot mills: the arm bent, the wrist not straight.
+pub(super) fn posture(random: &mut ChaCha8Rng) -> Vec<f64> {
+    [
+        (-40.0, 40.0),
+        (-95.0, -45.0),
+        (70.0, 120.0),
+        (-60.0, 60.0),
+        (20.0, 70.0),
+        (-60.0, 60.0),
+    ]
+    .map(|(low, high): (f64, f64)| random.random_range(low..high).to_radians())
+    .into()
+}
+
+/// Hammer blows in x, y and z with sensors of 1 % noise, and the receptances that follow.
+fn hammered(structure: &Structure, angles_rad: &[f64], seed: u64) -> PostureFrf {
+    let recordings: Vec<Recording> = AXES
+        .iter()
+        .enumerate()
+        .map(|(index, direction)| {
+            let signal = Signal::impacts(4, 800.0, 6e-3, 10.0, 10 * seed + index as u64);
+            let rig = Rig {
+                measured: vec![Quantity::Displacement],
+                ..Rig::new(*direction, signal, 2048.0)
+            };
+            let (mut recording, _) = rig.record(structure, Path::new("blows.csv")).unwrap();
+            let noise = Noise {
+                relative: 0.01,
+                ..Noise::default()
+            };
+            noise.add(&mut recording, 10 * seed + index as u64);
+            recording
+        })
+        .collect();
+    let settings = MeasurementSettings {
+        band_hz: Some((2.0, 60.0)),
+        ..MeasurementSettings::default()
+    };
+    let measured = measure(&recordings, &settings).unwrap();
+    PostureFrf {
+        angles_rad: angles_rad.to_vec(),
+        table: measured.table,
+        deviation: measured.deviation,
+    }
+}
+
+/// The fit of six postures that a seed draws, from a first guess that is wrong by up to a third; and the random source.
+fn trained(seed: u64, payload: bool, machine: fn(&Robot) -> Structure) -> (JointFit, ChaCha8Rng) {
+    let truth = robot();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let postures: Vec<Vec<f64>> = (0..6).map(|_| posture(&mut random)).collect();
+    let measured: Vec<PostureFrf> = postures
+        .par_iter()
+        .enumerate()
+        .map(|(index, angles)| hammered(&machine(&truth.at(angles)), angles, 100 * seed + index as u64))
+        .collect();
+    let mut guess = truth;
+    for joint in &mut guess.joints {
+        joint.stiffness_nm_per_rad *= random.random_range(0.7..1.4);
+        joint.damping_nms_per_rad *= random.random_range(0.5..2.0);
+    }
+    if payload {
+        guess.joints[5].mass_kg *= 0.8;
+    }
+    (fit(&guess, &measured, payload).unwrap(), random)
+}
+
+/// Peak of a direct receptance, by its frequency and value.
+fn peak(of: impl Fn(f64) -> Complex64) -> (f64, f64) {
+    (200..4000)
+        .map(|step| 0.01 * f64::from(step))
+        .map(|f| (f, of(f).norm()))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap()
+}
+
+/// Peaks of direct receptances at ten unseen postures: the largest error of the predicted ones, and how many of the 30 lie
+/// within their stated 90 % intervals.
+fn unseen(fit: &JointFit, random: &mut ChaCha8Rng, machine: fn(&Robot) -> Structure) -> (f64, usize) {
+    let (mut largest, mut held) = (0.0_f64, 0);
+    for _ in 0..10 {
+        let angles = posture(random);
+        let truth = machine(&robot().at(&angles)).first_order().unwrap();
+        for axis in 0..3 {
+            let (frequency, height) = peak(|f| truth.receptance(TAU * f).unwrap()[(axis, axis)]);
+            let predicted = |f: f64| fit.receptance(&angles, f).unwrap();
+            let (_, found) = peak(|f| predicted(f).0[(axis, axis)]);
+            largest = largest.max((found / height - 1.0).abs());
+            let (h, deviation) = predicted(frequency);
+            let off = (h[(axis, axis)].norm() - height).abs();
+            held += usize::from(off <= NINETY_PERCENT * deviation[(axis, axis)]);
+        }
+    }
+    (largest, held)
+}
+
+#[test]
+fn peaks_at_unseen_postures_are_within_three_percent() {
+    for (seed, payload) in [(1, false), (2, true)] {
+        let (fit, mut random) = trained(seed, payload, tool_space);
+        println!(
+            "seed {seed}: misfit {:.2}, left {:.2e}",
+            fit.misfit, fit.relative_error
+        );
+        for (index, parameter) in fit.parameters.iter().enumerate() {
+            let off = parameter.value(&fit.robot) / parameter.value(&robot()) - 1.0;
+            let deviation = fit.covariance[(index, index)].sqrt();
+            println!(
+                "seed {seed}: {} is off by {off:+.1e}, deviation {deviation:.1e}",
+                parameter.name()
+            );
+        }
+        let (largest, held) = unseen(&fit, &mut random, tool_space);
+        println!(
+            "seed {seed}: peaks at ten unseen postures within {:.2} %; {held} of 30 within the stated interval",
+            100.0 * largest
+        );
+        assert!(largest < 0.03, "{largest}");
+        // Three peaks of one posture move together: 24 of 30 is two deviations of ten draws below nine tenths.
+        assert!(held >= 24, "{held}");
+    }
+}
+
+/// Gravity is left out of what is fitted: joints sag by a milliradian or so, and links that are lifted store energy.
+#[test]
+fn peaks_at_unseen_postures_of_a_robot_that_sags_are_within_three_percent() {
+    let (fit, mut random) = trained(3, false, sagged);
+    let (largest, held) = unseen(&fit, &mut random, sagged);
+    let mut moved = 0.0_f64;
+    for _ in 0..10 {
+        let robot = robot().at(&posture(&mut random));
+        let [with, without] =
+            [sagged(&robot), tool_space(&robot)].map(|machine| machine.first_order().unwrap());
+        for axis in 0..3 {
+            let height =
+                |machine: &FirstOrder| peak(|f| machine.receptance(TAU * f).unwrap()[(axis, axis)]).1;
+            moved = moved.max((height(&with) / height(&without) - 1.0).abs());
+        }
+    }
+    println!(
+        "seed 3: gravity moves peaks by up to {:.2} %; with it left out they are predicted within {:.2} %, {held} of 30 within the stated interval",
+        100.0 * moved,
+        100.0 * largest
+    );
+    assert!(largest < 0.03, "{largest}");
+}
+
+/// How often the intervals of peaks at unseen postures, and those of the joints, hold the truth.
+#[test]
+#[ignore = "a campaign: QUIETCUT_SEEDS seeds, twenty without it"]
+fn coverage_of_joints() {
+    let seeds: u64 = std::env::var("QUIETCUT_SEEDS")
+        .ok()
+        .and_then(|seeds| seeds.parse().ok())
+        .unwrap_or(20);
+    type Machine = fn(&Robot) -> Structure;
+    let machines: [(&str, Machine); 2] = [("without", tool_space), ("with", sagged)];
+    for (name, machine) in machines {
+        let (mut largest, mut held, mut joints) = (0.0_f64, 0, 0);
+        for seed in 0..seeds {
+            let (fit, mut random) = trained(seed, false, machine);
+            let (off, of_peaks) = unseen(&fit, &mut random, machine);
+            largest = largest.max(off);
+            held += of_peaks;
+            joints += (0..fit.parameters.len())
+                .filter(|index| {
+                    let off = (fit.parameters[*index].value(&fit.robot)
+                        / fit.parameters[*index].value(&robot()))
+                    .ln();
+                    off.abs() <= NINETY_PERCENT * fit.covariance[(*index, *index)].sqrt()
+                })
+                .count();
+        }
+        println!(
+            "seeds 0 to {}, {name} gravity: peaks at unseen postures within {:.2} %, {:.1} % of {} held, joints {:.1} % of {}",
+            seeds - 1,
+            100.0 * largest,
+            100.0 * held as f64 / (30 * seeds) as f64,
+            30 * seeds,
+            100.0 * joints as f64 / (12 * seeds) as f64,
+            12 * seeds
+        );
+        assert!(largest < 0.03, "{largest}");
+    }
+}
+
+#[test]
+fn joint_angles_and_the_directions_of_the_tool_are_one_robot() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    for _ in 0..5 {
+        let robot = robot().at(&posture(&mut random));
+        let other = tool_space(&robot).first_order().unwrap();
+        let structure = Structure {
+            directions: AXES.to_vec(),
+            form: Form::Joints(Box::new(robot)),
+        };
+        let own = structure.first_order().unwrap();
+        for f in [0.0, 5.0, 12.3, 30.0] {
+            let (a, b) = (
+                own.receptance(TAU * f).unwrap(),
+                other.receptance(TAU * f).unwrap(),
+            );
+            // Rounding times the condition of J, M and K.
+            assert!((a - b).norm() < 1e-8 * a.norm(), "{f}");
+        }
+    }
+}
+
+#[test]
+fn limits_of_a_robot_are_those_of_its_tool_space_matrices() {
+    let robot_case = case("six-joint-robot");
+    let mut other = robot_case.clone();
+    other.structure = Some(tool_space(&robot()));
+    let limit = |case: &Case, rpm: f64| {
+        let problem = Problem::new(case, CubicTerms::Refuse).unwrap();
+        line(&problem, rpm, 60.0, 60).unwrap().first_limit.unwrap()
+    };
+    for rpm in [600.0, 1000.0] {
+        let (a, b) = (limit(&robot_case, rpm), limit(&other, rpm));
+        // Rounding times the condition of J, M and K, and of the limit.
+        assert!((a.depth_mm / b.depth_mm - 1.0).abs() < 1e-6, "{a:?} {b:?}");
+        assert_eq!(a.kind, b.kind);
+    }
+}

@@ -1,0 +1,167 @@
+//! Records that others measured: `QUIETCUT_DATA` names the folder.
+
+use std::path::PathBuf;
+
+use crate::periodic_fit::{self, Period};
+use crate::response;
+use crate::restoring_force::{Options, Record, Surface, Term};
+use quietcut_recording::Quantity;
+
+fn folder(name: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("QUIETCUT_DATA").map(|data| PathBuf::from(data).join(name));
+    if folder.is_none() {
+        println!("QUIETCUT_DATA is not set: {name} is not looked at");
+    }
+    folder
+}
+
+/// Input and output of the Silverbox in volts, without their means.
+fn silverbox() -> Option<[Vec<f64>; 2]> {
+    let path = folder("silverbox")?.join("SNLS80mV.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut columns = [Vec::new(), Vec::new()];
+    for line in text
+        .lines()
+        .skip(1)
+        .filter(|line| !line.trim_matches(',').is_empty())
+    {
+        let mut fields = line.split(',');
+        for column in &mut columns {
+            column.push(fields.next().unwrap().trim().parse::<f64>().unwrap());
+        }
+    }
+    Some(columns.map(|column| {
+        let mean = column.iter().sum::<f64>() / column.len() as f64;
+        column.into_iter().map(|x| x - mean).collect()
+    }))
+}
+
+const RATE_HZ: f64 = 610.35;
+
+/// RMSE on the arrow, V, and k3/k1 of a law.
+fn judge_silverbox(surface: &[(Term, f64)], [u, y]: &[Vec<f64>; 2], what: &str) -> (f64, f64) {
+    let arrow = 40_585;
+    let predicted = response::displacement(surface, &u[..arrow], RATE_HZ).unwrap();
+    let sum: f64 = predicted.iter().zip(y).map(|(a, b)| (a - b) * (a - b)).sum();
+    let rmse = (sum / arrow as f64).sqrt();
+    let of = |wanted| {
+        surface
+            .iter()
+            .find(|(term, _)| *term == wanted)
+            .map_or(0.0, |(_, value)| *value)
+    };
+    let ratio = of(Term::CubicStiffness) / of(Term::Stiffness);
+    println!(
+        "{what}: {:.3} mV on the arrow, k3/k1 = {ratio:.4} 1/V²",
+        1e3 * rmse
+    );
+    (rmse, ratio)
+}
+
+fn law_of(surface: &Surface) -> Vec<(Term, f64)> {
+    surface
+        .terms
+        .iter()
+        .copied()
+        .zip(surface.theta.iter().copied())
+        .collect()
+}
+
+#[test]
+fn silverbox_by_its_restoring_force() {
+    let Some(data) = silverbox() else { return };
+    let train = 49_270..80_000;
+    let surface = Record {
+        force: &data[0][train.clone()],
+        motion: &data[1][train],
+        quantity: Quantity::Displacement,
+        rate_hz: RATE_HZ,
+    }
+    .surface(&Options {
+        terms: vec![Term::Mass, Term::Damping, Term::Stiffness, Term::CubicStiffness],
+        mass_kg: None,
+        band_hz: None,
+        trim_s: 1.0,
+    })
+    .unwrap();
+    println!(
+        "band {:?}, force error {:.4}",
+        surface.band_hz, surface.force_error
+    );
+    let (rmse, ratio) = judge_silverbox(&law_of(&surface), &data, "restoring force");
+    assert!(rmse <= 0.96e-3, "{rmse}");
+    assert!((ratio / 3.99 - 1.0).abs() < 0.01, "{ratio}");
+    // A linear law is fifteen times worse.
+    let linear: Vec<_> = law_of(&surface)
+        .into_iter()
+        .filter(|(term, _)| *term != Term::CubicStiffness)
+        .collect();
+    assert!(judge_silverbox(&linear, &data, "linear").0 > 10e-3);
+}
+
+#[test]
+fn silverbox_by_harmonic_balance() {
+    let Some(data) = silverbox() else { return };
+    // Three realizations of the multisine; each ends here, and its last 8192 samples are one period.
+    let periods: Vec<Period<'_>> = [57_877, 66_571, 75_264]
+        .iter()
+        .map(|end| Period {
+            force: &data[0][end - 8192..*end],
+            displacement: &data[1][end - 8192..*end],
+        })
+        .collect();
+    let terms = [Term::Mass, Term::Damping, Term::Stiffness, Term::CubicStiffness];
+    let fit = periodic_fit::fit(&periods, RATE_HZ, &terms).unwrap();
+    for ((term, value), deviation) in fit.law.iter().zip(&fit.deviations) {
+        println!("{} = {value:.6e} ± {deviation:.1e}", term.key());
+    }
+    println!("fit error {:.3} %", 100.0 * fit.relative_error);
+    let (rmse, ratio) = judge_silverbox(&fit.law, &data, "harmonic balance");
+    assert!(rmse <= 0.96e-3, "{rmse}");
+    assert!((ratio / 3.99 - 1.0).abs() < 0.01, "{ratio}");
+}
+
+#[test]
+fn the_positioning_stage_has_its_published_friction() {
+    let Some(folder) = folder("emps") else { return };
+    let recording = quietcut_recording::Recording::read(folder.join("DATA_EMPS.mat"));
+    let recording = match recording {
+        Ok(recording) => recording,
+        Err(error) => panic!("{error}"),
+    };
+    let samples = |name: &str| &recording.channel(name).unwrap().samples;
+    // gtau of the file.
+    let force: Vec<f64> = samples("vir").iter().map(|volts| 35.150_651_88 * volts).collect();
+    let surface = Record {
+        force: &force,
+        motion: samples("qm"),
+        quantity: Quantity::Displacement,
+        rate_hz: 1000.0,
+    }
+    .surface(&Options {
+        terms: vec![Term::Mass, Term::Damping, Term::CoulombFriction, Term::Offset],
+        mass_kg: None,
+        band_hz: None,
+        trim_s: 0.1,
+    })
+    .unwrap();
+    println!(
+        "band {:?}, force error {:.4}",
+        surface.band_hz, surface.force_error
+    );
+    let published = [
+        (Term::Mass, 95.109),
+        (Term::Damping, 203.50),
+        (Term::CoulombFriction, 20.394),
+    ];
+    for (term, truth) in published {
+        let found = surface.value(term).unwrap();
+        println!(
+            "{}: {found:.4}, {:+.3} %",
+            term.key(),
+            100.0 * (found / truth - 1.0)
+        );
+        assert!((found / truth - 1.0).abs() < 0.01, "{}", term.key());
+    }
+    assert!(surface.force_error <= 0.041, "{}", surface.force_error);
+}

@@ -1,0 +1,130 @@
+//! What a predicted steady motion leaves of a measured one, in units of its noise.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::dwell::{Dwell, Line};
+use super::harmonic_balance::Solution;
+use super::steady_fit::derivative;
+use quietcut_model::structure::Direction;
+
+/// How degrees of freedom q are seen and driven: u = S q in `directions`, and forces on q are Sᵀ F.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    /// The directions of u.
+    pub(super) directions: &'a [Direction],
+    /// S, a row for each direction.
+    pub(super) shape: &'a DMatrix<f64>,
+}
+
+impl Seen<'_> {
+    fn row(&self, line: &Line) -> Option<usize> {
+        self.directions
+            .iter()
+            .position(|direction| *direction == line.direction)
+    }
+
+    /// Fourier coefficients of the force on every degree of freedom; its mean is left out, load cells do not have it.
+    pub(super) fn force(&self, dwell: &Dwell, width: usize) -> DVector<f64> {
+        let dofs = self.shape.ncols();
+        let mut force = DVector::zeros(dofs * width);
+        for line in &dwell.forces {
+            let Some(row) = self.row(line) else { continue };
+            for dof in 0..dofs {
+                force.rows_mut(dof * width + 1, width - 1).axpy(
+                    self.shape[(row, dof)],
+                    &line.coefficients.rows(1, width - 1),
+                    1.0,
+                );
+            }
+        }
+        force
+    }
+
+    /// Motion in the direction of a row, from that of all degrees of freedom.
+    fn moved(&self, row: usize, q: &DMatrix<f64>, width: usize) -> DMatrix<f64> {
+        let mut moved = DMatrix::zeros(width, q.ncols());
+        for (dof, share) in self.shape.row(row).iter().enumerate() {
+            if *share != 0.0 {
+                moved += q.rows(dof * width, width) * *share;
+            }
+        }
+        moved
+    }
+
+    /// Measured − predicted over its noise, and the derivative of the predicted by θ.
+    ///
+    /// Noise of the motion, and noise of the force and of the frequency carried through the law by its derivatives. `None` where
+    /// the motion is singular, or nothing was measured.
+    pub(super) fn whitened(
+        &self,
+        dwell: &Dwell,
+        solution: &Solution,
+        width: usize,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let lines: Vec<(&Line, usize)> = dwell
+            .motions
+            .iter()
+            .filter_map(|line| Some((line, self.row(line)?)))
+            .collect();
+        let used = width - 1;
+        let (by_theta, by_force, by_omega) = solution.sensitivities(0..self.shape.ncols() * width)?;
+        let motion = DMatrix::from_column_slice(solution.x.len(), 1, solution.x.as_slice());
+        let by_omega = DMatrix::from_column_slice(by_omega.len(), 1, by_omega.as_slice());
+        let size = lines.len() * used;
+        let mut residual = DVector::zeros(size);
+        let mut slope = DMatrix::zeros(size, by_theta.ncols());
+        let mut force_slope = DMatrix::zeros(size, by_force.ncols());
+        let mut omega_slope = DVector::zeros(size);
+        let noise = dwell.gram_inverse.view((1, 1), (used, used));
+        let mut covariance = DMatrix::zeros(size, size);
+        for (index, (line, row)) in lines.iter().enumerate() {
+            let order = derivative(line.quantity);
+            let of = |q: &DMatrix<f64>| {
+                let mut moved = self.moved(*row, q, width);
+                differentiate(&mut moved, order, dwell.omega);
+                moved.rows(1, used).into_owned()
+            };
+            let rows = index * used;
+            let predicted = of(&motion);
+            residual
+                .rows_mut(rows, used)
+                .copy_from(&(line.coefficients.rows(1, used) - predicted.column(0)));
+            slope.rows_mut(rows, used).copy_from(&of(&by_theta));
+            force_slope.rows_mut(rows, used).copy_from(&of(&by_force));
+            let own = predicted.column(0) * (f64::from(order) / dwell.omega);
+            omega_slope
+                .rows_mut(rows, used)
+                .copy_from(&(of(&by_omega).column(0) + own));
+            covariance
+                .view_mut((rows, rows), (used, used))
+                .copy_from(&(noise * line.variance));
+        }
+        for line in &dwell.forces {
+            let Some(row) = self.row(line) else { continue };
+            let mut part = DMatrix::zeros(size, used);
+            for dof in 0..self.shape.ncols() {
+                part += force_slope.columns(dof * width + 1, used) * self.shape[(row, dof)];
+            }
+            covariance += &part * (noise * line.variance) * part.transpose();
+        }
+        covariance += &omega_slope * omega_slope.transpose() * dwell.omega_variance;
+        let root = Cholesky::new(covariance)?.unpack();
+        root.solve_lower_triangular_mut(&mut residual).then_some(())?;
+        root.solve_lower_triangular_mut(&mut slope).then_some(())?;
+        Some((residual, slope))
+    }
+}
+
+/// Takes coefficients 1, cos, sin, cos 2 … in every column to those of the derivative.
+fn differentiate(x: &mut DMatrix<f64>, order: u8, omega: f64) {
+    for _ in 0..order {
+        for mut column in x.column_iter_mut() {
+            column[0] = 0.0;
+            for h in 1..=column.len() / 2 {
+                let (c, s) = (column[2 * h - 1], column[2 * h]);
+                let factor = h as f64 * omega;
+                (column[2 * h - 1], column[2 * h]) = (factor * s, -factor * c);
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The case file: structure, tool, material and cut of one machine and job.
+//!
+//! Sections may be missing where a verb does not need them; unknown keys are an error. x is the feed
+//! direction, y the normal, z the tool axis; angles in degrees, lengths in mm where a machinist says mm, SI
+//! otherwise.
+
+mod check;
+mod deviation;
+mod error;
+mod extension;
+mod file;
+mod limits;
+mod posture;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+pub use deviation::{Deviation, Parameter};
+pub use error::CaseError;
+pub use extension::{AXIAL_DEPTH_MODULATION, NAMES as EXTENSION_NAMES, OF_SENSORS as EXTENSIONS_OF_SENSORS};
+pub use limits::MachineLimits;
+pub use posture::Posture;
+
+use crate::milling::{Cut, Material, Tool};
+use crate::structure::Structure;
+
+/// One machine and one job.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Its name; the file's where it gives none.
+    pub name: String,
+    /// The machine. Its values are finite and of the right shape; whether the matrices are definite is judged
+    /// where they are used.
+    pub structure: Option<Structure>,
+    /// The tool.
+    pub tool: Option<Tool>,
+    /// The workpiece material.
+    pub material: Option<Material>,
+    /// The cut.
+    pub cut: Option<Cut>,
+    /// What the machine can do.
+    pub limits: Option<MachineLimits>,
+    /// Where the robot stood.
+    pub posture: Posture,
+    /// How well parameters are known.
+    pub deviations: Vec<Deviation>,
+    /// Extensions of the model by name, as they stand in the file. Names are checked, values are not, but for
+    /// axial-depth-modulation.
+    pub extensions: BTreeMap<String, toml::Table>,
+}
+
+impl Case {
+    /// Reads a case file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not TOML, has a key that does not belong or lacks one that does, or has a
+    /// value that no machine, tool or cut can have.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, CaseError> {
+        let path = path.as_ref();
+        Self::parse(path, &quietcut_recording::file::read_text(path)?)
+    }
+
+    /// A case from the text of a case file; `path` is for its name and for messages.
+    ///
+    /// # Errors
+    /// As [`Case::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, CaseError> {
+        check::case(path, text)
+    }
+
+    /// The structure.
+    ///
+    /// # Errors
+    /// The case has none.
+    pub fn structure(&self) -> Result<&Structure, CaseError> {
+        self.section(&self.structure, "structure", "the machine must be known")
+    }
+
+    /// The tool.
+    ///
+    /// # Errors
+    /// The case has none.
+    pub fn tool(&self) -> Result<&Tool, CaseError> {
+        self.section(&self.tool, "tool", "teeth and edge angle must be known")
+    }
+
+    /// The material.
+    ///
+    /// # Errors
+    /// The case has none.
+    pub fn material(&self) -> Result<&Material, CaseError> {
+        self.section(&self.material, "material", "the force coefficients must be known")
+    }
+
+    /// The cut.
+    ///
+    /// # Errors
+    /// The case has none.
+    pub fn cut(&self) -> Result<&Cut, CaseError> {
+        self.section(&self.cut, "cut", "start angle, exit angle and feed must be known")
+    }
+
+    fn section<'a, T>(
+        &self,
+        section: &'a Option<T>,
+        name: &'static str,
+        what_for: &'static str,
+    ) -> Result<&'a T, CaseError> {
+        section.as_ref().ok_or_else(|| CaseError::MissingSection {
+            path: self.path.clone(),
+            section: name,
+            what_for,
+        })
+    }
+
+    /// True where the depth of cut follows the axial vibration: edge and feed terms of eq. 3.7 act then.
+    pub fn axial_depth_modulation(&self) -> bool {
+        self.extensions
+            .get(AXIAL_DEPTH_MODULATION)
+            .and_then(|table| table.get("on"))
+            .and_then(toml::Value::as_bool)
+            .unwrap_or(false)
+    }
+
+    /// Refuses every extension that is not among `treated` and is not one of the sensors.
+    ///
+    /// # Errors
+    /// The first such extension, with `reason`.
+    pub fn refuse_extensions_but(&self, treated: &[&str], reason: &str) -> Result<(), CaseError> {
+        let stranger = self.extensions.keys().find(|name| {
+            !treated.contains(&name.as_str()) && !EXTENSIONS_OF_SENSORS.contains(&name.as_str())
+        });
+        match stranger {
+            None => Ok(()),
+            Some(name) => Err(CaseError::Extension {
+                path: self.path.clone(),
+                name: name.clone(),
+                reason: reason.into(),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,264 @@
+//! The structure, ready to be integrated: first-order form and cubic terms.
+
+use nalgebra::{DMatrix, Matrix3xX, MatrixXx3};
+
+use crate::structure::{FirstOrder, Form, Matrices, Structure, StructureError};
+use quietcut_numerics::dormand_prince::Quartic;
+
+/// ẋ = A x + B F − f₃(x), u = C x: [`FirstOrder`] with the cubic terms of the structure, if it has any.
+///
+/// Axes are the machine's x, y, z; SI units: m, m/s, N. Velocity and acceleration of the tool are u̇ = C ẋ and
+/// ü = C A ẋ. The latter holds where C B = 0, as for all matrices. Complex modes whose residues do not sum to zero have
+/// C B ≠ 0: there a jump of the force is a jump of the *velocity*, and the acceleration has an impulse.
+#[derive(Clone, Debug)]
+pub struct Dynamics {
+    order: usize,
+    /// A, row by row.
+    a: Vec<f64>,
+    /// B, one row of three per state.
+    b: Vec<[f64; 3]>,
+    c: [Vec<f64>; 3],
+    ca: [Vec<f64>; 3],
+    /// C B, (m/s)/N: not zero where a jump of the force is one of the velocity.
+    cb: [[f64; 3]; 3],
+    /// C A B, 1/kg.
+    cab: [[f64; 3]; 3],
+    cubic: Option<Cubic>,
+    sizes: Vec<f64>,
+    velocity_jumps: bool,
+}
+
+/// f₃ in the rates of v: damping·v∘³ + stiffness·q∘³ with q the first `freedoms` states and v as many after them.
+#[derive(Clone, Debug)]
+struct Cubic {
+    freedoms: usize,
+    damping: Vec<f64>,
+    stiffness: Vec<f64>,
+}
+
+impl Dynamics {
+    /// The equations of `structure`.
+    ///
+    /// # Errors
+    /// Mass, damping or stiffness is indefinite.
+    pub fn new(structure: &Structure) -> Result<Self, StructureError> {
+        let FirstOrder { a, b, c } = structure.first_order()?;
+        let order = a.nrows();
+        let row = |matrix: &DMatrix<f64>, axis: usize| matrix.row(axis).iter().copied().collect::<Vec<_>>();
+        let c = DMatrix::from_fn(3, order, |axis, state| c[(axis, state)]);
+        let ca = &c * &a;
+        let jump = &c * &b;
+        // The modes of real matrices cancel but for rounding and for the digits that a file gives them; less than a
+        // millionth of what does not cancel is below any sensor.
+        let velocity_jumps = jump.amax() > 1e-6 * c.amax() * b.amax() * order as f64;
+        let cubic = match structure.equation() {
+            Some(matrices) if structure.is_nonlinear() => Some(cubic(&matrices, &a)?),
+            _ => None,
+        };
+        // States of modes and joints move the tool by up to |C| each; states of matrices are displacements already.
+        let size = |state: usize| {
+            let moved = c.column(state).amax();
+            match &structure.form {
+                Form::Modes(_) | Form::Joints(_) if moved > 0.0 => 1.0 / moved,
+                _ => 1.0,
+            }
+        };
+        let mut dynamics = Self {
+            order,
+            a: a.transpose().as_slice().to_vec(),
+            b: b.row_iter().map(|row| [row[0], row[1], row[2]]).collect(),
+            c: std::array::from_fn(|axis| row(&c, axis)),
+            cb: [[0.0; 3]; 3],
+            cab: [[0.0; 3]; 3],
+            ca: std::array::from_fn(|axis| row(&ca, axis)),
+            cubic,
+            sizes: (0..order).map(size).collect(),
+            velocity_jumps,
+        };
+        dynamics.note_products();
+        Ok(dynamics)
+    }
+
+    fn note_products(&mut self) {
+        let product = |rows: &[Vec<f64>; 3]| -> [[f64; 3]; 3] {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|j| rows[i].iter().zip(&self.b).map(|(c, b)| c * b[j]).sum())
+            })
+        };
+        (self.cb, self.cab) = (product(&self.c), product(&self.ca));
+    }
+
+    /// One more mode behind the states: η̈ + 2ζω η̇ + ω² η = F/m along `axis`, and the tool moves by η along it too.
+    pub fn add_mode(&mut self, axis: usize, frequency_hz: f64, damping_ratio: f64, modal_mass_kg: f64) {
+        let (order, omega) = (self.order, std::f64::consts::TAU * frequency_hz);
+        let wider = order + 2;
+        let mut a = vec![0.0; wider * wider];
+        for (new, old) in a.chunks_exact_mut(wider).zip(self.a.chunks_exact(order)) {
+            new[..order].copy_from_slice(old);
+        }
+        // States (η, η̇/ω).
+        a[order * wider + order + 1] = omega;
+        a[(order + 1) * wider + order] = -omega;
+        a[(order + 1) * wider + order + 1] = -2.0 * damping_ratio * omega;
+        self.a = a;
+        let mut force = [0.0; 3];
+        force[axis] = 1.0 / (modal_mass_kg * omega);
+        self.b.extend([[0.0; 3], force]);
+        for (index, (c, ca)) in self.c.iter_mut().zip(&mut self.ca).enumerate() {
+            let moved = f64::from(u8::from(index == axis));
+            c.extend([moved, 0.0]);
+            ca.extend([0.0, moved * omega]);
+        }
+        self.sizes.extend([1.0, 1.0]);
+        self.order = wider;
+        self.note_products();
+    }
+
+    /// The motion of something else than the tool, as [`FirstOrder::seen`] has it; to be looked at: a force on it is not one on the tool.
+    #[must_use]
+    pub fn seen(&self, modes: &[f64]) -> Self {
+        let FirstOrder { a, c, .. } = self.first_order().seen(modes);
+        let ca = &c * &a;
+        let mut seen = self.clone();
+        for axis in 0..3 {
+            seen.c[axis] = c.row(axis).iter().copied().collect();
+            seen.ca[axis] = ca.row(axis).iter().copied().collect();
+        }
+        seen.note_products();
+        seen
+    }
+
+    /// The linear part, without cubic terms.
+    pub fn first_order(&self) -> FirstOrder {
+        FirstOrder {
+            a: DMatrix::from_row_slice(self.order, self.order, &self.a),
+            b: MatrixXx3::from_fn(self.order, |state, axis| self.b[state][axis]),
+            c: Matrix3xX::from_fn(self.order, |axis, state| self.c[axis][state]),
+        }
+    }
+
+    /// Number of states.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// About the size of each state while the tool is displaced by one meter: what error control measures by.
+    pub fn sizes(&self) -> &[f64] {
+        &self.sizes
+    }
+
+    /// True where a jump of the force makes the velocity jump: then there is no acceleration at that instant.
+    pub fn velocity_jumps(&self) -> bool {
+        self.velocity_jumps
+    }
+
+    /// Displacement of the tool, m.
+    pub fn displacement(&self, x: &[f64]) -> [f64; 3] {
+        std::array::from_fn(|axis| dot(&self.c[axis], x))
+    }
+
+    /// Displacement of the tool, m, from the interpolants of the states.
+    pub fn displacement_quartics(&self, x: &[Quartic]) -> [Quartic; 3] {
+        std::array::from_fn(|axis| {
+            let mut sum = [0.0; 5];
+            for (weight, quartic) in self.c[axis].iter().zip(x).filter(|(weight, _)| **weight != 0.0) {
+                for (sum, coefficient) in sum.iter_mut().zip(quartic) {
+                    *sum += weight * coefficient;
+                }
+            }
+            sum
+        })
+    }
+
+    /// Velocity of the tool, m/s, from the rate of the states.
+    pub fn velocity(&self, rate: &[f64]) -> [f64; 3] {
+        std::array::from_fn(|axis| dot(&self.c[axis], rate))
+    }
+
+    /// Acceleration of the tool, m/s², from the rate of the states; `None` where the velocity may jump.
+    pub fn acceleration(&self, rate: &[f64]) -> Option<[f64; 3]> {
+        (!self.velocity_jumps).then(|| std::array::from_fn(|axis| dot(&self.ca[axis], rate)))
+    }
+
+    /// Velocity of the tool, m/s, under the force in N: C A x + C B F.
+    pub fn velocity_under(&self, x: &[f64], force: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let jump = if self.velocity_jumps {
+                dot(&self.cb[axis], &force)
+            } else {
+                0.0
+            };
+            dot(&self.ca[axis], x) + jump
+        })
+    }
+
+    /// C B, (m/s)/N: what the velocity of the tool jumps by with the force on it; zero where it does not.
+    pub fn velocity_per_force(&self) -> [[f64; 3]; 3] {
+        if self.velocity_jumps {
+            self.cb
+        } else {
+            [[0.0; 3]; 3]
+        }
+    }
+
+    /// C A B, 1/kg: acceleration of the tool per force on it.
+    pub fn acceleration_per_force(&self) -> [[f64; 3]; 3] {
+        self.cab
+    }
+
+    /// Puts the velocity of one axis to zero, as friction that begins to hold does: by an impulse along it.
+    pub fn halt(&self, axis: usize, x: &mut [f64]) {
+        let per_impulse = self.cab[axis][axis];
+        if per_impulse > 0.0 {
+            let impulse = dot(&self.ca[axis], x) / per_impulse;
+            for (x, b) in x.iter_mut().zip(&self.b) {
+                *x -= impulse * b[axis];
+            }
+        }
+    }
+
+    /// ẋ under the force in N.
+    pub fn rate(&self, x: &[f64], force: [f64; 3], rate: &mut [f64]) {
+        for ((rate, a), b) in rate.iter_mut().zip(self.a.chunks_exact(self.order)).zip(&self.b) {
+            *rate = dot(a, x) + b[0] * force[0] + b[1] * force[1] + b[2] * force[2];
+        }
+        if let Some(cubic) = &self.cubic {
+            let freedoms = cubic.freedoms;
+            let (q, v) = (&x[..freedoms], &x[freedoms..2 * freedoms]);
+            for ((rate, damping), stiffness) in rate[freedoms..]
+                .iter_mut()
+                .zip(cubic.damping.chunks_exact(freedoms))
+                .zip(cubic.stiffness.chunks_exact(freedoms))
+            {
+                *rate -= dot_cubes(damping, v) + dot_cubes(stiffness, q);
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn dot_cubes(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b * b * b).sum()
+}
+
+/// C₃ and K₃ for the states (q, q̇/s): M⁻¹C₃ s² and M⁻¹K₃/s.
+fn cubic(matrices: &Matrices, a: &DMatrix<f64>) -> Result<Cubic, StructureError> {
+    let freedoms = matrices.mass.nrows();
+    let scale = a[(0, freedoms)];
+    let mass = matrices.mass.clone().lu();
+    let of = |matrix: &Option<DMatrix<f64>>, factor: f64| -> Result<Vec<f64>, StructureError> {
+        let Some(matrix) = matrix else {
+            return Ok(vec![0.0; freedoms * freedoms]);
+        };
+        let divided = mass.solve(matrix).ok_or(StructureError::SingularMass)?;
+        Ok((divided.transpose() * factor).as_slice().to_vec())
+    };
+    Ok(Cubic {
+        freedoms,
+        damping: of(&matrices.cubic_damping, scale * scale)?,
+        stiffness: of(&matrices.cubic_stiffness, scale.recip())?,
+    })
+}

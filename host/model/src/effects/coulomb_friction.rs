@@ -1,0 +1,337 @@
+//! Dry friction: f_r += fc·sign(v); at rest it holds whatever is within ±fc.
+//!
+//! Through a play of total width g in series (a damper that its rod takes along only after the play) the friction follows a
+//! slider w that moves with the tool only where |x − w| = g/2: after each reversal there is no force until the play is crossed.
+//!
+//! A joint with clearance closes softly: its contact is pressed in by δ before it carries fc, by Hertz's law of contacts of bodies
+//! that are not conforming (Lankarani & Nikravesh, J. Mech. Design 112, 1990; without their damping),
+//! f_r = fc·((|x − w| − g/2)/δ)^1.5 towards w, and w moves where |x − w| = g/2 + δ.
+
+use std::sync::Arc;
+
+use super::place::{along, axis_of};
+use super::{Effect, EffectError, Kind, Parameters, Value};
+use crate::structure::{Direction, Structure};
+use crate::{At, Branch, Term};
+
+pub(super) const KIND: Kind = Kind {
+    name: "coulomb-friction",
+    keys: "fc_n, fc_minus_n (against negative velocity, where it differs), play_mm, contact_mm (of the play) and direction",
+    build: |parameters| {
+        let plus_n = parameters.main("fc_n")?;
+        let minus_n = parameters.finite("fc_minus_n")?.unwrap_or(plus_n);
+        if plus_n < 0.0 || minus_n < 0.0 {
+            return Err(EffectError::Value {
+                effect: "coulomb-friction".into(),
+                found: plus_n.min(minus_n).to_string(),
+                needed: "a force of 0 or more",
+            });
+        }
+        let mut length = |key| parameters.number(key, |length| length >= 0.0, "a length of 0 or more");
+        let play_mm = length("play_mm")?.unwrap_or(0.0);
+        let contact_mm = length("contact_mm")?.unwrap_or(0.0);
+        if contact_mm > 0.0 && play_mm == 0.0 {
+            return Err(EffectError::Value {
+                effect: "coulomb-friction.contact_mm".into(),
+                found: contact_mm.to_string(),
+                needed: "play_mm above 0: it is the contact at the ends of a play that",
+            });
+        }
+        Ok(Arc::new(CoulombFriction {
+            plus_n,
+            minus_n,
+            half_play_m: 0.5e-3 * play_mm,
+            contact_m: 1e-3 * contact_mm,
+            direction: parameters.direction("direction")?,
+        }))
+    },
+};
+
+/// A backlash that stands before the friction (`[extension.backlash]` with `before = "coulomb-friction"`) is a play of it.
+///
+/// # Errors
+/// It stands before something else, or there is no friction.
+pub(super) fn take_play(all: &mut Vec<Parameters>) -> Result<(), EffectError> {
+    let Some(index) = all.iter().position(|known| known.effect() == "backlash") else {
+        return Ok(());
+    };
+    let Some(before) = all[index].text("before")? else {
+        return Ok(());
+    };
+    let friction = all.iter().position(|known| known.effect() == KIND.name);
+    let Some(friction) = friction.filter(|_| before == KIND.name) else {
+        return Err(EffectError::Value {
+            effect: "backlash.before".into(),
+            found: before,
+            needed: "\"coulomb-friction\", and that effect too,",
+        });
+    };
+    let mut play = all[index].clone();
+    let gap_mm = play.main("gap_mm")?;
+    all[friction].put("play_mm", Value::Number(gap_mm));
+    if let Some(contact_mm) = play.finite("contact_mm")? {
+        all[friction].put("contact_mm", Value::Number(contact_mm));
+    }
+    all.remove(index);
+    Ok(())
+}
+
+#[derive(Clone, Copy, Debug)]
+struct CoulombFriction {
+    plus_n: f64,
+    minus_n: f64,
+    half_play_m: f64,
+    contact_m: f64,
+    direction: Option<Direction>,
+}
+
+#[derive(Debug)]
+struct Friction {
+    plus_n: f64,
+    minus_n: f64,
+    axis: usize,
+}
+
+const STICKS: Branch = 0;
+const FORWARD: Branch = 1;
+const BACKWARD: Branch = 2;
+
+/// What the tool takes along where it is so far from it.
+#[derive(Debug)]
+struct Slider {
+    axis: usize,
+    reach_m: f64,
+}
+
+/// Behind a play: the same, and free within it; at rest it holds at one end or the other.
+#[derive(Debug)]
+struct BehindPlay {
+    friction: Friction,
+    slider: Slider,
+}
+
+/// Behind a clearance that closes softly: nothing sticks, the contact gives way.
+#[derive(Debug)]
+struct BehindClearance {
+    friction: Friction,
+    /// At its reach the contact is pressed in as far as friction can.
+    slider: Slider,
+    contact_m: f64,
+}
+
+const WITHIN: Branch = 0;
+const STICKS_AHEAD: Branch = 3;
+const STICKS_BEHIND: Branch = 4;
+
+impl Effect for CoulombFriction {
+    fn name(&self) -> &'static str {
+        KIND.name
+    }
+
+    fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
+        let axis = axis_of(structure, self.direction, KIND.name)?;
+        let friction = Friction {
+            plus_n: self.plus_n,
+            minus_n: self.minus_n,
+            axis,
+        };
+        let slider = Slider {
+            axis,
+            reach_m: self.half_play_m + self.contact_m,
+        };
+        Ok(vec![if self.contact_m > 0.0 {
+            Box::new(BehindClearance {
+                friction,
+                slider,
+                contact_m: self.contact_m,
+            })
+        } else if self.half_play_m > 0.0 {
+            Box::new(BehindPlay { friction, slider })
+        } else {
+            Box::new(friction)
+        }])
+    }
+}
+
+impl Friction {
+    fn sliding(&self, branch: Branch) -> [f64; 3] {
+        let force = match branch {
+            FORWARD => self.plus_n,
+            BACKWARD => -self.minus_n,
+            _ => 0.0,
+        };
+        along(self.axis, force)
+    }
+}
+
+impl Term for Friction {
+    fn restoring_n(&self, branch: Branch, _: &At, _: &[f64]) -> [f64; 3] {
+        self.sliding(branch)
+    }
+
+    fn holds(&self) -> Option<usize> {
+        Some(self.axis)
+    }
+
+    fn locked(&self, branch: Branch) -> bool {
+        branch == STICKS
+    }
+
+    fn margin(&self, branch: Branch, at: &At, _: &[f64], holding_n: f64) -> f64 {
+        match branch {
+            FORWARD => at.v[self.axis],
+            BACKWARD => -at.v[self.axis],
+            _ => (self.plus_n - holding_n).min(self.minus_n + holding_n),
+        }
+    }
+
+    fn next(&self, before: Option<Branch>, at: &At, _: &[f64], holding_n: f64) -> Branch {
+        let moving = before.is_none() && at.v[self.axis] != 0.0;
+        // A hair beyond the limit still counts as held: the end of sticking is found there to rounding only.
+        let beyond = if before == Some(STICKS) { -1e-9 } else { 0.0 };
+        if moving {
+            if at.v[self.axis] > 0.0 { FORWARD } else { BACKWARD }
+        } else if holding_n > self.plus_n * (1.0 + beyond) {
+            FORWARD
+        } else if holding_n < -self.minus_n * (1.0 + beyond) {
+            BACKWARD
+        } else {
+            STICKS
+        }
+    }
+}
+
+impl Slider {
+    /// How far the tool is from it.
+    fn ahead_m(&self, at: &At, own: &[f64]) -> f64 {
+        at.x[self.axis] - own[0]
+    }
+
+    /// In motion it is taken along; at rest nobody knows.
+    fn begin(&self, at: &At, own: &mut [f64]) {
+        let moving = at.v[self.axis].signum() * f64::from(u8::from(at.v[self.axis] != 0.0));
+        own[0] = at.x[self.axis] - self.reach_m * moving;
+    }
+
+    /// The play operator: it stays where it is as long as the tool is within its reach. A hair beyond that is the end of the play.
+    fn follow(&self, at: &At, own: &mut [f64]) {
+        let reach_m = self.reach_m * (1.0 + 1e-9);
+        let x = at.x[self.axis];
+        own[0] = own[0].clamp(x - reach_m, x + reach_m);
+    }
+
+    fn rate(&self, branch: Branch, at: &At, rate: &mut [f64]) {
+        rate[0] = match branch {
+            FORWARD | BACKWARD => at.v[self.axis],
+            _ => 0.0,
+        };
+    }
+
+    fn margin(&self, branch: Branch, at: &At, own: &[f64]) -> f64 {
+        match branch {
+            FORWARD => at.v[self.axis],
+            BACKWARD => -at.v[self.axis],
+            _ => self.reach_m - self.ahead_m(at, own).abs(),
+        }
+    }
+
+    /// Which way it is taken along, where the tool is at the end of its reach.
+    fn taken(&self, at: &At, own: &[f64]) -> Option<Branch> {
+        let ahead_m = self.ahead_m(at, own);
+        let is_at_end = ahead_m.abs() >= self.reach_m * (1.0 - 1e-9);
+        is_at_end.then_some(if ahead_m > 0.0 { FORWARD } else { BACKWARD })
+    }
+}
+
+impl Term for BehindPlay {
+    fn states(&self) -> usize {
+        1
+    }
+
+    fn begin(&self, at: &At, own: &mut [f64]) {
+        self.slider.begin(at, own);
+    }
+
+    fn restoring_n(&self, branch: Branch, _: &At, _: &[f64]) -> [f64; 3] {
+        self.friction.sliding(branch)
+    }
+
+    fn follow(&self, at: &At, own: &mut [f64]) -> bool {
+        self.slider.follow(at, own);
+        true
+    }
+
+    fn rate(&self, branch: Branch, at: &At, _: &[f64], rate: &mut [f64]) {
+        self.slider.rate(branch, at, rate);
+    }
+
+    fn holds(&self) -> Option<usize> {
+        Some(self.friction.axis)
+    }
+
+    fn locked(&self, branch: Branch) -> bool {
+        branch == STICKS_AHEAD || branch == STICKS_BEHIND
+    }
+
+    fn margin(&self, branch: Branch, at: &At, own: &[f64], holding_n: f64) -> f64 {
+        let Friction { plus_n, minus_n, .. } = self.friction;
+        match branch {
+            STICKS_AHEAD => (plus_n - holding_n).min(holding_n),
+            STICKS_BEHIND => (minus_n + holding_n).min(-holding_n),
+            _ => self.slider.margin(branch, at, own),
+        }
+    }
+
+    fn next(&self, before: Option<Branch>, at: &At, own: &[f64], holding_n: f64) -> Branch {
+        let Friction { plus_n, minus_n, .. } = self.friction;
+        match before {
+            None | Some(WITHIN) => self.slider.taken(at, own).unwrap_or(WITHIN),
+            Some(FORWARD) if holding_n > 0.0 => STICKS_AHEAD,
+            Some(BACKWARD) if holding_n < 0.0 => STICKS_BEHIND,
+            Some(STICKS_AHEAD) if holding_n > 0.5 * plus_n => FORWARD,
+            Some(STICKS_BEHIND) if holding_n < -0.5 * minus_n => BACKWARD,
+            _ => WITHIN,
+        }
+    }
+}
+
+/// Hertz's exponent of contacts that are not conforming.
+const HERTZ: f64 = 1.5;
+
+impl Term for BehindClearance {
+    fn states(&self) -> usize {
+        1
+    }
+
+    fn begin(&self, at: &At, own: &mut [f64]) {
+        self.slider.begin(at, own);
+    }
+
+    fn restoring_n(&self, _: Branch, at: &At, own: &[f64]) -> [f64; 3] {
+        let ahead_m = self.slider.ahead_m(at, own);
+        let pressed_m = ahead_m.abs() - (self.slider.reach_m - self.contact_m);
+        let share = (pressed_m / self.contact_m).clamp(0.0, 1.0).powf(HERTZ);
+        let way = if ahead_m > 0.0 { FORWARD } else { BACKWARD };
+        self.friction.sliding(way).map(|force| share * force)
+    }
+
+    fn follow(&self, at: &At, own: &mut [f64]) -> bool {
+        self.slider.follow(at, own);
+        true
+    }
+
+    fn rate(&self, branch: Branch, at: &At, _: &[f64], rate: &mut [f64]) {
+        self.slider.rate(branch, at, rate);
+    }
+
+    fn margin(&self, branch: Branch, at: &At, own: &[f64], _: f64) -> f64 {
+        self.slider.margin(branch, at, own)
+    }
+
+    fn next(&self, before: Option<Branch>, at: &At, own: &[f64], _: f64) -> Branch {
+        match before {
+            None | Some(WITHIN) => self.slider.taken(at, own).unwrap_or(WITHIN),
+            _ => WITHIN,
+        }
+    }
+}

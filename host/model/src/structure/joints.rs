@@ -1,0 +1,206 @@
+//! A robot: stiff links on compliant joints, and what it is at a posture.
+//!
+//! With the joint angles' deviations q from the posture, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ F and u = J q: the tool-space
+//! matrices of thesis eq. 3.14, J⁻ᵀ · J⁻¹, where J has an inverse, and still right where it has none (a straight wrist) and for
+//! any number of joints. Left out are the change of M and J within a vibration, and gravity: q and its cubes count from where the robot
+//! hangs, which is a milliradian or so from the commanded angles. On the robot of the cases that moves peaks by 0.3 % (a test).
+
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, Rotation3, Unit, Vector3};
+
+use super::Matrices;
+
+/// A joint and the link that it carries; all places in the base's axes with all joint angles at zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Axis, of length 1: the link turns about it by the right-hand rule.
+    pub axis: Unit<Vector3<f64>>,
+    /// A point on the axis, m.
+    pub point_m: Vector3<f64>,
+    /// N m/rad.
+    pub stiffness_nm_per_rad: f64,
+    /// N m s/rad.
+    pub damping_nms_per_rad: f64,
+    /// On the cube of the angle, N m/rad³.
+    pub cubic_stiffness_nm_per_rad3: f64,
+    /// On the cube of the angular velocity, N m s³/rad³.
+    pub cubic_damping_nms3_per_rad3: f64,
+    /// Inertia of motor and gear about the axis, as the link feels it, kg m².
+    pub rotor_kg_m2: f64,
+    /// Mass of the link, kg.
+    pub mass_kg: f64,
+    /// Centre of mass of the link, m.
+    pub center_m: Vector3<f64>,
+    /// Inertia of the link about its centre of mass, kg m².
+    pub inertia_kg_m2: Matrix3<f64>,
+}
+
+/// A robot at a posture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robot {
+    /// The joints from the base on.
+    pub joints: Vec<Joint>,
+    /// The tool centre point with all joint angles at zero, m.
+    pub tool_m: Vector3<f64>,
+    /// Joint angles, rad, one for each joint.
+    pub angles_rad: Vec<f64>,
+}
+
+/// Where things are at a posture.
+struct Placed {
+    /// Axis and a point on it, of each joint.
+    axes: Vec<(Vector3<f64>, Vector3<f64>)>,
+    /// Rotation and centre of mass of each link.
+    links: Vec<(Rotation3<f64>, Vector3<f64>)>,
+    tool_m: Vector3<f64>,
+}
+
+impl Robot {
+    /// The same at other angles, rad.
+    pub fn at(&self, angles_rad: &[f64]) -> Self {
+        Self {
+            angles_rad: angles_rad.to_vec(),
+            ..self.clone()
+        }
+    }
+
+    fn placed(&self) -> Placed {
+        let (mut rotation, mut shift) = (Rotation3::identity(), Vector3::zeros());
+        let mut axes = Vec::with_capacity(self.joints.len());
+        let mut links = Vec::with_capacity(self.joints.len());
+        for (joint, angle) in self.joints.iter().zip(&self.angles_rad) {
+            axes.push((
+                rotation * joint.axis.into_inner(),
+                rotation * joint.point_m + shift,
+            ));
+            let turn = Rotation3::from_axis_angle(&joint.axis, *angle);
+            // x ↦ turn (x − point) + point, before all that the joints below do.
+            shift += rotation * (joint.point_m - turn * joint.point_m);
+            rotation *= turn;
+            links.push((rotation, rotation * joint.center_m + shift));
+        }
+        Placed {
+            axes,
+            links,
+            tool_m: rotation * self.tool_m + shift,
+        }
+    }
+
+    /// The tool centre point, m.
+    pub fn tool_place_m(&self) -> Vector3<f64> {
+        self.placed().tool_m
+    }
+
+    /// J, 3 × n: displacement of the tool centre point, m, per joint angle, rad.
+    pub fn jacobian(&self) -> Matrix3xX<f64> {
+        let placed = self.placed();
+        jacobian(&placed, self.joints.len(), placed.tool_m)
+    }
+
+    /// Displacement of the centre of mass of the last link, m, per joint angle, rad.
+    pub fn payload_jacobian(&self) -> Matrix3xX<f64> {
+        let placed = self.placed();
+        let center = placed.links.last().map_or(placed.tool_m, |(_, center)| *center);
+        jacobian(&placed, self.joints.len(), center)
+    }
+
+    /// M(q₀), kg m².
+    pub fn mass(&self) -> DMatrix<f64> {
+        let placed = self.placed();
+        let mut mass = DMatrix::from_diagonal(&self.of_joints(|joint| joint.rotor_kg_m2).diagonal());
+        for (index, (joint, (rotation, center))) in self.joints.iter().zip(&placed.links).enumerate() {
+            let moved = jacobian(&placed, index + 1, *center);
+            let turned = Matrix3xX::from_columns(
+                &placed.axes[..=index]
+                    .iter()
+                    .map(|(axis, _)| *axis)
+                    .collect::<Vec<_>>(),
+            );
+            let inertia = rotation.matrix() * joint.inertia_kg_m2 * rotation.matrix().transpose();
+            let own = moved.tr_mul(&moved) * joint.mass_kg + turned.tr_mul(&(inertia * &turned));
+            let mut part = mass.view_mut((0, 0), (index + 1, index + 1));
+            part += own;
+        }
+        mass
+    }
+
+    /// The equation of motion in joint angles.
+    pub fn matrices(&self) -> Matrices {
+        let cubic = |of: fn(&Joint) -> f64| {
+            let matrix = self.of_joints(of);
+            (matrix.amax() > 0.0).then_some(matrix)
+        };
+        Matrices {
+            mass: self.mass(),
+            damping: self.of_joints(|joint| joint.damping_nms_per_rad),
+            stiffness: self.of_joints(|joint| joint.stiffness_nm_per_rad),
+            cubic_damping: cubic(|joint| joint.cubic_damping_nms3_per_rad3),
+            cubic_stiffness: cubic(|joint| joint.cubic_stiffness_nm_per_rad3),
+        }
+    }
+
+    /// One number of each joint as a diagonal matrix.
+    fn of_joints(&self, of: impl Fn(&Joint) -> f64) -> DMatrix<f64> {
+        let count = self.joints.len();
+        DMatrix::from_fn(
+            count,
+            count,
+            |i, j| if i == j { of(&self.joints[i]) } else { 0.0 },
+        )
+    }
+}
+
+/// Displacement of a point behind the first `count` joints per angle of each.
+fn jacobian(placed: &Placed, count: usize, point: Vector3<f64>) -> Matrix3xX<f64> {
+    let columns: Vec<Vector3<f64>> = placed.axes[..count]
+        .iter()
+        .map(|(axis, on_axis)| axis.cross(&(point - on_axis)))
+        .collect();
+    Matrix3xX::from_columns(&columns)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// The robot of the project's cases.
+    pub(crate) fn robot() -> Robot {
+        let path = format!(
+            "{}/../../tests/cases/six-joint-robot.toml",
+            env!("CARGO_MANIFEST_DIR")
+        );
+        match crate::case::Case::read(path).unwrap().structure.unwrap().form {
+            crate::structure::Form::Joints(robot) => *robot,
+            _ => panic!("no robot"),
+        }
+    }
+
+    #[test]
+    fn the_jacobian_is_the_derivative_of_the_tool_and_mass_that_of_the_kinetic_energy() {
+        let robot = robot();
+        let (h, jacobian, mass) = (1e-6, robot.jacobian(), robot.mass());
+        let moved = |joint: usize, by: f64| {
+            let mut angles = robot.angles_rad.clone();
+            angles[joint] += by;
+            robot.at(&angles).placed()
+        };
+        for joint in 0..6 {
+            let (low, high) = (moved(joint, -h), moved(joint, h));
+            let slope = (high.tool_m - low.tool_m) / (2.0 * h);
+            // Central differences of lengths of meters: 1e-12 of truncation, 1e-10 of rounding.
+            assert!((slope - jacobian.column(joint)).norm() < 1e-8, "{joint}");
+            // Kinetic energy of one joint at 1 rad/s, link by link, by differences of places and of rotations.
+            let mut twice = robot.joints[joint].rotor_kg_m2;
+            for (link, body) in robot.joints.iter().enumerate() {
+                let speed = (high.links[link].1 - low.links[link].1) / (2.0 * h);
+                let rotation = robot.placed().links[link].0;
+                let turned = (high.links[link].0.matrix() - low.links[link].0.matrix()) / (2.0 * h);
+                let spin = turned * rotation.matrix().transpose();
+                let spin = Vector3::new(spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]);
+                let local = rotation.inverse() * spin;
+                twice += body.mass_kg * speed.norm_squared() + local.dot(&(body.inertia_kg_m2 * local));
+            }
+            assert!((twice / mass[(joint, joint)] - 1.0).abs() < 1e-7, "{joint}");
+        }
+        assert!((mass.clone() - mass.transpose()).amax() < 1e-12 * mass.amax());
+    }
+}

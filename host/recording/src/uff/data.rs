@@ -1,0 +1,271 @@
+//! The values of a data set 58, as text or binary.
+
+use std::io::BufRead;
+
+use num_complex::Complex;
+
+use super::header::{Binary, Header};
+use super::number;
+use super::source::{Source, SourceError};
+use super::{Fault, fault};
+
+/// Values to make room for before any has been read: what a damaged count may cost at most.
+const TRUSTED: usize = 1 << 16;
+
+/// Values per piece of binary data.
+const PIECE: usize = 1 << 13;
+
+/// The values of a function.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ordinate {
+    /// Real ones.
+    Real(Vec<f64>),
+    /// Complex ones.
+    Complex(Vec<Complex<f64>>),
+}
+
+impl Ordinate {
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Real(values) => values.len(),
+            Self::Complex(values) => values.len(),
+        }
+    }
+}
+
+/// Abscissa, where it is uneven, and ordinate.
+pub(super) struct Data {
+    pub(super) uneven: Option<Vec<f64>>,
+    pub(super) ordinate: Ordinate,
+}
+
+/// Takes the numbers of a function one after the other and sorts them.
+struct Sorter {
+    data: Data,
+    /// Where the next number belongs: 0 abscissa, 1 real part, 2 imaginary part.
+    next: u8,
+    real: f64,
+}
+
+impl Sorter {
+    fn new(header: &Header) -> Self {
+        let room = header.count.min(TRUSTED);
+        let ordinate = if header.ordinate_type.is_complex {
+            Ordinate::Complex(Vec::with_capacity(room))
+        } else {
+            Ordinate::Real(Vec::with_capacity(room))
+        };
+        let uneven = header.even.is_none().then(|| Vec::with_capacity(room));
+        Self {
+            next: u8::from(uneven.is_none()),
+            data: Data { uneven, ordinate },
+            real: 0.0,
+        }
+    }
+
+    fn take(&mut self, value: f64) {
+        let first = u8::from(self.data.uneven.is_none());
+        match (self.next, &mut self.data.ordinate, &mut self.data.uneven) {
+            (0, _, Some(uneven)) => {
+                uneven.push(value);
+                self.next = 1;
+            }
+            (2, Ordinate::Complex(values), _) => {
+                values.push(Complex::new(self.real, value));
+                self.next = first;
+            }
+            (_, Ordinate::Complex(_), _) => {
+                self.real = value;
+                self.next = 2;
+            }
+            (_, Ordinate::Real(values), _) => {
+                values.push(value);
+                self.next = first;
+            }
+        }
+    }
+}
+
+/// Numbers for each value of the function.
+fn per_value(header: &Header) -> usize {
+    1 + usize::from(header.ordinate_type.is_complex) + usize::from(header.even.is_none())
+}
+
+/// Reads text up to and with the mark that ends the data set.
+///
+/// A line `-1` is a number as long as numbers are missing and something follows that no data set begins with.
+pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> Result<Data, Fault> {
+    let missing = |found: usize, line: u64| {
+        let per = per_value(header);
+        fault(
+            line,
+            format!("the data end after {} of {} values", found / per, header.count),
+        )
+    };
+    let expected = header.count.checked_mul(per_value(header));
+    let mut sorter = Sorter::new(header);
+    let mut found = 0;
+    let mut numbers = Vec::with_capacity(8);
+    while let Some(line) = source.next()? {
+        if line.is_blank() {
+            continue;
+        }
+        let is_complete = Some(found) == expected;
+        if line.is_mark() {
+            if is_complete {
+                return Ok(sorter.data);
+            }
+            let is_last = expected.and_then(|expected| expected.checked_sub(found)) == Some(1);
+            if ends_here(source, is_last)? {
+                return Err(missing(found, line.number));
+            }
+        } else if is_complete {
+            return Err(fault(
+                line.number,
+                format!(
+                    "\"{}\" after all {} values; a line -1 is needed there",
+                    line.text().trim(),
+                    header.count
+                ),
+            ));
+        }
+        numbers.clear();
+        number::append(&line.bytes, &mut numbers).map_err(|what| fault(line.number, what))?;
+        found += numbers.len();
+        if expected.is_some_and(|expected| found > expected) {
+            return Err(fault(
+                line.number,
+                format!("more numbers than the {} values that record 7 says", header.count),
+            ));
+        }
+        numbers.iter().for_each(|&value| sorter.take(value));
+    }
+    // The last mark of a file may be missing.
+    if Some(found) == expected {
+        Ok(sorter.data)
+    } else {
+        Err(missing(found, source.line()))
+    }
+}
+
+/// Whether a line `-1` ends the data, although numbers are missing; `is_last` says that it is only one.
+fn ends_here<R: BufRead>(source: &mut Source<R>, is_last: bool) -> Result<bool, SourceError> {
+    match source.peek_filled(0)? {
+        None => return Ok(true),
+        Some(next) if !next.is_mark() => return Ok(false),
+        Some(_) => {}
+    }
+    Ok(match source.peek_filled(1)? {
+        None => !is_last,
+        // The number of a data set ends in column six; a number among data is seldom written so.
+        Some(second) => {
+            second.bytes.get(5).is_some_and(u8::is_ascii_digit) && second.number_of_set().is_some()
+        }
+    })
+}
+
+/// Reads binary data, up to and with the mark that ends the data set.
+pub(super) fn read_binary<R: BufRead>(
+    source: &mut Source<R>,
+    header: &Header,
+    binary: Binary,
+) -> Result<Data, Fault> {
+    let line = source.line();
+    let widths = widths(header, binary).map_err(|what| fault(line, what))?;
+    let stride: usize = widths.iter().sum();
+    let mut sorter = Sorter::new(header);
+    let mut buffer = vec![0; stride * PIECE.min(header.count.max(1))];
+    let mut rest = header.count;
+    while rest > 0 {
+        let values = rest.min(PIECE);
+        let bytes = &mut buffer[..values * stride];
+        source.fill(bytes).map_err(|error| match error {
+            SourceError::Io(error) => Fault::Io(error),
+            SourceError::Ends { found } => fault(
+                line,
+                format!(
+                    "the file ends after {} of {} binary values",
+                    header.count - rest + found / stride,
+                    header.count
+                ),
+            ),
+        })?;
+        let mut at = 0;
+        for _ in 0..values {
+            for &width in &widths {
+                sorter.take(decode(&bytes[at..at + width], binary.is_big_endian));
+                at += width;
+            }
+        }
+        rest -= values;
+    }
+    let needed = stride as u64 * header.count as u64;
+    source.skip(binary.bytes.saturating_sub(needed))?;
+    end_of_binary(source)?;
+    Ok(sorter.data)
+}
+
+/// Bytes of the numbers of one value, in order.
+///
+/// The abscissa of doubles is single by the standard, but some writers make it double: the number of bytes tells.
+fn widths(header: &Header, binary: Binary) -> Result<Vec<usize>, String> {
+    let width = if header.ordinate_type.is_double { 8 } else { 4 };
+    let mut widths = vec![width; per_value(header)];
+    let bytes = |widths: &[usize]| widths.iter().sum::<usize>() as u64 * header.count as u64;
+    if header.even.is_none() && header.ordinate_type.is_double && binary.bytes != bytes(&widths) {
+        widths[0] = 4;
+    }
+    let needed = bytes(&widths);
+    // Padding to a whole record is read over; less than the values need is a contradiction.
+    if binary.bytes != 0 && binary.bytes < needed {
+        return Err(format!(
+            "{} bytes of data, but {} values of this type need {needed}",
+            binary.bytes, header.count
+        ));
+    }
+    Ok(widths)
+}
+
+fn decode(bytes: &[u8], is_big_endian: bool) -> f64 {
+    macro_rules! number {
+        ($type:ty) => {{
+            let mut array = [0; size_of::<$type>()];
+            array.copy_from_slice(bytes);
+            if is_big_endian {
+                <$type>::from_be_bytes(array)
+            } else {
+                <$type>::from_le_bytes(array)
+            }
+        }};
+    }
+    if bytes.len() == 4 {
+        f64::from(number!(f32))
+    } else {
+        number!(f64)
+    }
+}
+
+/// Takes the mark after binary data: on the same line, or after any number of empty ones.
+fn end_of_binary<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
+    match source.peek_filled(0)? {
+        None => return Ok(()),
+        Some(line) if line.is_mark() => {}
+        Some(line) => {
+            let shown: String = line.text().chars().take(40).collect();
+            return Err(fault(
+                line.number,
+                format!(
+                    "\"{}\" after binary data; a line -1 is needed there",
+                    shown.escape_debug()
+                ),
+            ));
+        }
+    }
+    while let Some(line) = source.next()? {
+        if line.is_mark() {
+            break;
+        }
+    }
+    Ok(())
+}

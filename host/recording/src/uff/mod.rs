@@ -1,0 +1,407 @@
+//! UFF (universal file format), data sets 58: functions at nodal degrees of freedom, as text and binary (58b).
+//!
+//! The format is documented by the Structural Dynamics Research Laboratory of the University of Cincinnati. Read as
+//! meant: empty lines anywhere between data sets, `D` exponents, both byte orders, data that look like the mark `-1`,
+//! several data sets in a file, units by data set 164, a missing last mark. Other data sets are passed over.
+
+mod data;
+mod header;
+mod number;
+mod source;
+mod units;
+mod write;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+pub use data::Ordinate;
+pub use header::{Axis, Freedom, Function, Header, OrdinateType};
+pub use units::unit;
+pub use write::UffForm;
+pub use write::{Values, axis_of, write_set, write_units};
+
+use header::{Binary, RECORDS};
+use source::{Line, Source, SourceError};
+use units::FileUnits;
+use write::{exponential, header_of};
+
+use super::{Quantity, Raw, RawColumn, Recording, RecordingError};
+use crate::file::FileError;
+
+/// A data set 58.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DataSet {
+    /// The line with its number, from 1.
+    pub line: u64,
+    /// The records before the data.
+    pub header: Header,
+    /// The abscissa where it is uneven.
+    pub uneven: Option<Vec<f64>>,
+    /// The values.
+    pub ordinate: Ordinate,
+    /// The units of the file.
+    pub units: FileUnits,
+}
+
+/// What is wrong with a file.
+#[derive(Debug)]
+enum Fault {
+    Io(std::io::Error),
+    Line { line: u64, what: String },
+}
+
+fn fault(line: u64, what: String) -> Fault {
+    Fault::Line { line, what }
+}
+
+impl From<SourceError> for Fault {
+    fn from(error: SourceError) -> Self {
+        match error {
+            SourceError::Io(error) => Self::Io(error),
+            SourceError::Ends { found } => Self::Io(std::io::Error::new(
+                std::io::ErrorKind::UnexpectedEof,
+                format!("the file ends {found} bytes after the last line"),
+            )),
+        }
+    }
+}
+
+impl Fault {
+    fn of_file(self, path: &Path) -> RecordingError {
+        match self {
+            Self::Io(cause) => RecordingError::File(FileError::Read {
+                path: path.into(),
+                cause,
+            }),
+            Self::Line { line, what } => RecordingError::Line {
+                path: path.into(),
+                line,
+                what,
+            },
+        }
+    }
+}
+
+/// All data sets 58 of a file, in order; there is at least one.
+///
+/// # Errors
+/// The file is not there, is no UFF file, or a data set is damaged: which line, and what would be right.
+pub fn data_sets(path: &Path) -> Result<Vec<DataSet>, RecordingError> {
+    let file = File::open(path).map_err(|cause| FileError::Read {
+        path: path.into(),
+        cause,
+    })?;
+    parse(BufReader::with_capacity(1 << 16, file)).map_err(|fault| fault.of_file(path))
+}
+
+fn parse(reader: impl BufRead) -> Result<Vec<DataSet>, Fault> {
+    let mut source = Source::new(reader);
+    let mut sets = Vec::new();
+    let mut units: Option<FileUnits> = None;
+    let mut others: Vec<u32> = Vec::new();
+    while let Some(line) = next_mark(&mut source)? {
+        let Some(mut first) = next_filled(&mut source)? else {
+            break;
+        };
+        // A mark too many.
+        while first.is_mark() {
+            match next_filled(&mut source)? {
+                Some(next) => first = next,
+                None => break,
+            }
+        }
+        if first.is_mark() {
+            break;
+        }
+        match first.number_of_set() {
+            Some((58, rest)) => sets.push(data_set(&mut source, first.number, &rest)?),
+            Some((164, _)) => {
+                let found = file_units(&mut source)?;
+                // Units stand at the start; those that come later say the same of what came before.
+                sets.iter_mut()
+                    .filter(|_| units.is_none())
+                    .for_each(|set: &mut DataSet| set.units = found);
+                units = Some(found);
+            }
+            Some((other, _)) => {
+                others.push(other);
+                skip(&mut source)?;
+            }
+            None => {
+                let shown: String = first.text().trim().chars().take(40).collect();
+                return Err(fault(
+                    first.number,
+                    format!(
+                        "\"{}\" after the -1 of line {line}; the number of a data set is needed",
+                        shown.escape_debug()
+                    ),
+                ));
+            }
+        }
+        if let (Some(set), Some(units)) = (sets.last_mut(), units)
+            && set.line == first.number
+        {
+            set.units = units;
+        }
+    }
+    if sets.is_empty() {
+        let found = match others.as_slice() {
+            [] => "no line -1 with the number of a data set after it".into(),
+            _ => format!("only data sets {others:?}"),
+        };
+        return Err(fault(
+            source.line().max(1),
+            format!("{found}; a data set 58 is needed"),
+        ));
+    }
+    Ok(sets)
+}
+
+/// Passes over lines up to and with the next mark; its number, or `None` at the end.
+fn next_mark<R: BufRead>(source: &mut Source<R>) -> Result<Option<u64>, Fault> {
+    while let Some(line) = source.next()? {
+        if line.is_mark() {
+            return Ok(Some(line.number));
+        }
+    }
+    Ok(None)
+}
+
+/// The next line that is not blank.
+fn next_filled<R: BufRead>(source: &mut Source<R>) -> Result<Option<Line>, Fault> {
+    while let Some(line) = source.next()? {
+        if !line.is_blank() {
+            return Ok(Some(line));
+        }
+    }
+    Ok(None)
+}
+
+/// Passes over a data set, with its last mark.
+fn skip<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
+    while let Some(line) = source.next()? {
+        if line.is_mark() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn file_units<R: BufRead>(source: &mut Source<R>) -> Result<FileUnits, Fault> {
+    let mut lines = Vec::new();
+    let mut first = source.line() + 1;
+    while let Some(line) = source.next()? {
+        if line.is_mark() {
+            break;
+        }
+        if lines.is_empty() {
+            first = line.number;
+        }
+        lines.push(line.text());
+    }
+    FileUnits::parse(&lines).map_err(|(index, what)| fault(first + index as u64, what))
+}
+
+fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result<DataSet, Fault> {
+    let binary = match rest.strip_prefix(['b', 'B']) {
+        Some(rest) => Some(Binary::parse(rest).map_err(|what| fault(line, what))?),
+        None => None,
+    };
+    let count = binary.map_or(RECORDS, |binary| binary.lines);
+    let mut records: [String; RECORDS] = Default::default();
+    let mut numbers = [line; RECORDS];
+    for index in 0..count {
+        let Some(record) = source.next()? else {
+            return Err(fault(
+                source.line(),
+                format!("the file ends within the {RECORDS} lines before the data"),
+            ));
+        };
+        // Words may be anything; of the numbers none is a mark.
+        if record.is_mark() && index >= 5 {
+            return Err(fault(
+                record.number,
+                format!("-1 in line {} of the {RECORDS} lines before the data", index + 1),
+            ));
+        }
+        if let (Some(text), Some(number)) = (records.get_mut(index), numbers.get_mut(index)) {
+            *text = record.text();
+            *number = record.number;
+        }
+    }
+    let header = Header::parse(&records).map_err(|(index, what)| fault(numbers[index], what))?;
+    let data = match binary {
+        Some(binary) => data::read_binary(source, &header, binary)?,
+        None => data::read_text(source, &header)?,
+    };
+    Ok(DataSet {
+        line,
+        header,
+        uneven: data.uneven,
+        ordinate: data.ordinate,
+        units: FileUnits::SI,
+    })
+}
+
+/// Reads the records over time of a file.
+pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
+    let mut sets = data_sets(path)?;
+    let functions: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
+    sets.retain(DataSet::is_over_time);
+    let Some(first) = sets.first() else {
+        return Err(RecordingError::Content {
+            path: path.into(),
+            what: format!(
+                "its functions are of type {functions:?}; a record over time is of type 1 (an FRF, type 4, is no recording)"
+            ),
+        });
+    };
+    let mut columns = Vec::with_capacity(sets.len() + 1);
+    let (even, uneven, count) = (first.header.even, first.uneven.clone(), first.ordinate.len());
+    if let Some(times) = &uneven {
+        columns.push(RawColumn {
+            name: "t".into(),
+            unit: "s".parse().ok(),
+            samples: times.clone(),
+        });
+    }
+    let names = names(&sets);
+    for (set, name) in sets.into_iter().zip(names) {
+        let wrong = |what: String| RecordingError::Line {
+            path: path.into(),
+            line: set.line,
+            what: format!("channel \"{name}\": {what}"),
+        };
+        if set.ordinate.len() != count || set.header.even != even || set.uneven != uneven {
+            return Err(wrong(format!(
+                "{} samples, but the first channel has {count}, or other times; all channels must have been sampled together",
+                set.ordinate.len()
+            )));
+        }
+        let unit = unit(&set.header.ordinate, set.units).map_err(wrong)?;
+        let Ordinate::Real(mut samples) = set.ordinate else {
+            return Err(wrong(
+                "complex samples; those of a record over time are real".into(),
+            ));
+        };
+        if let Some(at) = samples.iter().position(|sample| !sample.is_finite()) {
+            return Err(wrong(format!(
+                "sample {} is {}; a number is needed",
+                at + 1,
+                samples[at]
+            )));
+        }
+        // Along an axis, against its direction.
+        if (-3..0).contains(&set.header.response.direction) {
+            samples.iter_mut().for_each(|sample| *sample = -*sample);
+        }
+        columns.push(RawColumn { name, unit, samples });
+    }
+    Ok(Raw {
+        columns,
+        sample_rate_hz: even.map(|(_, step)| rate_hz(step)),
+        start_s: even.map_or(0.0, |(first, _)| first),
+    })
+}
+
+/// The rate of a step of time, of which the format keeps six digits: a whole number of hertz, where one has this step.
+fn rate_hz(step_s: f64) -> f64 {
+    let whole = (1.0 / step_s).round();
+    let six_digits = |step: f64| exponential(step, 5, 0);
+    if whole >= 1.0 && six_digits(1.0 / whole) == six_digits(step_s) {
+        whole
+    } else {
+        1.0 / step_s
+    }
+}
+
+impl DataSet {
+    /// True of a record over time; also where the type is not said but the abscissa is time.
+    fn is_over_time(&self) -> bool {
+        match self.header.function {
+            Function::Time => true,
+            Function::General => self.header.abscissa.kind == 17,
+            _ => false,
+        }
+    }
+
+    /// Name by convention: `az` for an acceleration along ±z; else the name of the entity.
+    fn name(&self) -> String {
+        let header = &self.header;
+        let axis = match header.response.direction.abs() {
+            1 => "x",
+            2 => "y",
+            3 => "z",
+            _ => "",
+        };
+        let prefix = match unit(&header.ordinate, self.units) {
+            Ok(Some(unit)) => match unit.quantity {
+                Quantity::Force => Some("f"),
+                Quantity::Displacement => Some(""),
+                Quantity::Velocity => Some("v"),
+                Quantity::Acceleration => Some("a"),
+                _ => None,
+            },
+            _ => None,
+        };
+        if let (false, Some(prefix)) = (axis.is_empty(), prefix) {
+            return format!("{prefix}{axis}");
+        }
+        let entity = &header.response.entity;
+        let words = &header.words[0];
+        // A name that fills its ten columns has lost its end.
+        if entity.is_empty() || (entity.len() == 10 && words.starts_with(entity.as_str())) {
+            if words.is_empty() {
+                "channel".into()
+            } else {
+                words.clone()
+            }
+        } else {
+            entity.clone()
+        }
+    }
+}
+
+/// Names of the channels; those that would be the same get the number of their node, then of their place.
+fn names(sets: &[DataSet]) -> Vec<String> {
+    let plain: Vec<String> = sets.iter().map(DataSet::name).collect();
+    let is_twice = |names: &[String], name: &String| names.iter().filter(|other| *other == name).count() > 1;
+    let with_node: Vec<String> = plain
+        .iter()
+        .zip(sets)
+        .map(|(name, set)| {
+            if is_twice(&plain, name) {
+                format!("{name}_{}", set.header.response.node)
+            } else {
+                name.clone()
+            }
+        })
+        .collect();
+    with_node
+        .iter()
+        .enumerate()
+        .map(|(index, name)| {
+            if is_twice(&with_node, name) {
+                format!("{name}_{}", index + 1)
+            } else {
+                name.clone()
+            }
+        })
+        .collect()
+}
+
+/// Writes a recording: one data set 58 per channel, after the units (SI) in a data set 164.
+pub(super) fn write(path: &Path, recording: &Recording, form: UffForm) -> Result<(), RecordingError> {
+    Ok(crate::file::write_with(path, |out| {
+        write_units(out)?;
+        for channel in &recording.channels {
+            let header = header_of(recording, channel);
+            write_set(out, &header, None, Values::Real(&channel.samples), form)?;
+        }
+        Ok(())
+    })?)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,553 @@
+//! Steps of controlled error that end exactly where the right-hand side is not smooth.
+
+use super::contact::{Change, Contact};
+use super::{Dynamics, Model, Settings, SimulateError, Stretch};
+use quietcut_model::term::{self, At, Branch, Branches};
+use quietcut_numerics::crossing::first_below_zero;
+use quietcut_numerics::dormand_prince::{DormandPrince, Quartic, at};
+
+/// What a run took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps tried again because their error was too large.
+    pub rejected: u64,
+    /// Times at which a tooth lost or found contact.
+    pub contact_changes: u64,
+    /// Times at which a term of the equation of motion changed its branch.
+    pub branch_changes: u64,
+}
+
+/// A stretch of the motion, to be read while it is the newest one.
+pub struct Segment<'a> {
+    model: &'a Model,
+    stretch: Stretch<'a>,
+    quartics: &'a [Quartic],
+    displacement: &'a [Quartic; 3],
+    from_s: f64,
+    to_s: f64,
+}
+
+/// The tool at one instant, in the machine's x, y, z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// m.
+    pub displacement_m: [f64; 3],
+    /// m/s.
+    pub velocity_m_per_s: [f64; 3],
+    /// m/s²; `None` where the structure has none at an instant, see [`super::Dynamics::velocity_jumps`].
+    pub acceleration_m_per_s2: Option<[f64; 3]>,
+    /// Force on the tool, N.
+    pub force_n: [f64; 3],
+}
+
+/// Room to compute a [`Motion`] in.
+#[derive(Clone, Debug, Default)]
+pub struct Room {
+    state: Vec<f64>,
+    rate: Vec<f64>,
+    /// The equations as they are seen from where the modes have other shapes than at the tool.
+    seen: Option<Dynamics>,
+}
+
+impl Room {
+    /// Room for the states of `model`.
+    pub fn new(model: &Model) -> Self {
+        let room = vec![0.0; model.order()];
+        Self {
+            state: room.clone(),
+            rate: room,
+            seen: None,
+        }
+    }
+
+    /// Room for the motion that a sensor sees, where each mode of `model`'s structure has so many times its shape at the tool; with no
+    /// modes said, the tool's.
+    pub fn seeing(model: &Model, modes: &[f64]) -> Self {
+        Self {
+            seen: (!modes.is_empty()).then(|| model.dynamics.seen(modes)),
+            ..Self::new(model)
+        }
+    }
+}
+
+impl Segment<'_> {
+    /// Where it begins, s.
+    pub fn from_s(&self) -> f64 {
+        self.from_s
+    }
+
+    /// Where it ends, s.
+    pub fn to_s(&self) -> f64 {
+        self.to_s
+    }
+
+    /// The motion at `t` within the stretch.
+    pub fn motion(&self, t: f64, room: &mut Room) -> Motion {
+        let u = (t - self.from_s) / (self.to_s - self.from_s);
+        for (state, quartic) in room.state.iter_mut().zip(self.quartics) {
+            *state = at(quartic, u);
+        }
+        let displacement_m = std::array::from_fn(|axis| at(&self.displacement[axis], u));
+        let force_n = self
+            .model
+            .rate(self.stretch, (t, displacement_m), &room.state, &mut room.rate);
+        let dynamics = room.seen.as_ref().unwrap_or(&self.model.dynamics);
+        Motion {
+            displacement_m: match &room.seen {
+                Some(seen) => seen.displacement(&room.state),
+                None => displacement_m,
+            },
+            velocity_m_per_s: dynamics.velocity(&room.rate),
+            acceleration_m_per_s2: dynamics.acceleration(&room.rate),
+            force_n,
+        }
+    }
+}
+
+/// A run in progress.
+pub(super) struct Integrator<'a> {
+    model: &'a Model,
+    settings: Settings,
+    contact: Option<Contact<'a>>,
+    step: DormandPrince,
+    t: f64,
+    y: Vec<f64>,
+    quartics: Vec<Quartic>,
+    displacement: [Quartic; 3],
+    /// Length of the next step if nothing comes between.
+    next_h: f64,
+    statistics: Statistics,
+    room: Room,
+    /// The branch of each term of the model.
+    branches: Vec<Branch>,
+    /// The stretch looked at, a little shortened at both ends.
+    within: [f64; 2],
+}
+
+/// What ends a step before its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Event {
+    /// A tooth loses or finds contact.
+    Contact(Change),
+    /// A term leaves its branch.
+    Term { index: usize, u: f64 },
+}
+
+impl Event {
+    /// When, as a fraction of the step.
+    fn u(self) -> f64 {
+        match self {
+            Self::Contact(change) => change.u,
+            Self::Term { u, .. } => u,
+        }
+    }
+}
+
+/// Error of a step, as a share of what is allowed, below which nothing moves.
+const AT_REST: f64 = 1e-6;
+
+/// Changes of contact in a row without a step between them before a run is given up.
+const STUCK: u32 = 3;
+
+impl<'a> Integrator<'a> {
+    pub(super) fn new(model: &'a Model, settings: Settings, y: Vec<f64>) -> Self {
+        let contact = model
+            .cutting
+            .as_ref()
+            .map(|cutting| Contact::new(cutting, model.dynamics.velocity_jumps()));
+        Self {
+            model,
+            settings,
+            contact,
+            step: DormandPrince::new(y.len()),
+            t: 0.0,
+            quartics: vec![[0.0; 5]; y.len()],
+            y,
+            displacement: [[0.0; 5]; 3],
+            next_h: 0.0,
+            statistics: Statistics::default(),
+            branches: vec![0; model.terms.len()],
+            room: Room::new(model),
+            within: [0.0; 2],
+        }
+    }
+
+    /// Runs to `end_s`; `observe` sees every stretch in its order.
+    pub(super) fn run(
+        mut self,
+        end_s: f64,
+        mut observe: impl FnMut(&Segment<'_>),
+    ) -> Result<Statistics, SimulateError> {
+        // Small enough for anything; the first steps find out.
+        self.next_h = 1e-3 * self.longest_step(end_s);
+        for index in 0..self.branches.len() {
+            self.branches[index] = self.next_branch(index, None);
+        }
+        self.start();
+        let mut stuck = 0;
+        while self.t < end_s {
+            let steps = self.statistics.steps + self.statistics.rejected;
+            if steps > self.settings.steps_max {
+                let time_s = self.t;
+                return Err(SimulateError::TooManySteps { time_s, steps });
+            }
+            let stop_s = self.next_stop(end_s);
+            let (h, event) = self.step_towards(stop_s)?;
+            if h > 0.0 {
+                self.accept(h, &mut observe)?;
+                stuck = 0;
+            }
+            let at_stop = event.is_none() && stop_s - self.t <= self.rounding_s();
+            if let Some(event) = event {
+                self.change(event, &mut stuck)?;
+            }
+            if at_stop {
+                self.t = stop_s;
+                self.switch();
+            }
+            if at_stop || event.is_some() {
+                self.start();
+            }
+        }
+        Ok(self.statistics)
+    }
+
+    fn change(&mut self, event: Event, stuck: &mut u32) -> Result<(), SimulateError> {
+        match event {
+            Event::Contact(change) => {
+                self.statistics.contact_changes += 1;
+                if let Some(contact) = &mut self.contact
+                    && !contact.change(change.tooth, self.t)
+                {
+                    *stuck += 1;
+                }
+                if *stuck > STUCK {
+                    return Err(SimulateError::ContactUndecided {
+                        time_s: self.t,
+                        tooth: change.tooth + 1,
+                    });
+                }
+            }
+            Event::Term { index, .. } => {
+                self.statistics.branch_changes += 1;
+                self.branches[index] = self.next_branch(index, Some(self.branches[index]));
+                // A term that has just changed counts as within its branch (see `first_below_zero`): many changes
+                // without a step between them are a term whose branches exclude each other.
+                *stuck += 1;
+                if *stuck > 10 * STUCK {
+                    return Err(SimulateError::BranchUndecided { time_s: self.t });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The branch of a term here and now; an axis that begins to be held stands still from now on.
+    fn next_branch(&mut self, index: usize, before: Option<Branch>) -> Branch {
+        let term = &self.model.terms[index];
+        let (at, place) = (self.at(self.t, &self.y), self.place(index));
+        let holding_n = self.holding_n(index, self.t, &self.y.clone());
+        let branch = term.next(before, &at, &self.y[place], holding_n);
+        if let Some(axis) = term.holds().filter(|_| term.locked(branch)) {
+            let order = self.model.dynamics.order();
+            self.model.dynamics.halt(axis, &mut self.y[..order]);
+        }
+        branch
+    }
+
+    fn at(&self, t: f64, y: &[f64]) -> At {
+        let dynamics = &self.model.dynamics;
+        let structure = &y[..dynamics.order()];
+        At {
+            t,
+            x: dynamics.displacement(structure),
+            v: dynamics.velocity_under(structure, [0.0; 3]),
+        }
+    }
+
+    /// Where the states of a term stand in y.
+    fn place(&self, index: usize) -> std::ops::Range<usize> {
+        let terms = &self.model.terms;
+        let from = self.model.dynamics.order() + term::states(&terms[..index]);
+        from..from + terms[index].states()
+    }
+
+    /// f_r that would hold the axis of a term at `t`; 0 where it holds none.
+    fn holding_n(&mut self, index: usize, t: f64, y: &[f64]) -> f64 {
+        let Some(axis) = self.model.terms[index].holds() else {
+            return 0.0;
+        };
+        let mut rate = std::mem::take(&mut self.room.rate);
+        let holding = self.held_n(index, axis, (t, y), &mut rate);
+        self.room.rate = rate;
+        holding
+    }
+
+    fn held_n(&self, index: usize, axis: usize, (t, y): (f64, &[f64]), rate: &mut [f64]) -> f64 {
+        let model = self.model;
+        let x = model.dynamics.displacement(&y[..model.dynamics.order()]);
+        let stretch = self.stretch();
+        let force = model.force_n(stretch, t, x, y);
+        let held = term::rate(
+            &model.dynamics,
+            &model.terms,
+            stretch.branches,
+            (t, x),
+            force,
+            y,
+            rate,
+        );
+        if model.terms[index].locked(self.branches[index]) {
+            return held[axis];
+        }
+        // What slides now has its own force in the rate: what holds it is that force and what is left.
+        let at = self.at(t, y);
+        let sliding = model.terms[index].restoring_n(self.branches[index], &at, &y[self.place(index)]);
+        let locked = std::array::from_fn(|other| other == axis);
+        sliding[axis] + term::holding_n(&model.dynamics, locked, &rate[..model.dynamics.order()])[axis]
+    }
+
+    fn stretch(&self) -> Stretch<'_> {
+        Stretch {
+            contact: self.contact.as_ref(),
+            within: self.within,
+            branches: Branches(&self.branches),
+        }
+    }
+
+    /// ẏ at the start of a smooth stretch.
+    fn start(&mut self) {
+        self.look_ahead(self.next_h);
+        let model = self.model;
+        let stretch = Stretch {
+            contact: self.contact.as_ref(),
+            within: self.within,
+            branches: Branches(&self.branches),
+        };
+        self.step.start(self.t, &self.y, |t, y, rate| {
+            model.rate(stretch, (t, model.dynamics.displacement(y)), y, rate);
+        });
+    }
+
+    /// Looks at the smooth stretch that begins here.
+    fn look_ahead(&mut self, h: f64) {
+        let inset = 1e-9 * h;
+        self.within = [self.t + inset, self.t + h - inset];
+        if let Some(contact) = &mut self.contact {
+            contact.look_at(self.t, self.t + h);
+        }
+    }
+
+    /// Tries steps until one is good; its length, and the event at its end. It is not taken yet.
+    ///
+    /// Length 0: the event is here and now.
+    fn step_towards(&mut self, stop_s: f64) -> Result<(f64, Option<Event>), SimulateError> {
+        let mut h = self.next_h;
+        let is_held = self.is_held();
+        if is_held {
+            h = h.min(self.longest_step_at_rest());
+        }
+        loop {
+            h = self.fitted(h, stop_s);
+            let error = self.attempt(h);
+            if error <= 1.0 {
+                let grown = h * (0.9 * error.max(1e-8).powf(-0.2)).clamp(0.2, 5.0);
+                // A step cut short by a switch says little about the next: it does not shrink it.
+                self.next_h = if h < self.next_h {
+                    grown.max(self.next_h)
+                } else {
+                    grown
+                };
+                self.next_h = self.next_h.min(self.longest_step(f64::INFINITY));
+                if is_held || error < AT_REST {
+                    self.next_h = self.next_h.min(self.longest_step_at_rest());
+                }
+                break;
+            }
+            self.statistics.rejected += 1;
+            // NaN shrinks as well.
+            let shrunk = if error.is_finite() {
+                (0.9 * error.powf(-0.2)).max(0.1)
+            } else {
+                0.1
+            };
+            h *= shrunk;
+            self.next_h = h;
+            if h < self.rounding_s() {
+                return Err(self.diverged());
+            }
+        }
+        let Some(event) = self.first_event(h) else {
+            return Ok((h, None));
+        };
+        let shorter = event.u() * h;
+        if shorter <= self.rounding_s() {
+            return Ok((0.0, Some(event)));
+        }
+        // A shorter step of an accepted one is at least as exact.
+        self.attempt(shorter);
+        Ok((shorter, Some(event)))
+    }
+
+    /// The first thing that ends the step tried last before its time.
+    fn first_event(&mut self, h: f64) -> Option<Event> {
+        let contact = self
+            .contact
+            .as_ref()
+            .and_then(|contact| contact.first_change(self.t, h, &self.displacement))
+            .map(Event::Contact);
+        let mut room = std::mem::take(&mut self.room);
+        let terms: Option<Event> = (0..self.branches.len())
+            .filter_map(|index| self.end_of_branch(index, h, &mut room))
+            .min_by(|a, b| a.u().total_cmp(&b.u()));
+        self.room = room;
+        match (contact, terms) {
+            (Some(contact), Some(term)) if contact.u() > term.u() => Some(term),
+            (Some(contact), _) => Some(contact),
+            (None, term) => term,
+        }
+    }
+
+    fn end_of_branch(&self, index: usize, h: f64, room: &mut Room) -> Option<Event> {
+        let (term, branch) = (&self.model.terms[index], self.branches[index]);
+        let place = self.place(index);
+        let room = std::cell::RefCell::new(room);
+        let margin = |u: f64| {
+            let mut room = room.borrow_mut();
+            let Room { state, rate, .. } = &mut **room;
+            for (state, quartic) in state.iter_mut().zip(&self.quartics) {
+                *state = at(quartic, u);
+            }
+            let t = self.t + u * h;
+            let holding_n = match term.holds().filter(|_| term.locked(branch)) {
+                Some(axis) => self.held_n(index, axis, (t, state), rate),
+                None => 0.0,
+            };
+            term.margin(branch, &self.at(t, state), &state[place.clone()], holding_n)
+        };
+        first_below_zero(margin).map(|u| Event::Term { index, u })
+    }
+
+    /// Tries one step and makes its interpolant; the error in units of what is allowed.
+    fn attempt(&mut self, h: f64) -> f64 {
+        self.look_ahead(h);
+        let model = self.model;
+        let stretch = Stretch {
+            contact: self.contact.as_ref(),
+            within: self.within,
+            branches: Branches(&self.branches),
+        };
+        self.step.attempt(self.t, h, &self.y, |t, y, rate| {
+            model.rate(stretch, (t, model.dynamics.displacement(y)), y, rate);
+        });
+        self.step.interpolant(h, &self.y, &mut self.quartics);
+        self.displacement = model.dynamics.displacement_quartics(&self.quartics);
+        let sizes = model.dynamics.sizes();
+        let allowed_m = self.settings.absolute_m + self.settings.relative * self.amplitude_m();
+        self.step.error(h, |element| {
+            sizes.get(element).copied().unwrap_or(1.0) * allowed_m
+        })
+    }
+
+    /// The largest element of y at the ends of the step tried last, as a displacement.
+    fn amplitude_m(&self) -> f64 {
+        let ends = self.y.iter().zip(self.step.end());
+        ends.zip(self.model.dynamics.sizes())
+            .map(|((y, end), size)| y.abs().max(end.abs()) / size)
+            .fold(0.0, f64::max)
+    }
+
+    fn accept(&mut self, h: f64, observe: &mut impl FnMut(&Segment<'_>)) -> Result<(), SimulateError> {
+        if self.amplitude_m() > self.settings.largest_m {
+            return Err(self.diverged());
+        }
+        observe(&Segment {
+            model: self.model,
+            stretch: self.stretch(),
+            quartics: &self.quartics,
+            displacement: &self.displacement,
+            from_s: self.t,
+            to_s: self.t + h,
+        });
+        if let Some(contact) = &mut self.contact {
+            contact.record(self.t, h, &self.displacement);
+        }
+        self.t += h;
+        self.y.copy_from_slice(self.step.end());
+        self.step.follow();
+        self.statistics.steps += 1;
+        Ok(())
+    }
+
+    fn switch(&mut self) {
+        let Some(contact) = &mut self.contact else { return };
+        let x = self.model.dynamics.displacement(&self.y);
+        self.room.state.copy_from_slice(&self.y);
+        let stretch = Stretch {
+            contact: Some(contact),
+            within: self.within,
+            branches: Branches(&self.branches),
+        };
+        self.model
+            .rate(stretch, (self.t, x), &self.room.state, &mut self.room.rate);
+        let v = self.model.dynamics.velocity(&self.room.rate);
+        contact.switch(self.t, x, v);
+    }
+
+    /// The next time at which the right-hand side is not smooth, or the end.
+    fn next_stop(&self, end_s: f64) -> f64 {
+        let contact = self
+            .contact
+            .as_ref()
+            .map_or(f64::INFINITY, |contact| contact.next_switch_s(self.t));
+        let drive = self.model.drive.as_ref().map_or(f64::INFINITY, |drive| {
+            drive.next_knot_s(self.t + self.rounding_s())
+        });
+        contact.min(drive).min(end_s)
+    }
+
+    /// Half the time from tooth to tooth: the surface in front must be there, and changes of contact be seen.
+    fn longest_step(&self, end_s: f64) -> f64 {
+        self.contact
+            .as_ref()
+            .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s())
+    }
+
+    /// The longest step while nothing moves, or friction holds an axis: the force alone then says when that ends, and no error of the
+    /// motion shortens steps.
+    fn longest_step_at_rest(&self) -> f64 {
+        let drive = self.model.drive.as_ref();
+        drive.map_or(f64::INFINITY, |drive| drive.longest_step_s())
+    }
+
+    fn is_held(&self) -> bool {
+        let mut branches = self.model.terms.iter().zip(&self.branches);
+        branches.any(|(term, branch)| term.locked(*branch))
+    }
+
+    /// The step that leaves no stub before `stop_s`.
+    fn fitted(&self, h: f64, stop_s: f64) -> f64 {
+        let left = stop_s - self.t;
+        if h >= 0.99 * left {
+            left
+        } else if 2.0 * h > left {
+            0.5 * left
+        } else {
+            h
+        }
+    }
+
+    /// Times closer than this cannot be told apart.
+    fn rounding_s(&self) -> f64 {
+        8.0 * f64::EPSILON * self.t
+    }
+
+    fn diverged(&self) -> SimulateError {
+        SimulateError::Diverged {
+            time_s: self.t,
+            displacement_mm: 1e3 * self.amplitude_m(),
+        }
+    }
+}

@@ -1,0 +1,279 @@
+//! When the tool is in the workpiece: air, entry, full cut, exit, air.
+
+use super::SimulateError;
+use quietcut_model::cutter::Cutter;
+use quietcut_model::spindle::Spindle;
+
+/// How the tool comes into the workpiece and leaves it again. Times in s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Passage {
+    /// It never meets the workpiece.
+    Air,
+    /// It has always been in full cut; the surface in front of it at t = 0 was left by a tool at rest.
+    Steady,
+    /// The axial depth grows linearly from `start_s` on for `ramp_s`, and shrinks as long until `end_s`.
+    Ramp {
+        /// First touch.
+        start_s: f64,
+        /// How long the depth grows, and shrinks.
+        ramp_s: f64,
+        /// Last touch.
+        end_s: f64,
+    },
+    /// It feeds in through the front face of the workpiece and out through the end face: immersion grows and
+    /// shrinks. A tooth at φ cuts while its place R sin φ along the feed is behind the front face and before the
+    /// end face.
+    Feed {
+        /// The circle of the teeth touches the front face.
+        start_s: f64,
+        /// The circle of the teeth touches the end face.
+        end_s: f64,
+    },
+}
+
+/// Stretches of time in which a tooth has material in front of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spans {
+    spans: [Option<[f64; 2]>; 2],
+}
+
+impl Spans {
+    /// True where `t` is in one of the stretches, ends excluded.
+    pub fn contain(&self, t: f64) -> bool {
+        self.spans
+            .iter()
+            .flatten()
+            .any(|[from, to]| (*from..*to).contains(&t))
+    }
+
+    /// The first beginning or end after `t`.
+    pub fn next_edge(&self, t: f64) -> f64 {
+        let edges = self.spans.iter().flatten().flatten();
+        edges
+            .copied()
+            .filter(|edge| *edge > t)
+            .fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Passage {
+    /// How long the tool takes from touching a face to full immersion, and from touching the end face to leaving, s.
+    ///
+    /// # Errors
+    /// The size of the tool is not known.
+    pub fn way_in_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
+        let radius_m = cutter.radius_m.ok_or(SimulateError::NoDiameter)?;
+        // The last place of the arc to reach a face is at one of its ends.
+        let last = cutter.start_rad.sin().min(cutter.exit_rad.sin());
+        Ok(radius_m * (1.0 - last) / feed_speed(cutter, spindle))
+    }
+
+    /// The share of the axial depth that is in the workpiece at `t`, 0 to 1.
+    pub fn depth_share(&self, t: f64) -> f64 {
+        match *self {
+            Self::Air => 0.0,
+            Self::Steady | Self::Feed { .. } => 1.0,
+            Self::Ramp {
+                start_s,
+                ramp_s,
+                end_s,
+            } => {
+                let inside = (t - start_s).min(end_s - t);
+                if inside <= 0.0 {
+                    0.0
+                } else if inside >= ramp_s {
+                    1.0
+                } else {
+                    inside / ramp_s
+                }
+            }
+        }
+    }
+
+    /// The first time after `t` at which the rate of the axial depth jumps.
+    pub fn next_knot(&self, t: f64) -> f64 {
+        let Self::Ramp {
+            start_s,
+            ramp_s,
+            end_s,
+        } = *self
+        else {
+            return f64::INFINITY;
+        };
+        // Where the ramps meet before the full depth is reached, their crossing is a knot too.
+        let knots = [
+            start_s,
+            start_s + ramp_s,
+            0.5 * (start_s + end_s),
+            end_s - ramp_s,
+            end_s,
+        ];
+        knots
+            .into_iter()
+            .filter(|knot| *knot > t)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// True where the tool meets no more of the workpiece from `t` on.
+    pub fn is_over(&self, t: f64, cutter: &Cutter, spindle: &Spindle) -> bool {
+        match *self {
+            Self::Air => true,
+            Self::Steady => false,
+            Self::Ramp { end_s, .. } => t >= end_s,
+            Self::Feed { end_s, .. } => {
+                let radius_m = cutter.radius_m.unwrap_or(0.0);
+                // A turn more, so that no tooth is in the middle of its last pass.
+                let turn_feed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64;
+                (t - end_s) * feed_speed(cutter, spindle) > radius_m + turn_feed_m
+            }
+        }
+    }
+
+    /// When a tooth that passes φ = start at `open_s` and φ = exit at `close_s` has material in front of it.
+    pub fn spans(&self, cutter: &Cutter, spindle: &Spindle, open_s: f64, close_s: f64) -> Spans {
+        let whole = Some([open_s, close_s]);
+        match *self {
+            Self::Air => Spans::default(),
+            Self::Steady => Spans { spans: [whole, None] },
+            Self::Ramp { start_s, end_s, .. } => Spans {
+                spans: [intersection(whole, Some([start_s, end_s])), None],
+            },
+            Self::Feed { start_s, end_s } => {
+                let radius_m = cutter.radius_m.unwrap_or(f64::INFINITY);
+                let speed = feed_speed(cutter, spindle) / radius_m;
+                let opened_rad = spindle.angle_rad(open_s);
+                let sin = |t: f64| (cutter.start_rad + (spindle.angle_rad(t) - opened_rad)).sin();
+                let window = [open_s, close_s];
+                // sin φ less the place of a face over the radius: concave in t (a spindle that fluctuates slowly against a
+                // tooth pass bends it little), positive beyond the face.
+                let behind_front = positive(|t| sin(t) - (1.0 - speed * (t - start_s)), window);
+                let behind_end = positive(|t| sin(t) - (1.0 - speed * (t - end_s)), window);
+                let [before, after] = complement(behind_end, window);
+                Spans {
+                    spans: [
+                        intersection(behind_front, before),
+                        intersection(behind_front, after),
+                    ],
+                }
+            }
+        }
+    }
+}
+
+/// m/s.
+fn feed_speed(cutter: &Cutter, spindle: &Spindle) -> f64 {
+    cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * spindle.speed_rad_per_s() / std::f64::consts::TAU
+}
+
+fn intersection(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    let ([a0, a1], [b0, b1]) = (a?, b?);
+    let both = [a0.max(b0), a1.min(b1)];
+    (both[0] < both[1]).then_some(both)
+}
+
+/// What a stretch leaves of the window, before and after it.
+fn complement(stretch: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>; 2] {
+    match stretch {
+        None => [Some(window), None],
+        Some([from, to]) => [
+            (window[0] < from).then_some([window[0], from]),
+            (to < window[1]).then_some([to, window[1]]),
+        ],
+    }
+}
+
+/// The stretch of the window in which a concave function is positive.
+fn positive(f: impl Fn(f64) -> f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
+    let top = maximum(&f, from, to);
+    if f(top) <= 0.0 {
+        return None;
+    }
+    let left = if f(from) >= 0.0 { from } else { root(&f, from, top) };
+    let right = if f(to) >= 0.0 { to } else { root(&f, to, top) };
+    Some([left, right])
+}
+
+/// Where a concave function is largest, by ternary search.
+fn maximum(f: &impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
+    // (2/3)^100 of the window: flat to rounding long before.
+    for _ in 0..100 {
+        let third = (to - from) / 3.0;
+        if f(from + third) < f(to - third) {
+            from += third;
+        } else {
+            to -= third;
+        }
+    }
+    // The ends of the window are left and right of any inner point that rounding prefers.
+    0.5 * (from + to)
+}
+
+/// The zero between `negative` and `positive`, to the last bit, by bisection.
+fn root(f: &impl Fn(f64) -> f64, mut negative: f64, mut positive: f64) -> f64 {
+    loop {
+        let middle = 0.5 * (negative + positive);
+        if middle == negative || middle == positive {
+            return positive;
+        }
+        if f(middle) > 0.0 {
+            positive = middle;
+        } else {
+            negative = middle;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::{acetal_cutter, slot_cutter};
+
+    #[test]
+    fn immersion_grows_as_the_tool_feeds_in_and_shrinks_as_it_feeds_out() {
+        for cutter in [acetal_cutter(), slot_cutter()] {
+            let spindle = Spindle::new(900.0);
+            let radius_m = 6.35e-3;
+            let feed_m_per_s = 0.15e-3 * 30.0;
+            let (start_s, end_s) = (1.0, 5.0);
+            let passage = Passage::Feed { start_s, end_s };
+            let turn_s = 60.0 / 900.0;
+            for pass in 0..120 {
+                let open_s = f64::from(pass) * turn_s + cutter.start_rad / spindle.speed_rad_per_s();
+                let close_s = f64::from(pass) * turn_s + cutter.exit_rad / spindle.speed_rad_per_s();
+                let spans = passage.spans(&cutter, &spindle, open_s, close_s);
+                // The rule of the passage, asked at many instants.
+                for i in 0..500 {
+                    let t = open_s + (close_s - open_s) * (f64::from(i) + 0.5) / 500.0;
+                    let x_m = radius_m * spindle.angle_rad(t).sin();
+                    let front_m = radius_m - feed_m_per_s * (t - start_s);
+                    let end_m = radius_m - feed_m_per_s * (t - end_s);
+                    // Not within rounding of a face.
+                    if (x_m - front_m).abs() > 1e-9 && (x_m - end_m).abs() > 1e-9 {
+                        assert_eq!(
+                            spans.contain(t),
+                            x_m > front_m && x_m < end_m,
+                            "pass {pass}, {t} s"
+                        );
+                    }
+                }
+            }
+            let way_s = Passage::way_in_s(&cutter, &spindle).unwrap();
+            assert!((way_s - radius_m / feed_m_per_s).abs() < 1e-12);
+            assert!(!passage.is_over(end_s + way_s, &cutter, &spindle));
+            assert!(passage.is_over(end_s + 2.0 * way_s, &cutter, &spindle));
+        }
+    }
+
+    #[test]
+    fn a_ramp_grows_to_the_whole_depth_and_back() {
+        let ramp = Passage::Ramp {
+            start_s: 1.0,
+            ramp_s: 0.5,
+            end_s: 4.0,
+        };
+        let shares = [0.5, 1.0, 1.25, 1.5, 2.0, 3.75, 4.0, 5.0].map(|t| ramp.depth_share(t));
+        assert_eq!(shares, [0.0, 0.0, 0.5, 1.0, 1.0, 0.5, 0.0, 0.0]);
+        assert_eq!(ramp.next_knot(1.2), 1.5);
+        assert_eq!(ramp.next_knot(4.0), f64::INFINITY);
+    }
+}

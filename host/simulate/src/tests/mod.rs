@@ -1,0 +1,88 @@
+//! Tests of the simulation: closed forms, reference multipliers, a brute-force integration, facts of chapter 6.
+
+mod brute_force;
+mod closed_form;
+mod facts;
+mod milling_rigs;
+mod multipliers;
+mod sensors;
+
+use super::*;
+use quietcut_model::case::Case;
+pub(crate) use quietcut_testkit::case;
+
+/// The tool of chapter 6 in a slot, 1 mm deep.
+pub(super) fn slot_cutter() -> Cutter {
+    cutter(&case("kuka-kr90-full"), 1.0)
+}
+
+/// The tool of chapter 7, half immersed in acetal, 1 mm deep.
+pub(super) fn acetal_cutter() -> Cutter {
+    cutter(&case("kuka-kr90-acetal"), 1.0)
+}
+
+fn cutter(case: &Case, depth_mm: f64) -> Cutter {
+    let (tool, material, cut) = (
+        case.tool().unwrap(),
+        case.material().unwrap(),
+        case.cut().unwrap(),
+    );
+    let mut cutter = Cutter::new(tool, material, cut, 1e-3 * depth_mm).unwrap();
+    cutter.axial_depth_modulation = case.axial_depth_modulation();
+    cutter
+}
+
+/// A case in full cut from the start.
+fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
+    Model {
+        dynamics: Dynamics::new(case.structure().unwrap()).unwrap(),
+        cutting: Some(Cutting {
+            cutter: cutter(case, depth_mm),
+            spindle: Spindle::new(spindle_rpm),
+            passage: Passage::Steady,
+            regeneration: Regeneration::AllPasses,
+            pores: None,
+        }),
+        drive: None,
+        terms: Vec::new(),
+    }
+}
+
+/// The motion at `first_s + k·every_s` up to `end_s`, from rest.
+fn motions(model: &Model, settings: Settings, first_s: f64, every_s: f64, end_s: f64) -> Vec<Motion> {
+    let at_rest = vec![0.0; model.dynamics.order()];
+    motions_from(model, at_rest, settings, first_s, every_s, end_s)
+}
+
+fn motions_from(
+    model: &Model,
+    states: Vec<f64>,
+    settings: Settings,
+    first_s: f64,
+    every_s: f64,
+    end_s: f64,
+) -> Vec<Motion> {
+    let mut found: Vec<Motion> = Vec::new();
+    let mut room = Room::new(model);
+    model
+        .run_from(states, end_s, settings, |segment| {
+            loop {
+                let t = first_s + found.len() as f64 * every_s;
+                if t > segment.to_s() {
+                    break;
+                }
+                found.push(segment.motion(t, &mut room));
+            }
+        })
+        .unwrap();
+    found
+}
+
+fn exact(relative: f64) -> Settings {
+    Settings {
+        absolute_m: 1e-4 * relative,
+        relative,
+        largest_m: f64::INFINITY,
+        ..Settings::default()
+    }
+}

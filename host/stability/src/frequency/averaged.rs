@@ -1,0 +1,159 @@
+//! The loop of averaged coefficients: one frequency, no period (eqs 3.8–3.12).
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use num_complex::Complex64;
+
+use super::open_loop::{OpenLoop, RealEnd, around, ascending};
+use super::problem::FrequencyProblem;
+use crate::{Kind, StabilityError};
+use quietcut_numerics::complex_eigenvalues;
+
+/// u = H (κ α₀ − β₀) u with the averages α₀ (times K_tc) and β₀ = β_e + β_f over a tooth period.
+///
+/// β₀ does not depend on the depth: with H̃ = (I + H β₀)⁻¹ H, u = κ H̃ α₀ u, and the eigenvalues of H̃ α₀ say all. Only
+/// displacements that change the chip thickness count in it.
+pub(super) struct AveragedLoop<'a> {
+    problem: &'a FrequencyProblem,
+    /// The delay, s; `None` where the displacement a tooth period ago is neglected.
+    delay_s: Option<f64>,
+    /// K_tc α₀, Pa.
+    directional: Matrix3<f64>,
+    /// The z column of β₀, N/m; zero where the depth does not follow the axial vibration.
+    forced: Vector3<f64>,
+    /// The directions that change the chip thickness.
+    axes: Vec<usize>,
+}
+
+impl<'a> AveragedLoop<'a> {
+    /// The loop at a speed, rev/min, or that of the cut without its own past.
+    pub(super) fn new(problem: &'a FrequencyProblem, rpm: Option<f64>) -> Self {
+        let process = &problem.process;
+        let averaged = process
+            .force
+            .averaged(&process.engagement, process.feed_per_tooth_m);
+        let moves = problem.moves();
+        let is_seen =
+            |axis: usize| averaged.directional.column(axis).amax() > 1e-14 * averaged.directional.amax();
+        Self {
+            problem,
+            delay_s: rpm.map(|rpm| problem.tooth_period_s(rpm)),
+            directional: averaged.directional,
+            forced: if process.axial_depth_modulation {
+                averaged.forced
+            } else {
+                Vector3::zeros()
+            },
+            axes: (0..3).filter(|&axis| moves[axis] && is_seen(axis)).collect(),
+        }
+    }
+
+    /// Refuses depths at which a table ends before the loop has become smaller than 1.
+    ///
+    /// Beyond its last line a table is continued as inertia: that nothing becomes unstable there can be said only where
+    /// the gain of the loop is below 1 at the last line already. A mode above the table is not seen, however small the
+    /// loop is.
+    ///
+    /// # Errors
+    /// The gain at the last line, with the displacement and its past in opposition, is 1 or more at that depth.
+    pub(super) fn check_reach(problem: &FrequencyProblem, depth_mm: f64) -> Result<(), StabilityError> {
+        let Some((_, last_hz)) = problem.band_hz() else {
+            return Ok(());
+        };
+        let last = Complex64::new(0.0, std::f64::consts::TAU * last_hz);
+        let loci = AveragedLoop::new(problem, None)
+            .eigenvalues(last, 0.0)
+            .unwrap_or_default();
+        let largest = loci.iter().map(|locus| locus.norm()).fold(0.0, f64::max);
+        let deepest_mm = 1e3 / (2.0 * largest);
+        if depth_mm < deepest_mm {
+            return Ok(());
+        }
+        Err(StabilityError::EndsEarly {
+            depth_mm,
+            deepest_mm,
+            last_hz,
+        })
+    }
+
+    /// 1 + (Hβ₀)_zz, which is det(I + Hβ₀).
+    fn modulation(&self, h: &Matrix3<Complex64>) -> Complex64 {
+        Complex64::ONE + (h.row(2) * self.forced.map(Complex64::from))[0]
+    }
+
+    /// H̃ α₀ by Sherman and Morrison.
+    fn matrix(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
+        let h = self.problem.transfer(s)?;
+        let change = h * self.forced.map(Complex64::from) * h.row(2);
+        let folded = h - change / self.modulation(&h);
+        Some(folded * self.directional.map(Complex64::from))
+    }
+}
+
+impl OpenLoop for AveragedLoop<'_> {
+    fn problem(&self) -> &FrequencyProblem {
+        self.problem
+    }
+
+    fn regeneration(&self, s: Complex64) -> Complex64 {
+        self.delay_s
+            .map_or(Complex64::ONE, |delay_s| Complex64::ONE - (-s * delay_s).exp())
+    }
+
+    fn folded(&self, s: Complex64) -> Complex64 {
+        s
+    }
+
+    fn eigenvalues(&self, s: Complex64, _floor: f64) -> Option<Vec<Complex64>> {
+        let matrix = self.matrix(s)?;
+        let seen = DMatrix::from_fn(self.axes.len(), self.axes.len(), |i, j| {
+            matrix[(self.axes[i], self.axes[j])]
+        });
+        complex_eigenvalues::eigenvalues(seen)
+    }
+
+    fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64> {
+        let mut cut = self.directional.map(|entry| kappa * entry);
+        for axis in 0..3 {
+            cut[(axis, 2)] -= self.forced[axis];
+        }
+        let determinant = (Matrix3::identity() - cut * self.problem.transfer(s)?).determinant();
+        determinant.is_finite().then_some(determinant)
+    }
+
+    fn real_end(&self) -> Option<RealEnd> {
+        // With regeneration loci start at 0; without, at the static compliance.
+        if self.delay_s.is_some() {
+            return None;
+        }
+        let loci = self.eigenvalues(Complex64::ZERO, 0.0)?;
+        let real = loci.iter().filter(|locus| locus.im.abs() <= 1e-9 * locus.norm());
+        Some(RealEnd {
+            omega: 0.0,
+            loci: real.map(|locus| locus.re).collect(),
+            kind: Kind::Fold,
+        })
+    }
+
+    fn grid(&self, floor: f64) -> Option<Vec<f64>> {
+        let resonances = self.problem.resonances();
+        let fastest = resonances
+            .iter()
+            .map(|resonance| resonance.omega.hypot(resonance.width))
+            .fold(0.0, f64::max);
+        let lines = self.problem.lines();
+        let mut end = lines.last().copied().unwrap_or(0.0).max(1.5 * fastest);
+        let size = |omega: f64| Some(2.0 * self.matrix(Complex64::new(0.0, omega))?.norm());
+        // Beyond all resonances receptances only fall.
+        while end > 0.0 && size(end)? >= floor {
+            end *= 1.4;
+        }
+        let mut grid = around(&resonances, end);
+        grid.extend(lines.into_iter().filter(|&line| line < end));
+        if let Some(delay_s) = self.delay_s {
+            // A locus turns by half of ωτ: a step turns it by a sixth of a turn at most.
+            let steps = (end * delay_s * 3.0 / std::f64::consts::TAU).ceil();
+            grid.extend((1..steps as usize).map(|i| end * i as f64 / steps));
+        }
+        Some(ascending(grid))
+    }
+}

@@ -1,0 +1,303 @@
+//! The loop of periodic coefficients, by its harmonics: the truncated harmonic transfer matrix.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use num_complex::Complex64;
+
+use super::limits::{Limit, limits};
+use super::open_loop::{OpenLoop, RealEnd, around, ascending};
+use super::problem::{FrequencyProblem, Resonance};
+use crate::Kind;
+use quietcut_model::milling::Harmonic;
+use quietcut_numerics::complex_eigenvalues;
+use quietcut_numerics::eigenvalues;
+
+/// u(t) = e^{st} Σ_p u_p e^{ipΩt}: u_p = H(s + ipΩ) Σ_q (κ α_{p−q} − β_{p−q}) u_q, with p, q from −K−1 to K.
+///
+/// Ω is the tooth-passing frequency, α_k and β_k the harmonics of the coefficients. e^{−(s+ipΩ)τ} is the same for all
+/// p, so that κ stands before the whole matrix. At s = iΩ/2 the frequencies are symmetric about 0: there a multiplier −1
+/// is a real eigenvalue, and the loop is real. s from 0 to iΩ/2 and the conjugate is all there is: what is true at
+/// s is true at s + iΩ. Forces jump where a tooth enters or leaves, so α_k falls as 1/k and H as 1/k²: what is left out
+/// changes limits as 1/K³, and as 1/K² for a structure whose residues do not sum to zero.
+pub(super) struct HarmonicLoop<'a> {
+    problem: &'a FrequencyProblem,
+    /// Tooth-passing frequency Ω, rad/s.
+    passing: f64,
+    /// K.
+    harmonics: usize,
+    /// Harmonics of the coefficients from −(2K + 1) to 2K + 1.
+    coefficients: Vec<Harmonic>,
+    /// The directions that change the chip thickness or the depth.
+    axes: Vec<usize>,
+}
+
+impl<'a> HarmonicLoop<'a> {
+    /// The loop at a speed, rev/min, with harmonics up to K.
+    pub(super) fn new(problem: &'a FrequencyProblem, rpm: f64, harmonics: usize) -> Self {
+        let process = &problem.process;
+        let most = 2 * harmonics as i32 + 1;
+        let moves = problem.moves();
+        let normal = &process.force.normal;
+        let is_seen = |axis: usize| {
+            let part = normal.constant[axis].abs() + normal.cosine[axis].abs() + normal.sine[axis].abs();
+            part > 1e-14 || (axis == 2 && process.axial_depth_modulation)
+        };
+        Self {
+            problem,
+            passing: std::f64::consts::TAU / problem.tooth_period_s(rpm),
+            harmonics,
+            coefficients: (-most..=most)
+                .map(|k| {
+                    process
+                        .force
+                        .harmonic(&process.engagement, process.feed_per_tooth_m, k)
+                })
+                .collect(),
+            axes: (0..3).filter(|&axis| moves[axis] && is_seen(axis)).collect(),
+        }
+    }
+
+    /// The fewest harmonics that reach beyond every resonance.
+    pub(super) fn least_harmonics(problem: &FrequencyProblem, rpm: f64) -> usize {
+        let fastest = problem
+            .resonances()
+            .iter()
+            .map(|resonance| resonance.omega)
+            .fold(0.0, f64::max);
+        let passing = std::f64::consts::TAU / problem.tooth_period_s(rpm);
+        (1.25 * fastest / passing).ceil() as usize + 4
+    }
+
+    /// K.
+    pub(super) fn harmonics(&self) -> usize {
+        self.harmonics
+    }
+
+    /// The limits with every second line of a table, none where they cannot be had; `None` without a table.
+    pub(super) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<Limit>> {
+        let problem = self.problem.thinned()?;
+        let thinned = HarmonicLoop {
+            problem: &problem,
+            passing: self.passing,
+            harmonics: self.harmonics,
+            coefficients: self.coefficients.clone(),
+            axes: self.axes.clone(),
+        };
+        Some(limits(&thinned, depth_m).unwrap_or_default())
+    }
+
+    /// Number of frequencies.
+    fn count(&self) -> usize {
+        2 * self.harmonics + 2
+    }
+
+    /// H at all frequencies, from the lowest up.
+    fn transfers(&self, s: Complex64) -> Option<Vec<Matrix3<Complex64>>> {
+        (0..self.count())
+            .map(|index| {
+                let order = index as f64 - self.harmonics as f64 - 1.0;
+                self.problem
+                    .transfer(s + Complex64::new(0.0, order * self.passing))
+            })
+            .collect()
+    }
+
+    /// The harmonic p − q of the coefficients.
+    fn coefficient(&self, p: usize, q: usize) -> &Harmonic {
+        // Both below the count: the difference lies within what was made.
+        &self.coefficients[p + 2 * self.harmonics + 1 - q]
+    }
+
+    /// Blocks H_p α_{p−q} and H_p β_{p−q}, both over the directions that are seen.
+    fn matrices(&self, s: Complex64) -> Option<(DMatrix<Complex64>, Option<DMatrix<Complex64>>)> {
+        let transfers = self.transfers(s)?;
+        let (count, axes) = (self.count(), &self.axes);
+        let size = count * axes.len();
+        let mut cut = DMatrix::zeros(size, size);
+        let mut forced = self
+            .problem
+            .process
+            .axial_depth_modulation
+            .then(|| DMatrix::zeros(size, size));
+        for (p, h) in transfers.iter().enumerate() {
+            for q in 0..count {
+                let coefficient = self.coefficient(p, q);
+                let block = h * coefficient.directional;
+                for (i, &row) in axes.iter().enumerate() {
+                    for (j, &column) in axes.iter().enumerate() {
+                        cut[(p * axes.len() + i, q * axes.len() + j)] = block[(row, column)];
+                    }
+                }
+                if let (Some(forced), Some(z)) = (&mut forced, axes.iter().position(|&axis| axis == 2)) {
+                    let column = h * coefficient.forced;
+                    for (i, &row) in axes.iter().enumerate() {
+                        forced[(p * axes.len() + i, q * axes.len() + z)] = column[row];
+                    }
+                }
+            }
+        }
+        Some((cut, forced))
+    }
+
+    /// (I + Hβ)⁻¹ Hα: its eigenvalues are λ.
+    fn matrix(&self, s: Complex64) -> Option<DMatrix<Complex64>> {
+        let (cut, forced) = self.matrices(s)?;
+        match forced {
+            None => Some(cut),
+            Some(forced) => {
+                let size = cut.nrows();
+                (DMatrix::identity(size, size) + forced).lu().solve(&cut)
+            }
+        }
+    }
+
+    /// The real eigenvalues, 1/m, at s = iΩ/2, where multipliers are −1.
+    fn flips(&self) -> Option<Vec<f64>> {
+        let matrix = self.matrix(Complex64::new(0.0, 0.5 * self.passing))?;
+        let real = real_form(&matrix, self.count(), self.axes.len());
+        let all = eigenvalues::eigenvalues(real)?;
+        Some(
+            all.iter()
+                .filter(|value| value.im == 0.0)
+                .map(|value| value.re)
+                .collect(),
+        )
+    }
+
+    /// The frequency, Hz, of the largest displacement in the motion of a root s at a depth, m.
+    pub(super) fn vibration_hz(&self, s: Complex64, depth_m: f64) -> Option<f64> {
+        let kappa = self.regeneration(s) * depth_m;
+        let (cut, forced) = self.matrices(s)?;
+        let size = cut.nrows();
+        // A depth a little off keeps the matrix regular and separates the vector by 1e8 at each step.
+        let mut matrix = DMatrix::identity(size, size) - &cut * (kappa * (1.0 + 1e-8));
+        if let Some(forced) = forced {
+            matrix += forced;
+        }
+        let lu = matrix.lu();
+        let mut vector = DVector::from_fn(size, |i, _| Complex64::cis(i as f64));
+        for _ in 0..3 {
+            vector = lu.solve(&vector)?;
+            let norm = vector.norm();
+            if !(norm.is_finite() && norm > 0.0) {
+                return None;
+            }
+            vector.unscale_mut(norm);
+        }
+        let is_modulated = self.problem.process.axial_depth_modulation;
+        let transfers = self.transfers(s)?;
+        transfers
+            .iter()
+            .enumerate()
+            .map(|(p, h)| {
+                let mut force = Vector3::<Complex64>::zeros();
+                for (index, part) in vector.iter().enumerate() {
+                    let (q, axis) = (index / self.axes.len(), self.axes[index % self.axes.len()]);
+                    let coefficient = self.coefficient(p, q);
+                    force += coefficient.directional.column(axis) * (kappa * part);
+                    if axis == 2 && is_modulated {
+                        force -= coefficient.forced * *part;
+                    }
+                }
+                let mut displacement = h * force;
+                // The same to rounding, but for a free vibration, which no force drives.
+                for (i, &axis) in self.axes.iter().enumerate() {
+                    displacement[axis] = vector[p * self.axes.len() + i];
+                }
+                let omega = s.im + (p as f64 - self.harmonics as f64 - 1.0) * self.passing;
+                (displacement.norm(), omega.abs() / std::f64::consts::TAU)
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, hz)| hz)
+    }
+}
+
+impl HarmonicLoop<'_> {
+    /// The frequency, Hz, of the largest displacement in the vibration at a limit.
+    pub(super) fn chatter_hz(&self, limit: &Limit) -> Option<f64> {
+        let s = Complex64::new(0.0, limit.omega);
+        self.vibration_hz(s, limit.depth_m)
+    }
+}
+
+/// The matrix at s = iΩ/2 in cosines and sines: real, since its entries for p, q are conjugate to those for −p−1, −q−1.
+fn real_form(matrix: &DMatrix<Complex64>, count: usize, axes: usize) -> DMatrix<f64> {
+    let mirrored = |index: usize| (count - 1 - index / axes) * axes + index % axes;
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let is_upper = |index: usize| index / axes >= count / 2;
+    // Row i of the unitary matrix that makes cosines (upper half) and sines (lower half).
+    let factors = |index: usize| {
+        if is_upper(index) {
+            (Complex64::from(half), Complex64::from(half))
+        } else {
+            (Complex64::new(0.0, half), Complex64::new(0.0, -half))
+        }
+    };
+    let size = count * axes;
+    let mut rows = DMatrix::zeros(size, size);
+    for i in 0..size {
+        let (own, other) = factors(i);
+        rows.set_row(i, &(matrix.row(i) * own + matrix.row(mirrored(i)) * other));
+    }
+    DMatrix::from_fn(size, size, |i, j| {
+        let (own, other) = factors(j);
+        (rows[(i, j)] * own.conj() + rows[(i, mirrored(j))] * other.conj()).re
+    })
+}
+
+impl OpenLoop for HarmonicLoop<'_> {
+    fn problem(&self) -> &FrequencyProblem {
+        self.problem
+    }
+
+    fn regeneration(&self, s: Complex64) -> Complex64 {
+        Complex64::ONE - (-s * (std::f64::consts::TAU / self.passing)).exp()
+    }
+
+    fn folded(&self, s: Complex64) -> Complex64 {
+        let rest = s.im - (s.im / self.passing).round() * self.passing;
+        Complex64::new(s.re, rest.abs())
+    }
+
+    fn eigenvalues(&self, s: Complex64, floor: f64) -> Option<Vec<Complex64>> {
+        complex_eigenvalues::dominant(&self.matrix(s)?, floor)
+    }
+
+    fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64> {
+        let (cut, forced) = self.matrices(s)?;
+        let size = cut.nrows();
+        let mut matrix = DMatrix::identity(size, size) - cut * kappa;
+        if let Some(forced) = forced {
+            matrix += forced;
+        }
+        let determinant = matrix.lu().determinant();
+        determinant.is_finite().then_some(determinant)
+    }
+
+    fn real_end(&self) -> Option<RealEnd> {
+        Some(RealEnd {
+            omega: 0.5 * self.passing,
+            // κ/w is 2 there.
+            loci: self.flips()?.into_iter().map(|value| 2.0 * value).collect(),
+            kind: Kind::Flip,
+        })
+    }
+
+    fn grid(&self, _floor: f64) -> Option<Vec<f64>> {
+        let end = 0.5 * self.passing;
+        let folded: Vec<Resonance> = self
+            .problem
+            .resonances()
+            .into_iter()
+            .map(|resonance| {
+                let rest = resonance.omega.rem_euclid(self.passing);
+                Resonance {
+                    omega: rest.min(self.passing - rest),
+                    ..resonance
+                }
+            })
+            .collect();
+        let mut grid = around(&folded, end);
+        grid.extend((1..12).map(|i| end * f64::from(i) / 12.0));
+        Some(ascending(grid))
+    }
+}

@@ -1,0 +1,166 @@
+//! Where roots cross the imaginary axis as the depth grows, and how many are unstable.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex64;
+
+use super::loci::{crossings, trace, turning};
+use super::open_loop::OpenLoop;
+use crate::{Kind, LEAST_ERROR, SpeedLine, StabilityError, Switch};
+
+/// Distance from an end where loci are real, as a share of the frequency beside it, at which their direction is read.
+const BESIDE: f64 = 1e-5;
+
+/// A root on the imaginary axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Limit {
+    /// Depth, m.
+    pub(super) depth_m: f64,
+    /// The root is iω; rad/s.
+    pub(super) omega: f64,
+    /// How it crosses.
+    pub(super) kind: Kind,
+    /// True where it becomes unstable with growing depth.
+    pub(super) outward: bool,
+}
+
+/// All crossings up to a depth, m, by depth.
+///
+/// `None` where receptances are infinite or nothing finite comes out.
+pub(super) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Limit>> {
+    let floor = depth_m.recip();
+    let mut grid = open_loop.grid(floor)?;
+    let real_end = open_loop.real_end();
+    let mut limits = Vec::new();
+    if let Some(end) = &real_end {
+        // Real loci at an end are exact there; beside it they would seem to cross by rounding.
+        let beside = if end.omega > 0.0 {
+            let beside = end.omega * (1.0 - BESIDE);
+            grid.retain(|&omega| omega < beside);
+            grid.push(beside);
+            beside
+        } else {
+            let beside = grid.get(1)? * BESIDE;
+            grid.retain(|&omega| omega > beside);
+            grid.insert(0, beside);
+            beside
+        };
+        let loci = open_loop.loci(beside, floor * 0.1)?;
+        for &value in end.loci.iter().filter(|&&value| value >= floor) {
+            let near = loci
+                .iter()
+                .min_by(|p, q| (*p - value).norm().total_cmp(&(*q - value).norm()))?;
+            limits.push(Limit {
+                depth_m: value.recip(),
+                omega: end.omega,
+                kind: end.kind,
+                // The conjugate follows beyond the end: the locus falls through the axis.
+                outward: (near.im > 0.0) == (end.omega > 0.0),
+            });
+        }
+    }
+    let loci = |omega: f64| open_loop.loci(omega, 0.2 * floor);
+    let samples = trace(&loci, &grid, floor, 1.0)?;
+    limits.extend(
+        crossings(&loci, &samples, floor)?
+            .into_iter()
+            .map(|crossing| Limit {
+                depth_m: crossing.value.recip(),
+                omega: crossing.omega,
+                kind: Kind::Hopf,
+                // 1 − wλκ/w turns the other way round than the locus.
+                outward: !crossing.rises,
+            }),
+    );
+    limits.sort_by(|a, b| a.depth_m.total_cmp(&b.depth_m));
+    Some(limits)
+}
+
+/// The number of roots to the right of Re s = `sigma`, 1/s, at a depth, m, by the Nyquist criterion on the determinant.
+///
+/// D(s) has the roots for zeros and the poles of the structure for poles; along the line from `sigma` to infinity its
+/// argument grows by π(P − N)/… of a full turn for each of the pair. `None` where the line meets a root, or where the table
+/// cannot be continued to it.
+pub(super) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
+    let grid = open_loop.grid(depth_m.max(1e-9).recip())?;
+    let determinant = |omega: f64| {
+        let s = Complex64::new(sigma, omega);
+        open_loop.determinant(s, open_loop.regeneration(s) * depth_m)
+    };
+    let mut turned = turning(&determinant, &grid)?;
+    if open_loop.real_end().is_none_or(|end| end.omega == 0.0) {
+        // Beyond the grid the loop is smaller than one: the determinant goes straight to 1.
+        turned -= determinant(*grid.last()?)?.arg();
+    }
+    let half_turns = turned / PI;
+    // Both ends are real to rounding, but for the truncation of harmonics at 0.
+    let rounded = half_turns.round();
+    ((half_turns - rounded).abs() < 0.2).then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
+}
+
+/// Limits that differ by more than this share are not the same.
+const SAME: f64 = 0.1;
+
+/// An estimate of the error of a limit, m: what other computations change (with every second line of a table, with another number
+/// of harmonics), and what has been checked against other methods. `None` where one of them has no such limit.
+fn error_m(limit: &Limit, others: &[Vec<Limit>]) -> Option<f64> {
+    others.iter().try_fold(LEAST_ERROR * limit.depth_m, |sum, other| {
+        let changes = other
+            .iter()
+            .filter(|other| other.kind == limit.kind && other.outward == limit.outward)
+            .map(|other| (other.depth_m - limit.depth_m).abs());
+        let change = changes.min_by(f64::total_cmp)?;
+        (change < SAME * limit.depth_m).then_some(sum + change)
+    })
+}
+
+/// The line of given limits at a speed; `others` are those of computations from which errors are told, `chatter_hz` says at which
+/// frequency the cut vibrates there.
+///
+/// # Errors
+/// The number unstable at depth 0 cannot be told, or a vibration has a frequency that was not measured.
+pub(super) fn speed_line(
+    open_loop: &impl OpenLoop,
+    rpm: f64,
+    depth_mm: f64,
+    limits: &[Limit],
+    others: &[Vec<Limit>],
+    chatter_hz: impl Fn(&Limit) -> Option<f64>,
+) -> Result<SpeedLine, StabilityError> {
+    let outside = outside_at_no_depth(open_loop).ok_or(StabilityError::BrokeDown {
+        rpm,
+        depth_mm: 0.0,
+        what: "the roots at depth 0 cannot be counted",
+    })?;
+    let switches = limits
+        .iter()
+        .map(|limit| {
+            let switch = Switch {
+                depth_mm: limit.depth_m * 1e3,
+                error_mm: error_m(limit, others).map(|error_m| 1e3 * error_m),
+                kind: limit.kind,
+                gain: !limit.outward,
+                chatter_hz: chatter_hz(limit),
+            };
+            open_loop
+                .problem()
+                .check_band(switch.chatter_hz, rpm, switch.depth_mm)?;
+            Ok(switch)
+        })
+        .collect::<Result<Vec<_>, StabilityError>>()?;
+    Ok(SpeedLine::of_switches(rpm, depth_mm, outside, switches))
+}
+
+/// How many roots are unstable at depth 0: with edge and feed terms that act on the axial vibration there may be some.
+pub(super) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
+    if open_loop.problem().process.axial_depth_modulation {
+        unstable_roots(open_loop, 0.0, 0.0)
+    } else {
+        Some(0)
+    }
+}
+
+/// ω as Hz.
+pub(super) fn hertz(limit: &Limit) -> Option<f64> {
+    Some(limit.omega / TAU)
+}

@@ -1,0 +1,227 @@
+//! The milling problem by its receptances.
+
+use nalgebra::Matrix3;
+use num_complex::Complex64;
+
+use crate::extension::Treated;
+use crate::problem::cutting;
+use crate::{CubicTerms, Problem, StabilityError};
+use quietcut_frf::{FrfTable, Interpolation};
+use quietcut_model::case::Case;
+use quietcut_model::milling::Process;
+use quietcut_model::structure::FirstOrder;
+
+/// A pole whose distance from the imaginary axis is below this share of its size has no damping.
+const UNDAMPED: f64 = 1e-9;
+
+/// Receptances and a cutting process, in feed, normal and axial direction.
+#[derive(Clone, Debug)]
+pub struct FrequencyProblem {
+    receptance: Receptance,
+    /// The cutting process.
+    pub process: Process,
+    /// Number of teeth.
+    pub teeth: usize,
+}
+
+/// Where H(s) comes from.
+#[derive(Clone, Debug)]
+enum Receptance {
+    /// A modelled structure and its poles.
+    Model(FirstOrder, Vec<Complex64>),
+    /// Measured lines.
+    Table(Interpolation),
+}
+
+/// A frequency, rad/s, where receptances change fast, and within how many rad/s they do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Resonance {
+    pub(super) omega: f64,
+    pub(super) width: f64,
+}
+
+impl FrequencyProblem {
+    /// The problem of a case.
+    ///
+    /// # Errors
+    /// As [`Problem::new`] and [`FrequencyProblem::of_model`].
+    pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
+        Self::of_model(&Problem::new(case, cubic)?)
+    }
+
+    /// The problem of a modelled structure.
+    ///
+    /// # Errors
+    /// A mode has no damping, or grows: receptances are then infinite, or are not those of a motion.
+    pub fn of_model(problem: &Problem) -> Result<Self, StabilityError> {
+        let poles = problem.structure.poles();
+        if let Some(pole) = poles.iter().find(|pole| pole.re >= -UNDAMPED * pole.norm()) {
+            return Err(StabilityError::Undamped {
+                frequency_hz: pole.im.abs() / std::f64::consts::TAU,
+            });
+        }
+        Ok(Self {
+            receptance: Receptance::Model(problem.structure.clone(), poles),
+            process: problem.process,
+            teeth: problem.teeth,
+        })
+    }
+
+    /// The problem with measured receptances in place of the structure of a case, which may be missing.
+    ///
+    /// # Errors
+    /// The case lacks a section or has what the equations do not cover; the table has fewer than four lines.
+    pub fn of_table(case: &Case, table: &FrfTable) -> Result<Self, StabilityError> {
+        let (process, teeth) = cutting(case, Treated::LinearProcess)?;
+        let interpolation = Interpolation::new(table)?.turned(case.cut()?.feed_direction_deg);
+        Ok(Self {
+            receptance: Receptance::Table(interpolation),
+            process,
+            teeth,
+        })
+    }
+
+    /// Tooth period, s.
+    pub(super) fn tooth_period_s(&self, rpm: f64) -> f64 {
+        60.0 / (rpm * self.teeth as f64)
+    }
+
+    /// H(s), m/N, rows displacement, columns force; s in rad/s. `None` where s is a pole.
+    pub(super) fn transfer(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
+        match &self.receptance {
+            Receptance::Model(structure, _) => structure.transfer(s),
+            Receptance::Table(interpolation) => {
+                Some(interpolation.at(s / Complex64::new(0.0, std::f64::consts::TAU)))
+            }
+        }
+    }
+
+    /// Number of poles of the structure with a real part above `sigma`, 1/s, each of a pair counted; of a table none is
+    /// known.
+    pub(super) fn poles_right_of(&self, sigma: f64) -> i32 {
+        self.poles().iter().map(|pole| i32::from(pole.re > sigma)).sum()
+    }
+
+    /// The poles of the structure, 1/s; those of a table are not known.
+    pub(super) fn poles(&self) -> &[Complex64] {
+        match &self.receptance {
+            Receptance::Model(_, poles) => poles,
+            Receptance::Table(_) => &[],
+        }
+    }
+
+    /// The same with every second line of a table; `None` for a model, and for a table with too few lines.
+    pub(super) fn thinned(&self) -> Option<Self> {
+        let Receptance::Table(interpolation) = &self.receptance else {
+            return None;
+        };
+        Some(Self {
+            receptance: Receptance::Table(interpolation.thinned()?),
+            ..self.clone()
+        })
+    }
+
+    /// The frequencies that were measured, Hz; `None` for a model, which knows all.
+    pub(super) fn band_hz(&self) -> Option<(f64, f64)> {
+        match &self.receptance {
+            Receptance::Model(..) => None,
+            Receptance::Table(interpolation) => Some(interpolation.band_hz()),
+        }
+    }
+
+    /// Refuses what is known only from outside the measured frequencies.
+    ///
+    /// # Errors
+    /// The vibration at that speed and depth has a frequency that the table does not have.
+    pub(super) fn check_band(
+        &self,
+        frequency_hz: Option<f64>,
+        rpm: f64,
+        depth_mm: f64,
+    ) -> Result<(), StabilityError> {
+        let (Some((first_hz, last_hz)), Some(frequency_hz)) = (self.band_hz(), frequency_hz) else {
+            return Ok(());
+        };
+        if (first_hz..=last_hz).contains(&frequency_hz) {
+            return Ok(());
+        }
+        Err(StabilityError::NotMeasured {
+            rpm,
+            depth_mm,
+            frequency_hz,
+            first_hz,
+            last_hz,
+        })
+    }
+
+    /// The directions, of feed, normal and axial, in which the tool moves at all.
+    pub(super) fn moves(&self) -> [bool; 3] {
+        std::array::from_fn(|axis| match &self.receptance {
+            Receptance::Model(structure, _) => structure.c.row(axis).iter().any(|&entry| entry != 0.0),
+            Receptance::Table(interpolation) => interpolation
+                .lines()
+                .iter()
+                .any(|line| line.row(axis).iter().any(|&entry| entry != Complex64::ZERO)),
+        })
+    }
+
+    /// Where receptances change fast: the poles of a model, the peaks of a table.
+    pub(super) fn resonances(&self) -> Vec<Resonance> {
+        match &self.receptance {
+            Receptance::Model(_, poles) => poles
+                .iter()
+                .filter(|pole| pole.im >= 0.0)
+                .map(|pole| Resonance {
+                    omega: pole.im,
+                    width: -pole.re,
+                })
+                .collect(),
+            Receptance::Table(interpolation) => peaks(interpolation),
+        }
+    }
+
+    /// Frequencies, rad/s, between which nothing of H is hidden: those of the lines of a table, else none.
+    pub(super) fn lines(&self) -> Vec<f64> {
+        match &self.receptance {
+            Receptance::Model(..) => Vec::new(),
+            Receptance::Table(interpolation) => {
+                let lines = interpolation.frequency_hz().iter();
+                lines.map(|f| f * std::f64::consts::TAU).collect()
+            }
+        }
+    }
+}
+
+/// The peaks of a table that stand above a hundredth of the highest, with their half bandwidth.
+///
+/// Noise makes peaks too; they cost time and do no harm.
+fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {
+    const RAD: f64 = std::f64::consts::TAU;
+    let size: Vec<f64> = interpolation.lines().iter().map(|line| line.norm()).collect();
+    let frequency_hz = interpolation.frequency_hz();
+    let highest = size.iter().copied().fold(0.0, f64::max);
+    let mut peaks = Vec::new();
+    for index in 1..size.len().saturating_sub(1) {
+        let peak = size[index];
+        if peak < size[index - 1] || peak <= size[index + 1] || peak < 0.01 * highest {
+            continue;
+        }
+        // Down to 1/√2 on either side, or to where the next peak begins.
+        let falls = |range: &mut dyn Iterator<Item = usize>| {
+            let mut last = index;
+            for other in range {
+                if size[other] > size[last] || size[last] < peak * std::f64::consts::FRAC_1_SQRT_2 {
+                    break;
+                }
+                last = other;
+            }
+            (frequency_hz[last] - frequency_hz[index]).abs()
+        };
+        let (below, above) = (falls(&mut (0..index).rev()), falls(&mut (index + 1..size.len())));
+        peaks.push(Resonance {
+            omega: RAD * frequency_hz[index],
+            width: RAD * below.min(above),
+        });
+    }
+    peaks
+}

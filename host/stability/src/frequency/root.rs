@@ -1,0 +1,215 @@
+//! The rightmost root at one speed and depth: the dominant multiplier.
+
+use num_complex::Complex64;
+
+use super::FrequencyProblem;
+use super::averaged::AveragedLoop;
+use super::limits::unstable_roots;
+use super::loci::{steps, trace};
+use super::open_loop::OpenLoop;
+use crate::{Kind, LEAST_ERROR, Point, StabilityError};
+
+/// Where the lines are laid along which roots are looked for: real parts as multiples of the slowest decay of a resonance.
+const LINES: [f64; 14] = [
+    0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
+];
+
+/// A locus as small as this share of 1/w is followed too: its root may lie far from the line.
+const REACH: f64 = 0.05;
+
+/// The rightmost root s, 1/s, with Im s ≥ 0, at a depth, m.
+///
+/// First roots are looked for where they begin at depth 0, at the poles of the structure. Then loci are followed along
+/// lines Re s = σ: where one passes near 1/w its straight continuation beside the line hits a root, which is solved for.
+/// The rightmost root found so far is confirmed by counting the roots to the right of it. `None` where none is confirmed.
+pub(super) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
+    let decay = open_loop
+        .problem()
+        .resonances()
+        .iter()
+        .map(|resonance| resonance.width)
+        .fold(f64::INFINITY, f64::min);
+    // Without resonances there is nothing to decay with.
+    let decay = if decay.is_finite() { decay } else { 0.0 };
+    let mut best = from_poles(open_loop, depth_m);
+    if let Some(root) = best
+        && is_rightmost(open_loop, depth_m, root, decay)
+    {
+        return Some(root);
+    }
+    for multiple in LINES {
+        let found = from_line(open_loop, depth_m, multiple * decay, decay);
+        best = [best, found]
+            .into_iter()
+            .flatten()
+            .max_by(|p, q| p.re.total_cmp(&q.re));
+        if let Some(root) = found.and(best)
+            && is_rightmost(open_loop, depth_m, root, decay)
+        {
+            return Some(root);
+        }
+    }
+    None
+}
+
+/// The rightmost of the roots that begin at the poles of the structure.
+fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
+    open_loop
+        .problem()
+        .poles()
+        .iter()
+        .filter(|pole| pole.im >= 0.0)
+        .filter_map(|&pole| polish(open_loop, depth_m, open_loop.folded(pole)))
+        .max_by(|p, q| p.re.total_cmp(&q.re))
+        .map(|root| Complex64::new(root.re, root.im.abs()))
+}
+
+/// The rightmost of the roots that lie beside a line Re s = `sigma`.
+fn from_line(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64, decay: f64) -> Option<Complex64> {
+    let target = depth_m.recip();
+    if !target.is_finite() {
+        return None;
+    }
+    let floor = REACH * target;
+    let grid = open_loop.grid(target)?;
+    let loci = |omega: f64| loci_at(open_loop, Complex64::new(sigma, omega), 0.2 * floor);
+    let samples = trace(&loci, &grid, floor, 1.0)?;
+    let mut best: Option<Complex64> = None;
+    for [(low, from), (high, to)] in steps(&samples) {
+        let share = (target - from) / (to - from);
+        let width = high - low;
+        if !(-0.6..=1.6).contains(&share.re) || share.im.abs() * width > 20.0 * (width + decay) {
+            continue;
+        }
+        let guess = Complex64::new(sigma, low) + Complex64::I * share * width;
+        if best.is_some_and(|best| guess.re < best.re - 3.0 * decay - (best.re - sigma).abs()) {
+            continue;
+        }
+        if let Some(root) = polish(open_loop, depth_m, guess)
+            && best.is_none_or(|best| root.re > best.re)
+        {
+            best = Some(Complex64::new(root.re, root.im.abs()));
+        }
+    }
+    best
+}
+
+/// True where no root lies further right.
+fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay: f64) -> bool {
+    // A little to the right of it.
+    let beside = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
+    if open_loop.problem().band_hz().is_none() {
+        return unstable_roots(open_loop, depth_m, beside) == Some(0);
+    }
+    // Poles of a table are not known beside the axis; there the side at least must be right.
+    unstable_roots(open_loop, depth_m, 0.0).is_some_and(|unstable| (unstable > 0) == (root.re > 0.0))
+}
+
+/// κλ/w at any s, 1/m.
+fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Option<Vec<Complex64>> {
+    let regeneration = open_loop.regeneration(s);
+    let size = regeneration.norm();
+    if size < 1e-14 {
+        return Some(Vec::new());
+    }
+    let mut loci = open_loop.eigenvalues(s, floor / size)?;
+    for locus in &mut loci {
+        *locus *= regeneration;
+    }
+    Some(loci)
+}
+
+/// The root near a guess, by secants on w − 1/locus, of the locus for which it is smallest.
+pub(super) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) -> Option<Complex64> {
+    // Without depth roots are poles of the loop, where a locus is infinite: large ones are enough.
+    const SHALLOW_M: f64 = 1e-3;
+    let floor = 0.3 / depth_m.max(SHALLOW_M);
+    let miss = |s: Complex64| {
+        let loci = loci_at(open_loop, s, floor)?;
+        loci.into_iter()
+            .map(|locus| depth_m - locus.inv())
+            .min_by(|p, q| p.norm().total_cmp(&q.norm()))
+    };
+    let scale = guess.norm().max(1e-6);
+    let (mut before, mut s) = (
+        guess + Complex64::new(1e-4, 1e-4) * scale,
+        guess + Complex64::new(1e-6, 0.0) * scale,
+    );
+    let (mut miss_before, mut miss_now) = (miss(before)?, miss(s)?);
+    for _ in 0..40 {
+        if miss_now.norm() < 1e-13 * depth_m.max(1e-3 * SHALLOW_M) {
+            return Some(s);
+        }
+        let step = miss_now * (s - before) / (miss_now - miss_before);
+        if !step.is_finite() {
+            return None;
+        }
+        (before, miss_before) = (s, miss_now);
+        s -= step;
+        if (s - guess).norm() > 0.3 * scale {
+            return None;
+        }
+        miss_now = match miss(s) {
+            Some(miss) => miss,
+            // A pole of the loop: without depth that is the root.
+            None => return (depth_m == 0.0).then_some(s),
+        };
+        if step.norm() < 1e-13 * scale {
+            return (miss_now.norm() < 1e-6 * depth_m.max(SHALLOW_M)).then_some(s);
+        }
+    }
+    None
+}
+
+/// The dominant multiplier of a loop without period, as averaged methods have it.
+///
+/// With a table the error is what every second line changes; that of a cubic through all of them is a sixteenth of it
+/// where lines are dense, and no more where they are not.
+///
+/// # Errors
+/// The root cannot be found or confirmed; it was not measured.
+pub(super) fn averaged_point(
+    problem: &FrequencyProblem,
+    rpm: f64,
+    depth_mm: f64,
+    open_loop: impl Fn(&FrequencyProblem) -> AveragedLoop<'_>,
+) -> Result<Point, StabilityError> {
+    let at = |problem: &FrequencyProblem| rightmost(&open_loop(problem), depth_mm * 1e-3);
+    let root = at(problem).ok_or(StabilityError::BrokeDown {
+        rpm,
+        depth_mm,
+        what: "the rightmost root cannot be found by receptances; limits can",
+    })?;
+    let multiplier = |root: Complex64| (root * problem.tooth_period_s(rpm)).exp();
+    let error = match problem.thinned() {
+        Some(thinned) => at(&thinned).map_or(f64::INFINITY, |other| {
+            (multiplier(other) - multiplier(root)).norm()
+        }),
+        None => 0.0,
+    };
+    let chatter_hz = root.im.abs() / std::f64::consts::TAU;
+    problem.check_band(Some(chatter_hz), rpm, depth_mm)?;
+    let kind = if root.im == 0.0 { Kind::Fold } else { Kind::Hopf };
+    Ok(point_of(
+        rpm,
+        depth_mm,
+        multiplier(root),
+        error,
+        kind,
+        Some(chatter_hz),
+    ))
+}
+
+/// A point from its multiplier and the error of it.
+pub(super) fn point_of(
+    rpm: f64,
+    depth_mm: f64,
+    multiplier: Complex64,
+    error: f64,
+    kind: Kind,
+    chatter_hz: Option<f64>,
+) -> Point {
+    let error = error + LEAST_ERROR * multiplier.norm().max(1.0);
+    let point = Point::new(rpm, depth_mm, multiplier, error, chatter_hz);
+    Point { kind, ..point }
+}

@@ -1,0 +1,135 @@
+//! The derivatives of the entries of a layer, as the table wants them.
+
+use std::f64::consts::TAU;
+
+use quietcut_core::lobes::{IntervalSlopes, LayerMode, MODES_MAX, Slopes};
+use quietcut_core::units::Hertz;
+use rayon::prelude::*;
+
+use super::BuildError;
+use super::entries::Entry;
+use super::layers::Family;
+use crate::{Sensitivity, SpeedLine, Switch, Tangent};
+use quietcut_model::structure::ModalPart;
+
+/// Derivatives of a layer.
+pub(super) struct Derivatives {
+    /// The modes, by rising frequency.
+    pub(super) modes: Vec<LayerMode>,
+    pub(super) by_speed: Vec<SlopesOfLine>,
+}
+
+/// Derivatives of the switches at one speed.
+pub(super) struct SlopesOfLine(Vec<(f64, Slopes)>);
+
+impl SlopesOfLine {
+    /// Those of both ends of an entry; 0 for an end that is no limit.
+    pub(super) fn of(&self, entry: &Entry) -> IntervalSlopes {
+        let at = |depth_mm: f64| {
+            let found = self.0.iter().find(|(switch_mm, _)| *switch_mm == depth_mm);
+            found.map_or_else(Slopes::default, |(_, slopes)| *slopes)
+        };
+        IntervalSlopes {
+            from: at(entry.from_mm),
+            to: at(entry.to_mm),
+        }
+    }
+}
+
+/// How many modes every layer can give.
+pub(super) fn mode_count(families: &[Family]) -> Result<usize, BuildError> {
+    let counts = families
+        .iter()
+        .map(|family| family.linear.structure.modal_parts().len());
+    let count = counts.min().unwrap_or(0).min(MODES_MAX);
+    match families.first() {
+        Some(family) if count == 0 => Err(BuildError::NotPossible {
+            path: family.path().into(),
+            what: "--derivatives are those by modes, and the structure has no mode that vibrates",
+        }),
+        _ => Ok(count),
+    }
+}
+
+/// All derivatives of one switch, by frequency and damping of each mode of the structure and by cutting force, mm per
+/// relative change.
+struct All {
+    depth_mm: f64,
+    by_mode: Vec<[f64; 2]>,
+    by_force: f64,
+}
+
+impl Derivatives {
+    /// Those of all switches; of the modes the `count` that move limits most.
+    pub(super) fn new(family: &Family, lines: &[SpeedLine], count: usize) -> Result<Self, BuildError> {
+        let parts = family.linear.structure.modal_parts();
+        let all: Vec<Vec<All>> = lines
+            .par_iter()
+            .map(|line| {
+                let switches = line.switches.iter();
+                switches
+                    .filter_map(|switch| of_switch(family, &parts, line.rpm, switch))
+                    .collect()
+            })
+            .collect();
+        let influence = |mode: usize| {
+            let switches = all.iter().flatten();
+            // The median would hide a mode that rules one lobe; the mean of absolute values counts it by its share.
+            switches.map(|switch| switch.by_mode[mode][0].abs()).sum::<f64>()
+        };
+        let mut chosen: Vec<usize> = (0..parts.len()).collect();
+        chosen.sort_by(|&a, &b| influence(b).total_cmp(&influence(a)).then(a.cmp(&b)));
+        chosen.truncate(count);
+        chosen.sort_unstable();
+        let by_speed = all.iter().map(|switches| {
+            let slopes = switches
+                .iter()
+                .map(|switch| (switch.depth_mm, switch.of_modes(&chosen)));
+            SlopesOfLine(slopes.collect())
+        });
+        Ok(Self {
+            by_speed: by_speed.collect(),
+            modes: chosen
+                .iter()
+                .map(|&index| LayerMode {
+                    frequency: Hertz((parts[index].omega() / TAU) as f32),
+                    damping_ratio: parts[index].damping_ratio() as f32,
+                })
+                .collect(),
+        })
+    }
+}
+
+impl All {
+    fn of_modes(&self, chosen: &[usize]) -> Slopes {
+        let mut slopes = Slopes {
+            by_cutting_force: self.by_force as f32,
+            ..Slopes::default()
+        };
+        for (slot, &mode) in chosen.iter().enumerate() {
+            let [frequency, damping] = self.by_mode[mode];
+            slopes.by_frequency[slot] = frequency as f32;
+            slopes.by_damping_ratio[slot] = damping as f32;
+        }
+        slopes
+    }
+}
+
+/// `None` where the limit does not follow its parameters: at the tip of an island. The table then has zeros.
+fn of_switch(family: &Family, parts: &[ModalPart], rpm: f64, switch: &Switch) -> Option<All> {
+    let problem = &family.linear;
+    let sensitivity = Sensitivity::new(problem, rpm, switch).ok()?;
+    let by_mode = parts.iter().map(|part| {
+        let by_omega = sensitivity.slope(&Tangent::omega(problem, part))?;
+        let by_damping = sensitivity.slope(&Tangent::damping_ratio(problem, part))?;
+        Some([
+            by_omega.depth_mm * part.omega(),
+            by_damping.depth_mm * part.damping_ratio(),
+        ])
+    });
+    Some(All {
+        depth_mm: switch.depth_mm,
+        by_mode: by_mode.collect::<Option<_>>()?,
+        by_force: sensitivity.slope(&Tangent::cutting_force(problem))?.depth_mm,
+    })
+}

@@ -1,0 +1,119 @@
+//! The entries of a column: a line of the method as the table wants it.
+
+use quietcut_core::lobes::{Interval, Kind as TableKind, format::MAX_INTERVALS};
+use quietcut_core::units::{Hertz, Millimeters};
+
+use crate::{Kind, SpeedLine};
+
+/// Depths that are not stable, with their ends in full precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Entry {
+    pub(super) interval: Interval,
+    pub(super) from_mm: f64,
+    pub(super) to_mm: f64,
+}
+
+/// The depths up to `depth_mm` that are surely stable: with two stable orbits it depends on how the cut began.
+pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
+    // A branch of orbits may have been followed a step beyond the last depth.
+    let mut stable: Vec<[f64; 2]> = line
+        .stable_mm
+        .iter()
+        .map(|&[from, to]| [from, to.min(depth_mm)])
+        .filter(|[from, to]| from < to)
+        .collect();
+    for &[from, to] in &line.bistable_mm {
+        stable = stable
+            .into_iter()
+            .flat_map(|[low, high]| [[low, high.min(from)], [low.max(to), high]])
+            .filter(|[low, high]| low < high)
+            .collect();
+    }
+    stable
+}
+
+/// The depths that are not stable, ascending.
+pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut from_mm = 0.0;
+    let ends = surely_stable(line, depth_mm)
+        .into_iter()
+        .chain([[depth_mm, depth_mm]]);
+    for [stable_from, stable_to] in ends {
+        if stable_from > from_mm {
+            let switch = line.switches.iter().find(|switch| switch.depth_mm == from_mm);
+            // Where a second orbit begins there is no switch on the line: the jump to it is a fold.
+            let is_jump = line.bistable_mm.iter().any(|interval| interval[0] == from_mm);
+            let kind = match switch {
+                Some(switch) => table_kind(switch.kind),
+                None if is_jump => TableKind::Fold,
+                None => TableKind::Undecided,
+            };
+            entries.push(Entry {
+                interval: Interval {
+                    from: Millimeters(from_mm as f32),
+                    to: Millimeters(stable_from as f32),
+                    kind,
+                    chatter: Hertz(switch.and_then(|switch| switch.chatter_hz).unwrap_or(0.0) as f32),
+                },
+                from_mm,
+                to_mm: stable_from,
+            });
+        }
+        from_mm = stable_to;
+    }
+    limited(entries)
+}
+
+/// The entries with all depths of others: what overlaps keeps its kind.
+pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
+    let mut all = entries.to_vec();
+    for other in others {
+        let mut from_mm = other.from_mm;
+        let behind = entries.iter().filter(|own| own.to_mm > other.from_mm);
+        for own in behind.take_while(|own| own.from_mm < other.to_mm) {
+            all.extend(other.part(from_mm, own.from_mm));
+            from_mm = own.to_mm;
+        }
+        all.extend(other.part(from_mm, other.to_mm));
+    }
+    all.sort_by(|a, b| a.from_mm.total_cmp(&b.from_mm));
+    limited(all)
+}
+
+impl Entry {
+    /// The part of it between two depths; `None` where there is none.
+    fn part(&self, from_mm: f64, to_mm: f64) -> Option<Self> {
+        (from_mm < to_mm).then_some(Self {
+            interval: Interval {
+                from: Millimeters(from_mm as f32),
+                to: Millimeters(to_mm as f32),
+                ..self.interval
+            },
+            from_mm,
+            to_mm,
+        })
+    }
+}
+
+/// No more entries than a column holds: the narrowest stable gaps are given up, which is on the safe side.
+fn limited(mut entries: Vec<Entry>) -> Vec<Entry> {
+    while entries.len() > MAX_INTERVALS {
+        let gap = |i: usize| entries[i + 1].from_mm - entries[i].to_mm;
+        let narrowest = (0..entries.len() - 1)
+            .min_by(|&a, &b| gap(a).total_cmp(&gap(b)))
+            .unwrap_or(0);
+        let upper = entries.remove(narrowest + 1);
+        entries[narrowest].to_mm = upper.to_mm;
+        entries[narrowest].interval.to = upper.interval.to;
+    }
+    entries
+}
+
+fn table_kind(kind: Kind) -> TableKind {
+    match kind {
+        Kind::Hopf => TableKind::Hopf,
+        Kind::Flip => TableKind::Flip,
+        Kind::Fold => TableKind::Fold,
+    }
+}

@@ -1,0 +1,46 @@
+//! Which speeds and depths a table covers.
+
+use super::layers::Family;
+use crate::{Refinement, StabilityError, chart, spaced};
+
+/// Four times the lowest limit, found by doubling: deep enough for every pocket that is worth while.
+pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> Result<f64, StabilityError> {
+    const SHALLOWEST_MM: f64 = 0.01;
+    const DEEPEST_MM: f64 = 500.0;
+    let speeds = spaced(from_rpm, to_rpm, 24);
+    let mut depth_mm = SHALLOWEST_MM;
+    while depth_mm < DEEPEST_MM {
+        let mut lowest_mm = f64::INFINITY;
+        for family in families {
+            for line in family.lines(&speeds, depth_mm)? {
+                lowest_mm = line
+                    .first_limit
+                    .map_or(lowest_mm, |limit| lowest_mm.min(limit.depth_mm));
+            }
+        }
+        if lowest_mm.is_finite() {
+            return Ok(4.0 * lowest_mm);
+        }
+        depth_mm *= 2.0;
+    }
+    Ok(DEEPEST_MM)
+}
+
+/// The speeds that any of the layers needs, ascending.
+pub(super) fn speeds_of_all(
+    families: &[Family],
+    coarse: &[f64],
+    depth_mm: f64,
+    refinement: Refinement,
+) -> Result<Vec<f64>, StabilityError> {
+    let mut speeds = Vec::new();
+    for family in families {
+        let method = family.method.as_ref();
+        let refined = chart(method, coarse, depth_mm, 0)?.refined(method, depth_mm, refinement)?;
+        speeds.extend(refined.speeds.iter().map(|line| line.rpm));
+    }
+    speeds.sort_by(f64::total_cmp);
+    // The table holds single precision: speeds that it cannot tell apart are one.
+    speeds.dedup_by_key(|rpm| *rpm as f32);
+    Ok(speeds)
+}

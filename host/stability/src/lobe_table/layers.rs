@@ -1,0 +1,396 @@
+//! The layers of a table: cases, feeds per tooth and feed directions.
+
+use std::path::Path;
+
+use quietcut_core::lobes::{FEED_DIRECTION_SPAN, Validity};
+use quietcut_core::units::{Degrees, Millimeters};
+use rayon::prelude::*;
+
+use super::{BuildError, TableRequest};
+use crate::continuation::collocation_of;
+use crate::{
+    CubicTerms, Limit, Method, Percentile, Pitched, Problem, SpeedLine, StabilityError, Uncertainty, chart,
+    needs_orbit,
+};
+use quietcut_model::case::Case;
+
+/// Feed per tooth, mm, up to which a layer holds whose limits do not depend on the feed.
+const ANY_FEED_MM: f32 = 100.0;
+
+/// Speeds at which is looked how limits bend over feed and direction.
+pub(super) const PROBES: usize = 16;
+
+/// The most layers that one case is divided into.
+const LAYERS_MAX: usize = 12;
+
+/// Where the draws begin that percentiles are computed with.
+const SEED: u64 = 1;
+
+/// What a layer is computed from.
+pub(super) struct Family {
+    pub(super) method: Box<dyn Method>,
+    /// The linear problem, with the mean pitch: the method's own where the structure is linear and the teeth stand evenly.
+    pub(super) linear: Problem,
+    pub(super) validity: Validity,
+    /// The feed direction, degrees, where the table states it.
+    pub(super) direction_deg: Option<f64>,
+    pub(super) teeth: usize,
+    case: Case,
+    percentile: Option<f64>,
+}
+
+impl Family {
+    fn new(case: Case, percentile: Option<f64>, direction_deg: Option<f64>) -> Result<Self, BuildError> {
+        let cut = *case.cut().map_err(StabilityError::from)?;
+        let (feed_from, feed_to) = if depends_on_feed(&case) {
+            (cut.feed_per_tooth_mm as f32, cut.feed_per_tooth_mm as f32)
+        } else {
+            (0.0, ANY_FEED_MM)
+        };
+        if percentile.is_some() && case.deviations.is_empty() {
+            return Err(BuildError::NotPossible {
+                path: case.path,
+                what: "--percentile needs deviations, keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa",
+            });
+        }
+        let pitched = Pitched::new(&case, CubicTerms::Kept)?;
+        let linear = pitched.with_mean_pitch().clone();
+        Ok(Self {
+            method: collocation_of(&case)?,
+            validity: Validity {
+                feed_from: Millimeters(feed_from),
+                feed_to: Millimeters(feed_to),
+                start: Degrees(cut.start_deg as f32),
+                exit: Degrees(cut.exit_deg as f32),
+                posture: case.posture.index,
+            },
+            direction_deg,
+            teeth: linear.teeth,
+            linear,
+            case,
+            percentile,
+        })
+    }
+
+    /// The case file.
+    pub(super) fn path(&self) -> &Path {
+        &self.case.path
+    }
+
+    fn feed_mm(&self) -> f64 {
+        self.case.cut.map_or(0.0, |cut| cut.feed_per_tooth_mm)
+    }
+
+    /// The same case at another feed and direction.
+    fn at(&self, feed_mm: f64, direction_deg: Option<f64>) -> Result<Self, BuildError> {
+        Self::new(
+            at(&self.case, feed_mm, direction_deg),
+            self.percentile,
+            direction_deg,
+        )
+    }
+
+    fn is_of_cut(&self, other: &Self) -> bool {
+        let (a, b) = (self.validity, other.validity);
+        (a.posture, a.start, a.exit) == (b.posture, b.start, b.exit)
+    }
+
+    /// By how much, mm, its feed is larger, all else the same; `None` where it is not.
+    fn feeds_beyond(&self, other: &Self) -> Option<f64> {
+        let more_mm = self.feed_mm() - other.feed_mm();
+        let is_same = self.is_of_cut(other) && self.direction_deg == other.direction_deg;
+        (is_same && depends_on_feed(&self.case) && more_mm > 0.0).then_some(more_mm)
+    }
+
+    /// By how much, degrees, its direction lies further, all else the same; `None` where that is too far for lookups.
+    fn turned_from(&self, other: &Self) -> Option<f64> {
+        let turn = (self.direction_deg? - other.direction_deg?).rem_euclid(360.0);
+        let is_same = self.is_of_cut(other) && self.feed_mm() == other.feed_mm();
+        (is_same && turn > 0.0 && turn <= f64::from(FEED_DIRECTION_SPAN.0)).then_some(turn)
+    }
+
+    /// The lines at these speeds; where a percentile was asked for, what it leaves of them.
+    pub(super) fn lines(&self, speeds_rpm: &[f64], depth_mm: f64) -> Result<Vec<SpeedLine>, StabilityError> {
+        let lines = chart(self.method.as_ref(), speeds_rpm, depth_mm, 0)?.speeds;
+        let Some(percent) = self.percentile else {
+            return Ok(lines);
+        };
+        let maker = |case: &Case| collocation_of(case).ok();
+        let Some(uncertainty) = Uncertainty::new(&self.case, &maker, SEED) else {
+            return Ok(lines);
+        };
+        let limited: Vec<Result<SpeedLine, StabilityError>> = lines
+            .into_par_iter()
+            .map(|line| {
+                let percentile = uncertainty.percentile(&line, depth_mm, 0.01 * percent)?;
+                Ok(up_to(line, &percentile, depth_mm))
+            })
+            .collect();
+        limited.into_iter().collect()
+    }
+}
+
+/// The line with nothing stable above a limit; the kind is that of the nominal first limit.
+fn up_to(line: SpeedLine, percentile: &Percentile, depth_mm: f64) -> SpeedLine {
+    let error_mm = percentile.error_mm(depth_mm);
+    let limit = percentile.depth_mm.and_then(|depth_mm| {
+        Some(Limit {
+            depth_mm,
+            error_mm,
+            ..line.first_limit?
+        })
+    });
+    let stable_to = percentile.depth_mm.unwrap_or(depth_mm);
+    SpeedLine {
+        stable_mm: if stable_to > 0.0 {
+            vec![[0.0, stable_to]]
+        } else {
+            Vec::new()
+        },
+        undecided_mm: percentile
+            .depth_mm
+            .zip(error_mm)
+            .map(|(limit_mm, error_mm)| {
+                [
+                    (limit_mm - error_mm).max(0.0),
+                    (limit_mm + error_mm).min(depth_mm),
+                ]
+            })
+            .into_iter()
+            .collect(),
+        bistable_mm: Vec::new(),
+        switches: limit
+            .map(|limit| crate::Switch {
+                depth_mm: limit.depth_mm,
+                error_mm: limit.error_mm,
+                kind: limit.kind,
+                gain: false,
+                chatter_hz: limit.chatter_hz,
+            })
+            .into_iter()
+            .collect(),
+        first_limit: limit,
+        ..line
+    }
+}
+
+fn has_variable_pitch(case: &Case) -> bool {
+    case.tool
+        .as_ref()
+        .is_some_and(quietcut_model::milling::Tool::has_variable_pitch)
+}
+
+fn depends_on_feed(case: &Case) -> bool {
+    case.axial_depth_modulation() || needs_orbit(case)
+}
+
+/// A place where a table is checked: a layer, or half way between two that lookups interpolate between.
+pub(super) struct Span {
+    pub(super) family: Family,
+    /// Index of the layer, or of both.
+    pub(super) layers: Vec<usize>,
+}
+
+/// All layers, and the middles of all pairs of neighbours in feed or in feed direction.
+pub(super) fn spans(families: &[Family]) -> Result<Vec<Span>, BuildError> {
+    let mut spans = Vec::new();
+    for (index, family) in families.iter().enumerate() {
+        spans.push(Span {
+            family: family.at(family.feed_mm(), family.direction_deg)?,
+            layers: vec![index],
+        });
+        if let Some(next) = nearest(families, index, |other| other.feeds_beyond(family)) {
+            let feed_mm = 0.5 * (family.feed_mm() + families[next].feed_mm());
+            spans.push(Span {
+                family: family.at(feed_mm, family.direction_deg)?,
+                layers: vec![index, next],
+            });
+        }
+        if let Some(next) = nearest(families, index, |other| other.turned_from(family)) {
+            let turn = families[next].turned_from(family).unwrap_or(0.0);
+            let degrees = family.direction_deg.map(|degrees| degrees + 0.5 * turn);
+            spans.push(Span {
+                family: family.at(family.feed_mm(), degrees)?,
+                layers: vec![index, next],
+            });
+        }
+    }
+    Ok(spans)
+}
+
+/// The family with the least distance from one, where it has any.
+fn nearest(families: &[Family], index: usize, distance: impl Fn(&Family) -> Option<f64>) -> Option<usize> {
+    let others = families.iter().enumerate().filter(|(other, _)| *other != index);
+    others
+        .filter_map(|(other, family)| Some((other, distance(family)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(other, _)| other)
+}
+
+/// What layers a case is divided into.
+#[derive(Clone)]
+struct Division {
+    feeds_mm: Vec<f64>,
+    /// `None` for the direction of the case, which is not stated.
+    directions_deg: Vec<Option<f64>>,
+}
+
+fn division(case: &Case, request: &TableRequest) -> Result<Division, BuildError> {
+    let cut = case.cut().map_err(StabilityError::from)?;
+    let mut feeds_mm = if depends_on_feed(case) && !request.feeds_per_tooth_mm.is_empty() {
+        request.feeds_per_tooth_mm.clone()
+    } else {
+        vec![cut.feed_per_tooth_mm]
+    };
+    feeds_mm.sort_by(f64::total_cmp);
+    feeds_mm.dedup();
+    let mut directions: Vec<f64> = request.feed_directions_deg.clone();
+    directions.sort_by(f64::total_cmp);
+    // 0 and 360 degrees are one direction.
+    directions.dedup_by_key(|degrees| (degrees.rem_euclid(360.0) * 100.0).round() as i64);
+    let directions_deg = if directions.is_empty() {
+        vec![None]
+    } else {
+        directions.into_iter().map(Some).collect()
+    };
+    Ok(Division {
+        feeds_mm,
+        directions_deg,
+    })
+}
+
+fn at(case: &Case, feed_mm: f64, direction_deg: Option<f64>) -> Case {
+    let mut case = case.clone();
+    if let Some(cut) = &mut case.cut {
+        cut.feed_per_tooth_mm = feed_mm;
+        cut.feed_direction_deg = direction_deg.unwrap_or(cut.feed_direction_deg);
+    }
+    case
+}
+
+fn divided(
+    cases: &[Case],
+    divisions: &[Division],
+    request: &TableRequest,
+) -> Result<Vec<Family>, BuildError> {
+    let mut families = Vec::new();
+    for (case, division) in cases.iter().zip(divisions) {
+        for &direction_deg in &division.directions_deg {
+            for &feed_mm in &division.feeds_mm {
+                let case = at(case, feed_mm, direction_deg);
+                families.push(Family::new(case, request.percentile, direction_deg)?);
+            }
+        }
+    }
+    Ok(families)
+}
+
+/// The layers as they were asked for.
+pub(super) fn families(cases: &[Case], request: &TableRequest) -> Result<Vec<Family>, BuildError> {
+    let mut teeth = None;
+    for case in cases {
+        let found = case.tool().map_err(StabilityError::from)?.teeth;
+        let expected = *teeth.get_or_insert(found);
+        if found != expected {
+            return Err(BuildError::Teeth {
+                path: case.path.clone(),
+                found,
+                expected,
+            });
+        }
+        let is_followed = !needs_orbit(case) && !has_variable_pitch(case) && request.percentile.is_none();
+        if request.derivatives && !is_followed {
+            return Err(BuildError::NotPossible {
+                path: case.path.clone(),
+                what: "--derivatives are those of the limits of a linear structure: without cubic terms, with equal pitch, without --percentile",
+            });
+        }
+    }
+    let divisions = divisions(cases, request)?;
+    divided(cases, &divisions, request)
+}
+
+fn divisions(cases: &[Case], request: &TableRequest) -> Result<Vec<Division>, BuildError> {
+    cases.iter().map(|case| division(case, request)).collect()
+}
+
+/// The layers with more feeds and directions between those asked for, until first limits half way differ from the mean of
+/// both sides by less than `tolerance_mm` at the probe speeds, or there are as many as there should be.
+pub(super) fn refined(
+    cases: &[Case],
+    request: &TableRequest,
+    probes_rpm: &[f64],
+    depth_mm: f64,
+    tolerance_mm: f64,
+) -> Result<Vec<Family>, BuildError> {
+    let mut divisions = divisions(cases, request)?;
+    for (case, division) in cases.iter().zip(&mut divisions) {
+        let limits = |feed_mm: f64, direction_deg: Option<f64>| -> Result<Vec<f64>, BuildError> {
+            let family = Family::new(at(case, feed_mm, direction_deg), None, direction_deg)?;
+            let lines = family.lines(probes_rpm, depth_mm)?;
+            let limit = |line: &SpeedLine| line.first_limit.map_or(depth_mm, |limit| limit.depth_mm);
+            Ok(lines.iter().map(limit).collect())
+        };
+        let direction_deg = division.directions_deg.first().copied().flatten();
+        let axis = Axis {
+            tolerance: tolerance_mm,
+            most: LAYERS_MAX / division.directions_deg.len().max(1),
+            widest: f64::INFINITY,
+        };
+        division.feeds_mm = axis.filled(&division.feeds_mm, |feed_mm| limits(feed_mm, direction_deg))?;
+        let stated: Vec<f64> = division.directions_deg.iter().copied().flatten().collect();
+        if stated.len() > 1 {
+            let axis = Axis {
+                tolerance: tolerance_mm,
+                most: (LAYERS_MAX / division.feeds_mm.len().max(1)).max(stated.len()),
+                widest: f64::from(FEED_DIRECTION_SPAN.0),
+            };
+            let feed_mm = division.feeds_mm[0];
+            let directions = axis.filled(&stated, |degrees| limits(feed_mm, Some(degrees)))?;
+            division.directions_deg = directions.into_iter().map(Some).collect();
+        }
+    }
+    divided(cases, &divisions, request)
+}
+
+/// How an axis of layers is filled.
+struct Axis {
+    tolerance: f64,
+    most: usize,
+    /// Gaps wider than this are divided whatever the limits say, since lookups do not interpolate over them.
+    widest: f64,
+}
+
+impl Axis {
+    /// The given values, ascending, and more between them, until what `limits` says half way is near the mean of both sides.
+    fn filled(
+        &self,
+        values: &[f64],
+        limits: impl Fn(f64) -> Result<Vec<f64>, BuildError>,
+    ) -> Result<Vec<f64>, BuildError> {
+        let mut filled: Vec<(f64, Vec<f64>)> = Vec::new();
+        if let [lone] = values {
+            return Ok(vec![*lone]);
+        }
+        for &value in values {
+            filled.push((value, limits(value)?));
+        }
+        let mut index = 0;
+        while index + 1 < filled.len() {
+            let (low, high) = (&filled[index], &filled[index + 1]);
+            let middle = 0.5 * (low.0 + high.0);
+            let there = limits(middle)?;
+            let miss = low.1.iter().zip(&high.1).zip(&there);
+            let miss = miss
+                .map(|((low, high), there)| (0.5 * (low + high) - there).abs())
+                .fold(0.0, f64::max);
+            let is_wide = high.0 - low.0 > self.widest;
+            if is_wide || (miss > self.tolerance && filled.len() < self.most) {
+                filled.insert(index + 1, (middle, there));
+            } else {
+                index += 1;
+            }
+        }
+        Ok(filled.into_iter().map(|(value, _)| value).collect())
+    }
+}

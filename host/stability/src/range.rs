@@ -1,0 +1,38 @@
+//! Which speeds matter to a machine where nobody says.
+
+use std::f64::consts::TAU;
+
+use quietcut_model::case::Case;
+use quietcut_model::structure::FirstOrder;
+
+/// Slowest and fastest speed, rev/min: the machine's limits, else 1/2 to 5 teeth per vibration of the most flexible mode.
+pub fn default_speeds(case: &Case, structure: &FirstOrder, teeth: usize) -> (f64, f64) {
+    if let Some(limits) = case.limits {
+        // A spindle at rest cuts nothing; a hundredth of the fastest speed stands for a slowest speed of 0.
+        return (limits.rpm_min.max(0.01 * limits.rpm_max), limits.rpm_max);
+    }
+    let rpm = most_flexible_hz(structure) * 60.0 / teeth as f64;
+    (0.5 * rpm, 5.0 * rpm)
+}
+
+/// The frequency, Hz, of the pole at which the receptance is largest.
+fn most_flexible_hz(structure: &FirstOrder) -> f64 {
+    let size = |omega: f64| structure.receptance(omega).map_or(f64::INFINITY, |h| h.norm());
+    structure
+        .poles()
+        .iter()
+        .map(|pole| pole.norm())
+        .max_by(|a, b| size(*a).total_cmp(&size(*b)))
+        .map_or(1.0, |omega| omega / TAU)
+}
+
+/// Speeds from first to last with equal ratios: lobes get narrower towards low speeds.
+pub fn spaced(from_rpm: f64, to_rpm: f64, count: usize) -> Vec<f64> {
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count)
+        .map(|index| {
+            let share = index as f64 / last;
+            from_rpm.powf(1.0 - share) * to_rpm.powf(share)
+        })
+        .collect()
+}

@@ -1,0 +1,236 @@
+//! Machines that a case with deviations stands for: which parameters vary together, and a few hundred draws of them that
+//! fill their distribution evenly.
+
+use std::f64::consts::SQRT_2;
+
+use nalgebra::DVector;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use quietcut_model::case::{Case, Deviation, Parameter};
+
+/// One normal variable: parameters that vary together, each by its standard deviation times the same number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    parts: Vec<Deviation>,
+}
+
+impl Variable {
+    /// The independent variables of a case.
+    ///
+    /// Deviations are independent, but for entries (i, j) and (j, i) of a matrix: where both have the same value and
+    /// the same deviation they are one number, and vary together.
+    pub fn of_case(case: &Case) -> Vec<Self> {
+        let mut variables: Vec<Self> = Vec::new();
+        for &deviation in &case.deviations {
+            let mirrored = mirrored(deviation.parameter);
+            let twin = variables.iter_mut().find(|variable| {
+                variable.parts.iter().any(|part| {
+                    Some(part.parameter) == mirrored
+                        && part.std == deviation.std
+                        && part.parameter.value(case) == deviation.parameter.value(case)
+                })
+            });
+            match twin {
+                Some(variable) => variable.parts.push(deviation),
+                None => variables.push(Self {
+                    parts: vec![deviation],
+                }),
+            }
+        }
+        variables
+    }
+
+    /// Parameters that vary together; a negative standard deviation is that of one that falls while others rise.
+    pub fn together(parts: Vec<Deviation>) -> Self {
+        Self { parts }
+    }
+
+    /// The parameters that vary together.
+    pub fn parts(&self) -> &[Deviation] {
+        &self.parts
+    }
+
+    /// Moves the parameters by so many standard deviations; false where no machine has such a value.
+    pub fn shift(&self, case: &mut Case, deviations: f64) -> bool {
+        self.parts
+            .iter()
+            .all(|part| part.parameter.shift(case, part.std * deviations))
+    }
+}
+
+/// The entry on the other side of the diagonal.
+fn mirrored(parameter: Parameter) -> Option<Parameter> {
+    match parameter {
+        Parameter::Mass(i, j) if i != j => Some(Parameter::Mass(j, i)),
+        Parameter::Damping(i, j) if i != j => Some(Parameter::Damping(j, i)),
+        Parameter::Stiffness(i, j) if i != j => Some(Parameter::Stiffness(j, i)),
+        Parameter::CubicDamping(i, j) if i != j => Some(Parameter::CubicDamping(j, i)),
+        Parameter::CubicStiffness(i, j) if i != j => Some(Parameter::CubicStiffness(j, i)),
+        _ => None,
+    }
+}
+
+/// An orthonormal basis of the space of the variables whose first vectors span the directions that matter most.
+#[derive(Clone, Debug)]
+pub struct Basis {
+    vectors: Vec<DVector<f64>>,
+}
+
+impl Basis {
+    /// `leading` by falling importance; those that the ones before them span, or that vanish, are passed over.
+    pub fn new(size: usize, leading: &[DVector<f64>]) -> Self {
+        let unit = |index: usize| DVector::from_fn(size, |i, _| if i == index { 1.0 } else { 0.0 });
+        let mut vectors: Vec<DVector<f64>> = Vec::with_capacity(size);
+        for candidate in leading.iter().cloned().chain((0..size).map(unit)) {
+            let length = candidate.norm();
+            let mut rest = candidate;
+            // Twice is enough for orthogonality to rounding.
+            for _ in 0..2 {
+                for vector in &vectors {
+                    let along = vector.dot(&rest);
+                    rest.axpy(-along, vector, 1.0);
+                }
+            }
+            let left = rest.norm();
+            // Unit vectors lose at most all but 1/√size where there is still a direction to be found.
+            if vectors.len() < size && left > 1e-3 * length && left.is_finite() && left > 0.0 {
+                vectors.push(rest / left);
+            }
+        }
+        Self { vectors }
+    }
+
+    /// The point with these coordinates.
+    fn point(&self, coordinates: &[f64]) -> DVector<f64> {
+        let size = self.vectors.first().map_or(0, |vector| vector.len());
+        let mut point = DVector::zeros(size);
+        for (vector, coordinate) in self.vectors.iter().zip(coordinates) {
+            point.axpy(*coordinate, vector, 1.0);
+        }
+        point
+    }
+
+    /// `count` points of the standard normal distribution, a power of 2: along the first vector one in each of `count` slices of
+    /// equal probability, along the first two a Hammersley set, along the others Latin, with random shifts.
+    ///
+    /// Along the first vector the points of 2, 4, 8 … batches, counted from 0, lie between one another.
+    pub fn points(&self, count: u32, seed: u64, stream: u64, batch: u32) -> Vec<DVector<f64>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream);
+        let size = self.vectors.len();
+        let n = f64::from(count);
+        // The radical inverse 0, 1/2, 1/4, 3/4 …; an eighth more, and four batches have the middles of their slices.
+        let first = f64::from(batch.reverse_bits()) / 2.0_f64.powi(32) + 0.125;
+        let second: f64 = rng.random();
+        let mut latin: Vec<Vec<f64>> = Vec::with_capacity(size.saturating_sub(2));
+        for _ in 2..size {
+            let mut slices: Vec<f64> = (0..count).map(f64::from).collect();
+            slices.shuffle(&mut rng);
+            let shifted = slices.into_iter().map(|slice| (slice + rng.random::<f64>()) / n);
+            latin.push(shifted.collect());
+        }
+        let bits = count.trailing_zeros();
+        (0..count)
+            .map(|i| {
+                let reversed = f64::from(i.reverse_bits() >> (32 - bits.max(1)));
+                let hammersley = [
+                    ((f64::from(i) + first) / n).fract(),
+                    ((reversed + 0.5) / n + second).fract(),
+                ];
+                let others = latin.iter().map(|slices| slices[i as usize]);
+                let shares = hammersley.into_iter().chain(others);
+                let coordinates: Vec<f64> = shares.take(size).map(normal_quantile).collect();
+                self.point(&coordinates)
+            })
+            .collect()
+    }
+}
+
+/// The number below which a standard normal variable stays with probability `share`, to 1e-12.
+fn normal_quantile(share: f64) -> f64 {
+    // Tails are lighter than a double can hold from 1e-300 on.
+    let share = share.clamp(1e-300, 1.0 - f64::EPSILON);
+    // By symmetry the lower half is enough, where erfc keeps its relative precision.
+    if share > 0.5 {
+        return -normal_quantile(1.0 - share);
+    }
+    // Start: the tail bound; then Halley, which triples the digits.
+    let mut x = -(-2.0 * (2.0 * share).ln()).sqrt();
+    for _ in 0..8 {
+        let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
+        let excess = (0.5 * libm::erfc(-x / SQRT_2) - share) / density;
+        let step = excess / (1.0 + 0.5 * x * excess);
+        x -= step;
+        if step.abs() < 1e-13 * x.abs().max(1.0) {
+            break;
+        }
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        // Abramowitz & Stegun, table 26.5.
+        for (share, x) in [
+            (0.05, -1.644_853_626_951_473),
+            (0.5, 0.0),
+            (0.95, 1.644_853_626_951_473),
+            (0.975, 1.959_963_984_540_054),
+            (1e-6, -4.753_424_308_822_899),
+            (0.3, -0.524_400_512_708_041),
+        ] {
+            assert!(
+                (normal_quantile(share) - x).abs() < 1e-11,
+                "{share} {}",
+                normal_quantile(share)
+            );
+        }
+    }
+
+    #[test]
+    fn points_fill_the_distribution_evenly_along_every_vector() {
+        let leading = [
+            DVector::from_vec(vec![3.0, 4.0, 0.0, 0.0]),
+            DVector::from_vec(vec![0.0, 0.0, 0.0, 0.0]),
+        ];
+        let basis = Basis::new(4, &leading);
+        assert_eq!(basis.vectors.len(), 4);
+        let points = basis.points(64, 1, 2, 0);
+        for vector in &basis.vectors {
+            let mut slices: Vec<usize> = points
+                .iter()
+                .map(|point| (0.5 * libm::erfc(-vector.dot(point) / SQRT_2) * 64.0) as usize)
+                .collect();
+            slices.sort_unstable();
+            // The second vector is shifted around the end: each slice still has one or its neighbour has two.
+            for (expected, slice) in slices.iter().enumerate() {
+                assert!(slice.abs_diff(expected) <= 1, "{slices:?}");
+            }
+        }
+        assert_eq!(points, basis.points(64, 1, 2, 0));
+        assert_ne!(points, basis.points(64, 1, 3, 0));
+    }
+
+    #[test]
+    fn symmetric_entries_of_a_matrix_vary_together() {
+        let text = r#"
+[structure]
+kind = "matrices"
+directions = ["x", "y"]
+mass = [[1.0, 0.1], [0.1, 1.0]]
+mass_std = [[0.0, 0.01], [0.01, 0.0]]
+damping = [[1.0, 0.2], [0.1, 1.0]]
+damping_std = [[0.0, 0.01], [0.01, 0.0]]
+stiffness = [[1.0, 0.0], [0.0, 1.0]]
+"#;
+        let case = Case::parse(std::path::Path::new("a.toml"), text).unwrap();
+        let sizes: Vec<usize> = Variable::of_case(&case).iter().map(|v| v.parts.len()).collect();
+        assert_eq!(sizes, [2, 1, 1]);
+    }
+}

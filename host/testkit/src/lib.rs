@@ -1,0 +1,34 @@
+//! What unit tests of several crates share: the cases that the project brings.
+//!
+//! A dev-dependency only. It knows the layers up to `quietcut-model`; that crate and those below it cannot use it.
+#![allow(clippy::expect_used, clippy::panic)]
+
+use std::path::PathBuf;
+
+use quietcut_model::case::Case;
+use quietcut_model::structure::{Form, Robot};
+
+/// The folder of files that the tests of the workspace share, `tests/` at its root.
+pub fn tests_folder() -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "..", "..", "tests"].iter().collect()
+}
+
+/// The case `tests/cases/NAME.toml`.
+///
+/// # Panics
+/// There is no such case, or it cannot be read.
+pub fn case(name: &str) -> Case {
+    let path = tests_folder().join("cases").join(format!("{name}.toml"));
+    Case::read(path).expect("a case of the project reads")
+}
+
+/// The robot of the case `six-joint-robot`.
+///
+/// # Panics
+/// The case is no robot.
+pub fn robot() -> Robot {
+    match case("six-joint-robot").structure.expect("a structure").form {
+        Form::Joints(robot) => *robot,
+        _ => panic!("six-joint-robot has joints"),
+    }
+}
