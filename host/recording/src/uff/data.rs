@@ -32,6 +32,11 @@ impl Ordinate {
             Self::Complex(values) => values.len(),
         }
     }
+
+    /// True where there are no values.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// Abscissa, where it is uneven, and ordinate.
