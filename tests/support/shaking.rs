@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// White noise of the force in each axis, constant over [`Shaking::STEP_S`].
+/// White noise of the force in each axis, constant over steps of 0.5 ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shaking {
     /// One-sided density, N per √Hz.
