@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use quietcut::case::Case;
 use quietcut::diagnose::answer::Outcome;
@@ -10,14 +10,7 @@ use quietcut::diagnose::{Diagnosis, Options, diagnose};
 use quietcut::identify::response;
 use quietcut::identify::restoring_force::{Record, Term};
 use quietcut::recording::{Channel, Kind, Quantity, Recording, Sidecar};
-
-fn folder(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("QUIETCUT_DATA").map(|data| PathBuf::from(data).join(name));
-    if folder.is_none() {
-        println!("QUIETCUT_DATA is not set: {name} is not looked at");
-    }
-    folder
-}
+use quietcut_testkit::measured;
 
 fn recording(
     name: &str,
@@ -77,9 +70,9 @@ fn not_again(text: &str, found: &Diagnosis, recordings: &[Recording]) {
 const SILVERBOX_RATE_HZ: f64 = 610.35;
 
 #[test]
-fn the_silverbox_has_a_cubic_spring() {
-    let Some(folder) = folder("silverbox") else { return };
-    let text = std::fs::read_to_string(folder.join("SNLS80mV.csv")).unwrap();
+#[ignore = "measured records: QUIETCUT_DATA names their folder"]
+fn the_measured_silverbox_has_a_cubic_spring() {
+    let text = std::fs::read_to_string(measured("silverbox/SNLS80mV.csv")).unwrap();
     let rows = text
         .lines()
         .skip(1)
@@ -147,9 +140,9 @@ fn the_silverbox_has_a_cubic_spring() {
 const BAND_HZ: f64 = 40.0;
 
 #[test]
-fn the_positioning_stage_has_dry_friction() {
-    let Some(folder) = folder("emps") else { return };
-    let raw = Recording::read(folder.join("DATA_EMPS.mat")).unwrap();
+#[ignore = "measured records: QUIETCUT_DATA names their folder"]
+fn the_measured_positioning_stage_has_dry_friction() {
+    let raw = Recording::read(measured("emps/DATA_EMPS.mat")).unwrap();
     let samples = |name: &str| raw.channel(name).unwrap().samples.clone();
     // gtau of the file.
     let force: Vec<f64> = samples("vir").iter().map(|volts| 35.150_651_88 * volts).collect();
@@ -279,10 +272,9 @@ fn plateau_in(record: &Recording, share: f64) -> f64 {
 const PUBLISHED_IN: f64 = 0.125;
 
 #[test]
-fn the_banded_damper_has_friction_behind_a_play() {
-    let Some(folder) = folder("friction_backlash") else {
-        return;
-    };
+#[ignore = "measured records: QUIETCUT_DATA names their folder"]
+fn the_measured_banded_damper_has_friction_behind_a_backlash() {
+    let folder = measured("friction_backlash");
     let records =
         ["0.5Hz25lbtension", "1Hz35lbtension", "1Hz70lbtension"].map(|name| damper_record(&folder, name));
     // A rod that slides: no spring and hardly a dashpot.

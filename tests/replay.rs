@@ -3,22 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use std::path::PathBuf;
-
+use quietcut_testkit::measured;
 use quietcut_tests::command::{folder, quietcut};
 
-/// The recording, or `None` (and one line that says so) where the measured data is not there.
-fn recording() -> Option<PathBuf> {
-    let Some(folder) = std::env::var_os("QUIETCUT_DATA") else {
-        println!("QUIETCUT_DATA is not set: the real slot cut was not replayed");
-        return None;
-    };
-    Some(PathBuf::from(folder).join("milling/slot_5000rpm_4flutes.mat"))
-}
-
 #[test]
-fn the_tone_is_found_in_the_cut_and_nothing_alarming_before() {
-    let Some(recording) = recording() else { return };
+#[ignore = "measured records: QUIETCUT_DATA names their folder"]
+fn the_tone_is_found_in_the_measured_cut_and_nothing_alarming_before() {
+    let recording = measured("milling/slot_5000rpm_4flutes.mat");
     let path = recording.to_str().unwrap();
     let run = quietcut(
         folder().path(),

@@ -4,14 +4,12 @@
 
 use quietcut::recording::{Recording, Sensed, Speed};
 use quietcut_core::monitor::{Monitor, State};
+use quietcut_testkit::measured;
 
 #[test]
-fn the_tone_of_the_slot_cut_is_heard() {
-    let Some(folder) = std::env::var_os("QUIETCUT_DATA") else {
-        println!("QUIETCUT_DATA is not set: the real slot cut was not run");
-        return;
-    };
-    let path = std::path::Path::new(&folder).join("milling/slot_5000rpm_4flutes.mat");
+#[ignore = "measured records: QUIETCUT_DATA names their folder"]
+fn the_tone_of_the_measured_slot_cut_is_detected() {
+    let path = measured("milling/slot_5000rpm_4flutes.mat");
     let speed = Speed {
         rpm: Some(5000.0),
         teeth: Some(4),

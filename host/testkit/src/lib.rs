@@ -13,6 +13,19 @@ pub fn tests_folder() -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "..", "..", "tests"].iter().collect()
 }
 
+/// The path `NAME` in the folder of measured records, which `QUIETCUT_DATA` names.
+///
+/// A test that uses it has `measured` in its name and is `#[ignore]`d, so that it counts as skipped where there are no such records;
+/// `tests/run` runs it where they are.
+///
+/// # Panics
+/// `QUIETCUT_DATA` is not set.
+pub fn measured(name: &str) -> PathBuf {
+    let folder =
+        std::env::var_os("QUIETCUT_DATA").expect("QUIETCUT_DATA names the folder of measured records");
+    PathBuf::from(folder).join(name)
+}
+
 /// The case `tests/cases/NAME.toml`.
 ///
 /// # Panics

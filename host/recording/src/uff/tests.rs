@@ -463,11 +463,9 @@ fn single_precision_and_complex_uneven_values_are_sorted() {
 
 /// The two samples of the same record, as text and binary, of which one has six digits.
 #[test]
+#[ignore = "measured records: QUIETCUT_DATA names their folder"]
 fn both_measured_samples_read_to_the_same_signal() {
-    let Some(folder) = std::env::var_os("QUIETCUT_DATA").map(PathBuf::from) else {
-        println!("QUIETCUT_DATA is not set: the UFF samples were not read");
-        return;
-    };
+    let folder = PathBuf::from(std::env::var_os("QUIETCUT_DATA").unwrap());
     let read = |name: &str| Recording::read(folder.join("uff").join(name)).unwrap();
     let (text, binary) = (read("Sample_UFF58_ascii.uff"), read("Sample_UFF58b_bin.uff"));
     assert_eq!((text.len(), text.sample_rate_hz), (79_292, 65_536.0));
