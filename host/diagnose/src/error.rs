@@ -37,14 +37,14 @@ pub enum DiagnoseError {
 }
 
 impl DiagnoseError {
-    pub(super) fn record(path: &std::path::Path, what: impl Into<String>) -> Self {
+    pub(crate) fn record(path: &std::path::Path, what: impl Into<String>) -> Self {
         Self::Record {
             path: path.into(),
             what: what.into(),
         }
     }
 
-    pub(super) fn simulate(path: &std::path::Path, error: impl Into<SimulateError>) -> Self {
+    pub(crate) fn simulate(path: &std::path::Path, error: impl Into<SimulateError>) -> Self {
         Self::Simulate {
             path: path.into(),
             error: error.into(),

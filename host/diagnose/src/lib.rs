@@ -1,116 +1,51 @@
 //! What the simulation gets wrong, why, and what to add.
 //!
 //! The residual is taken with the *measured* motion: with H the receptance of the case and f_r a term that it lacks,
-//! y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large terms. A cause is then one or few regressors
-//! ([`cause`]), fits of any set of causes are linear least squares ([`regression`]), and what competes is judged by
-//! likelihood, parsimony and records that were held out ([`evidence`]).
+//! y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large terms. A cause is one or few regressors, and the fit of
+//! any set of causes is linear least squares. The few best candidate models are then fitted by prediction error, without the noise of
+//! the measured motion in them: tests of structures are simulated, cuts are predicted again with the extended case.
 //!
-//! That finds the few explanations that are worth more: the extended case itself is then fitted, without the noise of the measured
-//! motion in it. Tests of structures are simulated (`output_error`), cuts are read again with the extended case
-//! (`relinearization`), near a lobe and in chatter along the measured motion still (`amplification`).
+//! Data flows through these rooms from the top to the bottom; a room uses only those above it:
+//!
+//! - `error`, `progress`, `signal`: the ground. Errors, options, stages; transforms and noise floors of sampled signals.
+//! - `baseline`: the model of the case file. It knows no recording.
+//! - `motion`: the kinematics of a recorded cut (spindle angle, tooth passings, chips) and free decays. It knows no `Record`.
+//! - `records`: each recording beside what the baseline predicts of it, and the `Study` that holds them. It knows no cause.
+//! - `candidates`: the causes that a baseline may lack, as regressors along the measured motion and as simulations. It fits nothing.
+//! - `fit`: the parameters of one candidate model. It does not compare candidates.
+//! - `selection`: which candidate model explains the records. It words nothing.
+//! - `conclusion`: parameter estimates, intervals, residual views, gain, effect on the lobes, the answer.
+//! - `next_test`: the experiment that separates what is confounded.
+//!
+//! `baseline` and `motion` stand before `records` because a `Record` holds the prediction of the baseline along the motion.
 
-mod amplification;
-pub mod answer;
-mod around;
-mod beginning;
-pub mod cause;
-mod causes;
-#[cfg(test)]
-mod chatter_tests;
-mod checks;
-pub mod chips;
-mod closed_fit;
-mod closed_loop;
-mod closed_selection;
-mod cubic;
-pub mod cut;
-mod cutting;
-#[cfg(test)]
-mod cutting_tests;
-mod decay;
+mod baseline;
+mod candidates;
+mod conclusion;
 mod error;
-pub mod evidence;
-mod extension;
-mod force_noise;
-mod full_cut;
-mod gram;
-mod grid;
-mod guess;
-#[cfg(test)]
-mod hammer_tests;
-mod judge;
-mod leftover;
-pub mod lobes;
-mod mean_slopes;
-mod missing_force;
+mod fit;
 mod motion;
-mod named;
 mod next_test;
-pub mod noise;
-mod output_error;
-mod own_slopes;
-mod part;
-mod receptance;
-mod record;
-mod recorded_cuts;
-mod refine;
-pub mod regression;
-mod relinearization;
-mod restarts;
-mod scene;
+mod progress;
+mod records;
 mod selection;
-#[cfg(test)]
-mod sensor_tests;
-mod stepwise;
-mod stiffness;
+mod signal;
 #[cfg(test)]
 mod tests;
-mod together;
-pub mod turning;
-#[cfg(test)]
-mod two_effects_tests;
-mod unknowns;
-#[cfg(test)]
-mod velocity_jump_tests;
-mod views;
-#[cfg(test)]
-mod virtual_records;
-mod whitening;
 
-pub use answer::Diagnosis;
-pub use cutting::Cutting;
+pub use conclusion::answer::{self, Diagnosis};
+pub use conclusion::lobes;
+pub use conclusion::missing_force::{AtAmplitude, MissingForce};
+pub use conclusion::recorded_cuts::recorded_cuts;
+pub use conclusion::residual_views::{TurningView, View};
 pub use error::DiagnoseError;
-pub use grid::Grid;
-pub use missing_force::{AtAmplitude, MissingForce};
-pub use receptance::Receptance;
-pub use record::{Observed, Record};
-pub use recorded_cuts::recorded_cuts;
-pub use scene::{Baseline, Domain, Scene};
-pub use views::{TurningView, View};
+pub use progress::{Options, Stage};
 
+use conclusion::{conclude, long_records};
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
-pub use quietcut_simulate::path::{Motion, restoring_along};
-
-/// How to diagnose.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Options {
-    /// Seed of whatever is drawn.
-    pub seed: u64,
-}
-
-/// How far a diagnosis is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Recordings are set against what the case predicts.
-    Records,
-    /// What each cause would look like in them.
-    Library,
-    /// So many causes at a time are tried.
-    Causes(usize),
-    /// What was found is put into figures.
-    Answer,
-}
+use records::full_engagement;
+use records::study::Scene;
 
 /// What the case gets wrong about the recordings, and why.
 ///
@@ -135,13 +70,13 @@ pub fn diagnose_watched(
     watch: &dyn Fn(Stage),
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
-    let (recordings, shortened) = full_cut::in_full_cut(case, recordings)?;
-    let mut diagnosis = match beginning::diagnosed(case, &recordings, options, watch) {
+    let (recordings, shortened) = full_engagement::in_full_cut(case, recordings)?;
+    let mut diagnosis = match long_records::diagnosed(case, &recordings, options, watch) {
         Some(diagnosis) => diagnosis,
         None => {
             watch(Stage::Records);
             let scene = Scene::new(case, &recordings)?;
-            judge::judge(&scene, &recordings, options, watch)
+            conclude::judge(&scene, &recordings, options, watch)
         }
     };
     diagnosis.next_test = next_test::next_test(case, &recordings, &diagnosis);

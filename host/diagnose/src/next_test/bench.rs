@@ -6,9 +6,9 @@ use nalgebra::Matrix3;
 use num_complex::Complex64;
 
 use super::experiment::Reading;
-use crate::noise::rms;
-use crate::scene::{Baseline, derivatives};
-use crate::views::View;
+use crate::baseline::{Baseline, derivatives};
+use crate::conclusion::residual_views::View;
+use crate::signal::noise::rms;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_recording::{Channel, Kind, Quantity, Recording};

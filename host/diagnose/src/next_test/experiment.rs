@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::bench::Bench;
 use super::separation::Difference;
-use crate::answer::NextTest;
+use crate::conclusion::answer::NextTest;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_model::structure::Direction;

@@ -16,12 +16,12 @@ use rayon::prelude::*;
 use self::bench::Bench;
 use self::experiment::{Experiment, Sensors, experiments};
 use self::separation::{Difference, Rival};
-use super::answer::{Diagnosis, NextTest, label};
+use crate::conclusion::answer::{Diagnosis, NextTest, label};
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
 /// Squared distance beyond which a test tells nearly always: the difference of twice the log-likelihoods of two explanations D apart
-/// is D² ± 2D, and [`super::selection::APART`] of it is asked for.
+/// is D² ± 2D, and [`crate::selection::select::APART`] of it is asked for.
 const PLAIN: f64 = 60.0;
 
 /// What could be done, and what it would tell.

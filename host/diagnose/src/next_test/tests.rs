@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::separation::least;
-use crate::answer::{Diagnosis, Outcome};
+use crate::conclusion::answer::{Diagnosis, Outcome};
 use crate::{Options, diagnose};
 use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;

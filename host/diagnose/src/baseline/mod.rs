@@ -1,0 +1,154 @@
+//! The baseline model: the case with its extensions, as numbers that later rooms compute with.
+
+mod cubic_term;
+pub(crate) mod dynamic_stiffness;
+pub(crate) mod receptance;
+
+use self::cubic_term::cubic_term;
+use self::receptance::Receptance;
+use crate::error::DiagnoseError;
+use quietcut_model::case::Case;
+use quietcut_model::structure::{Direction, FirstOrder, Structure};
+use quietcut_model::{Effects, ModelError, Term};
+use quietcut_simulate::effect::Pickup;
+
+/// The baseline: the case with its extensions.
+pub(crate) struct Baseline<'a> {
+    /// The case.
+    pub case: &'a Case,
+    /// Its structure, as it stands in the file.
+    pub structure: &'a Structure,
+    /// Its extensions.
+    pub effects: Effects,
+    /// The structure with what the case's extensions make of its numbers.
+    pub altered: Structure,
+    /// What the equation of motion has besides the linear structure.
+    pub terms: Vec<Box<dyn Term>>,
+    /// The linear structure with all that extensions change in it.
+    pub first_order: FirstOrder,
+    /// Its receptance.
+    pub receptance: Receptance,
+    /// True where a jump of the force makes the velocity jump, so that accelerations are means over a sample: see [`quietcut_simulate::Dynamics::velocity_jumps`].
+    pub velocity_jumps: bool,
+    /// The machine's axes (0, 1, 2) that the structure has.
+    pub axes: Vec<usize>,
+}
+
+impl<'a> Baseline<'a> {
+    /// The baseline of a case.
+    ///
+    /// # Errors
+    /// No structure, an indefinite one, or an extension that it cannot have.
+    pub(crate) fn new(case: &'a Case) -> Result<Self, DiagnoseError> {
+        let structure = case.structure()?;
+        let wrong = |error| DiagnoseError::simulate(&case.path, error);
+        let effects = Effects::of_case(case)
+            .map_err(|error| DiagnoseError::simulate(&case.path, ModelError::from(error)))?;
+        let (dynamics, mut terms) = effects.dynamics(structure).map_err(wrong)?;
+        if let Some(cubic) = cubic_term(structure) {
+            terms.push(cubic);
+        }
+        let first_order = dynamics.first_order();
+        let altered = effects.altered(structure).map_err(|error| wrong(error.into()))?;
+        Ok(Self {
+            altered,
+            case,
+            structure,
+            effects,
+            terms,
+            receptance: Receptance::new(&first_order),
+            first_order,
+            velocity_jumps: dynamics.velocity_jumps(),
+            axes: axes_of(structure),
+        })
+    }
+
+    /// The linear structure with one effect more.
+    ///
+    /// # Errors
+    /// What the effect cannot do to this structure.
+    pub(crate) fn altered(&self, effect: &Effects) -> Result<FirstOrder, ModelError> {
+        let (dynamics, _) = self.effects.clone().and(effect).dynamics(self.structure)?;
+        Ok(dynamics.first_order())
+    }
+
+    /// True where the structure has a motion without stiffness: a stage that can go away.
+    pub(crate) fn is_free(&self) -> bool {
+        let poles = self.first_order.poles();
+        let largest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+        poles.iter().any(|pole| pole.norm() <= 1e-9 * largest.max(1e-9))
+    }
+
+    /// The longest time constant of the structure, s.
+    pub(crate) fn slowest_decay_s(&self) -> f64 {
+        self.first_order
+            .poles()
+            .iter()
+            .map(|pole| 1.0 / (-pole.re).max(1e-6 * pole.norm()).max(1e-9))
+            .fold(0.0, f64::max)
+    }
+
+    /// The lowest natural frequency, Hz; `None` where nothing vibrates.
+    pub(crate) fn lowest_hz(&self) -> Option<f64> {
+        self.first_order
+            .poles()
+            .iter()
+            .filter(|pole| pole.im > 0.0)
+            .map(|pole| pole.norm() / std::f64::consts::TAU)
+            .min_by(f64::total_cmp)
+    }
+
+    /// What a channel reads, as the baseline has it; `None` for what is neither force nor motion along x, y or z.
+    pub(crate) fn pickup(&self, name: &str) -> Option<Pickup> {
+        pickup_of(name).map(|pickup| self.effects.pickup(pickup))
+    }
+}
+
+/// The machine's axes of a structure.
+pub(crate) fn axes_of(structure: &Structure) -> Vec<usize> {
+    structure
+        .directions
+        .iter()
+        .filter_map(|direction| direction.axis())
+        .collect()
+}
+
+/// The direction of an axis.
+pub(crate) fn direction_of(axis: usize) -> Direction {
+    [Direction::X, Direction::Y, Direction::Z][axis.min(2)]
+}
+
+/// A channel of the conventions of recordings: fx, x, vx, ax …
+fn pickup_of(name: &str) -> Option<Pickup> {
+    use quietcut_recording::Quantity;
+    let (quantity, axis) = match name.as_bytes() {
+        [axis] => (Quantity::Displacement, axis),
+        [b'f', axis] => (Quantity::Force, axis),
+        [b'v', axis] => (Quantity::Velocity, axis),
+        [b'a', axis] => (Quantity::Acceleration, axis),
+        _ => return None,
+    };
+    let axis = b"xyz".iter().position(|known| known == axis)?;
+    Some(Pickup::of_axis(quantity, axis))
+}
+
+/// The terms of one effect alone.
+pub(crate) fn terms_of(
+    effects: &Effects,
+    structure: &Structure,
+) -> Result<Vec<Box<dyn Term>>, quietcut_simulate::EffectError> {
+    let mut terms = Vec::new();
+    for effect in &effects.0 {
+        terms.extend(effect.terms(structure)?);
+    }
+    Ok(terms)
+}
+
+/// Number of derivatives that a channel's quantity is of displacement.
+pub(crate) fn derivatives(quantity: quietcut_recording::Quantity) -> i32 {
+    match quantity {
+        quietcut_recording::Quantity::Velocity => 1,
+        quietcut_recording::Quantity::Acceleration => 2,
+        _ => 0,
+    }
+}

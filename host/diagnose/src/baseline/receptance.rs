@@ -1,0 +1,128 @@
+//! The receptance of the baseline as a sum over its poles: fast at many frequencies, and its free decays.
+
+use nalgebra::{DMatrix, Matrix3};
+use num_complex::Complex64;
+
+use quietcut_model::structure::FirstOrder;
+
+/// Poles closer than this, relative, are one.
+const SAME: f64 = 1e-9;
+/// Modes with less than this share of the largest 1/mass are not felt.
+const FELT: f64 = 1e-3;
+
+/// H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N; rows displacement, columns force.
+#[derive(Clone, Debug)]
+pub(crate) struct Receptance {
+    terms: Vec<(Complex64, Matrix3<Complex64>)>,
+    /// Where poles with too few shapes leave no such sum: the structure itself.
+    whole: Option<FirstOrder>,
+}
+
+impl Receptance {
+    /// Residues by the projectors P_r = Π_{j≠r} (A − λ_j)/(λ_r − λ_j) (Lagrange–Sylvester); poles that coincide count once.
+    pub(crate) fn new(first_order: &FirstOrder) -> Self {
+        let mut poles: Vec<Complex64> = Vec::new();
+        for pole in first_order.poles() {
+            if !poles
+                .iter()
+                .any(|known| (known - pole).norm() <= SAME * pole.norm())
+            {
+                poles.push(pole);
+            }
+        }
+        let a = first_order.a.map(Complex64::from);
+        let b = first_order.b.map(Complex64::from);
+        let c = first_order.c.map(Complex64::from);
+        let terms = poles
+            .iter()
+            .map(|&pole| {
+                let mut projected = DMatrix::from_column_slice(b.nrows(), 3, b.as_slice());
+                for other in poles.iter().filter(|other| **other != pole) {
+                    projected = (&a * &projected - &projected * *other) / (pole - other);
+                }
+                let residue = &c * projected;
+                (pole, Matrix3::from_fn(|i, j| residue[(i, j)]))
+            })
+            .collect();
+        let sum = Self { terms, whole: None };
+        let size = first_order.poles().iter().map(|p| p.norm()).fold(0.0, f64::max);
+        let fits = [0.31, 0.83, 1.7].into_iter().all(|share| {
+            let omega = share * size;
+            let exact = first_order.receptance(omega).unwrap_or_else(Matrix3::zeros);
+            (exact - sum.at(omega)).norm() <= 1e-8 * exact.norm()
+        });
+        if fits {
+            sum
+        } else {
+            Self {
+                terms: Vec::new(),
+                whole: Some(first_order.clone()),
+            }
+        }
+    }
+
+    /// H(iω), m/N; ω in rad/s. Zero at a pole on the imaginary axis.
+    pub(crate) fn at(&self, omega: f64) -> Matrix3<Complex64> {
+        if let Some(whole) = &self.whole {
+            return whole.receptance(omega).unwrap_or_else(Matrix3::zeros);
+        }
+        let s = Complex64::new(0.0, omega);
+        let mut sum = Matrix3::zeros();
+        for (pole, residue) in &self.terms {
+            let distance = s - pole;
+            if distance != Complex64::ZERO {
+                sum += residue * distance.inv();
+            }
+        }
+        sum
+    }
+
+    /// Poles above the real axis that the force along `axis` moves, seen along it, and what each has there of 1/mass:
+    /// 2·Im(λ)·|R|, 1/kg.
+    pub(crate) fn modes_along(&self, axis: usize) -> impl Iterator<Item = (Complex64, f64)> {
+        let per_mass = move |(pole, residue): &(Complex64, Matrix3<Complex64>)| {
+            2.0 * pole.im * residue[(axis, axis)].norm()
+        };
+        let largest = self.terms.iter().map(per_mass).fold(0.0, f64::max);
+        self.terms
+            .iter()
+            .map(move |term| (term.0, per_mass(term)))
+            .filter(move |(pole, per_mass)| pole.im > 0.0 && *per_mass > FELT * largest)
+    }
+
+    /// Root of Σ |R_r/(iω − λ_r)|² along the diagonal entry of `axis`: what H would be if its parts did not cancel, m/N.
+    pub(crate) fn size_at(&self, omega: f64, axis: usize) -> f64 {
+        let s = Complex64::new(0.0, omega);
+        self.terms
+            .iter()
+            .map(|(pole, residue)| (residue[(axis, axis)] / (s - pole)).norm_sqr())
+            .sum::<f64>()
+            .sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quietcut_model::case::Case;
+
+    #[test]
+    fn the_sum_over_poles_is_the_receptance() {
+        for name in [
+            "kuka-kr90-acetal",
+            "kuka-kr90-full",
+            "staubli-tx200",
+            "insperger-2dof-ad1",
+        ] {
+            let path = format!("{}/../../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+            let case = Case::read(path).unwrap();
+            let first_order = case.structure().unwrap().first_order().unwrap();
+            let sum = Receptance::new(&first_order);
+            assert!(sum.whole.is_none(), "{name}");
+            for omega in [0.0, 20.0, 107.0, 5800.0] {
+                let exact = first_order.receptance(omega).unwrap();
+                assert!((sum.at(omega) - exact).norm() < 1e-9 * exact.norm(), "{name}");
+            }
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! Mass, stiffness and damping that differ from the case.
+//!
+//! Shows: a receptance that differs and does not depend on amplitude: above resonance for mass, below it for stiffness, at it for
+//! damping. Does not show: harmonics, or lines where nothing drives. All three by one factor are a gain of the only channel.
+//! Fit: linear in the relative change. Source: the output-error equation of Pintelon and Schoukens, System Identification (2012).
+//!
+//! With H the receptance and θ the relative change of the parameter, x = H(θ) F, and where Z = H⁻¹ is linear in θ (every
+//! structure of mass, damping and stiffness) the residual along the *measured* motion is exact for changes of any size:
+//! x − H F = −θ H (∂Z/∂θ) x = θ (∂H/∂θ) F_eff with F_eff = H⁻¹ x. Where H nearly vanishes (between two modes) F_eff would be
+//! noise; there it is the measured force: F_eff = F + H* (x − H F)/(|H|² + ε²).
+
+use nalgebra::{DMatrix, DVector, Matrix3};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::baseline::dynamic_stiffness;
+use crate::baseline::receptance::Receptance;
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::{Domain, Scene};
+use quietcut_model::structure::Form;
+use quietcut_recording::Quantity;
+use quietcut_simulate::Effects;
+
+/// Relative step of the differences: their error is its square, rounding is 1e-12 over it.
+const STEP: f64 = 1e-4;
+/// Share of the parts of H below which it counts as nearly vanishing.
+const VANISHING: f64 = 0.05;
+
+#[derive(Clone, Copy)]
+enum Which {
+    Mass,
+    Stiffness,
+    Damping,
+}
+
+struct Linear(Which);
+
+pub(crate) fn all() -> Vec<Box<dyn Cause>> {
+    [Which::Mass, Which::Stiffness, Which::Damping]
+        .into_iter()
+        .map(|which| Box::new(Linear(which)) as Box<dyn Cause>)
+        .collect()
+}
+
+impl Linear {
+    fn key(&self) -> &'static str {
+        match self.0 {
+            Which::Mass => "mass_kg",
+            Which::Stiffness => "stiffness_n_per_m",
+            Which::Damping => "damping_ns_per_m",
+        }
+    }
+
+    /// The entry of the matrix on the diagonal, where the structure has one there.
+    fn entry(&self, scene: &Scene<'_>, place: &Place) -> Option<f64> {
+        let Form::Matrices(matrices) = &scene.baseline.structure.form else {
+            return None;
+        };
+        let directions = &scene.baseline.structure.directions;
+        let index = directions
+            .iter()
+            .position(|direction| Some(*direction) == place.direction())?;
+        let matrix = match self.0 {
+            Which::Mass => &matrices.mass,
+            Which::Stiffness => &matrices.stiffness,
+            Which::Damping => &matrices.damping,
+        };
+        Some(matrix[(index, index)])
+    }
+
+    fn effect(&self, place: &Place, relative: f64) -> Option<Effects> {
+        let mut table = place.table();
+        table.insert("relative_change".into(), relative.into());
+        Effects::of_extension(self.name(), &table).ok()
+    }
+}
+
+impl Cause for Linear {
+    fn name(&self) -> &'static str {
+        match self.0 {
+            Which::Mass => "mass",
+            Which::Stiffness => "stiffness",
+            Which::Damping => "damping",
+        }
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        if scene.baseline.case.extensions.contains_key(self.name()) {
+            return Vec::new();
+        }
+        let driven = scene.driven_axes();
+        if scene.has_modes() {
+            return if driven.is_empty() {
+                Vec::new()
+            } else {
+                vec![Place::Everywhere]
+            };
+        }
+        let mut places: Vec<Place> = driven
+            .iter()
+            .map(|axis| Place::Axis(*axis))
+            .filter(|place| self.entry(scene, place).is_some_and(|entry| entry != 0.0))
+            .collect();
+        if driven.len() > 1 {
+            places.push(Place::Everywhere);
+        }
+        places
+    }
+
+    fn regressors(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        _: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let [below, above] = [-STEP, STEP].map(|step| {
+            let effect = self.effect(place, step)?;
+            let first_order = scene.baseline.altered(&effect).ok()?;
+            Some((effect, first_order))
+        });
+        let ((below_effect, below), (above_effect, above)) = (below?, above?);
+        let baseline = &scene.baseline;
+        let grid = &record.grid;
+        let folded = of_folded_forces(record);
+        let bins = if folded.is_some() {
+            grid.fine_bins()
+        } else {
+            grid.bins()
+        };
+        let difference: Vec<Matrix3<Complex64>> = match record.domain {
+            Domain::Response => {
+                let (below, above) = (Receptance::new(&below), Receptance::new(&above));
+                (0..bins)
+                    .into_par_iter()
+                    .map(|bin| {
+                        let omega = grid.omega(bin);
+                        (above.at(omega) - below.at(omega)) / Complex64::from(2.0 * STEP)
+                    })
+                    .collect()
+            }
+            Domain::Force => {
+                let of = |effect: &Effects, first_order| {
+                    let structure = baseline
+                        .effects
+                        .clone()
+                        .and(effect)
+                        .altered(baseline.structure)
+                        .ok()?;
+                    Some(dynamic_stiffness::table(
+                        &structure,
+                        first_order,
+                        &baseline.axes,
+                        grid,
+                    ))
+                };
+                let (below, above) = (of(&below_effect, &below)?, of(&above_effect, &above)?);
+                above
+                    .iter()
+                    .zip(&below)
+                    .map(|(above, below)| (above - below) / Complex64::from(2.0 * STEP))
+                    .collect()
+            }
+        };
+        let into = match record.domain {
+            Domain::Response => {
+                let mut force = effective_force(scene, record);
+                for (force, beyond) in force.iter_mut().zip(folded.into_iter().flatten()) {
+                    let known = force.len();
+                    force.extend(beyond.into_iter().flatten().skip(known));
+                    force.resize(bins, Complex64::ZERO);
+                }
+                force
+            }
+            Domain::Force => record.displacement.clone(),
+        };
+        let observed = record
+            .channels
+            .iter()
+            .map(|channel| {
+                let spectrum: Vec<Complex64> = (0..bins)
+                    .map(|bin| {
+                        let mut sum = Complex64::ZERO;
+                        for (axis, weight) in channel.pickup.weights.iter().enumerate() {
+                            if *weight == 0.0 {
+                                continue;
+                            }
+                            for &from in &baseline.axes {
+                                sum += difference[bin][(axis, from)] * into[from][bin] * *weight;
+                            }
+                        }
+                        match record.domain {
+                            Domain::Response => sum * record.factor(channel, bin),
+                            Domain::Force => sum,
+                        }
+                    })
+                    .collect();
+                if bins > grid.bins() {
+                    grid.samples_of_fine(&spectrum)
+                } else {
+                    grid.samples(&spectrum)
+                }
+            })
+            .collect();
+        Some(vec![Regressor::of_channels(observed)])
+    }
+
+    fn parameters(
+        &self,
+        scene: &Scene<'_>,
+        place: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let relative = *coefficients.first()?;
+        if relative <= -0.95 {
+            return None;
+        }
+        Some(match self.entry(scene, place) {
+            Some(entry) => vec![(self.key(), entry * (1.0 + relative))],
+            None => vec![("relative_change", relative)],
+        })
+    }
+
+    fn also(&self, scene: &Scene<'_>, _: &Place, parameters: &[Parameter]) -> Vec<Parameter> {
+        let [("relative_change", relative)] = parameters else {
+            return Vec::new();
+        };
+        let Form::Modes(modes) = &scene.baseline.structure.form else {
+            return Vec::new();
+        };
+        let [mode] = modes.as_slice() else {
+            return Vec::new();
+        };
+        match self.0 {
+            Which::Mass => vec![("frequency_hz", mode.frequency_hz / (1.0 + relative).sqrt())],
+            Which::Stiffness => vec![("frequency_hz", mode.frequency_hz * (1.0 + relative).sqrt())],
+            Which::Damping => vec![("damping_ratio", mode.damping_ratio * (1.0 + relative))],
+        }
+    }
+}
+
+/// The forces of a cut whose acceleration is measured, at the bins of the finer samples: above half the sample rate the structure
+/// is a mass, and its acceleration is folded into the band.
+fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
+    let cut = record.cut.as_ref()?;
+    record
+        .channels
+        .iter()
+        .any(|channel| channel.pickup.quantity == Quantity::Acceleration)
+        .then(|| record.cut_spectra(&cut.force))
+}
+
+/// F_eff, N, over the axes of the baseline.
+fn effective_force(scene: &Scene<'_>, record: &Record) -> [Vec<Complex64>; 3] {
+    let baseline = &scene.baseline;
+    let (axes, grid) = (&baseline.axes, &record.grid);
+    let measured: [Option<Vec<Complex64>>; 3] = std::array::from_fn(|axis| {
+        (!record.force_n[axis].is_empty()).then(|| grid.spectrum(&record.force_n[axis]))
+    });
+    let size = axes.len();
+    let found: Vec<[Complex64; 3]> = (0..grid.bins())
+        .into_par_iter()
+        .map(|bin| {
+            let force = DVector::from_fn(size, |i, _| {
+                measured[axes[i]]
+                    .as_ref()
+                    .map_or(Complex64::ZERO, |force| force[bin])
+            });
+            let h = DMatrix::from_fn(size, size, |i, j| record.transfer[bin][(axes[i], axes[j])]);
+            let x = DVector::from_fn(size, |i, _| record.displacement[axes[i]][bin]);
+            let left = x - &h * &force;
+            let omega = grid.omega(bin);
+            let mut normal = &h * h.adjoint();
+            for i in 0..size {
+                let vanishing = VANISHING * baseline.receptance.size_at(omega, axes[i]);
+                normal[(i, i)] += Complex64::from(vanishing * vanishing);
+            }
+            let mut whole = [Complex64::ZERO; 3];
+            if let Some(solved) = normal.lu().solve(&left) {
+                let added = h.adjoint() * solved;
+                for i in 0..size {
+                    whole[axes[i]] = force[i] + added[i];
+                }
+            }
+            whole
+        })
+        .collect();
+    std::array::from_fn(|axis| found.iter().map(|force| force[axis]).collect())
+}

@@ -1,0 +1,290 @@
+//! One more mode in the receptance of a direction: y gets F/(m·(ω_m² − ω² + 2iζω_m ω)), exact where the force is measured.
+//!
+//! Shows: a resonance with a phase of its own at a frequency where the case has none, the same at all levels. Does not show: harmonics or
+//! a dependence on amplitude. Far outside the band it is a little stiffness or mass (the residual terms of a modal fit).
+//! Fit: 1/m linear, ω_m and ζ as a shape. Source: Ewins, Modal Testing (2000), ch. 4.
+//!
+//! A structure that is let go was pulled as a whole: the mode begins at rest where the static force F₀ = H(0)⁻¹ u(0) had it,
+//! and y gets F₀/(m ω_m²)·e^(−ζω_m t)·(cos ω_d t + ζω_m/ω_d · sin ω_d t), ω_d = ω_m √(1 − ζ²).
+
+use nalgebra::Vector3;
+use num_complex::Complex64;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+use crate::baseline::derivatives;
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::closed_loop::{holding_force_n, starts_anywhere};
+use crate::records::record::{Observed, Record};
+use crate::records::study::{Domain, Scene};
+
+pub(crate) struct MissingMode;
+
+/// Damping ratios that are tried first.
+const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
+/// Frequencies that are kept after the first look.
+const KEPT: usize = 4;
+
+impl Cause for MissingMode {
+    fn name(&self) -> &'static str {
+        "missing-mode"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        if !scene.all_in(Domain::Response) || scene.baseline.case.extensions.contains_key(self.name()) {
+            return Vec::new();
+        }
+        scene
+            .driven_axes()
+            .into_iter()
+            .filter(|axis| {
+                scene
+                    .records
+                    .iter()
+                    .any(|record| !record.force_n[*axis].is_empty() || is_let_go(record, *axis))
+            })
+            .map(Place::Axis)
+            .collect()
+    }
+
+    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
+        let residual: Vec<Vec<Vec<f64>>> = scene
+            .records
+            .iter()
+            .map(|record| record.channels.iter().map(Observed::residual).collect())
+            .collect();
+        self.shapes_beside(scene, place, &residual)
+    }
+
+    /// The few frequencies at which such a mode would look most like the residual, at three dampings each.
+    fn shapes_beside(&self, scene: &Scene<'_>, place: &Place, left: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+        let Place::Axis(axis) = place else {
+            return Vec::new();
+        };
+        let [[low, high], _] = self.bounds(scene, place)[..] else {
+            return Vec::new();
+        };
+        let count = 160;
+        let (bins, releases) = (bins(scene, *axis, left), releases(scene, *axis, left));
+        let likeness: Vec<Vec<(f64, Vec<f64>)>> = DAMPING
+            .par_iter()
+            .map(|damping| {
+                (0..count)
+                    .map(|index| {
+                        let frequency = low * (high / low).powf(f64::from(index) / f64::from(count - 1));
+                        let alike = likeness(&bins, &releases, frequency, *damping);
+                        (alike, vec![frequency, *damping])
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut peaks: Vec<(f64, Vec<f64>)> = Vec::new();
+        for of_damping in likeness {
+            for (index, (value, shape)) in of_damping.iter().enumerate() {
+                let below = |other: Option<&(f64, Vec<f64>)>| other.is_none_or(|other| other.0 <= *value);
+                let before = index.checked_sub(1).and_then(|index| of_damping.get(index));
+                if below(before) && below(of_damping.get(index + 1)) {
+                    peaks.push((*value, shape.clone()));
+                }
+            }
+        }
+        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        peaks.truncate(KEPT);
+        peaks.into_iter().map(|(_, shape)| shape).collect()
+    }
+
+    fn bounds(&self, scene: &Scene<'_>, _: &Place) -> Vec<[f64; 2]> {
+        let rate = scene
+            .records
+            .iter()
+            .map(|record| record.grid.rate_hz())
+            .fold(f64::INFINITY, f64::min);
+        let longest = scene
+            .records
+            .iter()
+            .map(|record| record.grid.count() as f64 / record.grid.rate_hz())
+            .fold(0.0, f64::max);
+        let highest = scene
+            .records
+            .iter()
+            .map(|record| record.highest_hz)
+            .fold(0.0, f64::max);
+        let low = (3.0 / longest).min(0.1 * highest);
+        vec![[low, (2.0 * highest).min(0.45 * rate)], [0.001, 0.5]]
+    }
+
+    fn regressors(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let (Place::Axis(axis), [frequency, damping]) = (place, shape) else {
+            return None;
+        };
+        if is_let_go(record, *axis) {
+            let force_n = held_by_n(scene, record)?[*axis];
+            let count = record.grid.count();
+            let of = |channel| released(record, channel, *axis, force_n, [*frequency, *damping]);
+            let observed = record
+                .channels
+                .iter()
+                .map(|channel| of(channel).take(count).collect())
+                .collect();
+            return Some(vec![Regressor::of_channels(observed)]);
+        }
+        let force = &record.force_n[*axis];
+        let observed = record
+            .channels
+            .iter()
+            .map(|channel| {
+                let weight = channel.pickup.weights[*axis];
+                if force.is_empty() || weight == 0.0 {
+                    return Vec::new();
+                }
+                let mut spectrum = record.grid.spectrum(force);
+                for (bin, value) in spectrum.iter_mut().enumerate() {
+                    let omega = record.grid.omega(bin);
+                    *value *= mode(omega, *frequency, *damping) * record.factor(channel, bin) * weight;
+                }
+                record.grid.samples(&spectrum)
+            })
+            .collect();
+        Some(vec![Regressor::of_channels(observed)])
+    }
+
+    /// None where a mode of the case has its peak within the peak of this one and is as large: that is a change of a mode that is
+    /// there.
+    fn parameters(
+        &self,
+        scene: &Scene<'_>,
+        place: &Place,
+        shape: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let per_mass = *coefficients.first()?;
+        let (Place::Axis(axis), natural) = (place, TAU * shape[0]) else {
+            return None;
+        };
+        let is_known = scene
+            .baseline
+            .receptance
+            .modes_along(*axis)
+            .any(|(pole, known_per_mass)| {
+                (pole.norm() - natural).abs() < -pole.re + shape[1] * natural && per_mass < known_per_mass
+            });
+        (per_mass > 0.0 && !is_known).then(|| {
+            vec![
+                ("frequency_hz", shape[0]),
+                ("damping_ratio", shape[1]),
+                ("modal_mass_kg", 1.0 / per_mass),
+            ]
+        })
+    }
+}
+
+/// 1/(ω_m² − ω² + 2iζω_m ω), the receptance of a mode of mass 1.
+fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
+    let natural = TAU * frequency_hz;
+    Complex64::new(
+        natural * natural - omega * omega,
+        2.0 * damping_ratio * natural * omega,
+    )
+    .inv()
+}
+
+/// True of a record of what was let go, where nobody measured the force along `axis`.
+fn is_let_go(record: &Record, axis: usize) -> bool {
+    starts_anywhere(record) && record.force_n[axis].is_empty()
+}
+
+/// The static force from which the baseline was let go, N.
+fn held_by_n(scene: &Scene<'_>, record: &Record) -> Option<Vector3<f64>> {
+    holding_force_n(scene, &scene.baseline.first_order, &record.decays.start)
+}
+
+/// What a channel reads of a mode of mass 1 that is let go from under a static force along `axis`, sample after sample.
+fn released<'a>(
+    record: &'a Record,
+    channel: &'a Observed,
+    axis: usize,
+    force_n: f64,
+    [frequency_hz, damping_ratio]: [f64; 2],
+) -> impl Iterator<Item = f64> + 'a {
+    let natural = TAU * frequency_hz;
+    let pole = natural * Complex64::new(-damping_ratio, (1.0 - damping_ratio * damping_ratio).sqrt());
+    // η(t) = η(0)·Re[−λ̄/(i ω_d)·e^(λt)]: one at the start, and at rest there.
+    let start = -pole.conj() / Complex64::new(0.0, pole.im) * pole.powi(derivatives(channel.pickup.quantity));
+    let size = channel.pickup.weights[axis] * force_n / (natural * natural);
+    let since = move |sample: usize| sample as f64 / record.grid.rate_hz() - channel.pickup.delay_s;
+    (0_usize..).map(move |sample| match since(sample) {
+        t if t < 0.0 => 0.0,
+        t => size * (start * (pole * t).exp()).re,
+    })
+}
+
+/// A channel that hears the axis in a record of what was let go, with the force that held it.
+type Release<'a> = (&'a Record, &'a Observed, &'a [f64], usize, f64);
+
+fn releases<'a>(scene: &'a Scene<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<Release<'a>> {
+    let mut all = Vec::new();
+    for (record, left) in scene.records.iter().zip(left) {
+        let Some(force) = held_by_n(scene, record).filter(|_| is_let_go(record, axis)) else {
+            continue;
+        };
+        let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
+        for (channel, left) in record.channels.iter().zip(left).filter(hears) {
+            all.push((record, channel, &left[..], axis, force[axis]));
+        }
+    }
+    all
+}
+
+/// One bin of a channel: ω, the force as the channel would read it of a mode with receptance 1, and the residual; both in
+/// units of the noise.
+type Bin = (f64, Complex64, Complex64);
+
+fn bins(scene: &Scene<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
+    let mut all = Vec::new();
+    let forced = |(record, _): &(&Record, _)| !record.force_n[axis].is_empty();
+    for (record, left) in scene.records.iter().zip(left).filter(forced) {
+        let force = record.grid.spectrum(&record.force_n[axis]);
+        let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
+        for (channel, left) in record.channels.iter().zip(left).filter(hears) {
+            let residual = record.grid.spectrum(left);
+            for bin in 1..record.grid.bins() {
+                let omega = record.grid.omega(bin);
+                if omega > TAU * record.band_hz {
+                    break;
+                }
+                let read = force[bin] * channel.factor(omega) * channel.pickup.weights[axis];
+                all.push((omega, read / channel.deviation, residual[bin] / channel.deviation));
+            }
+        }
+    }
+    all
+}
+
+/// The share of the residual's power in units of the noise that a mode takes, positive masses only.
+fn likeness(bins: &[Bin], releases: &[Release<'_>], frequency_hz: f64, damping_ratio: f64) -> f64 {
+    let (mut along, mut size) = (0.0, 0.0);
+    for (omega, force, residual) in bins {
+        let column = mode(*omega, frequency_hz, damping_ratio) * force;
+        along += (column.conj() * residual).re;
+        size += column.norm_sqr();
+    }
+    for (record, channel, residual, axis, force_n) in releases {
+        let column = released(record, channel, *axis, *force_n, [frequency_hz, damping_ratio]);
+        for (column, residual) in column.zip(residual.iter()) {
+            let power = channel.deviation * channel.deviation;
+            along += column * residual / power;
+            size += column * column / power;
+        }
+    }
+    if size > 0.0 && along > 0.0 {
+        along * along / size
+    } else {
+        0.0
+    }
+}

@@ -1,0 +1,90 @@
+//! What a cutting process may have otherwise: every one changes the force of the cut along the measured motion.
+//!
+//! The force with the cause is that of the simulation's own [`Cutter`](quietcut_simulate::Cutter) and
+//! [`ForceLaw`](quietcut_simulate::ForceLaw). What it adds is filtered by the structure where motion is compared, and compared
+//! as it is where the force was measured.
+
+mod axial_depth_modulation;
+mod coefficients;
+mod common_factor;
+mod edge_force;
+mod force_coefficients;
+mod force_exponent;
+mod process_damping;
+mod runout;
+mod speed_fluctuation;
+mod wear;
+
+use crate::candidates::cause::{Cause, Place, Regressor};
+use crate::motion::recorded_cut::CutForce;
+use crate::records::cutting::Cutting;
+use crate::records::record::Record;
+use crate::records::study::Scene;
+use quietcut_simulate::Cutter;
+
+pub(crate) fn all() -> Vec<Box<dyn Cause>> {
+    vec![
+        Box::new(common_factor::CommonFactor { with_edge: false }),
+        Box::new(common_factor::CommonFactor { with_edge: true }),
+        Box::new(force_coefficients::FORCE_COEFFICIENTS),
+        Box::new(edge_force::EDGE_FORCE),
+        Box::new(force_exponent::ForceExponent),
+        Box::new(runout::OfTool),
+        Box::new(process_damping::OfFlank),
+        Box::new(axial_depth_modulation::OfDepth),
+        Box::new(speed_fluctuation::OfSpindle),
+        Box::new(wear::OfEdge),
+    ]
+}
+
+/// The whole cut, where the scene has one that is not known to have the cause already.
+fn everywhere(scene: &Scene<'_>, name: &str) -> Vec<Place> {
+    let known = scene.baseline.case.extensions.contains_key(name);
+    if known || cutter(scene).is_none() {
+        Vec::new()
+    } else {
+        vec![Place::Everywhere]
+    }
+}
+
+/// The tool of the first cut of a scene.
+fn cutter<'a>(scene: &'a Scene<'_>) -> Option<&'a Cutter> {
+    scene
+        .records
+        .iter()
+        .find_map(|record| Some(&record.cut.as_ref()?.cut.cutter))
+}
+
+/// True where the axial direction is part of the cut: it moves, or its force is seen.
+fn has_axial(scene: &Scene<'_>) -> bool {
+    scene.baseline.axes.contains(&2)
+}
+
+/// What a cut adds per unit when its tool changes from `before` to `after`, `over` units apart; nothing in a record without a
+/// cut.
+fn added(record: &Record, before: impl Fn(&mut Cutter), after: impl Fn(&mut Cutter), over: f64) -> Regressor {
+    let Some(cut) = &record.cut else {
+        return Regressor::default();
+    };
+    let (before, after) = (with(record, cut, before), with(record, cut, after));
+    Regressor::of_cut(after.difference(&before, over))
+}
+
+/// What a cut adds per unit when its tool changes from the one that is believed.
+fn changed(record: &Record, after: impl Fn(&mut Cutter), over: f64) -> Regressor {
+    let Some(cut) = &record.cut else {
+        return Regressor::default();
+    };
+    Regressor::of_cut(with(record, cut, after).difference(&cut.force, over))
+}
+
+fn with(record: &Record, cut: &Cutting, change: impl Fn(&mut Cutter)) -> CutForce {
+    let mut cutter = cut.cut.cutter.clone();
+    change(&mut cutter);
+    cut.force_of(&cutter, &record.motion)
+}
+
+/// A step that stands for a size that may vanish.
+fn step(size: f64, least: f64) -> f64 {
+    if size.abs() < least { least } else { size }
+}

@@ -1,0 +1,67 @@
+//! A set of coefficients of the material that differs from that of the case: F is linear in each.
+
+use super::{changed, cutter, everywhere, has_axial};
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+use quietcut_model::milling::Material;
+use quietcut_simulate::Cutter;
+
+/// Tangential, radial and axial coefficient.
+pub(super) struct Coefficients {
+    pub(super) name: &'static str,
+    pub(super) keys: [&'static str; 3],
+    /// Where they stand in the material.
+    pub(super) of: fn(&mut Material) -> [&mut f64; 3],
+    /// A step as large as they are.
+    pub(super) step: fn(&Cutter) -> f64,
+    /// True where such a tangential coefficient can be.
+    pub(super) can_be: fn(f64) -> bool,
+}
+
+impl Cause for Coefficients {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        everywhere(scene, self.name)
+    }
+
+    fn regressors(&self, scene: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+        let step = (self.step)(cutter(scene)?);
+        // The axial coefficient acts where there is an axial direction.
+        let count = if has_axial(scene) { 3 } else { 2 };
+        let with_more = |index: usize| {
+            changed(
+                record,
+                |cutter| {
+                    let mut material = cutter.force.material();
+                    *(self.of)(&mut material)[index] += step;
+                    cutter.force = cutter.force.with_material(material);
+                },
+                step,
+            )
+        };
+        Some((0..count).map(with_more).collect())
+    }
+
+    fn parameters(
+        &self,
+        scene: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let mut material = cutter(scene)?.force.material();
+        let believed = (self.of)(&mut material).map(|value| *value);
+        let found: Vec<Parameter> = self
+            .keys
+            .into_iter()
+            .zip(believed)
+            .zip(coefficients)
+            .map(|((key, believed), change)| (key, believed + change))
+            .collect();
+        (self.can_be)(found.first()?.1).then_some(found)
+    }
+}

@@ -1,0 +1,111 @@
+//! All coefficients of the force, those of the edge included, differ by one factor: F·(1 + change).
+//!
+//! In the steady state of a stable linear cut without measured force one gain on all channels is exactly the same.
+
+use super::{changed, cutter, everywhere};
+use crate::candidates::cause::{Cause, Parameter, Part, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+use quietcut_model::milling::Material;
+
+/// Coefficients of the cut, and those of an edge that has a force.
+pub(super) struct CommonFactor {
+    pub(super) with_edge: bool,
+}
+
+const CUTTING: [&str; 3] = ["ktc_mpa", "krc_mpa", "kac_mpa"];
+const EDGE: [&str; 3] = ["kte_n_per_mm", "kre_n_per_mm", "kae_n_per_mm"];
+
+fn values(material: &Material) -> [f64; 6] {
+    [
+        material.ktc_mpa,
+        material.krc_mpa,
+        material.kac_mpa,
+        material.kte_n_per_mm,
+        material.kre_n_per_mm,
+        material.kae_n_per_mm,
+    ]
+}
+
+fn scaled(material: Material, factor: f64) -> Material {
+    let [
+        ktc_mpa,
+        krc_mpa,
+        kac_mpa,
+        kte_n_per_mm,
+        kre_n_per_mm,
+        kae_n_per_mm,
+    ] = values(&material).map(|value| factor * value);
+    Material {
+        ktc_mpa,
+        krc_mpa,
+        kac_mpa,
+        kte_n_per_mm,
+        kre_n_per_mm,
+        kae_n_per_mm,
+    }
+}
+
+impl Cause for CommonFactor {
+    fn name(&self) -> &'static str {
+        "force-coefficients"
+    }
+
+    fn names(&self) -> Vec<&'static str> {
+        if self.with_edge {
+            vec!["force-coefficients", "edge-force"]
+        } else {
+            vec!["force-coefficients"]
+        }
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        let has_edge = cutter(scene).is_some_and(|cutter| values(&cutter.force.material())[3..] != [0.0; 3]);
+        let known = self
+            .names()
+            .iter()
+            .any(|name| scene.baseline.case.extensions.contains_key(*name));
+        if has_edge == self.with_edge && !known {
+            everywhere(scene, self.name())
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+        Some(vec![changed(
+            record,
+            |cutter| {
+                let force = &mut cutter.force;
+                *force = force.with_material(scaled(force.material(), 2.0));
+            },
+            1.0,
+        )])
+    }
+
+    fn parameters(
+        &self,
+        scene: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let factor = 1.0 + coefficients.first()?;
+        let found = values(&scaled(cutter(scene)?.force.material(), factor));
+        let keys = CUTTING.into_iter().chain(EDGE).zip(found);
+        (factor > 0.0).then(|| keys.take(if self.with_edge { 6 } else { 3 }).collect())
+    }
+
+    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
+        self.names()
+            .into_iter()
+            .zip(parameters.chunks(3))
+            .map(|(name, parameters)| Part {
+                name,
+                place: place.clone(),
+                parameters: parameters.to_vec(),
+                extension: self.extension(place, parameters),
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,82 @@
+//! The force is not in proportion to the chip: F = K·b·h₀·(h/h₀)^p.
+//!
+//! Shows: at two feeds, or over the chips of one tooth pass, a force that grows less than the chip. Does not show: anything but other
+//! coefficients at one chip. Source: Kienzle, VDI-Z 94 (1952).
+//!
+//! Fit: with a chip h* to measure by, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*): the coefficients are p − 1 and q, and
+//! their regressors are exact at the shape (p, q) that they are made for.
+
+use super::{added, changed, cutter, everywhere, step};
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+use quietcut_simulate::ChipLaw;
+
+pub(super) struct ForceExponent;
+
+/// A shape closer to 1 than this is the slope there.
+const LEAST: f64 = 1e-3;
+
+/// h*, m: half the feed of the first cut.
+fn reference_m(scene: &Scene<'_>) -> f64 {
+    cutter(scene).map_or(1e-4, |cutter| 0.5 * cutter.feed_per_tooth_m)
+}
+
+impl Cause for ForceExponent {
+    fn name(&self) -> &'static str {
+        "force-exponent"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        everywhere(scene, self.name())
+    }
+
+    fn shapes(&self, _: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
+        [0.6, 0.8, 1.0, 1.2].map(|exponent| vec![exponent, 0.0]).to_vec()
+    }
+
+    fn regressors(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        _: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let &[exponent, q] = shape else { return None };
+        let less = step(exponent - 1.0, LEAST);
+        let h = reference_m(scene);
+        let law = move |q: f64| ChipLaw {
+            exponent: 1.0 + less,
+            reference_m: h * (-q / less).exp(),
+        };
+        let q_step = step(q, LEAST);
+        Some(vec![
+            changed(record, |cutter| cutter.force.chip = Some(law(0.0)), less),
+            added(
+                record,
+                |cutter| cutter.force.chip = Some(law(0.0)),
+                |cutter| cutter.force.chip = Some(law(q_step)),
+                q_step,
+            ),
+        ])
+    }
+
+    fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
+        let (less, q) = (*coefficients.first()?, *coefficients.get(1)?);
+        Some(vec![1.0 + less.clamp(-0.8, 1.0), q.clamp(-1.0, 1.0)])
+    }
+
+    fn parameters(
+        &self,
+        scene: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let &[less, q] = coefficients else { return None };
+        let reference_mm = 1e3 * reference_m(scene) * (-q / less).exp();
+        // Beyond these no chip law was ever measured.
+        let physical = less > -0.8 && less < 1.0 && reference_mm.is_finite() && reference_mm > 0.0;
+        physical.then(|| vec![("exponent", 1.0 + less), ("reference_chip_mm", reference_mm)])
+    }
+}

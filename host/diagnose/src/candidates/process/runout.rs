@@ -1,0 +1,114 @@
+//! Runout: tooth j on the radius R + e·cos(ψ + 2πj/N).
+//!
+//! Shows: lines at the spindle order 1 and its multiples between those of the teeth, from the first tooth on. Does not show: growth, or
+//! lines that are not of the spindle. A flip of an even number of teeth has the same lines once it no longer grows.
+//! Fit: linear in e cos ψ and −e sin ψ. Source: Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983).
+
+use std::f64::consts::TAU;
+
+use super::{added, changed, cutter, everywhere, step};
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+use quietcut_model::milling::Runout;
+use quietcut_simulate::Cutter;
+
+pub(super) struct OfTool;
+
+/// Offsets that are tried first, as shares of the feed per tooth.
+const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
+/// A shape below this, in µm, is the slope there.
+const LEAST_UM: f64 = 0.01;
+
+fn teeth(scene: &Scene<'_>) -> usize {
+    cutter(scene).map_or(0, |cutter| cutter.teeth.len())
+}
+
+fn offset(along_um: f64, across_um: f64) -> impl Fn(&mut Cutter) {
+    move |cutter| {
+        cutter.set_runout(Runout {
+            offset_um: along_um.hypot(across_um),
+            angle_deg: across_um.atan2(along_um).to_degrees(),
+        });
+    }
+}
+
+impl Cause for OfTool {
+    fn name(&self) -> &'static str {
+        "runout"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        let runs_true = scene
+            .baseline
+            .case
+            .tool
+            .as_ref()
+            .is_some_and(|tool| tool.runout.is_none());
+        // The only tooth of a tool follows itself.
+        if runs_true && teeth(scene) > 1 {
+            everywhere(scene, self.name())
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// The slope at none, and about offsets with which some teeth leave the surface.
+    fn shapes(&self, scene: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
+        let feed_um = cutter(scene).map_or(0.0, |cutter| 1e6 * cutter.feed_per_tooth_m);
+        let directions = if teeth(scene) > 2 { 6 } else { 2 };
+        let about = SHARES_OF_FEED.into_iter().flat_map(|share| {
+            (0..directions).map(move |direction| {
+                let angle = TAU * f64::from(direction) / f64::from(directions);
+                vec![share * feed_um * angle.cos(), share * feed_um * angle.sin()]
+            })
+        });
+        std::iter::once(vec![0.0, 0.0]).chain(about).collect()
+    }
+
+    fn regressors(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        _: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let &[along, across] = shape else { return None };
+        let (along_step, across_step) = (step(along, LEAST_UM), step(across, LEAST_UM));
+        let mut regressors = vec![changed(record, offset(along_step, 0.0), along_step)];
+        // Two teeth stand on one line: what is across it moves neither.
+        if teeth(scene) > 2 {
+            regressors.push(added(
+                record,
+                offset(along, 0.0),
+                offset(along, across_step),
+                across_step,
+            ));
+        }
+        Some(regressors)
+    }
+
+    fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
+        Some(vec![
+            *coefficients.first()?,
+            coefficients.get(1).copied().unwrap_or(0.0),
+        ])
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let (along, across) = (
+            *coefficients.first()?,
+            coefficients.get(1).copied().unwrap_or(0.0),
+        );
+        Some(vec![
+            ("runout_um", along.hypot(across)),
+            ("angle_deg", across.atan2(along).to_degrees().rem_euclid(360.0)),
+        ])
+    }
+}

@@ -1,0 +1,109 @@
+//! The spindle does not turn steadily: Ω = Ω₀(1 + δ·sin(2πf_m t + ψ)).
+//!
+//! Shows: in the tachometer, and as side lines of the tooth lines at ± f_m. Does not show: anything in records without a tachometer that
+//! drift of the structure could not. Source: Sexton, Milne and Stone (1977); Insperger and Stépán, J. Vib. Control 10 (2004).
+//!
+//! Fit: the tachometer says how: the swing that comes nearest to its edges is looked for up to half a swing per turn. The force
+//! with that swing less the one at steady speed then has the coefficient 1: that it is near 1 is what the record confirms; how
+//! large the swing is, the tachometer knows better.
+
+use super::everywhere;
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::motion::spindle_motion::{Swing, Turning, swing};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+use quietcut_simulate::Fluctuation;
+
+pub(super) struct OfSpindle;
+
+/// How far from 1 the coefficient may be.
+const ROUNDING: f64 = 0.5;
+
+/// The swing that the tachometers of all cuts tell.
+fn of_tachometer(scene: &Scene<'_>) -> Option<Swing> {
+    let turnings: Vec<&Turning> = scene
+        .records
+        .iter()
+        .filter_map(|record| Some(&record.cut.as_ref()?.cut.turning))
+        .collect();
+    swing(&turnings)
+}
+
+impl Cause for OfSpindle {
+    fn name(&self) -> &'static str {
+        "speed-fluctuation"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        everywhere(scene, self.name())
+    }
+
+    fn shapes(&self, scene: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
+        let shape = |found: Swing| {
+            let Fluctuation {
+                delta,
+                frequency_hz,
+                phase_rad,
+            } = found.fluctuation;
+            vec![frequency_hz, delta, phase_rad]
+        };
+        of_tachometer(scene).map(shape).into_iter().collect()
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, shape: &[f64]) -> Option<Vec<Regressor>> {
+        let &[frequency_hz, delta, phase_rad] = shape else {
+            return None;
+        };
+        let fluctuation = Fluctuation {
+            delta,
+            frequency_hz,
+            phase_rad,
+        };
+        let Some(cut) = &record.cut else {
+            return Some(vec![Regressor::default()]);
+        };
+        let turning = cut.cut.turning.with(fluctuation);
+        let force = cut.force_along(&turning, &record.motion);
+        Some(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
+    }
+
+    /// The shape is the tachometer's, not one that the fit chose.
+    fn settled(&self, shape: &[f64], _: &[f64]) -> Option<Vec<f64>> {
+        Some(shape.to_vec())
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        shape: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let &[frequency_hz, delta, phase_rad] = shape else {
+            return None;
+        };
+        let share = *coefficients.first()?;
+        ((share - 1.0).abs() < ROUNDING).then(|| {
+            vec![
+                ("delta", delta),
+                ("frequency_hz", frequency_hz),
+                ("phase_deg", phase_rad.to_degrees()),
+            ]
+        })
+    }
+
+    fn known_deviations(&self, scene: &Scene<'_>) -> Vec<Parameter> {
+        let Some(Swing {
+            deviation: [delta, frequency_hz, phase_rad],
+            ..
+        }) = of_tachometer(scene)
+        else {
+            return Vec::new();
+        };
+        vec![
+            ("delta", delta),
+            ("frequency_hz", frequency_hz),
+            ("phase_deg", phase_rad.to_degrees()),
+        ]
+    }
+}

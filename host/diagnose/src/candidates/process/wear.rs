@@ -1,0 +1,41 @@
+//! The edge wears: all forces of the cut grow, × (1 + r·t).
+//!
+//! Shows: all tooth lines grow alike along the record. Does not show: frequencies that move. A sensor whose gain drifts is the same.
+//! Fit: linear in r. Source: Altintas, Manufacturing Automation (2012), ch. 2 (forces over flank wear).
+
+use super::{changed, everywhere};
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+
+pub(super) struct OfEdge;
+
+impl Cause for OfEdge {
+    fn name(&self) -> &'static str {
+        "wear"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        everywhere(scene, self.name())
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+        Some(vec![changed(
+            record,
+            |cutter| cutter.force.wear_per_s += 1.0,
+            1.0,
+        )])
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        coefficients
+            .first()
+            .map(|rate| vec![("relative_rate_per_s", *rate)])
+    }
+}

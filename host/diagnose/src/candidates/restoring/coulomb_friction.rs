@@ -1,0 +1,56 @@
+//! f_r += fc·sign(v), alike for both ways or another force for each; sticking included.
+//!
+//! Shows: damping that falls as 1/amplitude, rest between moves at low levels, odd harmonics that fall slowly with their order. Does
+//! not show: a frequency that moves while it slips, or anything at large amplitudes. A Bouc-Wen loop with very stiff pre-slip is the
+//! same.
+//! Fit: linear in fc along the motion, sticking in the simulation. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica
+//! 30 (1994).
+
+use super::{Restoring, largest_m, plain};
+use crate::records::study::Domain;
+
+pub(super) const ALIKE: Restoring = Restoring {
+    physical: |fc| fc.iter().all(|fc| *fc > 0.0),
+    ..plain("coulomb-friction", &["fc_n"])
+};
+
+pub(super) const EACH_WAY: Restoring = Restoring {
+    physical: |fc| fc.iter().all(|fc| *fc >= 0.0),
+    ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
+};
+
+/// Friction that takes hold only once a play has been crossed: no force after a reversal, then friction.
+pub(super) const BEHIND_PLAY: Restoring = Restoring {
+    shape: &["play_mm"],
+    shapes: |scene, axis| {
+        let most = 2e3 * largest_m(scene, axis);
+        [0.02, 0.04, 0.08, 0.16, 0.32, 0.5, 0.7]
+            .map(|share| vec![share * most])
+            .to_vec()
+    },
+    bounds: |scene, axis| vec![[largest_m(scene, axis), 1.9e3 * largest_m(scene, axis)]],
+    physical: |fc| fc.iter().all(|fc| *fc >= 0.0) && fc.iter().any(|fc| *fc > 0.0),
+    behind_play: true,
+    ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
+};
+
+/// The same where the joint that has the play closes softly. Where a structure moves freely a loop of Bouc and Wen takes its place:
+/// it is sought where the motion is imposed, and the force of every instant is seen.
+pub(super) const BEHIND_CLEARANCE: Restoring = Restoring {
+    shape: &["play_mm", "contact_mm"],
+    shapes: |scene, axis| {
+        if !scene.all_in(Domain::Force) {
+            return Vec::new();
+        }
+        let most = 2e3 * largest_m(scene, axis);
+        [0.02, 0.04, 0.08, 0.16, 0.32]
+            .into_iter()
+            .flat_map(|play| [0.02, 0.06].map(|contact| vec![play * most, contact * most]))
+            .collect()
+    },
+    bounds: |scene, axis| {
+        let largest_m = largest_m(scene, axis);
+        vec![[largest_m, 1.9e3 * largest_m], [largest_m, 1e3 * largest_m]]
+    },
+    ..BEHIND_PLAY
+};

@@ -1,0 +1,71 @@
+//! A channel that sees another direction too: y = y_t + p·(the other direction).
+//!
+//! Shows: what the other direction does, at once and without a phase, also where only that is driven. Does not show: anything where the
+//! other direction rests. A cross receptance would be reciprocal.
+//! Fit: linear in p. Source: transverse sensitivity as in McConnell and Varoto, Vibration Testing (2008).
+
+use num_complex::Complex64;
+
+use super::{channels, in_cut, of_meant};
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+
+pub(super) struct CrossAxis;
+
+/// The fraction for which the chip of a cut is taken.
+const SMALL_FRACTION: f64 = 0.05;
+
+impl Cause for CrossAxis {
+    fn name(&self) -> &'static str {
+        "cross-axis"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        if scene.baseline.case.extensions.contains_key(self.name()) {
+            return Vec::new();
+        }
+        let axes = scene.driven_axes();
+        let mut places = Vec::new();
+        for name in channels(scene) {
+            let Some(pickup) = scene.baseline.pickup(&name) else {
+                continue;
+            };
+            for &axis in axes.iter().filter(|axis| pickup.weights[**axis] == 0.0) {
+                places.push(Place::ChannelFrom(name.clone(), axis));
+            }
+        }
+        places
+    }
+
+    fn regressors(&self, _: &Scene<'_>, record: &Record, place: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+        let Place::ChannelFrom(_, axis) = place else {
+            return None;
+        };
+        let mut weights = [0.0; 3];
+        weights[*axis] = 1.0;
+        let read = of_meant(record, place, |_| weights, |_| Complex64::ONE);
+        let other = record.motion.clone();
+        // x = y − p·(the other direction).
+        Some(in_cut(record, place, read, SMALL_FRACTION, |motion, to| {
+            for (to, from) in [
+                (&mut motion.x[to], &other.x[*axis]),
+                (&mut motion.v[to], &other.v[*axis]),
+            ] {
+                to.iter_mut()
+                    .zip(from)
+                    .for_each(|(to, from)| *to -= SMALL_FRACTION * from);
+            }
+        }))
+    }
+
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        coefficients.first().map(|fraction| vec![("fraction", *fraction)])
+    }
+}

@@ -1,0 +1,96 @@
+//! A channel that is late: y(t) = y_t(t − τ), so that y − ŷ = y(t) − y(t + τ), which is −τ·ẏ while the delay is short.
+//!
+//! Shows: a phase in proportion to frequency over a band. Does not show: a change of amplitude; in a narrow band it is damping. Without a
+//! force or another channel to be late against it cannot be seen.
+//! Fit: τ as a shape, exact for delays of any length. Source: McConnell and Varoto, Vibration Testing (2008).
+
+use num_complex::Complex64;
+
+use super::{in_cut, in_steps, meant, of_meant, one_or_all};
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+
+pub(super) struct Delay;
+
+/// Delays up to this share of the period of the highest frequency are looked for.
+const LONGEST: f64 = 0.4;
+
+/// Delays that differ by this factor are of another size.
+const ANOTHER: f64 = 100.0;
+
+impl Cause for Delay {
+    fn name(&self) -> &'static str {
+        "sensor-delay"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        one_or_all(scene, self.name())
+    }
+
+    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
+        let [[_, longest]] = self.bounds(scene, place)[..] else {
+            return Vec::new();
+        };
+        [0.01, 0.3, 1.0].map(|share| vec![share * longest]).to_vec()
+    }
+
+    fn bounds(&self, scene: &Scene<'_>, _: &Place) -> Vec<[f64; 2]> {
+        let highest = scene
+            .records
+            .iter()
+            .map(|record| record.highest_hz)
+            .fold(1e-9, f64::max);
+        vec![[1e-5 / highest, LONGEST / highest]]
+    }
+
+    fn regressors(
+        &self,
+        _: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let delay = *shape.first()?;
+        // Per second of delay, so that the coefficient is the delay.
+        let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
+        let read = if record.cut.is_some() {
+            let of = |channel: usize| {
+                if meant(place, &record.channels[channel]) {
+                    in_steps(record, channel, change)
+                } else {
+                    Some(Vec::new())
+                }
+            };
+            vec![Regressor::of_channels(
+                (0..record.channels.len()).map(of).collect::<Option<_>>()?,
+            )]
+        } else {
+            of_meant(record, place, |channel| channel.pickup.weights, change)
+        };
+        // x(t) = y(t + τ).
+        Some(in_cut(record, place, read, delay, |motion, axis| {
+            motion.advance(axis, delay);
+        }))
+    }
+
+    /// The regressor is exact at the delay that it was made for.
+    fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
+        coefficients
+            .first()
+            .filter(|delay| **delay > 0.0)
+            .map(|delay| vec![*delay])
+    }
+
+    /// None where the regressor was made for a delay of another size: that is no delay.
+    fn parameters(
+        &self,
+        _: &Scene<'_>,
+        _: &Place,
+        shape: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let (delay, made_for) = (*coefficients.first()?, *shape.first()?);
+        (delay > made_for / ANOTHER && delay < made_for * ANOTHER).then(|| vec![("delay_s", delay)])
+    }
+}

@@ -1,0 +1,144 @@
+//! A sensor that does not sit at the tool tip, where the sidecar says so: y = Σ ratio_r·u_r with u_r what mode r moves the tool, so that
+//! y − ŷ = Σ (ratio_r − 1)·u_r.
+//!
+//! Shows: each mode larger or smaller by a ratio of its own, and no phase. Does not show: frequencies or damping that differ.
+//! Fit: linear in the ratios. Source: mode shapes of a rigid or flexible body as in Ewins, Modal Testing (2000), ch. 2.
+//!
+//! Where one mode moves the axis, or the structure is not given by its modes, there is one ratio, and it is what a gain of the channel is
+//! there. So it is in a cut, whose chip is known only along the motion that the sensor tells.
+
+use super::gain::{Gain, factor};
+use super::one_or_all;
+use crate::baseline::receptance::Receptance;
+use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::records::motion_estimate::main_axis;
+use crate::records::record::{Observed, Record, response};
+use crate::records::study::{Domain, Scene};
+use quietcut_model::structure::Form;
+
+pub(super) struct Offset;
+
+/// The ratio of each mode, in the order of the case; of structures with more modes there is one for all.
+const RATIOS: [&str; 9] = [
+    "ratio_1", "ratio_2", "ratio_3", "ratio_4", "ratio_5", "ratio_6", "ratio_7", "ratio_8", "ratio_9",
+];
+
+/// A mode that moves an axis by less than this share of what the largest does is not seen there.
+const SEEN: f64 = 1e-6;
+
+/// The modes that each have their ratio in a channel, as places in the case, of so many; `None` where there is one ratio for all.
+fn modes(scene: &Scene<'_>, place: &Place) -> Option<(Vec<usize>, usize)> {
+    let name = place.channel()?;
+    let Form::Modes(modes) = &scene.baseline.structure.form else {
+        return None;
+    };
+    let is_driven = |record: &Record| record.domain == Domain::Response && record.cut.is_none();
+    if modes.len() > RATIOS.len() || !scene.records.iter().all(is_driven) {
+        return None;
+    }
+    let mut channels = scene.records.iter().flat_map(|record| &record.channels);
+    let axis = main_axis(channels.find(|channel| channel.pickup.name == name)?)?;
+    let directions = &scene.baseline.structure.directions;
+    let along = directions
+        .iter()
+        .position(|direction| direction.axis() == Some(axis))?;
+    let size = |mode: &quietcut_model::structure::Mode| {
+        let driven = mode.left.iter().map(|left| left.norm()).fold(0.0, f64::max);
+        mode.right[along].norm() * driven
+    };
+    let largest = modes.iter().map(size).fold(0.0, f64::max);
+    let seen: Vec<usize> = (0..modes.len())
+        .filter(|mode| size(&modes[*mode]) > SEEN * largest)
+        .collect();
+    (seen.len() > 1).then_some((seen, modes.len()))
+}
+
+/// What a channel reads of one mode under the forces of the record, with its share of the free decay.
+fn read_of(scene: &Scene<'_>, record: &Record, index: usize, mode: usize) -> Vec<f64> {
+    let channel: &Observed = &record.channels[index];
+    let first_order = &scene.baseline.first_order;
+    let mut alone = vec![0.0; first_order.order() / 2];
+    alone[mode] = 1.0;
+    let transfer = response(&Receptance::new(&first_order.seen(&alone)), &record.grid);
+    let responses = record.responses_by(channel, &transfer, &scene.baseline.axes);
+    let mut force = std::array::from_fn(|axis| {
+        let force = &record.force_n[axis];
+        (!force.is_empty()).then(|| record.grid.spectrum(force))
+    });
+    record.add_terms(&scene.baseline, &mut force);
+    let mut read = record.read_by(&force, &responses, index);
+    for state in [2 * mode, 2 * mode + 1] {
+        let start = record.decays.start[state];
+        for (read, decay) in read.iter_mut().zip(record.decays.column(index, state)) {
+            *read += start * decay;
+        }
+    }
+    read
+}
+
+impl Cause for Offset {
+    fn name(&self) -> &'static str {
+        "sensor-offset-from-tool-tip"
+    }
+
+    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+        one_or_all(scene, self.name())
+            .into_iter()
+            .filter(|place| scene.sits_elsewhere(place.channel()))
+            .collect()
+    }
+
+    fn regressors(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        place: &Place,
+        shape: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let Some((modes, _)) = modes(scene, place) else {
+            return Gain.regressors(scene, record, place, shape);
+        };
+        let of_mode = |mode: &usize| {
+            let read = |(index, channel): (usize, &Observed)| {
+                if place.channel() == Some(&channel.pickup.name) {
+                    read_of(scene, record, index, *mode)
+                } else {
+                    Vec::new()
+                }
+            };
+            Regressor::of_channels(record.channels.iter().enumerate().map(read).collect())
+        };
+        Some(modes.iter().map(of_mode).collect())
+    }
+
+    fn parameters(
+        &self,
+        scene: &Scene<'_>,
+        place: &Place,
+        _: &[f64],
+        coefficients: &[f64],
+    ) -> Option<Vec<Parameter>> {
+        let Some((modes, count)) = modes(scene, place) else {
+            return Some(vec![("ratio", factor(coefficients)?)]);
+        };
+        let ratio = |mode: usize| {
+            let known = modes.iter().position(|known| *known == mode);
+            known.map_or(1.0, |index| 1.0 + coefficients[index])
+        };
+        Some((0..count).map(|mode| (RATIOS[mode], ratio(mode))).collect())
+    }
+
+    fn extension(&self, place: &Place, parameters: &[Parameter]) -> toml::Table {
+        let mut table = place.table();
+        let ratio = match parameters {
+            [(_, ratio)] => (*ratio).into(),
+            _ => parameters
+                .iter()
+                .map(|(_, ratio)| toml::Value::from(*ratio))
+                .collect::<Vec<_>>()
+                .into(),
+        };
+        table.insert("ratio".into(), ratio);
+        table
+    }
+}

@@ -1,0 +1,206 @@
+//! From evidence to an answer.
+
+use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
+use crate::conclusion::parameter_estimates::{by_common_factor, named};
+use crate::conclusion::residual_views::views;
+use crate::fit::library::{Explanation, Library};
+use crate::fit::regression::{Regression, Share};
+use crate::progress::{Options, Stage};
+use crate::records::checks;
+use crate::records::study::{Domain, Scene};
+use crate::selection::select::{APART, Scale, Selection, WITHIN_NOISE, names, select};
+use quietcut_recording::Recording;
+
+/// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
+/// where the noise is known by its floor, and of forces, where derivatives of the motion bring noise that is not white.
+pub(crate) const LEFT_OF_RESPONSE: f64 = 0.012;
+const LEFT_OF_FORCE: f64 = 0.15;
+/// By what that becomes less for each further cause of an explanation that is simulated: with two or three terms much can be
+/// imitated, but not all of it.
+const FEWER_LEFT: f64 = 0.05;
+
+/// A simulated explanation that leaves more than this share of the noise beyond chance is not all of the truth, and the
+/// confidence in it becomes this share of what it would be.
+const REJECTED: f64 = 0.03;
+const DOUBT: f64 = 0.8;
+
+/// What is held out is not like the whole records where they miss so many times as much.
+const UNLIKE: f64 = 3.0;
+
+pub(crate) fn judge(
+    scene: &Scene<'_>,
+    recordings: &[Recording],
+    _options: &Options,
+    watch: &dyn Fn(Stage),
+) -> Diagnosis {
+    watch(Stage::Library);
+    let mut regression = Regression::new(scene);
+    let mut library = Library::new(scene, &mut regression);
+    if scene.all_in(Domain::Force) && scene.records.len() > 1 {
+        regression.level_records();
+    }
+    let scale = Scale::new(scene, recordings, &library, &regression);
+    let selection = select(&scale, &mut library, &mut regression, watch);
+    watch(Stage::Answer);
+    answer(&scale, &library, &mut regression, &selection)
+}
+
+fn answer(
+    scale: &Scale<'_>,
+    library: &Library,
+    regression: &mut Regression,
+    selection: &Selection,
+) -> Diagnosis {
+    let scene = scale.scene;
+    let inflation = scale.inflation(regression, selection.best.as_ref());
+    let held_out = regression.residual(Share::HeldOut);
+    let count = regression.count(Share::HeldOut) as f64;
+    let whole = regression.residual(Share::Whole);
+    let missed = Quality {
+        nrmse_heldout: regression.missed(scene, Share::HeldOut),
+        nrmse_whole: regression.missed(scene, Share::Whole),
+    };
+    let mut diagnosis = Diagnosis {
+        outcome: Outcome::None,
+        baseline: missed,
+        causes: Vec::new(),
+        equivalent: Vec::new(),
+        extended: None,
+        gain: None,
+        unexplained: Unexplained {
+            fraction: 0.0,
+            place: "none above noise".into(),
+            guess: None,
+        },
+        lobes: None,
+        believed: None,
+        next_test: None,
+        warnings: Vec::new(),
+        explanations: Vec::new(),
+        acting: 0,
+        views: views(scene, library, selection.best.as_ref()),
+    };
+    if missed.nrmse_whole > UNLIKE * missed.nrmse_heldout {
+        diagnosis.warnings.push(format!(
+            "the parts of the records that are held out miss {:.2} %, the whole records {:.2} %: most of what is wrong lies in what is fitted, and held-out parts tell little of the gain",
+            100.0 * missed.nrmse_heldout,
+            100.0 * missed.nrmse_whole
+        ));
+    }
+    let (of_noise, of_excess) = scale.excess(regression, selection.best.as_ref());
+    let allowed = match &selection.best {
+        _ if scene.all_in(Domain::Force) => LEFT_OF_FORCE,
+        Some(best) if best.simulated.is_some() => {
+            LEFT_OF_RESPONSE * FEWER_LEFT.powi(best.choices.len() as i32 - 1)
+        }
+        _ => LEFT_OF_RESPONSE,
+    };
+    if of_noise > WITHIN_NOISE {
+        diagnosis.unexplained.fraction = of_excess;
+    }
+    let Some(best) = selection
+        .best
+        .as_ref()
+        .filter(|_| of_noise <= WITHIN_NOISE || of_excess <= allowed)
+    else {
+        if of_noise > WITHIN_NOISE {
+            // What was tried and is not believed takes nothing off.
+            diagnosis.views = views(scene, library, None);
+            diagnosis.unexplained.place = crate::conclusion::unexplained::describe(&diagnosis.views);
+            diagnosis.outcome = Outcome::Unexplained;
+            diagnosis.unexplained.guess = crate::conclusion::guess::guess(scene, regression);
+        }
+        return diagnosis;
+    };
+    if of_noise > WITHIN_NOISE {
+        diagnosis.unexplained.place = crate::conclusion::unexplained::describe(&diagnosis.views);
+    }
+    let left_held_out = scale.left_held_out(library, regression, best);
+    diagnosis.outcome = Outcome::Cause;
+    let chance = 5.0 * (2.0 / regression.count(Share::Whole).max(1) as f64).sqrt() + REJECTED;
+    let doubt = if best.simulated.is_some() && of_noise > chance {
+        DOUBT
+    } else {
+        1.0
+    };
+    let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
+    // Errors of the computation go along with the signal: where they are like a cause, they are not averaged away.
+    let uncertain = inflation + scale.coherent;
+    let spread = |explanation: &Explanation| {
+        let closed = scale.closed.as_ref();
+        closed.and_then(|closed| closed.spread_by_force_noise(library, explanation))
+    };
+    let best = &spread(best).unwrap_or_else(|| best.clone());
+    diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
+    diagnosis.acting = diagnosis.causes.len();
+    for cause in diagnosis
+        .causes
+        .iter()
+        .filter(|cause| cause.name == "sensor-gain")
+    {
+        let gain = cause.parameters["gain"].value;
+        if let Some(unit) = checks::unit_of_gain(gain) {
+            let channel = cause.channel.as_deref().unwrap_or("every channel of motion");
+            diagnosis.warnings.push(format!(
+                "{channel} reads {gain:.4} times the truth, and that is about {unit}: are its unit and that of the force right?"
+            ));
+        }
+    }
+    diagnosis.explanations = vec![diagnosis.causes.clone()];
+    let who = names(library, best);
+    for other in &selection.others {
+        let other = &spread(other).unwrap_or_else(|| other.clone());
+        let causes = named(scene, library, regression, other, uncertain, confidence);
+        diagnosis.add_rival(causes, names(library, other) == who);
+    }
+    let by_factor = by_common_factor(scene, library, regression, best, inflation);
+    diagnosis.add_rival(by_factor, false);
+    if diagnosis.causes.len() > diagnosis.acting {
+        let shared: Vec<&'static str> = who
+            .into_iter()
+            .filter(|name| {
+                !selection.others.is_empty()
+                    && selection
+                        .others
+                        .iter()
+                        .all(|other| names(library, other).contains(name))
+            })
+            .collect();
+        confound(&mut diagnosis, &shared);
+    }
+    let share = |left: f64, there: f64| (left / there.max(f64::MIN_POSITIVE)).sqrt();
+    diagnosis.extended = Some(Quality {
+        nrmse_heldout: missed.nrmse_heldout * share(left_held_out, held_out),
+        nrmse_whole: missed.nrmse_whole * share(best.fit.left, whole),
+    });
+    diagnosis.gain = Some(Gain::new(held_out, left_held_out, count));
+    diagnosis
+}
+
+/// Makes the names that not all explanations have one group, of which none is surer than the others; where all have the same names at
+/// other places, those that are at other places.
+fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
+    diagnosis.outcome = Outcome::Confounded;
+    let mut group = diagnosis.names();
+    group.retain(|name| !shared.contains(name));
+    if group.is_empty() {
+        let elsewhere = &diagnosis.causes[diagnosis.acting..];
+        group = diagnosis.names();
+        group.retain(|name| elsewhere.iter().any(|cause| cause.name == *name));
+    }
+    let share = 1.0 / group.len().max(diagnosis.explanations.len()) as f64;
+    let explanations = diagnosis.explanations.iter_mut().flatten();
+    for cause in diagnosis.causes.iter_mut().chain(explanations) {
+        if group.contains(&cause.name) {
+            cause.confidence = cause.confidence.min(share);
+        }
+    }
+    diagnosis.equivalent = vec![group];
+}
+
+/// From the distance to the next explanation, and from what is left as a share of what is allowed.
+fn confidence(ahead: f64, left: f64) -> f64 {
+    let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * APART) / 6.0).exp());
+    let by_rest = 1.0 - 0.5 * left.clamp(0.0, 1.0).powi(2);
+    (by_rivals * by_rest).min(0.995)
+}

@@ -1,0 +1,121 @@
+//! The case with what was found.
+
+use std::fmt::Write as _;
+
+use toml::{Table, Value};
+
+use crate::conclusion::answer::{Diagnosis, Figure, NamedCause, Outcome};
+use crate::conclusion::lobes::Moved;
+use quietcut_model::case::Case;
+
+/// Tables `[extension.NAME]`, in their order, each name once: a cause that acts along several directions has a list of them, and
+/// of each parameter a list that is as long.
+pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = (&'a str, &'a Table)>) -> Vec<(String, Table)> {
+    let mut all: Vec<(String, Table)> = Vec::new();
+    for (name, table) in parts {
+        match all.iter_mut().find(|(known, _)| known == name) {
+            None => all.push((name.to_owned(), table.clone())),
+            Some((_, known)) => {
+                for (key, value) in table {
+                    match known.get_mut(key) {
+                        Some(Value::Array(list)) => list.push(value.clone()),
+                        Some(one) => *one = Value::Array(vec![one.clone(), value.clone()]),
+                        None => {
+                            known.insert(key.clone(), value.clone());
+                        }
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+/// What is said of a key behind its value: the intervals of the causes that have it, or have it by number (`ratio_1`, `ratio_2` …).
+fn intervals(causes: &[&NamedCause], key: &str) -> String {
+    let is_of_key = |known: &str| {
+        let behind = known
+            .strip_prefix(key)
+            .map(|rest| rest.strip_prefix('_').unwrap_or(rest));
+        behind.is_some_and(|number| number.chars().all(|digit| digit.is_ascii_digit()))
+    };
+    let said: Vec<String> = causes
+        .iter()
+        .flat_map(|cause| &cause.parameters)
+        .filter(|(known, _)| is_of_key(known))
+        .map(|(_, Figure { ci90: [from, to], .. })| format!("{from:.6e} to {to:.6e}"))
+        .collect();
+    if said.is_empty() {
+        String::new()
+    } else {
+        format!(" # 90 % interval {}", said.join(", "))
+    }
+}
+
+impl Diagnosis {
+    fn found(&self) -> impl Iterator<Item = (&str, &Table)> {
+        let found = self.causes.iter().take(self.acting);
+        found.map(|cause| (cause.name, &cause.extension))
+    }
+
+    /// The extended case; `None` where nothing was found.
+    pub fn extended(&self, case: &Case) -> Option<Case> {
+        (self.acting > 0).then(|| {
+            let mut extended = case.clone();
+            extended.extensions.extend(joined(self.found()));
+            extended
+        })
+    }
+
+    /// The extended case with each principal direction of what was fitted at either end of its 90 % interval: those of one cause after
+    /// the other, which are taken to be independent of one another.
+    pub fn moved(&self, case: &Case) -> Vec<Moved> {
+        let found = &self.causes[..self.acting];
+        let choices = found
+            .iter()
+            .map(|cause| cause.choice)
+            .max()
+            .map_or(0, |last| last + 1);
+        let mut all = Vec::new();
+        for choice in 0..choices {
+            let directions = found
+                .iter()
+                .find(|cause| cause.choice == choice)
+                .map_or(0, |cause| cause.moved.len());
+            for direction in 0..directions {
+                all.push([0, 1].map(|end| {
+                    let tables = found.iter().map(|cause| match cause.choice == choice {
+                        true => (cause.name, &cause.moved[direction][end]),
+                        false => (cause.name, &cause.extension),
+                    });
+                    let mut moved = case.clone();
+                    moved.extensions.extend(joined(tables));
+                    moved
+                }));
+            }
+        }
+        all
+    }
+
+    /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each cause that acts, and
+    /// the 90 % intervals of its parameters as comments. `None` where nothing was found.
+    ///
+    /// Where causes are confounded, those named first are taken.
+    pub fn extended_case(&self, case_text: &str) -> Option<String> {
+        if !matches!(self.outcome, Outcome::Cause | Outcome::Confounded) {
+            return None;
+        }
+        let mut text = case_text.trim_end().to_owned();
+        text.push('\n');
+        let found = &self.causes[..self.acting];
+        for (name, table) in joined(self.found()) {
+            let causes: Vec<&NamedCause> = found.iter().filter(|cause| cause.name == name).collect();
+            // Writing to a string cannot fail.
+            let _ = write!(text, "\n[extension.{name}]\n");
+            for (key, value) in &table {
+                let _ = writeln!(text, "{key} = {value}{}", intervals(&causes, key));
+            }
+        }
+        Some(text)
+    }
+}

@@ -1,0 +1,199 @@
+//! A formula for what no known cause explains: a guess, and no more.
+//!
+//! The missing restoring force along an axis is taken to be Σ cᵢ φᵢ(x, v) with few of many terms: products of powers x^i v^j,
+//! what switches with the sign of the velocity, and the state z of Bouc–Wen loops of several yields. Terms are added one by one,
+//! each time the one that takes most of the residual, as long as Schwarz's criterion n ln(left) + k ln n falls. What the formula takes of
+//! data that it was not fitted to says what it is worth. S. A. Billings, Nonlinear System Identification, 2013, ch. 3 (forward
+//! regression); S. L. Brunton et al., PNAS 113 (2016) 3932 (sparse regression).
+
+use std::fmt::Write;
+
+use crate::baseline::direction_of;
+use crate::candidates::cause::Regressor;
+use crate::fit::regression::{Regression, Share};
+use crate::records::study::Scene;
+use quietcut_simulate::Effects;
+use quietcut_simulate::path::{Motion, restoring_along};
+
+/// The most terms of a formula.
+const MOST: usize = 4;
+
+/// Share of the held-out residual that a formula must take to be said.
+const WORTH: f64 = 0.1;
+
+/// Powers of x and v, as products.
+const POWERS: [(i32, i32); 16] = [
+    (1, 0),
+    (0, 1),
+    (2, 0),
+    (1, 1),
+    (0, 2),
+    (3, 0),
+    (2, 1),
+    (1, 2),
+    (0, 3),
+    (4, 0),
+    (2, 2),
+    (0, 4),
+    (5, 0),
+    (4, 1),
+    (1, 4),
+    (0, 5),
+];
+
+/// Yields of the loops that are tried, as shares of the largest displacement.
+const YIELDS: [f64; 4] = [0.05, 0.15, 0.4, 0.8];
+
+/// One term along one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Term {
+    Power(i32, i32),
+    /// v|v|.
+    Drag,
+    /// x|x|.
+    Bend,
+    /// sign v.
+    Sign,
+    /// |x| sign v.
+    Rub,
+    /// z of a Bouc–Wen loop with this yield, m.
+    Loop(f64),
+}
+
+/// The formula with what it is worth; `None` where none takes a tenth of what is held out.
+pub(crate) fn guess(scene: &Scene<'_>, regression: &mut Regression) -> Option<String> {
+    let mut all: Vec<(usize, Term, usize)> = Vec::new();
+    for axis in scene.driven_axes() {
+        for term in terms(scene, axis) {
+            if let Some(column) = column(scene, axis, term) {
+                all.push((axis, term, regression.add(&column)));
+            }
+        }
+    }
+    regression.complete();
+    let count = regression.count(Share::Fitted) as f64;
+    let price =
+        |left: f64, terms: usize| count * left.max(f64::MIN_POSITIVE).ln() + terms as f64 * count.ln();
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut best = price(regression.residual(Share::Fitted), 0);
+    while chosen.len() < MOST {
+        let next = (0..all.len())
+            .filter(|index| !chosen.contains(index))
+            .filter_map(|index| {
+                let columns: Vec<usize> = chosen.iter().chain([&index]).map(|&i| all[i].2).collect();
+                Some((index, regression.fit(Share::Fitted, &columns)?.left))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, left)) = next else { break };
+        let new = price(left, chosen.len() + 1);
+        if new >= best {
+            break;
+        }
+        best = new;
+        chosen.push(index);
+    }
+    let columns: Vec<usize> = chosen.iter().map(|&index| all[index].2).collect();
+    let coefficients = regression.fit(Share::Fitted, &columns)?.coefficients;
+    let left = regression.left(Share::HeldOut, &columns, coefficients.as_slice());
+    let taken = 1.0 - left / regression.residual(Share::HeldOut).max(f64::MIN_POSITIVE);
+    if chosen.is_empty() || taken < WORTH {
+        return None;
+    }
+    let mut formula = String::new();
+    for (index, coefficient) in chosen.iter().zip(coefficients.iter()) {
+        let (axis, term, _) = all[*index];
+        let name = direction_of(axis).name();
+        let sign = if *coefficient < 0.0 { "−" } else { "+" };
+        // Writing to a string cannot fail.
+        let _ = write!(formula, " {sign} {:.3e}·{}", coefficient.abs(), words(term, name));
+    }
+    Some(format!(
+        "a guess, no cause: a restoring force of{formula} N (x and v in SI) takes {:.0} % of the residual that it was not fitted to",
+        100.0 * taken
+    ))
+}
+
+fn terms(scene: &Scene<'_>, axis: usize) -> Vec<Term> {
+    let largest_m = scene
+        .records
+        .iter()
+        .map(|record| record.motion.largest_m(axis))
+        .fold(0.0, f64::max);
+    let powers = POWERS.into_iter().map(|(i, j)| Term::Power(i, j));
+    let others = [Term::Drag, Term::Bend, Term::Sign, Term::Rub];
+    let loops = YIELDS.into_iter().map(|share| Term::Loop(share * largest_m));
+    powers.chain(others).chain(loops).collect()
+}
+
+/// Samples by record and channel per unit of the coefficient; `None` where the term cannot be computed.
+fn column(scene: &Scene<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>>>> {
+    let columns: Vec<Vec<Vec<f64>>> = scene
+        .records
+        .iter()
+        .map(|record| {
+            let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
+            if !record.motion.x[axis].is_empty() {
+                force[axis] = along(scene, &record.motion, axis, term)?;
+            }
+            Some(Regressor::of_force(force).columns(record))
+        })
+        .collect::<Option<_>>()?;
+    let is_finite = columns
+        .iter()
+        .flatten()
+        .flatten()
+        .all(|sample| sample.is_finite());
+    is_finite.then_some(columns)
+}
+
+fn along(scene: &Scene<'_>, motion: &Motion, axis: usize, term: Term) -> Option<Vec<f64>> {
+    let of = |f: &dyn Fn(f64, f64) -> f64| {
+        let samples = motion.x[axis].iter().zip(&motion.v[axis]);
+        samples.map(|(x, v)| f(*x, *v)).collect()
+    };
+    Some(match term {
+        Term::Power(i, j) => of(&|x, v| x.powi(i) * v.powi(j)),
+        Term::Drag => of(&|_, v| v * v.abs()),
+        Term::Bend => of(&|x, _| x * x.abs()),
+        Term::Sign => of(&|_, v| v.signum()),
+        Term::Rub => of(&|x, v| x.abs() * v.signum()),
+        Term::Loop(yield_m) => {
+            let direction = direction_of(axis);
+            let texts = [
+                "hysteresis=1".to_owned(),
+                format!("hysteresis.yield_m={yield_m:e}"),
+                format!("hysteresis.direction={direction}"),
+            ];
+            let effects = Effects::parse(texts.iter().map(String::as_str)).ok()?;
+            let terms = effects.0.first()?.terms(scene.baseline.structure).ok()?;
+            // z − x, with x taken off again.
+            let difference = restoring_along(&**terms.first()?, motion).into_iter().nth(axis)?;
+            difference
+                .iter()
+                .zip(&motion.x[axis])
+                .map(|(z, x)| z + x)
+                .collect()
+        }
+    })
+}
+
+fn words(term: Term, direction: &str) -> String {
+    let power = |name: String, power: i32| match power {
+        0 => String::new(),
+        1 => name,
+        _ => format!("{name}^{power}"),
+    };
+    let (x, v) = (direction.to_owned(), format!("v{direction}"));
+    match term {
+        Term::Power(i, j) => [power(x, i), power(v, j)]
+            .into_iter()
+            .filter(|word| !word.is_empty())
+            .collect::<Vec<_>>()
+            .join("·"),
+        Term::Drag => format!("{v}·|{v}|"),
+        Term::Bend => format!("{x}·|{x}|"),
+        Term::Sign => format!("sign({v})"),
+        Term::Rub => format!("|{x}|·sign({v})"),
+        Term::Loop(yield_m) => format!("z(Bouc–Wen along {x}, yield {:.3} µm)", 1e6 * yield_m),
+    }
+}

@@ -1,0 +1,442 @@
+//! What an extension changes for the user: limits, chatter frequencies, calls of stable and unstable.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::conclusion::recorded_cuts::recorded_cuts;
+use quietcut_model::case::Case;
+use quietcut_recording::{Kind as RecordKind, Recording};
+use quietcut_stability::continuation::{ForcedProblem, collocation_of};
+use quietcut_stability::test_cuts::{Call, Calls, TestCut, call, calls};
+use quietcut_stability::{
+    CubicTerms, Kind, Limit, Method, Pitched, SpeedLine, StabilityError, after, chart, default_speeds,
+    needs_orbit, spaced,
+};
+
+/// Speeds of the charts.
+const SPEEDS: usize = 41;
+
+/// The same where a speed takes seconds, as forced orbits over the revolution do.
+const FEW_SPEEDS: usize = 2;
+
+/// Speeds at which the lowest limit is sought.
+const COARSE: usize = 12;
+
+/// Depths between which it is, mm.
+const SHALLOWEST_MM: f64 = 0.01;
+const DEEPEST_MM: f64 = 200.0;
+
+/// How many times the lowest limit charts go down to.
+const DEPTH: f64 = 4.0;
+
+/// How many times the deepest cut they do.
+const BELOW_CUTS: f64 = 1.2;
+
+/// The limit at one speed before and after; `None` for none up to the last depth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// Where stability is first lost by the case, mm.
+    pub limit_before_mm: Option<f64>,
+    /// Where by the extended case, mm.
+    pub limit_after_mm: Option<f64>,
+    /// The 90 % interval of that, from those of the parameters that were found; an upper end of `None` is beyond the last depth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit_after_ci90_mm: Option<[Option<f64>; 2]>,
+    /// Spindle speed, rev/min.
+    pub at_rpm: f64,
+    /// How it is lost by the case.
+    pub kind_before: Option<Kind>,
+    /// How by the extended case.
+    pub kind_after: Option<Kind>,
+    /// Frequency of the chatter by the case, Hz.
+    pub chatter_before_hz: Option<f64>,
+    /// Frequency by the extended case, Hz.
+    pub chatter_after_hz: Option<f64>,
+}
+
+/// How cuts that were tried or recorded are called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct CallsChange {
+    /// By the case.
+    pub before: Calls,
+    /// By the extended case.
+    pub after: Calls,
+}
+
+/// The lobes of one case with the cuts that were tried or recorded.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// How they were computed.
+    pub method: &'static str,
+    /// The depth up to which limits were sought, mm.
+    pub searched_mm: f64,
+    /// The limits, speed by speed.
+    pub lines: Vec<SpeedLine>,
+    /// The cuts, each with what the lobes say of it.
+    pub cuts: Vec<(TestCut, Call)>,
+}
+
+/// The limits of the case and of the extended case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Lobes {
+    /// At the speed of the recorded cuts, else where the two differ most.
+    #[serde(flatten)]
+    pub at: Change,
+    /// The depth up to which limits were sought, mm.
+    pub searched_mm: f64,
+    /// The moment for which limits of a case with drift or wear hold: the end of the longest recording, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after_s: Option<f64>,
+    /// How the limits of the extended case were computed.
+    pub method_after: &'static str,
+    /// At every speed.
+    pub speeds: Vec<Change>,
+    /// How cuts that were tried or recorded are called, where there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calls: Option<CallsChange>,
+    /// Both charts.
+    #[serde(skip)]
+    pub charts: [Chart; 2],
+}
+
+/// An extended case with one direction of its parameters moved to either end of their 90 % interval.
+pub type Moved = [Case; 2];
+
+/// The lobes of a case over the speeds of the cuts that were tried or recorded, else of the machine.
+///
+/// # Errors
+/// A case without tool, material or cut, or one whose limits cannot be computed.
+pub fn believed(case: &Case, recordings: &[Recording], cuts: &[TestCut]) -> Result<Chart, StabilityError> {
+    let method = method(case, after_s(&[case], recordings))?;
+    let cuts = Cuts::new(case, recordings, cuts);
+    let range = Range::new(case, &*method, &cuts, is_costly(case))?;
+    Chart::new(&*method, &range, &cuts)
+}
+
+/// The limits of a case and of its extension, over the same speeds; `moved` says how well the parameters of the extension are known.
+///
+/// # Errors
+/// As [`believed`], also for the extended case.
+pub fn lobes(
+    case: &Case,
+    extended: &Case,
+    moved: &[Moved],
+    recordings: &[Recording],
+    cuts: &[TestCut],
+) -> Result<Lobes, StabilityError> {
+    let after_s = after_s(&[case, extended], recordings);
+    let methods = [method(case, after_s)?, method(extended, after_s)?];
+    let cuts = Cuts::new(case, recordings, cuts);
+    let is_costly = is_costly(case) || is_costly(extended);
+    let range = Range::new(case, &*methods[0], &cuts, is_costly)?;
+    let charts = [
+        Chart::new(&*methods[0], &range, &cuts)?,
+        Chart::new(&*methods[1], &range, &cuts)?,
+    ];
+    let lines = charts[0].lines.iter().zip(&charts[1].lines);
+    let mut speeds: Vec<Change> = lines.map(Change::from).collect();
+    let at = match cuts.recorded_rpm.first() {
+        Some(rpm) => speeds.iter().position(|change| change.at_rpm == *rpm),
+        None => (0..speeds.len()).max_by(|a, b| {
+            let by = |index: &usize| speeds[*index].relative(range.searched_mm).abs();
+            by(a).total_cmp(&by(b))
+        }),
+    };
+    let at = at.ok_or(StabilityError::Argument {
+        quantity: "number of speeds",
+        value: 0.0,
+        expected: "a speed",
+    })?;
+    let known = if is_costly { at..at + 1 } else { 0..speeds.len() };
+    spread(&mut speeds[known], range.searched_mm, moved, after_s);
+    Ok(Lobes {
+        at: speeds[at],
+        searched_mm: range.searched_mm,
+        after_s,
+        method_after: charts[1].method,
+        speeds,
+        calls: (!charts[0].cuts.is_empty()).then(|| CallsChange {
+            before: charts[0].calls(),
+            after: charts[1].calls(),
+        }),
+        charts,
+    })
+}
+
+/// The 90 % intervals of limits: those of the directions of parameters, which are independent of one another, added by their
+/// squares, upward and downward apart. None where a moved case has no limits.
+fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[Moved], after_s: Option<f64>) {
+    if moved.is_empty() {
+        return;
+    }
+    let speeds_rpm: Vec<f64> = speeds.iter().map(|change| change.at_rpm).collect();
+    let or_last = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm);
+    let limits = |case: &Case| -> Option<Vec<f64>> {
+        let lines = chart(&*method(case, after_s).ok()?, &speeds_rpm, searched_mm, 0).ok()?;
+        let limits = lines.speeds.iter().map(|line| line.first_limit);
+        Some(
+            limits
+                .map(|limit| or_last(limit.map(|limit| limit.depth_mm)))
+                .collect(),
+        )
+    };
+    let moved: Option<Vec<[Vec<f64>; 2]>> = moved
+        .par_iter()
+        .map(|[low, high]| Some([limits(low)?, limits(high)?]))
+        .collect();
+    let Some(moved) = moved else { return };
+    for (index, change) in speeds.iter_mut().enumerate() {
+        let center_mm = or_last(change.limit_after_mm);
+        let reach = |sign: f64| {
+            let squares = moved.iter().map(|[low, high]| {
+                let furthest = |a: f64, limits: &Vec<f64>| a.max(sign * (limits[index] - center_mm));
+                [low, high].into_iter().fold(0.0, furthest).powi(2)
+            });
+            squares.sum::<f64>().sqrt()
+        };
+        let high_mm = center_mm + reach(1.0);
+        change.limit_after_ci90_mm = Some([
+            Some((center_mm - reach(-1.0)).max(0.0)),
+            (high_mm < searched_mm).then_some(high_mm),
+        ]);
+    }
+}
+
+/// The cuts that are known.
+struct Cuts<'a> {
+    tried: &'a [TestCut],
+    recorded: Vec<TestCut>,
+    /// Speeds of all recorded cuts, also of those that are on no chart of the case.
+    recorded_rpm: Vec<f64>,
+}
+
+impl<'a> Cuts<'a> {
+    fn new(case: &Case, recordings: &[Recording], tried: &'a [TestCut]) -> Self {
+        Self {
+            tried,
+            recorded: recorded_cuts(case, recordings),
+            recorded_rpm: recordings
+                .iter()
+                .filter(|recording| recording.sidecar.kind == Some(RecordKind::Cutting))
+                .filter_map(|recording| recording.sidecar.cut?.spindle_rpm)
+                .collect(),
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &TestCut> {
+        self.tried.iter().chain(&self.recorded)
+    }
+}
+
+/// Speeds and depths of charts.
+struct Range {
+    speeds_rpm: Vec<f64>,
+    searched_mm: f64,
+}
+
+impl Range {
+    fn new(
+        case: &Case,
+        method: &dyn Method,
+        cuts: &Cuts<'_>,
+        is_costly: bool,
+    ) -> Result<Self, StabilityError> {
+        let count = if is_costly { FEW_SPEEDS } else { SPEEDS };
+        let speeds_rpm = speeds(case, cuts.tried, &cuts.recorded_rpm, count)?;
+        let below_cuts_mm = BELOW_CUTS * cuts.all().map(|cut| cut.depth_mm).fold(0.0, f64::max);
+        let searched_mm = if cuts.tried.is_empty() {
+            depth_mm(method, &speeds_rpm)?.max(below_cuts_mm)
+        } else {
+            below_cuts_mm
+        };
+        Ok(Self {
+            speeds_rpm,
+            searched_mm,
+        })
+    }
+}
+
+impl Chart {
+    fn new(method: &dyn Method, range: &Range, cuts: &Cuts<'_>) -> Result<Self, StabilityError> {
+        let lines = chart(method, &range.speeds_rpm, range.searched_mm, 0)?.speeds;
+        let mut said = calls(method, cuts.tried)?;
+        said.extend(cuts.recorded.iter().map(|cut| call(&lines, cut)));
+        Ok(Self {
+            method: method.name(),
+            searched_mm: range.searched_mm,
+            lines,
+            cuts: cuts.all().copied().zip(said).collect(),
+        })
+    }
+
+    /// How often the cuts are called right.
+    pub fn calls(&self) -> Calls {
+        let calls: Vec<Call> = self.cuts.iter().map(|(_, call)| *call).collect();
+        Calls::of(&calls)
+    }
+}
+
+fn after_s(cases: &[&Case], recordings: &[Recording]) -> Option<f64> {
+    let moves = cases.iter().any(|case| {
+        ["drift", "wear"]
+            .iter()
+            .any(|name| case.extensions.contains_key(*name))
+    });
+    moves.then(|| recordings.iter().map(duration_s).fold(0.0, f64::max))
+}
+
+fn is_costly(case: &Case) -> bool {
+    needs_orbit(case) && ForcedProblem::new(case).is_ok_and(|problem| problem.is_over_revolution())
+}
+
+impl Change {
+    /// Natural logarithm of the limit after over that before; none counts as the last depth.
+    pub fn relative(&self, searched_mm: f64) -> f64 {
+        let limit = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm).max(1e-6 * searched_mm);
+        (limit(self.limit_after_mm) / limit(self.limit_before_mm)).ln()
+    }
+}
+
+impl From<(&SpeedLine, &SpeedLine)> for Change {
+    fn from((before, after): (&SpeedLine, &SpeedLine)) -> Self {
+        let depth = |limit: Limit| limit.depth_mm;
+        let (a, b) = (before.first_limit, after.first_limit);
+        Self {
+            limit_before_mm: a.map(depth),
+            limit_after_mm: b.map(depth),
+            limit_after_ci90_mm: None,
+            at_rpm: before.rpm,
+            kind_before: a.map(|limit| limit.kind),
+            kind_after: b.map(|limit| limit.kind),
+            chatter_before_hz: a.and_then(|limit| limit.chatter_hz),
+            chatter_after_hz: b.and_then(|limit| limit.chatter_hz),
+        }
+    }
+}
+
+fn duration_s(recording: &Recording) -> f64 {
+    recording.len() as f64 / recording.sample_rate_hz
+}
+
+fn method(case: &Case, after_s: Option<f64>) -> Result<Box<dyn Method>, StabilityError> {
+    match after_s {
+        Some(after_s) => collocation_of(&after(case, after_s)?),
+        None => collocation_of(case),
+    }
+}
+
+/// Those of the cuts, else around those of the recorded cuts, else of the machine; with the speeds of recorded cuts among them.
+fn speeds(
+    case: &Case,
+    cuts: &[TestCut],
+    recorded_rpm: &[f64],
+    count: usize,
+) -> Result<Vec<f64>, StabilityError> {
+    let ends = |speeds: &mut dyn Iterator<Item = f64>| {
+        speeds.fold(None, |ends: Option<(f64, f64)>, rpm| {
+            Some(ends.map_or((rpm, rpm), |(from, to)| (from.min(rpm), to.max(rpm))))
+        })
+    };
+    let (from_rpm, to_rpm) = match ends(&mut cuts.iter().map(|cut| cut.rpm)) {
+        Some((from, to)) if from < to => (from, to),
+        Some((from, to)) => (0.8 * from, 1.25 * to),
+        None => match ends(&mut recorded_rpm.iter().copied()) {
+            Some((from, to)) => (0.7 * from, 1.4 * to),
+            None => {
+                let pitched = Pitched::new(case, CubicTerms::Kept)?;
+                let linear = pitched.with_mean_pitch();
+                default_speeds(case, &linear.structure, linear.teeth)
+            }
+        },
+    };
+    let mut speeds = spaced(from_rpm, to_rpm, count);
+    speeds.extend(recorded_rpm);
+    speeds.sort_by(f64::total_cmp);
+    speeds.dedup();
+    Ok(speeds)
+}
+
+/// Some times the lowest limit, found by doubling.
+fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityError> {
+    let every = speeds_rpm.len().div_ceil(COARSE).max(1);
+    let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();
+    let mut depth_mm = SHALLOWEST_MM;
+    while depth_mm < DEEPEST_MM {
+        let lines = chart(method, &coarse, depth_mm, 0)?.speeds;
+        let limits = lines.iter().filter_map(|line| line.first_limit);
+        if let Some(lowest_mm) = limits.map(|limit| limit.depth_mm).min_by(f64::total_cmp) {
+            return Ok(DEPTH * lowest_mm);
+        }
+        depth_mm *= 2.0;
+    }
+    Ok(DEEPEST_MM)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quietcut_stability::test_cuts::Outcome;
+
+    /// The robot with all its stiffness changed by this share.
+    fn stiffened(change: f64) -> Case {
+        let mut case = quietcut_testkit::case("kuka-kr90-acetal");
+        let mut table = toml::Table::new();
+        table.insert("relative_change".into(), change.into());
+        case.extensions.insert("stiffness".into(), table);
+        case
+    }
+
+    #[test]
+    fn limits_are_known_as_well_as_the_parameters_of_what_was_found() {
+        let case = quietcut_testkit::case("kuka-kr90-acetal");
+        let between = |low: f64, high: f64| {
+            lobes(
+                &case,
+                &stiffened(0.1),
+                &[[stiffened(low), stiffened(high)]],
+                &[],
+                &[],
+            )
+            .unwrap()
+        };
+        let [low, high] = [0.06, 0.14].map(|change| between(change, change));
+        let found = between(0.06, 0.14);
+        for (at, change) in found.speeds.iter().enumerate() {
+            let center_mm = change.limit_after_mm.unwrap_or(found.searched_mm);
+            // Ends that lie on one side of the limit reach to that side alone.
+            let [one, other] = [&low, &high].map(|ends| ends.speeds[at].limit_after_ci90_mm.unwrap());
+            let [from_mm, to_mm] = change.limit_after_ci90_mm.unwrap();
+            assert!(from_mm.unwrap() <= center_mm && to_mm.is_none_or(|to_mm| to_mm >= center_mm));
+            assert_eq!(from_mm, [one[0], other[0]].into_iter().flatten().reduce(f64::min));
+            let last = |limit_mm: Option<f64>| limit_mm.unwrap_or(f64::INFINITY);
+            assert_eq!(last(to_mm), last(one[1]).max(last(other[1])));
+        }
+        // Twice the same direction is √2 as far.
+        let moved = [stiffened(0.06), stiffened(0.14)];
+        let twice = lobes(&case, &stiffened(0.1), &[moved.clone(), moved], &[], &[]).unwrap();
+        let reach = |lobes: &Lobes| {
+            let Some([Some(from_mm), _]) = lobes.at.limit_after_ci90_mm else {
+                return 0.0;
+            };
+            lobes.at.limit_after_mm.unwrap_or(lobes.searched_mm) - from_mm
+        };
+        assert!(reach(&found) > 0.0);
+        assert!((reach(&twice) / reach(&found) - 2.0_f64.sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_an_extension_the_cuts_are_called_by_the_case() {
+        let case = quietcut_testkit::case("kuka-kr90-acetal");
+        // Chapter 7: the limit is 3.174 mm at 600 rev/min.
+        let cut = |depth_mm, outcome| TestCut {
+            rpm: 600.0,
+            depth_mm,
+            outcome,
+        };
+        let cuts = [cut(2.5, Outcome::Stable), cut(3.0, Outcome::Chatter)];
+        let chart = believed(&case, &[], &cuts).unwrap();
+        let calls: Vec<Call> = chart.cuts.iter().map(|(_, call)| *call).collect();
+        assert_eq!(calls, [Call::Right, Call::MissedChatter]);
+        assert_eq!(chart.searched_mm, BELOW_CUTS * 3.0);
+    }
+}

@@ -1,0 +1,133 @@
+//! The restoring force that a residual says is missing, along the axis of its channel.
+//!
+//! Of a response y = H (F − f_r) the residual y − H F is −H f_r: f_r is what it is, over −H, where the residual stands above its
+//! noise. In the domain of forces the residual is f_r itself.
+
+use num_complex::Complex64;
+
+use crate::baseline::Baseline;
+use crate::records::record::{Observed, Record};
+use crate::records::study::Domain;
+use quietcut_recording::Quantity;
+
+/// Bins over which the power of a residual is averaged.
+const SMOOTHED: usize = 9;
+
+/// How many times its noise the power of a residual must be to tell of a force.
+const ABOVE: f64 = 3.0;
+
+/// Periods of the slowest mode in a stretch that has one amplitude.
+const PERIODS: f64 = 2.0;
+
+/// A missing force along the motion.
+#[derive(Clone, Debug)]
+pub struct MissingForce {
+    /// Displacement, m.
+    pub x: Vec<f64>,
+    /// Velocity, m/s.
+    pub v: Vec<f64>,
+    /// Force, N.
+    pub force_n: Vec<f64>,
+    /// Static stiffness of the case there, N/m; 0 where it has none.
+    pub stiffness: f64,
+    /// Samples of a stretch over which stiffness and damping are taken.
+    stretch: usize,
+}
+
+/// Stiffness and damping of a stretch at its amplitude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtAmplitude {
+    /// Largest distance from the middle, m.
+    pub amplitude_m: f64,
+    /// Missing force over displacement, N/m.
+    pub stiffness: f64,
+    /// Missing force over velocity, N s/m.
+    pub damping: f64,
+}
+
+impl MissingForce {
+    /// The force that the residual of a channel tells of; `None` for a channel of forces of a cut, or an axis without motion.
+    pub(crate) fn of(
+        baseline: &Baseline<'_>,
+        record: &Record,
+        channel: &Observed,
+        residual: &[f64],
+    ) -> Option<Self> {
+        let axis = (0..3).find(|axis| channel.pickup.weights[*axis] != 0.0)?;
+        let every = record.grid.finer();
+        let thinned = |signal: &[f64]| signal.iter().copied().step_by(every).collect::<Vec<f64>>();
+        let (x, v) = (thinned(&record.motion.x[axis]), thinned(&record.motion.v[axis]));
+        if x.len() != residual.len() || v.len() != residual.len() {
+            return None;
+        }
+        let force_n = match record.domain {
+            Domain::Force => residual.to_vec(),
+            Domain::Response if channel.pickup.quantity == Quantity::Force => return None,
+            Domain::Response => response_over(record, channel, axis, residual),
+        };
+        let at_rest = baseline.receptance.at(0.0)[(axis, axis)].re;
+        // Where nothing oscillates by itself, a record has twenty stretches.
+        let duration_s = residual.len() as f64 / record.grid.rate_hz();
+        let stretch_s = baseline.lowest_hz().map_or(0.05 * duration_s, |hz| PERIODS / hz);
+        Some(Self {
+            x,
+            v,
+            force_n,
+            stiffness: if at_rest > 0.0 { at_rest.recip() } else { 0.0 },
+            stretch: ((stretch_s * record.grid.rate_hz()) as usize).max(16),
+        })
+    }
+
+    /// Stiffness and damping that the force adds, stretch by stretch; stretches much quieter than the loudest tell nothing.
+    pub fn at_amplitudes(&self) -> Vec<AtAmplitude> {
+        let all: Vec<AtAmplitude> = self
+            .x
+            .chunks_exact(self.stretch)
+            .zip(self.v.chunks_exact(self.stretch))
+            .zip(self.force_n.chunks_exact(self.stretch))
+            .map(|((x, v), force)| {
+                let middle = |a: &[f64]| a.iter().sum::<f64>() / a.len() as f64;
+                let (x0, f0) = (middle(x), middle(force));
+                let share = |by: &dyn Fn(usize) -> f64| {
+                    let whole: f64 = (0..x.len()).map(|n| by(n) * by(n)).sum();
+                    let part: f64 = (0..x.len()).map(|n| by(n) * (force[n] - f0)).sum();
+                    if whole > 0.0 { part / whole } else { 0.0 }
+                };
+                AtAmplitude {
+                    amplitude_m: x.iter().map(|x| (x - x0).abs()).fold(0.0, f64::max),
+                    stiffness: share(&|n| x[n] - x0),
+                    damping: share(&|n| v[n]),
+                }
+            })
+            .collect();
+        let loudest = all.iter().map(|at| at.amplitude_m).fold(0.0, f64::max);
+        all.into_iter()
+            .filter(|at| at.amplitude_m > 0.02 * loudest)
+            .collect()
+    }
+}
+
+/// −residual over the receptance of its axis, where it stands above its noise.
+fn response_over(record: &Record, channel: &Observed, axis: usize, residual: &[f64]) -> Vec<f64> {
+    let grid = &record.grid;
+    let spectrum = grid.spectrum(residual);
+    let power: Vec<f64> = spectrum.iter().map(|bin| bin.norm_sqr()).collect();
+    let noise = channel.deviation.powi(2) * residual.len() as f64;
+    let transfer = record.seen_by(channel);
+    let force: Vec<Complex64> = (0..spectrum.len())
+        .map(|bin| {
+            let omega = grid.omega(bin);
+            let near = &power[bin.saturating_sub(SMOOTHED / 2)..(bin + SMOOTHED / 2 + 1).min(power.len())];
+            let mean = near.iter().sum::<f64>() / near.len() as f64;
+            let weight = 1.0 - ABOVE * noise / mean.max(f64::MIN_POSITIVE);
+            let response = transfer[bin][(axis, axis)] * channel.factor(omega) * channel.pickup.weights[axis];
+            let within = bin > 0 && omega <= std::f64::consts::TAU * record.band_hz;
+            if within && weight > 0.0 && response.norm() > 0.0 {
+                -spectrum[bin] / response * weight
+            } else {
+                Complex64::ZERO
+            }
+        })
+        .collect();
+    grid.samples(&force)
+}

@@ -1,0 +1,13 @@
+//! From the selected candidate model to the answer.
+
+pub mod answer;
+pub(crate) mod conclude;
+pub(crate) mod extended_case;
+pub(crate) mod guess;
+pub mod lobes;
+pub(crate) mod long_records;
+pub(crate) mod missing_force;
+pub(crate) mod parameter_estimates;
+pub(crate) mod recorded_cuts;
+pub(crate) mod residual_views;
+pub(crate) mod unexplained;

@@ -1,0 +1,287 @@
+//! Causes with their parameters and intervals, as an answer says them.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use crate::baseline::direction_of;
+use crate::candidates::cause::{Part, Place};
+use crate::conclusion::answer::{Figure, NINETY_PERCENT, NamedCause};
+use crate::fit::library::{Explanation, Library};
+use crate::fit::regression::{Regression, Share};
+use crate::records::study::{Domain, Scene};
+use crate::selection::select::APART;
+
+/// The causes of an explanation.
+pub(crate) fn named(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &mut Regression,
+    explanation: &Explanation,
+    inflation: f64,
+    confidence: f64,
+) -> Vec<NamedCause> {
+    let covariance = match &explanation.simulated {
+        Some(simulated) => simulated.covariance.clone(),
+        None => covariance(scene, library, regression, explanation, inflation),
+    };
+    let mut all = Vec::new();
+    for (place, covariance) in covariance.iter().enumerate() {
+        let choice = explanation.choices[place];
+        let candidate = &library.candidates[choice.candidate];
+        let cause = library.cause(choice.candidate);
+        let shape = &candidate.shapes[choice.shape].0;
+        let coefficients = library.coefficients(explanation, place);
+        let parts_of = |inner: &[f64]| -> Option<Vec<Part>> {
+            let (coefficients, shape) = inner.split_at(coefficients.len());
+            let parameters = cause.parameters(scene, &candidate.place, shape, coefficients)?;
+            let mut parts = cause.parts(&candidate.place, &parameters);
+            parts[0]
+                .parameters
+                .extend(cause.also(scene, &candidate.place, &parameters));
+            Some(parts)
+        };
+        let values = |inner: &[f64]| -> Option<Vec<f64>> {
+            let parts = parts_of(inner)?;
+            Some(
+                parts
+                    .iter()
+                    .flat_map(|part| part.parameters.iter().map(|(_, value)| *value))
+                    .collect(),
+            )
+        };
+        let inner: Vec<f64> = coefficients.iter().chain(shape).copied().collect();
+        let (Some(parts), Some(center)) = (parts_of(&inner), values(&inner)) else {
+            continue;
+        };
+        let known = cause.known_deviations(scene);
+        let mut deviations = deviations(&values, &inner, &center, covariance, inflation).into_iter();
+        let moved = moved(&parts_of, &inner, covariance, inflation);
+        for (index, part) in parts.into_iter().enumerate() {
+            let tables = moved
+                .iter()
+                .map(|ends| ends.each_ref().map(|parts| parts[index].extension.clone()));
+            all.push(NamedCause {
+                choice: place,
+                moved: tables.collect(),
+                parameters: part
+                    .parameters
+                    .iter()
+                    .map(|(key, value)| {
+                        let fitted = deviations.next().unwrap_or(0.0);
+                        let known = known.iter().find(|(known, _)| known == key);
+                        (
+                            *key,
+                            figure(*value, known.map_or(fitted, |(_, deviation)| *deviation)),
+                        )
+                    })
+                    .collect(),
+                ..empty(part.name, &part.place, confidence, part.extension)
+            });
+        }
+    }
+    all
+}
+
+/// Mass, stiffness and damping by one factor, where that is the same as the gain that was found.
+pub(crate) fn by_common_factor(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &Regression,
+    best: &Explanation,
+    inflation: f64,
+) -> Vec<NamedCause> {
+    let [choice] = best.choices[..] else {
+        return Vec::new();
+    };
+    if !["sensor-gain", "sensor-offset-from-tool-tip"].contains(&library.cause(choice.candidate).name()) {
+        return Vec::new();
+    }
+    // Along the measured motion, as the common factor is.
+    let along = match regression.fit(Share::Whole, &library.columns_of(best)) {
+        Some(fit) => fit.left,
+        None => best.fit.left,
+    };
+    let places: Vec<Place> = if scene.has_modes() {
+        vec![Place::Everywhere]
+    } else {
+        scene.driven_axes().into_iter().map(Place::Axis).collect()
+    };
+    for place in places {
+        let Some((left, change)) = library.common_factor(regression, &place) else {
+            continue;
+        };
+        if (left - along) / inflation > APART {
+            continue;
+        }
+        // The factor is as sure as the gain.
+        let deviation = best.fit.covariance[(0, 0)].max(0.0).sqrt() * inflation.sqrt();
+        return library
+            .candidates
+            .iter()
+            .filter(|known| known.place == place)
+            .filter_map(|known| {
+                let cause = &*library.causes[known.cause];
+                if !["mass", "stiffness", "damping"].contains(&cause.name()) {
+                    return None;
+                }
+                let of = |change: f64| cause.parameters(scene, &known.place, &[], &[change]);
+                let parameters = of(change)?;
+                let (key, value) = *parameters.first()?;
+                // Linear in the change.
+                let (_, beyond) = *of(change + 1.0)?.first()?;
+                let scale = beyond - value;
+                let extension = cause.extension(&known.place, &parameters);
+                Some(NamedCause {
+                    parameters: [(key, figure(value, scale * deviation))].into(),
+                    ..empty(cause.name(), &known.place, 0.25, extension)
+                })
+            })
+            .collect();
+    }
+    Vec::new()
+}
+
+fn empty(name: &'static str, place: &Place, confidence: f64, extension: toml::Table) -> NamedCause {
+    NamedCause {
+        name,
+        confidence,
+        direction: place.direction().map(|direction| direction.name()),
+        directions: match place {
+            Place::Axes(a, b) => Some([direction_of(*a).name(), direction_of(*b).name()]),
+            _ => None,
+        },
+        channel: place.channel().map(String::from),
+        parameters: std::collections::BTreeMap::new(),
+        extension,
+        choice: 0,
+        moved: Vec::new(),
+    }
+}
+
+fn figure(value: f64, deviation: f64) -> Figure {
+    Figure {
+        value,
+        ci90: [
+            value - NINETY_PERCENT * deviation,
+            value + NINETY_PERCENT * deviation,
+        ],
+    }
+}
+
+/// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1, of which
+/// there is so many times the power. What is left of forces is no noise: errors of the motion's derivatives and of the equations,
+/// of which the covariance is taken as they are.
+pub(crate) fn covariance(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &mut Regression,
+    explanation: &Explanation,
+    inflation: f64,
+) -> Vec<DMatrix<f64>> {
+    let mut columns = library.columns_of(explanation);
+    let mut places: Vec<Vec<usize>> = Vec::new();
+    let mut from = 0;
+    for place in 0..explanation.choices.len() {
+        let coefficients = library.coefficients(explanation, place);
+        places.push((from..from + coefficients.len()).collect());
+        from += coefficients.len();
+    }
+    for (rows, slopes) in places
+        .iter_mut()
+        .zip(library.slopes_of(scene, regression, explanation))
+    {
+        rows.extend(columns.len()..columns.len() + slopes.len());
+        columns.extend(slopes);
+    }
+    let whole = match regression.fit(Share::Whole, &columns) {
+        Some(fit) if scene.all_in(Domain::Force) => {
+            regression.covariance_by_residual(Share::Whole, &columns, &fit) / inflation
+        }
+        Some(fit) => fit.covariance,
+        None => explanation.fit.covariance.clone(),
+    };
+    places
+        .iter()
+        .map(|rows| {
+            DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+                whole.get((rows[i], rows[j])).copied().unwrap_or(0.0)
+            })
+        })
+        .collect()
+}
+
+/// The parts of a cause with each principal direction of its covariance at the ends of its 90 % interval; a direction in which no
+/// such cause is physical at one end stays where it is there.
+fn moved(
+    parts_of: &dyn Fn(&[f64]) -> Option<Vec<Part>>,
+    inner: &[f64],
+    covariance: &DMatrix<f64>,
+    inflation: f64,
+) -> Vec<[Vec<Part>; 2]> {
+    // In units of the deviations: coefficients are of different kinds and sizes.
+    let scales: Vec<f64> = covariance
+        .diagonal()
+        .iter()
+        .map(|variance| variance.max(0.0).sqrt())
+        .collect();
+    let of = |i: usize, j: usize| match scales[i] * scales[j] {
+        0.0 => 0.0,
+        scale => covariance[(i, j)] / scale,
+    };
+    let correlation = DMatrix::from_fn(scales.len(), scales.len(), of);
+    let Some(center) = parts_of(inner).filter(|_| correlation.iter().all(|value| value.is_finite())) else {
+        return Vec::new();
+    };
+    let correlation = SymmetricEigen::new(correlation);
+    correlation
+        .eigenvalues
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| **value > 0.0)
+        .map(|(direction, value)| {
+            [-1.0, 1.0].map(|sign| {
+                let size = sign * NINETY_PERCENT * (inflation * value).sqrt();
+                let along = correlation.eigenvectors.column(direction);
+                let moves = inner.iter().zip(along.iter().zip(&scales));
+                let moved: Vec<f64> = moves
+                    .map(|(inner, (along, scale))| inner + size * along * scale)
+                    .collect();
+                parts_of(&moved)
+                    .filter(|parts| parts.len() == center.len())
+                    .unwrap_or_else(|| center.clone())
+            })
+        })
+        .collect()
+}
+
+/// Standard deviations of what `values` says, by differences.
+fn deviations(
+    values: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
+    inner: &[f64],
+    center: &[f64],
+    covariance: &DMatrix<f64>,
+    inflation: f64,
+) -> Vec<f64> {
+    let mut gradient = vec![vec![0.0; inner.len()]; center.len()];
+    for index in 0..inner.len() {
+        let step = 1e-6 * inner[index].abs().max(1e-300);
+        let mut moved = inner.to_vec();
+        moved[index] += step;
+        if let Some(moved) = values(&moved) {
+            for (parameter, value) in moved.iter().enumerate() {
+                gradient[parameter][index] = (value - center[parameter]) / step;
+            }
+        }
+    }
+    gradient
+        .iter()
+        .map(|gradient| {
+            let mut variance = 0.0;
+            for i in 0..covariance.nrows() {
+                for j in 0..covariance.nrows() {
+                    variance += gradient[i] * gradient[j] * covariance[(i, j)];
+                }
+            }
+            (variance.max(0.0) * inflation).sqrt()
+        })
+        .collect()
+}

@@ -1,0 +1,172 @@
+//! The residual as people look at it.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use crate::conclusion::missing_force::MissingForce;
+use crate::fit::library::{Explanation, Library};
+use crate::motion::recorded_cut::RecordedCut;
+use crate::records::record::Record;
+use crate::records::study::{Domain, Scene};
+use crate::signal::grid::Grid;
+use crate::signal::noise::rms;
+
+/// One channel of one record: what was measured, what the case misses of it, and what the extended case misses.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// The record.
+    pub record: String,
+    /// The channel.
+    pub channel: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Highest frequency at which it is compared, Hz.
+    pub highest_hz: f64,
+    /// Deviation of its noise.
+    pub deviation: f64,
+    /// What was measured.
+    pub measured: Vec<f64>,
+    /// Measured less what the case says along the measured motion.
+    pub residual: Vec<f64>,
+    /// The same with what was found; empty where nothing was.
+    pub left: Vec<f64>,
+    /// The force that the residual tells of; `None` where there is no motion that it could act on.
+    pub missing: Option<MissingForce>,
+    /// What a cut has besides; `None` for other tests.
+    pub turning: Option<TurningView>,
+}
+
+/// How the spindle turns under a channel of a cut.
+#[derive(Clone, Debug)]
+pub struct TurningView {
+    /// Mean speed, rev/min.
+    pub rpm: f64,
+    /// Number of teeth.
+    pub teeth: usize,
+    /// What was measured as each tooth passes the immersion angle 0, with the number of the pass.
+    pub measured: Vec<(u32, f64)>,
+    /// The same of the residual.
+    pub residual: Vec<(u32, f64)>,
+}
+
+impl View {
+    /// Amplitudes of a signal of this channel over frequency, averaged to at most `points` points: (Hz, RMS per line).
+    pub fn spectrum(&self, samples: &[f64], points: usize) -> Vec<(f64, f64)> {
+        if samples.is_empty() {
+            return Vec::new();
+        }
+        let grid = Grid::new(samples.len(), self.rate_hz, 0.0, 1);
+        let bins: Vec<Complex64> = grid.spectrum(samples);
+        let per = bins.len().div_ceil(points.max(1)).max(1);
+        let scale = 2.0 / samples.len() as f64;
+        bins.chunks(per)
+            .enumerate()
+            .map(|(index, chunk)| {
+                let middle = index * per + chunk.len() / 2;
+                let power: f64 = chunk.iter().map(|bin| bin.norm_sqr()).sum::<f64>() / chunk.len() as f64;
+                (grid.omega(middle) / TAU, scale * power.sqrt())
+            })
+            .collect()
+    }
+
+    /// Root mean squares: measured, residual, left.
+    pub fn sizes(&self) -> [f64; 3] {
+        [rms(&self.measured), rms(&self.residual), rms(&self.left)]
+    }
+}
+
+/// Views of every channel, with the explanation taken off where there is one.
+pub(crate) fn views(scene: &Scene<'_>, library: &Library, best: Option<&Explanation>) -> Vec<View> {
+    let mut all = Vec::new();
+    for record in &scene.records {
+        let left_by_best = best.map(|best| left_by(scene, library, record, best));
+        for (index, channel) in record.channels.iter().enumerate() {
+            let residual = channel.residual();
+            let left = left_by_best
+                .as_ref()
+                .map_or_else(Vec::new, |left| left[index].clone());
+            let turning = record.cut.as_ref().map(|cutting| {
+                let passes = passes(record, &cutting.cut);
+                let at = |samples: &[f64]| strobe(&passes, samples);
+                TurningView {
+                    rpm: cutting.cut.turning.rpm(),
+                    teeth: cutting.cut.cutter.teeth.len(),
+                    measured: at(&channel.measured),
+                    residual: at(&residual),
+                }
+            });
+            all.push(View {
+                record: record.path.display().to_string(),
+                channel: channel.pickup.name.clone(),
+                unit: channel.pickup.quantity.unit(),
+                rate_hz: record.grid.rate_hz(),
+                highest_hz: record.band_hz,
+                deviation: channel.deviation,
+                measured: channel.measured.clone(),
+                missing: MissingForce::of(&scene.baseline, record, channel, &residual),
+                turning,
+                residual,
+                left,
+            });
+        }
+    }
+    all
+}
+
+/// What an explanation leaves of each channel, once the free decay that it leaves has been taken out.
+fn left_by(scene: &Scene<'_>, library: &Library, record: &Record, best: &Explanation) -> Vec<Vec<f64>> {
+    let explained = library.explained(scene, record, best);
+    let left: Vec<Vec<f64>> = record
+        .channels
+        .iter()
+        .zip(&explained)
+        .map(|(channel, explained)| {
+            let residual = channel.residual();
+            residual.iter().zip(explained).map(|(a, b)| a - b).collect()
+        })
+        .collect();
+    if record.domain == Domain::Force {
+        return left;
+    }
+    let sizes: Vec<f64> = record.channels.iter().map(|channel| channel.deviation).collect();
+    let mut decays = record.decays.clone();
+    decays.fit(&left, &sizes);
+    left.iter()
+        .enumerate()
+        .map(|(index, left)| decays.without(index, left))
+        .collect()
+}
+
+/// Where teeth pass, in samples, with the numbers of the passes.
+fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
+    let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
+    let rate_hz = record.grid.rate_hz();
+    let turned = |sample: usize| cut.turning.angle_rad(sample as f64 / rate_hz) / pitch;
+    let first = turned(0).ceil();
+    let mut next = first;
+    let mut found = Vec::new();
+    for sample in 1..record.grid.count() {
+        let (from, to) = (turned(sample - 1), turned(sample));
+        while next <= to && to > from {
+            let share = ((next - from) / (to - from)).clamp(0.0, 1.0);
+            found.push(((next - first) as u32, (sample - 1) as f64 + share));
+            next += 1.0;
+        }
+    }
+    found
+}
+
+/// Samples at these places, in straight lines between neighbours.
+fn strobe(passes: &[(u32, f64)], samples: &[f64]) -> Vec<(u32, f64)> {
+    passes
+        .iter()
+        .filter_map(|(pass, place)| {
+            let (index, share) = (place.floor() as usize, place.fract());
+            let (from, to) = (samples.get(index)?, samples.get(index + 1)?);
+            Some((*pass, from + share * (to - from)))
+        })
+        .collect()
+}

@@ -1,0 +1,100 @@
+//! Where the unexplained part of a residual sits.
+
+use std::f64::consts::TAU;
+
+use crate::conclusion::residual_views::View;
+use crate::signal::grid::Grid;
+use crate::signal::noise::rms;
+
+/// Stretches into which a record is cut to see where it moves most.
+const STRETCHES: usize = 40;
+/// Lines of the spectrum on each side that still count as one peak.
+const NEAR: usize = 8;
+
+/// Frequency (and spindle order), time and amplitude at which most of what is left sits: of what was found, or of the case where
+/// nothing was, in the channel where it is largest beside its noise.
+pub(crate) fn describe(views: &[View]) -> String {
+    let worst = views.iter().max_by(|a, b| {
+        let beside_noise = |view: &View| rms(left(view)) / view.deviation.max(f64::MIN_POSITIVE);
+        beside_noise(a).total_cmp(&beside_noise(b))
+    });
+    worst.map_or_else(String::new, of_channel)
+}
+
+fn left(view: &View) -> &[f64] {
+    if view.left.is_empty() {
+        &view.residual
+    } else {
+        &view.left
+    }
+}
+
+fn of_channel(view: &View) -> String {
+    let left = left(view);
+    let size = rms(left);
+    let mut said = format!(
+        "{} of {}: {size:.3e} {} RMS, {:.1} times its noise",
+        view.channel,
+        view.record,
+        view.unit,
+        size / view.deviation.max(f64::MIN_POSITIVE)
+    );
+    if let Some((hz, share)) = peak(view, left) {
+        said += &format!("; most at {hz:.3} Hz");
+        if let Some(turning) = &view.turning {
+            said += &format!(", spindle order {:.2}", 60.0 * hz / turning.rpm);
+        }
+        said += &format!(" ({:.0} % of the energy within a few lines)", 100.0 * share);
+    }
+    let by_stretch = stretches(left);
+    let loudest = (0..by_stretch.len()).max_by(|a, b| by_stretch[*a].total_cmp(&by_stretch[*b]));
+    if let Some(loudest) = loudest {
+        let middle = (loudest as f64 + 0.5) * stretch(left) as f64 / view.rate_hz;
+        said += &format!(", loudest at {middle:.2} s");
+    }
+    said + &format!(
+        "; {:.0} % of the energy in the quarter of the record that moves most",
+        100.0 * where_it_moves_most(&by_stretch, &stretches(&view.measured))
+    )
+}
+
+/// The frequency with the most energy, and the share of all that is near it.
+fn peak(view: &View, samples: &[f64]) -> Option<(f64, f64)> {
+    if samples.is_empty() {
+        return None;
+    }
+    let grid = Grid::new(samples.len(), view.rate_hz, 0.0, 1);
+    let power: Vec<f64> = grid.spectrum(samples).iter().map(|bin| bin.norm_sqr()).collect();
+    let within = power.iter().enumerate();
+    let within = within.take_while(|(bin, _)| grid.omega(*bin) <= TAU * view.highest_hz);
+    let (peak, _) = within.max_by(|a, b| a.1.total_cmp(b.1))?;
+    let near: f64 = power[peak.saturating_sub(NEAR)..(peak + NEAR + 1).min(power.len())]
+        .iter()
+        .sum();
+    let whole: f64 = power.iter().sum();
+    (whole > 0.0).then(|| (grid.omega(peak) / TAU, near / whole))
+}
+
+fn stretch(samples: &[f64]) -> usize {
+    samples.len().div_ceil(STRETCHES).max(1)
+}
+
+/// Energy in each stretch.
+fn stretches(samples: &[f64]) -> Vec<f64> {
+    samples
+        .chunks(stretch(samples))
+        .map(|chunk| chunk.iter().map(|value| value * value).sum())
+        .collect()
+}
+
+/// The share of `energy` in the quarter of the stretches in which the channel itself has most: about a quarter of what does not depend
+/// on amplitude, more of what grows with it.
+fn where_it_moves_most(energy: &[f64], measured: &[f64]) -> f64 {
+    let mut order: Vec<usize> = (0..measured.len().min(energy.len())).collect();
+    order.sort_by(|a, b| measured[*b].total_cmp(&measured[*a]));
+    let most: f64 = order[..order.len().div_ceil(4)]
+        .iter()
+        .map(|index| energy[*index])
+        .sum();
+    most / energy.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+}

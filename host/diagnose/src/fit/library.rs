@@ -1,0 +1,504 @@
+//! Which causes explain the residual, and which do so equally well.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::candidates;
+use crate::candidates::cause::{Cause, Parameter, Place};
+use crate::fit::closed_fit::Reading;
+use crate::fit::regression::{Fit, Regression, Share};
+use crate::records::record::Record;
+use crate::records::study::Scene;
+
+/// A cause at a place, with the columns of each of its shapes.
+pub(crate) struct Candidate {
+    /// Its cause, a place in the library.
+    pub cause: usize,
+    /// Where.
+    pub place: Place,
+    /// Shapes and the columns that they have.
+    pub shapes: Vec<(Vec<f64>, Vec<usize>)>,
+}
+
+/// One candidate with one of its shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Choice {
+    /// The candidate.
+    pub candidate: usize,
+    /// Its shape.
+    pub shape: usize,
+}
+
+/// Causes that act together, fitted.
+#[derive(Clone, Debug)]
+pub(crate) struct Explanation {
+    /// What acts.
+    pub choices: Vec<Choice>,
+    /// The fit of all their coefficients, in the order of the choices.
+    pub fit: Fit,
+    /// Parameters that were fitted, those of the shape included.
+    pub freedoms: usize,
+    /// What simulation says, where the records can be simulated: coefficients, shapes and what is left are then its own.
+    pub simulated: Option<Simulated>,
+}
+
+/// Parameters that make a simulation agree with the records.
+#[derive(Clone, Debug)]
+pub(crate) struct Simulated {
+    /// By choice: covariance of coefficients and, behind them, of the shape, for noise of deviation 1.
+    pub covariance: Vec<DMatrix<f64>>,
+    /// By record: states at its start; empty where it starts from rest.
+    pub starts: Vec<Vec<f64>>,
+    /// The records with the extended case, where that is kept.
+    pub reading: Option<Arc<Reading>>,
+}
+
+/// The library on a scene.
+pub(crate) struct Library {
+    /// All causes.
+    pub causes: Vec<Box<dyn Cause>>,
+    /// Where they could act.
+    pub candidates: Vec<Candidate>,
+}
+
+/// How many of the best pairs are tried with a third cause.
+const PAIRS_KEPT: usize = 24;
+
+impl Library {
+    /// All causes on a scene, with their columns added to the regression.
+    pub(crate) fn new(scene: &Scene<'_>, regression: &mut Regression) -> Self {
+        let causes = candidates::all();
+        let placed: Vec<(usize, Place, Vec<f64>)> = causes
+            .iter()
+            .enumerate()
+            .flat_map(|(index, cause)| {
+                let places = cause.places(scene);
+                places.into_iter().flat_map(move |place| {
+                    let shapes = cause.shapes(scene, &place);
+                    shapes.into_iter().map(move |shape| (index, place.clone(), shape))
+                })
+            })
+            .collect();
+        // Along each of several axes it adds what it adds along one after the other.
+        let (each, placed): (Vec<_>, Vec<_>) = placed
+            .into_iter()
+            .partition(|(_, place, _)| matches!(place, Place::EachOf(_)));
+        let computed: Vec<_> = placed
+            .into_par_iter()
+            .filter_map(|(cause, place, shape)| {
+                let columns = columns(scene, &*causes[cause], &place, &shape)?;
+                Some((cause, place, shape, columns))
+            })
+            .collect();
+        let mut library = Self {
+            causes,
+            candidates: Vec::new(),
+        };
+        for (cause, place, shape, columns) in computed {
+            let numbers = columns.iter().map(|column| regression.add(column)).collect();
+            library.put(cause, place, shape, numbers);
+        }
+        for (cause, place, shape) in each {
+            if let Some(numbers) = library.columns_along_each(cause, &place, &shape) {
+                library.put(cause, place, shape, numbers);
+            }
+        }
+        regression.complete();
+        library
+    }
+
+    fn find(&self, cause: usize, place: &Place) -> Option<usize> {
+        self.candidates
+            .iter()
+            .position(|candidate| candidate.cause == cause && candidate.place == *place)
+    }
+
+    fn put(&mut self, cause: usize, place: Place, shape: Vec<f64>, columns: Vec<usize>) {
+        match self.find(cause, &place) {
+            Some(known) => self.candidates[known].shapes.push((shape, columns)),
+            None => self.candidates.push(Candidate {
+                cause,
+                place,
+                shapes: vec![(shape, columns)],
+            }),
+        }
+    }
+
+    /// The columns of a cause along each of several axes: those along one after the other; `None` where one of them is not known.
+    fn columns_along_each(&self, cause: usize, place: &Place, shape: &[f64]) -> Option<Vec<usize>> {
+        let Place::EachOf(axes) = place else { return None };
+        let mut columns = Vec::new();
+        for axis in axes {
+            let known = &self.candidates[self.find(cause, &Place::Axis(*axis))?];
+            let (_, own) = known.shapes.iter().find(|(known, _)| known == shape)?;
+            columns.extend_from_slice(own);
+        }
+        Some(columns)
+    }
+
+    /// The cause of a candidate.
+    pub(crate) fn cause(&self, candidate: usize) -> &dyn Cause {
+        &*self.causes[self.candidates[candidate].cause]
+    }
+
+    /// Every candidate with every shape.
+    pub(crate) fn choices(&self) -> Vec<Choice> {
+        self.candidates
+            .iter()
+            .enumerate()
+            .flat_map(|(candidate, known)| {
+                (0..known.shapes.len()).map(move |shape| Choice { candidate, shape })
+            })
+            .collect()
+    }
+
+    /// The columns of a choice.
+    pub(crate) fn columns(&self, choice: Choice) -> &[usize] {
+        &self.candidates[choice.candidate].shapes[choice.shape].1
+    }
+
+    /// The fit of some choices; `None` where they cannot be told from each other, or are not physical.
+    pub(crate) fn explain(
+        &self,
+        scene: &Scene<'_>,
+        regression: &Regression,
+        choices: &[Choice],
+    ) -> Option<Explanation> {
+        let columns: Vec<usize> = choices
+            .iter()
+            .flat_map(|choice| self.columns(*choice))
+            .copied()
+            .collect();
+        let fit = regression.fit(Share::Whole, &columns)?;
+        let explanation = Explanation {
+            freedoms: choices.iter().map(|choice| self.freedoms(*choice)).sum(),
+            choices: choices.to_vec(),
+            fit,
+            simulated: None,
+        };
+        self.parameters(scene, &explanation).map(|_| explanation)
+    }
+
+    /// Parameters of a choice that are fitted; what settles by itself is none.
+    pub(crate) fn freedoms(&self, choice: Choice) -> usize {
+        let (shape, columns) = &self.candidates[choice.candidate].shapes[choice.shape];
+        let settles = self
+            .cause(choice.candidate)
+            .settled(shape, &vec![1.0; columns.len()])
+            .is_some();
+        columns.len() + if settles { 0 } else { shape.len() }
+    }
+
+    /// All columns of an explanation, choice after choice.
+    pub(crate) fn columns_of(&self, explanation: &Explanation) -> Vec<usize> {
+        explanation
+            .choices
+            .iter()
+            .flat_map(|choice| self.columns(*choice))
+            .copied()
+            .collect()
+    }
+
+    /// The coefficients of one of the choices.
+    pub(crate) fn coefficients(&self, explanation: &Explanation, place: usize) -> Vec<f64> {
+        let from: usize = explanation.choices[..place]
+            .iter()
+            .map(|choice| self.columns(*choice).len())
+            .sum();
+        explanation.fit.coefficients[from..from + self.columns(explanation.choices[place]).len()].to_vec()
+    }
+
+    /// What an explanation adds to the residual of each channel of a record.
+    pub(crate) fn explained(
+        &self,
+        scene: &Scene<'_>,
+        record: &Record,
+        explanation: &Explanation,
+    ) -> Vec<Vec<f64>> {
+        let mut sum = vec![vec![0.0; record.grid.count()]; record.channels.len()];
+        for (place, choice) in explanation.choices.iter().enumerate() {
+            let known = &self.candidates[choice.candidate];
+            let cause = self.cause(choice.candidate);
+            let coefficients = self.coefficients(explanation, place);
+            let regressors = cause.regressors(scene, record, &known.place, &known.shapes[choice.shape].0);
+            for (regressor, coefficient) in regressors.iter().flatten().zip(coefficients) {
+                for (sum, column) in sum.iter_mut().zip(regressor.columns(record)) {
+                    sum.iter_mut()
+                        .zip(column)
+                        .for_each(|(sum, value)| *sum += coefficient * value);
+                }
+            }
+        }
+        sum
+    }
+
+    /// What is left of the held-out parts if the coefficients come from the fitted ones alone.
+    pub(crate) fn left_held_out(&self, regression: &Regression, explanation: &Explanation) -> f64 {
+        let columns = self.columns_of(explanation);
+        match regression.fit(Share::Fitted, &columns) {
+            Some(fit) => regression.left(Share::HeldOut, &columns, &fit.coefficients),
+            None => regression.residual(Share::HeldOut),
+        }
+    }
+
+    /// The parameters of every cause of an explanation.
+    pub(crate) fn parameters(
+        &self,
+        scene: &Scene<'_>,
+        explanation: &Explanation,
+    ) -> Option<Vec<Vec<Parameter>>> {
+        let mut from = 0;
+        explanation
+            .choices
+            .iter()
+            .map(|choice| {
+                let candidate = &self.candidates[choice.candidate];
+                let (shape, columns) = &candidate.shapes[choice.shape];
+                let coefficients = &explanation.fit.coefficients[from..from + columns.len()];
+                from += columns.len();
+                self.causes[candidate.cause].parameters(scene, &candidate.place, shape, coefficients)
+            })
+            .collect()
+    }
+
+    /// The extensions that make an explanation part of a case.
+    pub(crate) fn extensions(
+        &self,
+        scene: &Scene<'_>,
+        explanation: &Explanation,
+    ) -> Option<Vec<(&'static str, toml::Table)>> {
+        let parameters = self.parameters(scene, explanation)?;
+        let of = |(choice, parameters): (&Choice, Vec<Parameter>)| {
+            let place = &self.candidates[choice.candidate].place;
+            self.cause(choice.candidate).parts(place, &parameters)
+        };
+        let parts = explanation.choices.iter().zip(parameters).flat_map(of);
+        Some(parts.map(|part| (part.name, part.extension)).collect())
+    }
+
+    /// The best explanation by each single candidate, best first.
+    pub(crate) fn singles(&self, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+        let found = self
+            .choices()
+            .par_iter()
+            .filter_map(|choice| self.explain(scene, regression, &[*choice]))
+            .collect();
+        self.best_of_each(found)
+    }
+
+    /// The best explanation by each pair of candidates, best first.
+    pub(crate) fn pairs(&self, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+        let choices = self.choices();
+        let found = choices
+            .par_iter()
+            .enumerate()
+            .flat_map_iter(|(index, first)| {
+                let rest = &choices[index + 1..];
+                rest.iter()
+                    .filter(|second| self.may_act_together(&[*first], **second))
+                    .filter_map(|second| self.explain(scene, regression, &[*first, *second]))
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        self.best_of_each(found)
+    }
+
+    /// The best explanation by each triple that contains one of the best pairs, best first.
+    pub(crate) fn triples(
+        &self,
+        scene: &Scene<'_>,
+        regression: &Regression,
+        pairs: &[Explanation],
+    ) -> Vec<Explanation> {
+        let choices = self.choices();
+        let found = pairs
+            .par_iter()
+            .take(PAIRS_KEPT)
+            .flat_map_iter(|pair| {
+                choices
+                    .iter()
+                    .filter(|third| self.may_act_together(&pair.choices, **third))
+                    .filter_map(|third| {
+                        let mut all = pair.choices.clone();
+                        all.push(*third);
+                        all.sort_unstable();
+                        self.explain(scene, regression, &all)
+                    })
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        self.best_of_each(found)
+    }
+
+    fn best_of_each(&self, mut found: Vec<Explanation>) -> Vec<Explanation> {
+        found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
+        let mut seen: Vec<Vec<usize>> = Vec::new();
+        found.retain(|explanation| {
+            let who: Vec<usize> = explanation
+                .choices
+                .iter()
+                .map(|choice| choice.candidate)
+                .collect();
+            let new = !seen.contains(&who);
+            if new {
+                seen.push(who);
+            }
+            new
+        });
+        found
+    }
+
+    /// By choice of an explanation: columns of the change of what it adds per unit of each parameter of its shape; none where the
+    /// shape is no freedom of the fit.
+    pub(crate) fn slopes_of(
+        &self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        explanation: &Explanation,
+    ) -> Vec<Vec<usize>> {
+        (0..explanation.choices.len())
+            .map(|place| {
+                let choice = explanation.choices[place];
+                let coefficients = self.coefficients(explanation, place);
+                let shape = &self.candidates[choice.candidate].shapes[choice.shape].0;
+                let cause = self.cause(choice.candidate);
+                if shape.is_empty() || cause.settled(shape, &coefficients).is_some() {
+                    return Vec::new();
+                }
+                self.slopes(scene, regression, choice, &coefficients)
+                    .unwrap_or_default()
+            })
+            .collect()
+    }
+
+    /// Columns of the change of what a choice with these coefficients adds, per unit of each parameter of its shape.
+    pub(crate) fn slopes(
+        &self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        choice: Choice,
+        coefficients: &[f64],
+    ) -> Option<Vec<usize>> {
+        let known = &self.candidates[choice.candidate];
+        let cause = &*self.causes[known.cause];
+        let shape = &known.shapes[choice.shape].0;
+        let bounds = cause.bounds(scene, &known.place);
+        (0..shape.len())
+            .map(|parameter| {
+                let [low, high] = bounds[parameter];
+                let step = 0.01 * if low > 0.0 { shape[parameter] } else { high - low };
+                let at = |value: f64| {
+                    let mut moved = shape.clone();
+                    moved[parameter] = value.clamp(low, high);
+                    let width = moved[parameter];
+                    columns(scene, cause, &known.place, &moved).map(|columns| (columns, width))
+                };
+                let (above, to) = at(shape[parameter] + step)?;
+                let (below, from) = at(shape[parameter] - step)?;
+                let mut slope = above[0].clone();
+                for (record, slope) in slope.iter_mut().enumerate() {
+                    for (channel, slope) in slope.iter_mut().enumerate() {
+                        for (sample, slope) in slope.iter_mut().enumerate() {
+                            *slope = coefficients
+                                .iter()
+                                .enumerate()
+                                .map(|(j, coefficient)| {
+                                    let change =
+                                        above[j][record][channel][sample] - below[j][record][channel][sample];
+                                    coefficient * change / (to - from)
+                                })
+                                .sum();
+                        }
+                    }
+                }
+                Some(regression.add(&slope))
+            })
+            .collect()
+    }
+
+    /// What is left if one factor on mass, stiffness and damping at `place` stands for everything, and that factor less one.
+    pub(crate) fn common_factor(&self, regression: &Regression, place: &Place) -> Option<(f64, f64)> {
+        let columns: Vec<usize> = ["mass", "stiffness", "damping"]
+            .iter()
+            .map(|name| {
+                self.candidates
+                    .iter()
+                    .position(|known| self.causes[known.cause].name() == *name && known.place == *place)
+                    .map(|index| self.candidates[index].shapes[0].1[0])
+            })
+            .collect::<Option<_>>()?;
+        let at = |factor: f64| regression.left(Share::Whole, &columns, &vec![factor; columns.len()]);
+        // A parabola in the factor.
+        let (below, middle, above) = (at(-1.0), at(0.0), at(1.0));
+        let curvature = below + above - 2.0 * middle;
+        if curvature <= 0.0 {
+            return None;
+        }
+        let best = 0.5 * (below - above) / curvature;
+        Some((at(best), best))
+    }
+
+    /// Adds the shapes that are worth a look for what an explanation leaves.
+    pub(crate) fn add_shapes_beside(
+        &mut self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        left: &[Vec<Vec<f64>>],
+    ) {
+        for candidate in 0..self.candidates.len() {
+            let place = &self.candidates[candidate].place;
+            for shape in self.cause(candidate).shapes_beside(scene, place, left) {
+                self.add_shape(scene, regression, candidate, shape);
+            }
+        }
+    }
+
+    /// Adds a shape to a candidate; `None` where it has no columns.
+    pub(crate) fn add_shape(
+        &mut self,
+        scene: &Scene<'_>,
+        regression: &mut Regression,
+        candidate: usize,
+        shape: Vec<f64>,
+    ) -> Option<Choice> {
+        let known = &self.candidates[candidate];
+        if let Some(index) = known.shapes.iter().position(|(known, _)| *known == shape) {
+            return Some(Choice {
+                candidate,
+                shape: index,
+            });
+        }
+        let columns = columns(scene, &*self.causes[known.cause], &known.place, &shape)?;
+        let numbers = columns.iter().map(|column| regression.add(column)).collect();
+        let shapes = &mut self.candidates[candidate].shapes;
+        shapes.push((shape, numbers));
+        Some(Choice {
+            candidate,
+            shape: shapes.len() - 1,
+        })
+    }
+}
+
+/// Samples by coefficient, record and channel.
+fn columns(
+    scene: &Scene<'_>,
+    cause: &dyn Cause,
+    place: &Place,
+    shape: &[f64],
+) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
+    let mut by_coefficient: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
+    for record in &scene.records {
+        for (index, regressor) in cause.regressors(scene, record, place, shape)?.iter().enumerate() {
+            if by_coefficient.len() <= index {
+                by_coefficient.push(Vec::new());
+            }
+            by_coefficient[index].push(regressor.columns(record));
+        }
+    }
+    let whole = by_coefficient
+        .iter()
+        .all(|column| column.iter().flatten().flatten().all(|sample| sample.is_finite()));
+    whole.then_some(by_coefficient)
+}

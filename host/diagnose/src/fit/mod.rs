@@ -1,0 +1,15 @@
+//! The parameters of one candidate model: linear regression first, then the prediction-error fit.
+
+pub(crate) mod closed_fit;
+pub(crate) mod force_noise;
+pub(crate) mod library;
+pub(crate) mod normal_equations;
+pub(crate) mod output_error;
+pub(crate) mod own_slopes;
+pub(crate) mod refine;
+pub(crate) mod regression;
+pub(crate) mod relinearization;
+pub(crate) mod restarts;
+pub(crate) mod segment;
+pub(crate) mod unknowns;
+pub(crate) mod whitening;

@@ -1,0 +1,201 @@
+//! Shapes between those of the grid.
+
+use crate::fit::library::{Explanation, Library};
+use crate::fit::regression::{Regression, Share};
+use crate::records::study::Scene;
+
+/// Explanations whose shapes are refined.
+const REFINED: usize = 3;
+
+/// Refines the shapes of the best few explanations.
+pub(crate) fn refine(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    found: &mut [Explanation],
+) {
+    let Some(best) = found.first().map(|best| best.fit.left) else {
+        return;
+    };
+    let whole = regression.residual(Share::Whole);
+    let worth: Vec<usize> = (0..found.len())
+        .filter(|index| whole - found[*index].fit.left > 0.5 * (whole - best))
+        .take(REFINED)
+        .collect();
+    for index in worth {
+        let mut explanation = found[index].clone();
+        for place in 0..explanation.choices.len() {
+            explanation = one(scene, library, regression, explanation, place);
+        }
+        found[index] = explanation;
+    }
+    found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
+}
+
+fn one(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    explanation: Explanation,
+    place: usize,
+) -> Explanation {
+    let choice = explanation.choices[place];
+    let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
+    if shape.is_empty() {
+        return explanation;
+    }
+    let settles = library
+        .cause(choice.candidate)
+        .settled(shape, &[1.0; 8])
+        .is_some();
+    if settles {
+        settle(scene, library, regression, explanation, place)
+    } else {
+        search(scene, library, regression, explanation, place)
+    }
+}
+
+/// Most steps towards a shape that settles by itself: where teeth lose contact it takes some.
+const SETTLINGS: usize = 12;
+
+/// Goes to the shape that the coefficients ask for until it stays, by half where all of the way leaves more.
+fn settle(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    mut explanation: Explanation,
+    place: usize,
+) -> Explanation {
+    for _ in 0..SETTLINGS {
+        let choice = explanation.choices[place];
+        let shape = library.candidates[choice.candidate].shapes[choice.shape]
+            .0
+            .clone();
+        let coefficients = library.coefficients(&explanation, place);
+        let Some(asked) = library.cause(choice.candidate).settled(&shape, &coefficients) else {
+            break;
+        };
+        if asked
+            .iter()
+            .zip(&shape)
+            .all(|(a, b)| (a - b).abs() <= 1e-4 * b.abs())
+        {
+            break;
+        }
+        let better = [1.0, 0.5].into_iter().find_map(|share| {
+            let next = shape
+                .iter()
+                .zip(&asked)
+                .map(|(shape, asked)| shape + share * (asked - shape));
+            with_shape(scene, library, regression, &explanation, place, next.collect())
+                .filter(|better| better.fit.left < explanation.fit.left)
+        });
+        // What leaves less where it contradicts itself is no explanation.
+        let better = better.or_else(|| with_shape(scene, library, regression, &explanation, place, asked));
+        let Some(better) = better else {
+            break;
+        };
+        explanation = better;
+    }
+    explanation
+}
+
+/// Most steps along the slopes.
+const SLOPES_FOLLOWED: usize = 3;
+
+/// Steps along each parameter, shorter where they do not help; then where the slopes point.
+fn search(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    mut explanation: Explanation,
+    place: usize,
+) -> Explanation {
+    let candidate = explanation.choices[place].candidate;
+    let bounds = library
+        .cause(candidate)
+        .bounds(scene, &library.candidates[candidate].place);
+    let mut steps = vec![0.25; bounds.len()];
+    for _ in 0..4 {
+        for parameter in 0..bounds.len() {
+            let [low, high] = bounds[parameter];
+            let shape = library.candidates[candidate].shapes[explanation.choices[place].shape]
+                .0
+                .clone();
+            let mut improved = false;
+            for sign in [1.0, -1.0] {
+                let mut moved = shape.clone();
+                let step = sign * steps[parameter];
+                // Sizes are moved by factors, what may be zero by shares of its range.
+                moved[parameter] = if low > 0.0 {
+                    shape[parameter] * (1.0 + step)
+                } else {
+                    shape[parameter] + step * (high - low)
+                }
+                .clamp(low, high);
+                if let Some(better) = with_shape(scene, library, regression, &explanation, place, moved)
+                    .filter(|tried| tried.fit.left < explanation.fit.left)
+                {
+                    explanation = better;
+                    improved = true;
+                    break;
+                }
+            }
+            if !improved {
+                steps[parameter] *= 0.4;
+            }
+        }
+    }
+    for _ in 0..SLOPES_FOLLOWED {
+        let Some(better) = along_slopes(scene, library, regression, &explanation, place, &bounds) else {
+            break;
+        };
+        explanation = better;
+    }
+    explanation
+}
+
+/// One Gauss–Newton step in the shape; `None` where it does not help.
+fn along_slopes(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    explanation: &Explanation,
+    place: usize,
+    bounds: &[[f64; 2]],
+) -> Option<Explanation> {
+    let choice = explanation.choices[place];
+    let coefficients = library.coefficients(explanation, place);
+    let slopes = library.slopes(scene, regression, choice, &coefficients)?;
+    let mut columns = library.columns_of(explanation);
+    let own = columns.len();
+    columns.extend(&slopes);
+    let fit = regression.fit(Share::Whole, &columns)?;
+    let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
+    let moved: Vec<f64> = shape
+        .iter()
+        .zip(&fit.coefficients[own..])
+        .zip(bounds)
+        .map(|((value, step), [low, high])| {
+            let most = 0.3 * if *low > 0.0 { *value } else { high - low };
+            (value + step.clamp(-most, most)).clamp(*low, *high)
+        })
+        .collect();
+    with_shape(scene, library, regression, explanation, place, moved)
+        .filter(|tried| tried.fit.left < explanation.fit.left - 0.01)
+}
+
+fn with_shape(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    explanation: &Explanation,
+    place: usize,
+    shape: Vec<f64>,
+) -> Option<Explanation> {
+    let candidate = explanation.choices[place].candidate;
+    let choice = library.add_shape(scene, regression, candidate, shape)?;
+    let mut choices = explanation.choices.clone();
+    choices[place] = choice;
+    library.explain(scene, regression, &choices)
+}

@@ -1,0 +1,110 @@
+//! Searches that begin again: from beside where one ended, and from other sizes.
+
+use crate::fit::output_error::{LEAST_STEP, OutputError, ROUNDS, SETTLED};
+use crate::fit::segment::Part;
+use crate::fit::unknowns::{Found, Point, Problem, Slot, energy};
+
+/// χ² per number from which on a search is looked at again.
+const STUCK: f64 = 1.1;
+/// How far from where a search with friction ended it is looked at again, as shares.
+const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
+/// Sizes from which a search begins again, as shares of those from which it began.
+const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
+/// Parameters of causes whose sizes are sought so: of more there are too many places to begin.
+const FEW: usize = 2;
+/// How many of the best beginnings are followed to the end.
+const FOLLOWED: usize = 3;
+/// Steps of the search in the beginning of a record.
+const ROUNDS_AT_FIRST: usize = 4;
+
+impl OutputError<'_> {
+    /// What was `found` from `start`, or better where a search that begins again finds that. `count` numbers are compared, and
+    /// another explanation has reached the χ² of `rival`.
+    pub(crate) fn looked_at_again(
+        &self,
+        problem: &mut Problem<'_>,
+        parts: &[&Part],
+        start: &Point,
+        mut found: Found,
+        (rival, count): (f64, usize),
+    ) -> Found {
+        let stuck = STUCK * count as f64;
+        let is_simple = problem.choices.len() == 1 && problem.inner().count() <= FEW;
+        if self.is_let_go && found.left > stuck && is_simple {
+            found = self.elsewhere(problem, parts, start, found, rival);
+        }
+        if problem.least_step > LEAST_STEP && found.left > stuck && found.left < STUCK * rival {
+            found = self.beside(problem, parts, found, rival);
+        }
+        found
+    }
+
+    /// The search once more from the best of what lies near where it ended: whether friction lets go at all is a cliff.
+    fn beside(&self, problem: &mut Problem<'_>, parts: &[&Part], ended: Found, rival: f64) -> Found {
+        let mut best: Option<(f64, Point)> = None;
+        for slot in problem.inner() {
+            for share in BESIDE.into_iter().flat_map(|share| [share, -share]) {
+                let mut moved = ended.point.clone();
+                *slot.of(&mut moved) *= 1.0 + share;
+                let least = best.as_ref().map_or(ended.left, |best| best.0);
+                if let Some(left) = self.residuals(problem, parts, &moved).map(|left| energy(&left))
+                    && left < least - SETTLED
+                {
+                    best = Some((left, moved));
+                }
+            }
+        }
+        let again = best.and_then(|(_, point)| self.search(problem, parts, point, ROUNDS, rival));
+        again.filter(|again| again.left < ended.left).unwrap_or(ended)
+    }
+
+    /// The best of searches from other sizes: where a structure is let go, the phase of all that follows hangs on them, and
+    /// between two sizes there are hills.
+    fn elsewhere(
+        &self,
+        problem: &mut Problem<'_>,
+        parts: &[&Part],
+        start: &Point,
+        ended: Found,
+        rival: f64,
+    ) -> Found {
+        let mut best = ended;
+        let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
+        for _ in problem.inner() {
+            grid = grid
+                .into_iter()
+                .flat_map(|known| SIZES.map(|size| [known.clone(), vec![size]].concat()))
+                .collect();
+        }
+        let first: Vec<&Part> = self.horizons[0].iter().collect();
+        let mut tried: Vec<(f64, Point)> = grid
+            .into_iter()
+            .filter_map(|sizes| {
+                let mut point = start.clone();
+                for (slot, size) in problem.inner().zip(sizes) {
+                    let value = slot.of(&mut point);
+                    *value *= size;
+                    if let Slot::Inner {
+                        bounds: [low, high], ..
+                    } = slot
+                    {
+                        *value = value.clamp(low, high);
+                    }
+                }
+                let found = self.search(problem, &first, point, ROUNDS_AT_FIRST, f64::INFINITY)?;
+                Some((found.left, found.point))
+            })
+            .collect();
+        tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, point) in tried.into_iter().take(FOLLOWED) {
+            let point = self.near_to_far(problem, point);
+            let rival = rival.min(best.left);
+            if let Some(found) = self.search(problem, parts, point, ROUNDS, rival)
+                && found.left < best.left
+            {
+                best = found;
+            }
+        }
+        best
+    }
+}

@@ -1,0 +1,213 @@
+//! Parts of records as they are compared: transformed, cut to the band, in units of the noise, and freed of what decays of
+//! the initial state and constant offsets of the sensors could explain.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use crate::fit::whitening::Whitening;
+use crate::motion::free_decay::dot;
+use crate::records::record::Record;
+use crate::records::study::{Domain, Scene};
+use crate::signal::grid::Stretch;
+use quietcut_recording::Kind;
+
+/// A part of a record.
+pub(crate) struct Part {
+    /// Its record, by its place in the scene.
+    pub(crate) record: usize,
+    pub(crate) range: Range<usize>,
+    pub(crate) share: Share,
+    /// One over how many times the noise of its record is taken for what it is.
+    pub(crate) weight: f64,
+    bins: usize,
+    stretch: Stretch,
+    whitening: Whitening,
+    /// By channel: samples, counted from the start of the part, that are not compared.
+    skipped: Vec<Vec<usize>>,
+    /// Orthonormal: what decays and offsets can be.
+    nuisance: Vec<Vec<f64>>,
+}
+
+/// What a part may owe to what nobody knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unknown {
+    /// The state at its start, as free decays of the baseline, and the offsets of sensors.
+    StartAndOffsets,
+    /// Offsets of sensors alone.
+    Offsets,
+}
+
+/// Which parts count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Share {
+    /// Those that are fitted.
+    Fitted,
+    /// Those that are held out.
+    HeldOut,
+    /// Each record as a whole.
+    Whole,
+}
+
+/// Each record as a whole, and in four blocks of a third, a sixth, a third and a sixth of which the short ones are held out:
+/// they hold other times, and of a sweep other frequencies, than what is fitted. Of several free decays the last is held out
+/// whole: the end of a decay tells nothing.
+pub(crate) fn split(scene: &Scene<'_>, unknown: impl Fn(&Record) -> Unknown) -> Vec<Part> {
+    let several = scene.records.len() > 1;
+    let last = scene.records.len().saturating_sub(1);
+    scene
+        .records
+        .iter()
+        .enumerate()
+        .flat_map(|(index, record)| {
+            let Range { start: from, end } = record.compared.clone();
+            let count = end - from;
+            let mut ranges = vec![(from..end, Share::Whole)];
+            if several && record.kind == Some(Kind::FreeDecay) {
+                let share = if index == last {
+                    Share::HeldOut
+                } else {
+                    Share::Fitted
+                };
+                ranges.push((from..end, share));
+            } else {
+                ranges.extend([
+                    (from..from + count / 3, Share::Fitted),
+                    (from + count / 3..from + count / 2, Share::HeldOut),
+                    (from + count / 2..from + 5 * count / 6, Share::Fitted),
+                    (from + 5 * count / 6..end, Share::HeldOut),
+                ]);
+            }
+            let unknown = unknown(record);
+            ranges
+                .into_iter()
+                .map(move |(range, share)| Part::new(scene, index, range, share, unknown))
+        })
+        .collect()
+}
+
+impl Part {
+    /// A part of the record at `index`.
+    pub(crate) fn new(
+        scene: &Scene<'_>,
+        index: usize,
+        range: Range<usize>,
+        share: Share,
+        unknown: Unknown,
+    ) -> Self {
+        let record = &scene.records[index];
+        let mut part = Self {
+            record: index,
+            bins: bins_of(record, range.len()),
+            skipped: record
+                .skipped
+                .iter()
+                .map(|of| {
+                    of.iter()
+                        .filter(|sample| range.contains(sample))
+                        .map(|sample| sample - range.start)
+                        .collect()
+                })
+                .collect(),
+            stretch: Stretch::new(range.len()),
+            range,
+            share,
+            weight: 1.0,
+            whitening: Whitening::default(),
+            nuisance: Vec::new(),
+        };
+        part.whitening = Whitening::of(record, part.range.len(), part.bins);
+        part.nuisance = nuisance(record, &part, unknown);
+        part
+    }
+
+    /// Transformed, cut to the band, in units of the noise, and without what nuisances explain; `samples` are those of the
+    /// whole record, channel by channel.
+    pub(crate) fn whiten(&self, samples: &[Vec<f64>]) -> Vec<f64> {
+        let mut column = raw(self, samples);
+        for nuisance in &self.nuisance {
+            let along = dot(&column, nuisance);
+            for (value, nuisance) in column.iter_mut().zip(nuisance) {
+                *value -= along * nuisance;
+            }
+        }
+        if self.weight != 1.0 {
+            column.iter_mut().for_each(|value| *value *= self.weight);
+        }
+        column
+    }
+
+    /// Numbers that nuisances take, and that are not compared.
+    pub(crate) fn taken(&self) -> usize {
+        self.nuisance.len() + self.skipped.iter().map(Vec::len).sum::<usize>()
+    }
+}
+
+fn bins_of(record: &Record, length: usize) -> usize {
+    let share = record.band_hz / record.grid.rate_hz();
+    ((share * length as f64) as usize + 1).min(length / 2 + 1)
+}
+
+fn raw(part: &Part, samples: &[Vec<f64>]) -> Vec<f64> {
+    let mut column = Vec::with_capacity(2 * part.bins * samples.len());
+    for (samples, skipped) in samples.iter().zip(&part.skipped) {
+        let mut samples = Cow::Borrowed(&samples[part.range.clone()]);
+        for &sample in skipped {
+            samples.to_mut()[sample] = 0.0;
+        }
+        part.stretch.parts(&samples, part.bins, &mut column);
+    }
+    part.whitening.apply(&mut column);
+    column
+}
+
+/// An orthonormal basis of decays and offsets in a part; where forces are compared there is neither.
+fn nuisance(record: &Record, part: &Part, unknown: Unknown) -> Vec<Vec<f64>> {
+    if record.domain == Domain::Force {
+        return Vec::new();
+    }
+    let count = record.grid.count();
+    let channels = record.channels.len();
+    let mut raws = Vec::new();
+    let states = match unknown {
+        Unknown::StartAndOffsets => record.decays.count(),
+        Unknown::Offsets => 0,
+    };
+    for state in 0..states {
+        // The decay of a part begins with the part.
+        let shifted: Vec<Vec<f64>> = (0..channels)
+            .map(|channel| {
+                let column = record.decays.column(channel, state);
+                let mut samples = vec![0.0; count];
+                samples[part.range.clone()].copy_from_slice(&column[..part.range.len()]);
+                samples
+            })
+            .collect();
+        raws.push(raw(part, &shifted));
+    }
+    for constant in 0..channels {
+        let samples: Vec<Vec<f64>> = (0..channels)
+            .map(|channel| vec![f64::from(u8::from(channel == constant)); count])
+            .collect();
+        raws.push(raw(part, &samples));
+    }
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for mut column in raws {
+        let size = dot(&column, &column).sqrt();
+        // Twice is enough: what is left after the first pass is rounding.
+        for _ in 0..2 {
+            for known in &basis {
+                let along = dot(&column, known);
+                column
+                    .iter_mut()
+                    .zip(known)
+                    .for_each(|(value, known)| *value -= along * known);
+            }
+        }
+        let left = dot(&column, &column).sqrt();
+        if left > 1e-7 * size && left > 0.0 {
+            column.iter_mut().for_each(|value| *value /= left);
+            basis.push(column);
+        }
+    }
+    basis
+}

@@ -1,0 +1,155 @@
+//! Free decays: what a record owes to the state in which it began.
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::baseline::{Baseline, derivatives};
+use crate::records::record::Record;
+use quietcut_recording::Quantity;
+
+/// The decay of each state of the baseline as each channel reads it, and how much of each the record holds.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Decays {
+    /// By channel, by state: samples.
+    columns: Vec<Vec<Vec<f64>>>,
+    /// By channel: samples that are not compared, which owe nothing to a decay.
+    skipped: Vec<Vec<usize>>,
+    /// The state at the start of the record.
+    pub start: Vec<f64>,
+}
+
+impl Decays {
+    pub(crate) fn of(baseline: &Baseline<'_>, record: &Record) -> Self {
+        let first_order = &baseline.first_order;
+        let order = first_order.order();
+        let count = record.grid.count();
+        let step = (&first_order.a / record.grid.rate_hz()).exp();
+        let columns = record
+            .channels
+            .iter()
+            .map(|channel| {
+                let mut row = DMatrix::zeros(1, order);
+                if channel.pickup.quantity == Quantity::Force {
+                    return vec![vec![0.0; count]; order];
+                }
+                let seen = first_order.seen(&channel.pickup.modes);
+                for (axis, weight) in channel.pickup.weights.iter().enumerate() {
+                    row += seen.c.row(axis) * *weight;
+                }
+                for _ in 0..derivatives(channel.pickup.quantity) {
+                    row = &row * &first_order.a;
+                }
+                let mut columns = vec![Vec::with_capacity(count); order];
+                for _ in 0..count {
+                    for (column, value) in columns.iter_mut().zip(row.iter()) {
+                        column.push(*value);
+                    }
+                    row = &row * &step;
+                }
+                columns
+            })
+            .collect();
+        Self {
+            columns,
+            skipped: record.skipped.clone(),
+            start: vec![0.0; order],
+        }
+    }
+
+    /// Number of states.
+    pub(crate) fn count(&self) -> usize {
+        self.start.len()
+    }
+
+    /// The decay of a state in a channel.
+    pub(crate) fn column(&self, channel: usize, state: usize) -> &[f64] {
+        &self.columns[channel][state]
+    }
+
+    /// The state that explains most of `residuals`, each channel measured by its `sizes`.
+    pub(crate) fn fit(&mut self, residuals: &[Vec<f64>], sizes: &[f64]) {
+        let order = self.start.len();
+        let mut gram = DMatrix::<f64>::zeros(order, order);
+        let mut right = DVector::<f64>::zeros(order);
+        for (channel, (residual, size)) in residuals.iter().zip(sizes).enumerate() {
+            let columns = self.compared(channel);
+            let weight = 1.0 / (size * size).max(f64::MIN_POSITIVE);
+            for i in 0..order {
+                right[i] += weight * dot(&columns[i], residual);
+                for j in 0..=i {
+                    gram[(i, j)] += weight * dot(&columns[i], &columns[j]);
+                    gram[(j, i)] = gram[(i, j)];
+                }
+            }
+        }
+        // States that no channel sees have no size: they stay zero.
+        let scale: Vec<f64> = (0..order).map(|i| gram[(i, i)].sqrt()).collect();
+        for i in 0..order {
+            for j in 0..order {
+                let by = scale[i] * scale[j];
+                gram[(i, j)] = if by > 0.0 { gram[(i, j)] / by } else { 0.0 };
+            }
+            gram[(i, i)] += 1e-12;
+            right[i] = if scale[i] > 0.0 { right[i] / scale[i] } else { 0.0 };
+        }
+        let found = gram.cholesky().map(|factor| factor.solve(&right));
+        self.start = (0..order)
+            .map(|i| match &found {
+                Some(found) if scale[i] > 0.0 => found[i] / scale[i],
+                _ => 0.0,
+            })
+            .collect();
+    }
+
+    /// The decays of a channel at the samples that are compared.
+    fn compared(&self, channel: usize) -> Cow<'_, [Vec<f64>]> {
+        let mut columns = Cow::Borrowed(&self.columns[channel][..]);
+        if !self.skipped[channel].is_empty() {
+            for column in columns.to_mut() {
+                for &sample in &self.skipped[channel] {
+                    column[sample] = 0.0;
+                }
+            }
+        }
+        columns
+    }
+
+    /// What a channel reads without the decay of the record.
+    pub(crate) fn without(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
+        let mut without = samples.to_vec();
+        for (column, start) in self.compared(channel).iter().zip(&self.start) {
+            for (sample, value) in without.iter_mut().zip(column) {
+                *sample -= start * value;
+            }
+        }
+        without
+    }
+
+    /// Adds the decay of the record to what a channel reads.
+    pub(crate) fn add_to(&self, channel: usize, samples: &mut [f64]) {
+        for (column, start) in self.compared(channel).iter().zip(&self.start) {
+            for (sample, value) in samples.iter_mut().zip(column) {
+                *sample += start * value;
+            }
+        }
+    }
+}
+
+/// Σ a·b, in eight sums side by side: that is what a processor can do at once.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a_chunks
+        .remainder()
+        .iter()
+        .zip(b_chunks.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a_chunks.zip(b_chunks) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}

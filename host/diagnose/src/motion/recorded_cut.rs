@@ -1,0 +1,175 @@
+//! The force of a recorded cut along a motion that is known.
+//!
+//! With the measured motion u the chip of every tooth is known: h = min over earlier passes p of
+//! n·(u − u(t − pτ)) + (r_j − r_(j+p)) sin γ + p f sin φ sin γ (a surface is what all earlier passes left), and the force of
+//! the cut is linear in most of what a process may have otherwise. Between samples the force jumps where teeth enter and
+//! leave: what drives the structure is its mean over each finer sample, with entry, exit and loss of contact at their instants.
+
+use crate::error::DiagnoseError;
+use crate::motion::chips::{Chips, Sampling};
+use crate::motion::spindle_motion::Turning;
+use quietcut_model::case::Case;
+use quietcut_model::milling::Cut;
+use quietcut_recording::Recording;
+use quietcut_simulate::path::Motion;
+use quietcut_simulate::{Cutter, Effects, Spindle};
+
+/// Samples of forces and accelerations closer to
+/// which side they are.
+const BESIDE: f64 = 0.375;
+
+/// Share of the feed in a chip, sin φ, from which on a surface that was left long ago is looked at.
+const SHALLOW: f64 = 0.1;
+/// Passes that a tooth may jump over, at most.
+const MOST_JUMPED: usize = 24;
+
+/// A recorded cut.
+#[derive(Clone, Debug)]
+pub(crate) struct RecordedCut {
+    /// The tool in its cut, as the case has it.
+    pub cutter: Cutter,
+    /// How the spindle turns.
+    pub turning: Turning,
+    /// Samples per second.
+    rate_hz: f64,
+    /// Samples of the record.
+    count: usize,
+    /// Earlier passes that a surface may come from, of a cut in which teeth jump over several.
+    passes: Option<usize>,
+}
+
+/// The force of a cut, N, in the machine's axes.
+#[derive(Clone, Debug)]
+pub(crate) struct CutForce {
+    /// Its mean over each finer sample.
+    pub mean_n: [Vec<f64>; 3],
+    /// At the samples of the record, where forces are measured; 0 at those beside an entry or an exit.
+    pub sampled_n: [Vec<f64>; 3],
+}
+
+impl CutForce {
+    /// This less `other`, over `divisor`.
+    pub(crate) fn difference(&self, other: &Self, divisor: f64) -> Self {
+        let of = |a: &[Vec<f64>; 3], b: &[Vec<f64>; 3]| {
+            std::array::from_fn(|axis| {
+                a[axis]
+                    .iter()
+                    .zip(&b[axis])
+                    .map(|(a, b)| (a - b) / divisor)
+                    .collect()
+            })
+        };
+        Self {
+            mean_n: of(&self.mean_n, &other.mean_n),
+            sampled_n: of(&self.sampled_n, &other.sampled_n),
+        }
+    }
+}
+
+/// Immersion and feed of a recording: from its sidecar, and what that does not say from the case.
+///
+/// # Errors
+/// The case has no cut.
+pub(crate) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, DiagnoseError> {
+    let believed = case.cut()?;
+    let said = recording.sidecar.cut.unwrap_or_default();
+    Ok(Cut {
+        start_deg: said.start_deg.unwrap_or(believed.start_deg),
+        exit_deg: said.exit_deg.unwrap_or(believed.exit_deg),
+        feed_per_tooth_mm: said.feed_per_tooth_mm.unwrap_or(believed.feed_per_tooth_mm),
+        feed_direction_deg: believed.feed_direction_deg,
+    })
+}
+
+impl RecordedCut {
+    /// The cut of a recording: working point from its sidecar, the rest from the case with its extensions.
+    ///
+    /// # Errors
+    /// The case has no tool, material or cut, the sidecar no depth, the recording no tachometer; an extension that cannot be.
+    pub(crate) fn new(case: &Case, effects: &Effects, recording: &Recording) -> Result<Self, DiagnoseError> {
+        let (tool, material, cut) = (case.tool()?, case.material()?, cut_of(case, recording)?);
+        let said = recording.sidecar.cut.unwrap_or_default();
+        let depth_mm = said.axial_depth_mm.ok_or_else(|| {
+            recording.lacks("axial_depth_mm under [cut] in the .toml beside it, the depth that was cut")
+        })?;
+        if let Some(teeth) = said.teeth.filter(|teeth| *teeth as usize != tool.teeth) {
+            return Err(DiagnoseError::record(
+                &recording.path,
+                format!(
+                    "[cut] says {teeth} teeth, the case {}: they are not of the same tool",
+                    tool.teeth
+                ),
+            ));
+        }
+        let wrong = |error| DiagnoseError::simulate(&case.path, error);
+        let cutter = Cutter::new(tool, material, &cut, 1e-3 * depth_mm)
+            .and_then(|cutter| effects.cutter(cutter))
+            .map_err(wrong)?;
+        let turning = Turning::new(recording, effects.spindle(Spindle::new(1.0)).fluctuation())?;
+        if let Some(rpm) = said.spindle_rpm
+            && (turning.rpm() / rpm - 1.0).abs() > 0.05
+        {
+            return Err(DiagnoseError::record(
+                &recording.path,
+                format!(
+                    "tacho says {:.1} rev/min, the .toml beside it {rpm}: is pulses_per_rev of the tachometer right?",
+                    turning.rpm()
+                ),
+            ));
+        }
+        Ok(Self {
+            cutter,
+            turning,
+            rate_hz: recording.sample_rate_hz,
+            count: recording.len(),
+            passes: None,
+        })
+    }
+
+    /// Its chips along `motion`, whose samples are `finer` times as dense as those of the record, for a spindle that turns so.
+    pub(crate) fn chips(&self, turning: &Turning, motion: &Motion, finer: usize, with_force: bool) -> Chips {
+        let sampling = Sampling {
+            rate_hz: self.rate_hz,
+            count: self.count,
+            finer,
+            passes: self.passes,
+        };
+        // Where no force is measured none is compared at samples.
+        Chips::new(&self.cutter, turning, motion, sampling, |sample| {
+            with_force && !self.is_beside(sample as f64 / self.rate_hz)
+        })
+    }
+
+    /// Samples per second.
+    pub(crate) fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Lets teeth jump over passes as a tool that swings by `swing_m` does: where the feed adds a share `SHALLOW` of itself to a chip,
+    /// near the ends of a slot, what it cut ahead is caught up with after swing / (share · feed) passes.
+    pub(crate) fn let_jump(&mut self, swing_m: f64) {
+        let jumped = swing_m / (SHALLOW * self.cutter.feed_per_tooth_m).max(f64::MIN_POSITIVE);
+        self.passes = Some((jumped.ceil() as usize).min(MOST_JUMPED) + 2);
+    }
+
+    /// Samples of the first turn, or of as many as a surface may come from: what they cut was left before the record.
+    pub(crate) fn first_turn(&self) -> usize {
+        let passes = self.passes.unwrap_or(1).max(self.cutter.teeth.len());
+        let turns = passes as f64 / self.cutter.teeth.len() as f64;
+        ((turns * self.turning.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
+    }
+
+    /// True where a tooth enters or leaves within `BESIDE` of a sample of `t`.
+    pub(crate) fn is_beside(&self, t: f64) -> bool {
+        let near_rad = BESIDE / self.rate_hz * self.turning.speed_rad_per_s(t);
+        self.cutter.teeth.iter().any(|tooth| {
+            let phi = self.turning.angle_rad(t) + tooth.angle_rad;
+            [self.cutter.start_rad, self.cutter.exit_rad]
+                .into_iter()
+                .any(|edge| {
+                    let apart = (phi - edge).rem_euclid(std::f64::consts::TAU);
+                    apart < near_rad || apart > std::f64::consts::TAU - near_rad
+                })
+        })
+    }
+}

@@ -1,0 +1,415 @@
+//! How the spindle of a recorded cut turns.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::error::DiagnoseError;
+use quietcut_recording::Recording;
+use quietcut_simulate::{Fluctuation, Spindle};
+
+/// Fewest edges of the tachometer: with fewer its angle is not known to a share of a sample.
+const FEWEST_EDGES: usize = 4;
+
+/// The spindle angle along a record: that of a spindle, and an angle at the start.
+#[derive(Clone, Debug)]
+pub(crate) struct Turning {
+    spindle: Spindle,
+    rpm: f64,
+    /// The angle at the beginning of the whole recording, from which a fluctuation counts as well.
+    start_rad: f64,
+    fluctuation: Option<Fluctuation>,
+    /// See [`Recording::since_s`].
+    since_s: f64,
+    /// Times of the edges at immersion angle 0 of tooth 1, s.
+    edges_s: Vec<f64>,
+}
+
+impl Turning {
+    /// From the tachometer of a recording: the steady turning (with the fluctuation that the case has) whose whole turns are
+    /// nearest to the edges.
+    ///
+    /// # Errors
+    /// No tachometer, too few edges, or more than one per turn without saying so.
+    pub(crate) fn new(
+        recording: &Recording,
+        fluctuation: Option<Fluctuation>,
+    ) -> Result<Self, DiagnoseError> {
+        let level = recording.channel("tacho").ok_or_else(|| {
+            recording
+                .lacks("tacho, whose rising edges say where the teeth are (a cut cannot be judged without)")
+        })?;
+        let tacho = recording.sidecar.channels.get("tacho");
+        let per_turn = tacho.and_then(|tacho| tacho.pulses_per_rev).unwrap_or(1);
+        let missing = tacho.and_then(|tacho| tacho.missing).unwrap_or(0);
+        let all_s = rises_s(&level.samples, recording.sample_rate_hz, recording.since_s);
+        let edges_s = firsts_of_turns(&all_s, usize::from(per_turn), usize::from(missing));
+        if edges_s.len() < FEWEST_EDGES {
+            return Err(DiagnoseError::record(
+                &recording.path,
+                format!(
+                    "tacho tells of {} whole turns; at least {FEWEST_EDGES} are needed",
+                    edges_s.len()
+                ),
+            ));
+        }
+        Ok(Self {
+            spindle: Spindle::new(1.0),
+            rpm: 1.0,
+            start_rad: 0.0,
+            fluctuation,
+            since_s: recording.since_s,
+            edges_s,
+        }
+        .fitted())
+    }
+
+    /// The same edges with another fluctuation.
+    pub(crate) fn with(&self, fluctuation: Fluctuation) -> Self {
+        Self {
+            fluctuation: Some(fluctuation),
+            ..self.clone()
+        }
+        .fitted()
+    }
+
+    /// Speed and start angle for which whole turns come nearest to the edges; the fluctuation depends on the speed only by
+    /// its size, so that two rounds settle it.
+    fn fitted(mut self) -> Self {
+        let count = self.edges_s.len() as f64;
+        for _ in 0..3 {
+            // Edge k at 2πk: the angle of the spindle there, less what fluctuates, is a line.
+            let swing = |t: f64| self.swing_s(t);
+            let times: Vec<f64> = self.edges_s.iter().map(|t| t + swing(*t)).collect();
+            let mean_t = times.iter().sum::<f64>() / count;
+            let mean_k = 0.5 * (count - 1.0);
+            let (mut tt, mut tk) = (0.0, 0.0);
+            for (k, t) in times.iter().enumerate() {
+                tt += (t - mean_t) * (t - mean_t);
+                tk += (t - mean_t) * (k as f64 - mean_k);
+            }
+            let turns_per_s = tk / tt;
+            self.rpm = 60.0 * turns_per_s;
+            self.start_rad = TAU * (mean_k - turns_per_s * mean_t);
+        }
+        let steady = Spindle::new(self.rpm);
+        self.spindle = self
+            .fluctuation
+            .map_or(steady, |fluctuation| steady.fluctuating(fluctuation));
+        self
+    }
+
+    fn swing_s(&self, t: f64) -> f64 {
+        let steady = Spindle::new(60.0);
+        self.fluctuation.map_or(0.0, |fluctuation| {
+            steady.fluctuating(fluctuation).angle_rad(t) / TAU - t
+        })
+    }
+
+    /// Mean speed, rev/min.
+    pub(crate) fn rpm(&self) -> f64 {
+        self.rpm
+    }
+
+    /// The angle `t` after the first sample, rad: immersion angle of tooth 1.
+    pub(crate) fn angle_rad(&self, t: f64) -> f64 {
+        self.start_rad + self.spindle.angle_rad(self.since_s(t))
+    }
+
+    /// The speed `t` after the first sample, rad/s.
+    pub(crate) fn speed_rad_per_s(&self, t: f64) -> f64 {
+        self.spindle.speed_at_rad_per_s(self.since_s(t))
+    }
+
+    /// How long after the beginning of the whole recording `t` after the first sample is, s.
+    pub(crate) fn since_s(&self, t: f64) -> f64 {
+        self.since_s + t
+    }
+
+    /// How long before `t` after the first sample the spindle stood `angle_rad` back, s.
+    pub(crate) fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
+        self.spindle.delay_s(self.since_s(t), angle_rad)
+    }
+
+    /// Mean of the time of a turn, s.
+    pub(crate) fn turn_s(&self) -> f64 {
+        60.0 / self.rpm
+    }
+}
+
+/// When the level rises through the middle of its range, s, once it has been in the lower quarter; between samples by a straight
+/// line.
+///
+/// A device finds its threshold as it goes; here the whole record is known.
+fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
+    let (low, high) = level
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(*value), high.max(*value))
+        });
+    let (middle, quarter) = (0.5 * (low + high), low + 0.25 * (high - low));
+    let mut is_armed = false;
+    let mut rises_s = Vec::new();
+    for (index, pair) in level.windows(2).enumerate() {
+        is_armed |= pair[0] < quarter;
+        if is_armed && pair[0] < middle && pair[1] >= middle {
+            let share = (middle - pair[0]) / (pair[1] - pair[0]);
+            rises_s.push(since_s + (index as f64 + share) / rate_hz);
+            is_armed = false;
+        }
+    }
+    rises_s
+}
+
+/// Of the edges those of the first position of the wheel: with a gap the one after it, else every `positions`-th.
+fn firsts_of_turns(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64> {
+    if positions <= 1 {
+        return edges_s.to_vec();
+    }
+    let there = positions - missing;
+    let intervals: Vec<f64> = edges_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    // The widest interval of the first turn is the gap.
+    let first = if missing == 0 || there < 2 {
+        0
+    } else {
+        intervals
+            .iter()
+            .take(there)
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .map_or(0, |(index, _)| index + 1)
+    };
+    edges_s.iter().skip(first).step_by(there).copied().collect()
+}
+
+/// Steps of the frequency that is looked for, as a share of one swing per record.
+const STEP: f64 = 0.2;
+/// A swing must explain so much more of the edges per parameter than is left per edge.
+const BEYOND_CHANCE: f64 = 20.0;
+
+/// A swing of the speed, as tachometers tell it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Swing {
+    /// The swing.
+    pub fluctuation: Fluctuation,
+    /// Standard deviations of δ, f_m in Hz and ψ in rad: from what is left of the times of the edges.
+    pub deviation: [f64; 3],
+}
+
+/// The swing of the speed that comes nearest to the edges of all records; `None` where none stands out.
+///
+/// Edge k comes at t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + a constant: linear in all but the frequency,
+/// with T₀ and the constant those of each record.
+pub(crate) fn swing(turnings: &[&Turning]) -> Option<Swing> {
+    let longest_s = turnings
+        .iter()
+        .filter_map(|turning| Some(turning.edges_s.last()? - turning.edges_s.first()?))
+        .fold(0.0, f64::max);
+    let turns_per_s = turnings
+        .iter()
+        .map(|turning| 1.0 / turning.turn_s())
+        .fold(f64::INFINITY, f64::min);
+    let edges: usize = turnings.iter().map(|turning| turning.edges_s.len()).sum();
+    let free = edges.checked_sub(2 * turnings.len() + 4)? as f64;
+    if longest_s <= 0.0 {
+        return None;
+    }
+    let [low_hz, high_hz] = [0.7 / longest_s, 0.45 * turns_per_s];
+    let step_hz = STEP / longest_s;
+    let count = ((high_hz - low_hz) / step_hz).max(0.0) as usize;
+    let (_, best_hz) = (0..=count)
+        .map(|index| low_hz + step_hz * index as f64)
+        .map(|hertz| (nearest(turnings, hertz).left, hertz))
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    // Golden section about the best of the grid.
+    let (mut from, mut to) = (best_hz - step_hz, best_hz + step_hz);
+    for _ in 0..40 {
+        let third = 0.381_966 * (to - from);
+        if nearest(turnings, from + third).left < nearest(turnings, to - third).left {
+            to -= third;
+        } else {
+            from += third;
+        }
+    }
+    let frequency_hz = 0.5 * (from + to);
+    let found = nearest(turnings, frequency_hz);
+    let gained = (found.without - found.left) / 3.0;
+    let delta = found.along.hypot(found.across);
+    let is_found = gained > BEYOND_CHANCE * found.left / free && delta < 0.9;
+    is_found.then(|| Swing {
+        fluctuation: Fluctuation {
+            delta,
+            frequency_hz,
+            phase_rad: found.across.atan2(found.along),
+        },
+        deviation: deviation(turnings, frequency_hz, &found, found.left / free),
+    })
+}
+
+/// Standard deviations of δ, f_m and ψ for edges whose times have the given variance, s².
+fn deviation(turnings: &[&Turning], frequency_hz: f64, found: &Nearest, variance: f64) -> [f64; 3] {
+    let step_hz = 1e-4 * frequency_hz;
+    let times = |along: f64, across: f64, frequency_hz: f64| -> Vec<f64> {
+        let omega = TAU * frequency_hz;
+        let of = |t: f64| along * (1.0 - (omega * t).cos()) / omega + across * (omega * t).sin() / omega;
+        turnings
+            .iter()
+            .flat_map(|turning| without_line(&turning.edges_s, of))
+            .collect()
+    };
+    let (along, across) = (found.along, found.across);
+    let columns = [
+        times(1.0, 0.0, frequency_hz),
+        times(0.0, 1.0, frequency_hz),
+        times(along, across, frequency_hz + step_hz)
+            .iter()
+            .zip(times(along, across, frequency_hz - step_hz))
+            .map(|(above, below)| (above - below) / (2.0 * step_hz))
+            .collect(),
+    ];
+    let products = Matrix3::from_fn(|i, j| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum());
+    let Some(covariance) = products
+        .try_inverse()
+        .map(|inverse: Matrix3<f64>| inverse * variance)
+    else {
+        return [f64::INFINITY; 3];
+    };
+    let delta = along.hypot(across);
+    let of_delta = Vector3::new(along / delta, across / delta, 0.0);
+    let of_phase = Vector3::new(-across, along, 0.0) / (delta * delta);
+    [of_delta, Vector3::z(), of_phase]
+        .map(|gradient| (gradient.transpose() * covariance * gradient)[0].max(0.0).sqrt())
+}
+
+/// The fit of a swing of a given frequency.
+struct Nearest {
+    /// δ cos ψ and δ sin ψ.
+    along: f64,
+    across: f64,
+    /// Σ of squares of what is left of the times of the edges, s², with the swing and without.
+    left: f64,
+    without: f64,
+}
+
+fn nearest(turnings: &[&Turning], frequency_hz: f64) -> Nearest {
+    let omega = TAU * frequency_hz;
+    // Products of (1 − cos)/ω, sin/ω and t, each without its line over the edges of its record.
+    let mut products = [[0.0; 3]; 3];
+    for turning in turnings {
+        let columns = [
+            without_line(&turning.edges_s, |t| (1.0 - (omega * t).cos()) / omega),
+            without_line(&turning.edges_s, |t| (omega * t).sin() / omega),
+            without_line(&turning.edges_s, |t| t),
+        ];
+        for (row, a) in products.iter_mut().zip(&columns) {
+            for (product, b) in row.iter_mut().zip(&columns) {
+                *product += a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
+    let [[cc, cs, ct], [_, ss, st], [_, _, without]] = products;
+    let determinant = cc * ss - cs * cs;
+    let (along, across) = if determinant > 1e-12 * cc * ss {
+        (
+            -(ct * ss - st * cs) / determinant,
+            -(st * cc - ct * cs) / determinant,
+        )
+    } else {
+        (0.0, 0.0)
+    };
+    Nearest {
+        along,
+        across,
+        left: without + along * ct + across * st,
+        without,
+    }
+}
+
+/// A function of the time of each edge, without the part that grows evenly from edge to edge.
+fn without_line(edges_s: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
+    let values: Vec<f64> = edges_s.iter().map(|t| of(*t)).collect();
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let middle = 0.5 * (count - 1.0);
+    let (mut kk, mut kv) = (0.0, 0.0);
+    for (k, value) in values.iter().enumerate() {
+        kk += (k as f64 - middle).powi(2);
+        kv += (k as f64 - middle) * (value - mean);
+    }
+    values
+        .iter()
+        .enumerate()
+        .map(|(k, value)| value - mean - kv / kk * (k as f64 - middle))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turning(edges_s: Vec<f64>) -> Turning {
+        Turning {
+            spindle: Spindle::new(1.0),
+            rpm: 1.0,
+            start_rad: 0.0,
+            fluctuation: None,
+            since_s: 0.0,
+            edges_s,
+        }
+        .fitted()
+    }
+
+    #[test]
+    fn a_swing_is_found_from_edges_and_none_where_there_is_none() {
+        let truth = Fluctuation {
+            delta: 0.012,
+            frequency_hz: 1.7,
+            phase_rad: 2.1,
+        };
+        let edges = |rpm: f64, start: f64, fluctuation: Option<Fluctuation>| {
+            let steady = Spindle::new(rpm);
+            let spindle = fluctuation.map_or(steady, |fluctuation| steady.fluctuating(fluctuation));
+            let times = (0..24).map(|k| spindle.time_s(TAU * f64::from(k) + start));
+            // Known to two microseconds, in a fixed disorder.
+            times
+                .enumerate()
+                .map(|(k, t)| t + 2e-6 * (7.3 * (k * k) as f64).sin())
+                .collect::<Vec<_>>()
+        };
+        let swings = [
+            turning(edges(900.0, 0.4, Some(truth))),
+            turning(edges(1233.0, 2.0, Some(truth))),
+        ];
+        let Swing {
+            fluctuation: found,
+            deviation,
+        } = swing(&swings.each_ref()).unwrap();
+        // Two microseconds against a swing of δ/ω = 1.1 ms over 24 edges.
+        assert!((found.delta / truth.delta - 1.0).abs() < 3e-3, "{found:?}");
+        assert!(
+            (found.frequency_hz - truth.frequency_hz).abs() < 2e-3,
+            "{found:?}"
+        );
+        assert!((found.phase_rad - truth.phase_rad).abs() < 1e-2, "{found:?}");
+        let errors = [
+            found.delta - truth.delta,
+            found.frequency_hz - truth.frequency_hz,
+            found.phase_rad - truth.phase_rad,
+        ];
+        for (error, deviation) in errors.iter().zip(deviation) {
+            // What the fixed disorder makes of them is of the size that is told.
+            assert!(error.abs() < 4.0 * deviation, "{errors:?} {deviation:?}");
+            assert!(deviation < 1e-2, "{deviation:?}");
+        }
+        let spindle = Spindle::new(900.0).fluctuating(truth);
+        let known = swings[0].with(truth);
+        for i in 0..100 {
+            let t = 0.016 * f64::from(i);
+            let apart = known.angle_rad(t) - (spindle.angle_rad(t) - 0.4);
+            assert!(apart.abs() < 1e-3, "{t}: {apart}");
+        }
+        let steady = turning(edges(900.0, 0.4, None));
+        assert!(swing(&[&steady]).is_none());
+        assert!((steady.rpm() - 900.0).abs() < 0.01);
+    }
+}

@@ -1,0 +1,366 @@
+//! Records that tell nothing, said plainly with what is needed.
+
+use crate::baseline::Baseline;
+use crate::error::DiagnoseError;
+use crate::records::record::Observed;
+use crate::records::study::Domain;
+use crate::signal::noise::rms;
+use quietcut_recording::{Kind, Quantity, Recording};
+
+/// Fewest samples.
+const FEWEST: usize = 128;
+/// Periods of the slowest mode that a record must hold.
+const PERIODS: f64 = 3.0;
+/// Share of samples at the very ends of a channel's range, in runs, from which on it is clipped.
+const CLIPPED: f64 = 0.002;
+
+/// In what a recording is compared.
+pub(crate) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<Domain, DiagnoseError> {
+    let has = |quantity: Quantity| {
+        recording
+            .channels
+            .iter()
+            .any(|channel| channel.quantity == quantity)
+    };
+    let motion = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
+    let input = recording.sidecar.input.clone().unwrap_or_default();
+    for name in &input {
+        if recording.channel(name).is_none() {
+            return Err(recording
+                .lacks(format!("{name}, which its sidecar names as its input"))
+                .into());
+        }
+    }
+    if !motion.into_iter().any(has) {
+        return Err(recording
+            .lacks("channel of motion, such as x [m] or ax [m/s^2]")
+            .into());
+    }
+    let kind = recording.sidecar.kind;
+    if kind == Some(Kind::Cutting) {
+        return Ok(Domain::Response);
+    }
+    let driven_by_motion = input
+        .iter()
+        .filter_map(|name| recording.channel(name))
+        .any(|channel| motion.contains(&channel.quantity));
+    if driven_by_motion || (baseline.is_free() && kind != Some(Kind::FreeDecay)) {
+        if !has(Quantity::Force) {
+            return Err(recording
+                .lacks("channel of force, such as fx [N]: driven by motion, that is what the case predicts")
+                .into());
+        }
+        return Ok(Domain::Force);
+    }
+    match kind {
+        Some(Kind::Idle) => Err(DiagnoseError::record(
+            &recording.path,
+            "an idle record has nothing that drives the structure as far as the case knows: shaker, step-sine, sweep, \
+             hammer, free-decay and cutting are diagnosed",
+        )),
+        Some(Kind::FreeDecay) => Ok(Domain::Response),
+        _ if has(Quantity::Force) => Ok(Domain::Response),
+        _ => Err(recording
+            .lacks(
+                "channel of the force that drove it, such as fx [N] (only kind = \"free-decay\" needs none)",
+            )
+            .into()),
+    }
+}
+
+/// Refuses what no fit could use.
+pub(crate) fn record(
+    baseline: &Baseline<'_>,
+    recording: &Recording,
+    channels: &[Observed],
+) -> Result<(), DiagnoseError> {
+    let wrong = |what: String| Err(DiagnoseError::record(&recording.path, what));
+    let count = recording.len();
+    let seconds = count as f64 / recording.sample_rate_hz;
+    if channels.is_empty() {
+        let directions: Vec<String> = baseline
+            .structure
+            .directions
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        return wrong(format!(
+            "no channel belongs to a direction of the case ({}): x, vx, ax and the like are needed",
+            directions.join(", ")
+        ));
+    }
+    let needed_s = baseline.lowest_hz().map_or(0.0, |hertz| PERIODS / hertz);
+    if count < FEWEST || seconds < needed_s {
+        return wrong(format!(
+            "too short: {count} samples, {seconds:.3} s; at least {FEWEST} samples and {needed_s:.3} s ({PERIODS} periods of the slowest mode) are needed"
+        ));
+    }
+    for channel in &recording.channels {
+        if let Some(at) = channel.samples.iter().position(|sample| !sample.is_finite()) {
+            return wrong(format!(
+                "{} is no number at {:.6} s; every sample must be one",
+                channel.name,
+                recording.time_s(at)
+            ));
+        }
+        if baseline.pickup(&channel.name).is_some()
+            && let Some(level) = clipped(&channel.samples)
+        {
+            return wrong(format!(
+                "{} is clipped at {level:.6e} {}: the range of the sensor is too small; record again with a larger range or less excitation",
+                channel.name,
+                channel.quantity.unit()
+            ));
+        }
+    }
+    if let Some(still) = channels.iter().find(|channel| rms(&channel.measured) == 0.0) {
+        return wrong(format!(
+            "{} is zero throughout: nothing was measured",
+            still.pickup.name
+        ));
+    }
+    Ok(())
+}
+
+/// How many equal samples at an end of the range one blow of a hammer may be clipped to, and how many steps of the channel's resolution
+/// are steep two samples beside them.
+const FLAT: std::ops::RangeInclusive<usize> = 3..=64;
+const CLIFF: f64 = 16.0;
+
+/// Factors that a wrong unit brings, how far from it a model that is wrong as well may make it (in the logarithm), and the name of
+/// what was likely meant.
+const UNITS: [(f64, f64, &str); 6] = [
+    (4.448, 0.1, "4.45: pounds of force for N"),
+    (1e3, 0.4, "a thousand: mm, kN or g for m, N or kg"),
+    (1e6, 0.4, "a million: µm for m"),
+    (25.4, 0.4, "25.4: inches for mm"),
+    (39.37, 0.4, "39.37: inches for m"),
+    (9.806_65, 0.4, "9.81: g for m/s²"),
+];
+/// A model may be wrong by this factor before a unit is suspected; and by this one, of a shape that is nothing like what was measured,
+/// before nothing but a unit can be the reason: no resonance and no nonlinearity of a machine brings as much.
+const WRONG_BY: f64 = 4.0;
+const FAR_OFF: f64 = 250.0;
+/// Friction may hold a machine back to this share of what a case without it predicts. Newtons that were read as pounds are then told as a
+/// gain of the sensors.
+const HELD_BACK: f64 = 0.15;
+/// How close to a unit a gain is that is told to be one.
+const GAIN: f64 = 0.03;
+
+/// A prediction of less than so many times the energy that noise of the forces alone would bring tells nothing.
+const MOST_BY_NOISE: f64 = 25.0;
+
+/// Refuses a channel whose size cannot be that of the case: a wrong unit.
+///
+/// `response` is what the case predicts of the forces alone of what was `measured`, `by_noise` the energy that it would have by the
+/// noise of the force sensors. The factor is that by which it fits best; it counts where the two look alike.
+pub(crate) fn unit(
+    path: &std::path::Path,
+    name: &str,
+    response: &[f64],
+    measured: &[f64],
+    by_noise: f64,
+) -> Result<(), DiagnoseError> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (own, cross) = (dot(response, response), dot(response, measured));
+    let whole = dot(measured, measured);
+    if own <= MOST_BY_NOISE * by_noise || whole <= 0.0 {
+        return Ok(());
+    }
+    // What a constant force does says nothing of what moves.
+    if spread(response).powi(2) * response.len() as f64 > MOST_BY_NOISE * by_noise {
+        far_off(path, name, response, measured)?;
+    }
+    let factor = cross.abs() / own;
+    let alike = cross * cross / (own * whole);
+    let likely = likely(factor);
+    // Where no unit is known that would do, the shapes must be the same.
+    let least_alike = if likely.is_some() { 0.3 } else { 0.8 };
+    if alike < least_alike || (HELD_BACK..WRONG_BY).contains(&factor) {
+        return Ok(());
+    }
+    Err(DiagnoseError::record(
+        path,
+        format!(
+            "{name} is {factor:.4e} times what the case predicts, though of the same shape: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
+            said(likely)
+        ),
+    ))
+}
+
+/// Of channels of a cut that were checked: the first complaint, or none where one of them is right. Then so is the unit of the others,
+/// if they are not out of all proportion: one edge coefficient makes ten times an axial force that was believed to be small.
+pub(crate) fn unless_one_is_right(
+    checked: impl IntoIterator<Item = Result<(), DiagnoseError>>,
+) -> Result<(), DiagnoseError> {
+    let checked: Vec<_> = checked.into_iter().collect();
+    if checked.iter().any(Result::is_ok) {
+        return Ok(());
+    }
+    checked.into_iter().collect()
+}
+
+/// Refuses a channel that reads out of all proportion to its prediction, whatever their shapes. Offsets of sensors do not count; too
+/// large is what moves more than the prediction is with its mean, since what is left of even teeth in a slot is next to nothing.
+pub(crate) fn far_off(
+    path: &std::path::Path,
+    name: &str,
+    response: &[f64],
+    measured: &[f64],
+) -> Result<(), DiagnoseError> {
+    let moves = spread(measured);
+    let [least, most] = [moves / rms(response), moves / spread(response)];
+    let factor = match () {
+        () if least.is_finite() && least > FAR_OFF => least,
+        () if most.is_finite() && moves > 0.0 && most < 1.0 / FAR_OFF => most,
+        () => return Ok(()),
+    };
+    Err(DiagnoseError::record(
+        path,
+        format!(
+            "{name} is {factor:.1e} times as large as what the case predicts: no machine is that far from its model; its unit, that of what drives it, or the case is wrong; give units in the header as name [unit].{}",
+            said(likely(factor))
+        ),
+    ))
+}
+
+/// Root mean square about the mean.
+fn spread(samples: &[f64]) -> f64 {
+    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+    rms(&samples.iter().map(|x| x - mean).collect::<Vec<_>>())
+}
+
+/// What a gain that was found may be if it is none of the sensor: a unit.
+pub(crate) fn unit_of_gain(gain: f64) -> Option<&'static str> {
+    unit_within(gain.abs(), |_| GAIN)
+}
+
+/// The unit that was likely meant where something is so many times too large, or too small, by a model that may be wrong as well.
+fn likely(factor: f64) -> Option<&'static str> {
+    unit_within(factor, |share| share)
+}
+
+fn unit_within(factor: f64, most: impl Fn(f64) -> f64) -> Option<&'static str> {
+    let size = factor.max(1.0 / factor);
+    let near = |unit: f64| (size / unit).ln().abs();
+    let units = UNITS.iter().filter(|(unit, share, _)| near(*unit) < most(*share));
+    let nearest = units.min_by(|a, b| near(a.0).total_cmp(&near(b.0)));
+    nearest.map(|(.., meant)| *meant)
+}
+
+fn said(likely: Option<&str>) -> String {
+    likely.map_or_else(String::new, |meant| format!(" It is about {meant}."))
+}
+
+/// The level at which a channel is cut off: flat tops of three and more equal samples at an end of its range, many of them, or one
+/// that the signal reaches and leaves steeply.
+fn clipped(samples: &[f64]) -> Option<f64> {
+    let (low, high) = samples
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
+    let range = high - low;
+    if range <= 0.0 {
+        return None;
+    }
+    let resolution = samples
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .filter(|step| *step > 1e-9 * range)
+        .fold(f64::INFINITY, f64::min);
+    // A digital channel has few levels; flat tops of a slow signal on coarse levels are no clipping.
+    [high, low].into_iter().find(|end| {
+        let at = |x: &f64| (x - end).abs() <= 1e-9 * range;
+        if *end != 0.0 && has_cliff(samples, at, *end, resolution) {
+            return true;
+        }
+        let (mut flat, mut run, mut runs) = (0, 0, 0);
+        for sample in samples {
+            if at(sample) {
+                run += 1;
+                continue;
+            }
+            if run >= 3 {
+                flat += run;
+                runs += 1;
+            }
+            run = 0;
+        }
+        runs >= 2 && flat as f64 > CLIPPED * samples.len() as f64 && *end != 0.0
+    })
+}
+
+/// True where some flat top, no longer than a blow, is reached and left steeply. Of a smooth top whose level three samples share, the
+/// second ones beside them are at most twelve levels below: 9c under the peak where c keeps a level, and one for rounding.
+fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f64) -> bool {
+    let (mut first, mut steepest) = (0, 0.0_f64);
+    while first < samples.len() {
+        if !at(&samples[first]) {
+            first += 1;
+            continue;
+        }
+        let length = samples[first..].iter().take_while(|x| at(x)).count();
+        let beyond = first + length;
+        let sides = [first.checked_sub(2), Some(beyond + 1)];
+        if FLAT.contains(&length)
+            && let [Some(before), Some(after)] = sides.map(|place| Some(samples.get(place?)? - end))
+        {
+            steepest = steepest.max(before.abs().min(after.abs()));
+        }
+        first = beyond;
+    }
+    steepest > CLIFF * resolution && steepest > CLIFF * written_resolution(samples, end)
+}
+
+/// The step of the last digit of `end`, where all samples are written with as few digits as they seem to be.
+fn written_resolution(samples: &[f64], end: f64) -> f64 {
+    let digits = |x: &f64| {
+        let text = format!("{x:e}");
+        let mantissa = text.split('e').next().unwrap_or_default();
+        mantissa.chars().filter(char::is_ascii_digit).count() as i32
+    };
+    let most = samples.iter().map(digits).max().unwrap_or(1);
+    10_f64.powi(end.abs().log10().floor() as i32 + 1 - most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_clipped_blow_is_enough_and_a_coarse_one_is_not_clipped() {
+        let blow = |n: i32| {
+            let phase = f64::from(n - 700) / 24.0;
+            if (0.0..1.0).contains(&phase) {
+                (std::f64::consts::PI * phase).sin()
+            } else {
+                0.0
+            }
+        };
+        let noise = |n: i32| 1e-3 * (37.0 * f64::from(n)).sin();
+        let whole: Vec<f64> = (0..20_000).map(|n| blow(n) + noise(n)).collect();
+        assert_eq!(clipped(&whole), None);
+        let cut: Vec<f64> = whole.iter().map(|x| x.min(0.8)).collect();
+        assert_eq!(clipped(&cut), Some(0.8));
+        // On 64 levels the top of a blow is flat, and is left level by level.
+        let coarse: Vec<f64> = whole.iter().map(|x| (64.0 * x).round() / 64.0).collect();
+        assert_eq!(clipped(&coarse), None);
+        // Written with three digits it has finer steps beside it than at its top.
+        for digits in [2, 3] {
+            let written = whole.iter().map(|x| format!("{x:.digits$e}").parse().unwrap());
+            assert_eq!(clipped(&written.collect::<Vec<f64>>()), None);
+        }
+        // What is held and let go is no blow.
+        let held: Vec<f64> = (0..2000).map(|n| if n < 900 { 1.0 } else { 0.0 }).collect();
+        assert_eq!(clipped(&held), None);
+    }
+
+    #[test]
+    fn flat_tops_are_clipping_and_tones_are_not() {
+        let tone: Vec<f64> = (0..5000).map(|n| (0.05 * f64::from(n)).sin()).collect();
+        assert_eq!(clipped(&tone), None);
+        let cut: Vec<f64> = tone.iter().map(|x| x.clamp(-2.0, 0.8)).collect();
+        assert_eq!(clipped(&cut), Some(0.8));
+    }
+}

@@ -1,0 +1,412 @@
+//! Where recorded cuts are in full cut.
+//!
+//! A case describes a tool in full immersion and depth. Recordings of real cuts begin and end in air, and between air and full cut
+//! the tool goes through a face of the workpiece, where the case says nothing of the chips. So only what is in full cut is compared.
+//! Air is where a turn of the spindle is quiet, against the other turns of the recording and against what the teeth shake the believed
+//! machine by: cuts may grow into chatter, and those turns are not quiet that have the chips of the feed alone.
+
+use std::borrow::Cow;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use nalgebra::Vector3;
+use num_complex::Complex64;
+
+use crate::baseline::{Baseline, derivatives};
+use crate::error::DiagnoseError;
+use crate::motion::recorded_cut::cut_of;
+use crate::motion::spindle_motion::Turning;
+use crate::signal::noise::{floor_between_lines, median, rms};
+use quietcut_model::case::Case;
+use quietcut_recording::{Kind, Quantity, Recording};
+use quietcut_simulate::effect::Pickup;
+use quietcut_simulate::{Cutter, Passage, Spindle};
+
+/// A turn in air has less than this share of what a turn in the cut has, in some channel.
+const QUIET: f64 = 0.2;
+/// The tool is well in the cut where every channel has this share of it.
+const LOUD: f64 = 0.8;
+/// From where it is no longer quiet to full cut a depth that grows evenly takes 4/3 of the time that it takes to where it is loud.
+const BEYOND_LOUD: f64 = 1.4;
+/// Margin on the way through a face: the first touch itself is not seen.
+const UNSEEN: f64 = 1.1;
+/// Share of the way out that is over before it is quiet: chips are thin at the end of it.
+const SEEN_OUT: f64 = 0.7;
+/// Chatter is what makes the motion so many times that by the feed alone.
+const CHATTER: f64 = 2.0;
+/// A channel tells of air where a turn in the cut is so many times its noise.
+const TELLING: f64 = 3.0;
+/// Fewest turns of air at an end of a recording, and within it, where chatter may beat.
+const FEWEST_AT_ENDS: usize = 2;
+const FEWEST_WITHIN: usize = 4;
+/// From rest a resonance grows from turn to turn by more than this factor at first; in air turns are alike.
+const ALIKE: f64 = 2.0;
+/// Fewest turns in full cut that can be diagnosed.
+const FEWEST_IN_CUT: f64 = 8.0;
+/// Angles of a turn at which chips are looked at.
+const ANGLES: usize = 512;
+
+/// Recordings without what is not in full cut, and a sentence about each that was shortened; those that are in full cut throughout, and
+/// those that are of no cut, as they are.
+///
+/// # Errors
+/// A recording whose full cut is too short to be diagnosed.
+pub(crate) fn in_full_cut<'a>(
+    case: &Case,
+    recordings: &'a [Recording],
+) -> Result<(Cow<'a, [Recording]>, Vec<String>), DiagnoseError> {
+    let mut said = Vec::new();
+    let mut shortened = Cow::Borrowed(recordings);
+    if !recordings.iter().any(is_of_a_cut) {
+        return Ok((shortened, said));
+    }
+    let baseline = Baseline::new(case)?;
+    for (index, recording) in recordings.iter().enumerate() {
+        let Some(range) = range(&baseline, recording) else {
+            continue;
+        };
+        let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
+        let turns = (to_s - from_s) / Turning::new(recording, None)?.turn_s();
+        if turns < FEWEST_IN_CUT {
+            return Err(DiagnoseError::record(
+                &recording.path,
+                format!(
+                    "is in air, or the tool on its way in or out, but for {turns:.1} turns from {from_s:.3} s on; at least \
+                     {FEWEST_IN_CUT} turns in full cut are needed"
+                ),
+            ));
+        }
+        said.push(format!(
+            "{}: in full cut from {from_s:.3} to {to_s:.3} s, and diagnosed there; the rest is air, or the tool on its way in or out",
+            recording.path.display()
+        ));
+        shortened.to_mut()[index] = recording.part(range);
+    }
+    Ok((shortened, said))
+}
+
+fn is_of_a_cut(recording: &Recording) -> bool {
+    recording.sidecar.kind == Some(Kind::Cutting)
+}
+
+/// The samples in which a recorded cut is in full cut; `None` where there is no air in it, or nothing that could tell.
+fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>> {
+    if !is_of_a_cut(recording) {
+        return None;
+    }
+    let turn_s = Turning::new(recording, None).ok()?.turn_s();
+    let cutter = cutter(baseline, recording)?;
+    let levels = Levels::of(
+        baseline,
+        recording,
+        turn_s,
+        &Forced::new(baseline, &cutter, turn_s),
+    )?;
+    let cut = longest_gap(&levels.quiet(), levels.count)?;
+    let is_loud = |turn: &usize| levels.smallest(*turn) >= LOUD;
+    let first = cut.clone().find(is_loud)?;
+    let last = cut.clone().rev().find(is_loud)?;
+    let by_diameter = Passage::way_in_s(&cutter, &Spindle::new(60.0 / turn_s)).ok();
+    let loud_after = BEYOND_LOUD * (first - cut.start) as f64;
+    let way = by_diameter.map_or(loud_after, |seconds| seconds / turn_s);
+    let from = match cut.start {
+        0 => 0.0,
+        start => start as f64 + (UNSEEN * way).max(loud_after) + 1.0,
+    };
+    // Who records air before the cut may stop when the cut is over, before all is quiet. Chatter is loud to the end of the way out.
+    let to = if cut.end == levels.count && cut.end - last <= FEWEST_AT_ENDS {
+        f64::INFINITY
+    } else {
+        let loud_before = BEYOND_LOUD * (cut.end - 1 - last) as f64;
+        let out = if levels.chatters { UNSEEN } else { SEEN_OUT };
+        cut.end as f64 - (out * way).max(loud_before) - 1.0
+    };
+    let sample =
+        |turn: f64| ((turn * turn_s * recording.sample_rate_hz).max(0.0) as usize).min(recording.len());
+    let (from, to) = (sample(from), sample(to));
+    Some(from..to.max(from))
+}
+
+/// The tool in its cut; `None` where something of it is not said, which is complained of elsewhere.
+fn cutter(baseline: &Baseline<'_>, recording: &Recording) -> Option<Cutter> {
+    let case = baseline.case;
+    let depth_mm = recording.sidecar.cut?.axial_depth_mm?;
+    let cut = cut_of(case, recording).ok()?;
+    let cutter = Cutter::new(case.tool().ok()?, case.material().ok()?, &cut, 1e-3 * depth_mm).ok()?;
+    baseline.effects.cutter(cutter).ok()
+}
+
+/// What the chips of the feed alone do to the believed machine: harmonics of the turn of force, N, and of displacement, m.
+struct Forced {
+    omega: f64,
+    harmonics: Vec<[Vector3<Complex64>; 2]>,
+}
+
+impl Forced {
+    fn new(baseline: &Baseline<'_>, cutter: &Cutter, turn_s: f64) -> Self {
+        let omega = TAU / turn_s;
+        let forces_n: Vec<Vector3<f64>> = (0..ANGLES)
+            .map(|index| TAU * index as f64 / ANGLES as f64)
+            .map(|angle_rad| force_n(cutter, angle_rad))
+            .collect();
+        let harmonics = (1..ANGLES / 2)
+            .map(|harmonic| {
+                let force = forces_n
+                    .iter()
+                    .enumerate()
+                    .map(|(index, force)| {
+                        let angle_rad = TAU * ((harmonic * index) % ANGLES) as f64 / ANGLES as f64;
+                        force.map(|force| Complex64::from_polar(2.0 * force / ANGLES as f64, -angle_rad))
+                    })
+                    .sum::<Vector3<Complex64>>();
+                [force, baseline.receptance.at(harmonic as f64 * omega) * force]
+            })
+            .collect();
+        Self { omega, harmonics }
+    }
+
+    /// Standard deviation of what a channel reads within a turn, of what is below half its sample rate.
+    fn level(&self, pickup: &Pickup, rate_hz: f64) -> f64 {
+        let squares = self.harmonics.iter().enumerate().map(|(index, [force, x])| {
+            let omega = (index + 1) as f64 * self.omega;
+            if omega >= 0.5 * TAU * rate_hz {
+                return 0.0;
+            }
+            let (vector, factor) = match pickup.quantity {
+                Quantity::Force => (force, 1.0),
+                quantity => (x, omega.powi(derivatives(quantity))),
+            };
+            let read =
+                |part: fn(&Complex64) -> f64| pickup.read(std::array::from_fn(|axis| part(&vector[axis])));
+            0.5 * (factor * read(|value| value.re).hypot(read(|value| value.im))).powi(2)
+        });
+        squares.sum::<f64>().sqrt()
+    }
+}
+
+/// The force of teeth of one radius on a tool that stands still beside its axis.
+fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
+    let arc = cutter.exit_rad - cutter.start_rad;
+    cutter
+        .teeth
+        .iter()
+        .map(|tooth| angle_rad + tooth.angle_rad)
+        .filter(|phi_rad| (phi_rad - cutter.start_rad).rem_euclid(TAU) < arc)
+        .map(|phi_rad| {
+            let place = cutter.immersion(phi_rad);
+            let thickness_m = cutter.recession_m(place, cutter.feed_per_tooth_m);
+            Vector3::from(cutter.force.force_n(place, thickness_m.max(0.0), cutter.depth_m))
+        })
+        .sum()
+}
+
+/// How much each channel moves within each turn, over what it does in the cut: the median of its turns, or where chatter makes that
+/// more, what the feed alone makes of it.
+struct Levels {
+    count: usize,
+    /// True where the median is more by far.
+    chatters: bool,
+    /// By channel.
+    of: Vec<Vec<f64>>,
+    /// The noise of each.
+    noise: Vec<f64>,
+}
+
+impl Levels {
+    /// `None` where no channel tells.
+    fn of(baseline: &Baseline<'_>, recording: &Recording, turn_s: f64, forced: &Forced) -> Option<Self> {
+        let rate_hz = recording.sample_rate_hz;
+        let per_turn = turn_s * rate_hz;
+        let count = (recording.len() as f64 / per_turn) as usize;
+        let mut levels = Self {
+            count,
+            chatters: false,
+            of: Vec::new(),
+            noise: Vec::new(),
+        };
+        for channel in &recording.channels {
+            let Some(pickup) = baseline.pickup(&channel.name) else {
+                continue;
+            };
+            let noise = floor_between_lines(&channel.samples, rms(&channel.samples));
+            let turns: Vec<f64> = (0..count)
+                .map(|turn| [turn, turn + 1].map(|turn| (turn as f64 * per_turn) as usize))
+                .map(|[from, to]| deviation(&channel.samples[from..to], noise))
+                .collect();
+            let (usual, fed) = (median(&mut turns.clone()), forced.level(&pickup, rate_hz));
+            let in_cut = usual.min(fed);
+            if in_cut > TELLING * noise {
+                levels.chatters |= usual > CHATTER * fed;
+                levels.of.push(turns.iter().map(|level| level / in_cut).collect());
+                levels.noise.push(noise / in_cut);
+            }
+        }
+        (!levels.of.is_empty()).then_some(levels)
+    }
+
+    fn smallest(&self, turn: usize) -> f64 {
+        self.of.iter().map(|of| of[turn]).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The stretches of air.
+    fn quiet(&self) -> Vec<Range<usize>> {
+        let mut stretches = Vec::new();
+        let mut turn = 0;
+        while turn < self.count {
+            let from = turn;
+            while turn < self.count && self.smallest(turn) < QUIET {
+                turn += 1;
+            }
+            let is_at_end = from == 0 || turn == self.count;
+            let fewest = if is_at_end { FEWEST_AT_ENDS } else { FEWEST_WITHIN };
+            if turn - from >= fewest && (from > 0 || !self.grows_from_rest()) {
+                stretches.push(from..turn);
+            }
+            turn += 1;
+        }
+        stretches
+    }
+
+    /// True where a channel that is quiet at first grows at once, as a resonance does in a cut that begins with the recording.
+    fn grows_from_rest(&self) -> bool {
+        self.of
+            .iter()
+            .zip(&self.noise)
+            .filter(|(of, _)| of[0] < QUIET)
+            .all(|(of, noise)| of[1] > ALIKE * of[0] + noise)
+    }
+}
+
+/// Standard deviation without that of the noise.
+fn deviation(samples: &[f64], noise: f64) -> f64 {
+    let count = samples.len().max(1) as f64;
+    let mean = samples.iter().sum::<f64>() / count;
+    let square = samples.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+    (square - noise * noise).max(0.0).sqrt()
+}
+
+/// The longest stretch of turns between those that are given; `None` where none are.
+fn longest_gap(stretches: &[Range<usize>], count: usize) -> Option<Range<usize>> {
+    if stretches.is_empty() {
+        return None;
+    }
+    let starts = std::iter::once(0).chain(stretches.iter().map(|stretch| stretch.end));
+    let ends = stretches.iter().map(|stretch| stretch.start).chain([count]);
+    starts.zip(ends).map(|(from, to)| from..to).max_by_key(Range::len)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conclusion::answer::Outcome;
+    use crate::tests::virtual_records::{case, record};
+    use crate::{Options, diagnose};
+    use quietcut_simulate::{Entry, VirtualCut};
+
+    /// How long the tool takes through a face at 900 rev/min with two teeth and 0.15 mm of feed each, s: its radius over the feed.
+    const WAY_S: f64 = 6.35 / (0.3 * 15.0);
+    const SECONDS: f64 = 8.0;
+    const AIR_S: f64 = 0.2;
+    const SLOT: &str = "kuka-kr90-full";
+
+    fn entering(entry: Entry, depth_mm: f64, seconds: f64) -> VirtualCut {
+        VirtualCut {
+            entry,
+            ..VirtualCut::new(900.0, depth_mm, seconds)
+        }
+    }
+
+    fn recorded(case: &Case, cut: VirtualCut, measured: &[Quantity], noise: f64) -> Recording {
+        let cut = VirtualCut {
+            measured: measured.to_vec(),
+            ..cut
+        };
+        record(case, &cut, "cut.csv", 1000.0, noise, 3)
+    }
+
+    #[test]
+    fn what_is_left_is_in_full_cut() {
+        use Quantity::{Acceleration, Displacement, Force};
+        let ramp = Entry::Ramp { seconds: 1.0 };
+        for (name, depth_mm, entry, measured, noise) in [
+            (SLOT, 1.0, Entry::Feed, &[Force, Displacement][..], 0.005),
+            (SLOT, 1.0, Entry::Feed, &[Displacement], 0.005),
+            (SLOT, 1.0, Entry::Feed, &[Acceleration], 0.05),
+            // Chatter grows over all of it.
+            (SLOT, 3.0, Entry::Feed, &[Displacement], 0.005),
+            (SLOT, 1.0, ramp, &[Displacement], 0.005),
+            ("kuka-kr90-acetal", 1.0, Entry::Feed, &[Force, Acceleration], 0.02),
+        ] {
+            let case = case(name, "");
+            let recording = recorded(&case, entering(entry, depth_mm, SECONDS), measured, noise);
+            let range = range(&Baseline::new(&case).unwrap(), &recording).unwrap();
+            let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
+            println!("{name} {depth_mm} mm {entry:?} {measured:?}: {from_s} to {to_s} s");
+            // It touches, and is in the air again, at AIR_S from the ends; slow decays after the exit look like a part of it.
+            let way_s = if entry == ramp { 1.0 } else { WAY_S };
+            let touches = [AIR_S, SECONDS - AIR_S];
+            assert!(from_s >= touches[0] + way_s && from_s < touches[0] + 1.6 * WAY_S);
+            assert!(to_s <= touches[1] - way_s && to_s > touches[1] - 2.0 * WAY_S);
+        }
+    }
+
+    #[test]
+    fn a_cut_that_fills_the_recording_is_left_as_it_is() {
+        for (depth_mm, measured) in [
+            (1.0, Quantity::Displacement),
+            (1.0, Quantity::Acceleration),
+            // Grows to chatter.
+            (4.0, Quantity::Displacement),
+        ] {
+            let case = case(SLOT, "");
+            let recording = recorded(
+                &case,
+                entering(Entry::None, depth_mm, SECONDS),
+                &[measured],
+                0.005,
+            );
+            let range = range(&Baseline::new(&case).unwrap(), &recording);
+            assert_eq!(range, None, "{depth_mm} mm, {measured:?}");
+        }
+    }
+
+    #[test]
+    fn a_cut_is_diagnosed_where_it_is_in_full_cut() {
+        // What swings and grows counts from the start of the recording, not from that of the full cut.
+        let swings = "\n[extension.speed-fluctuation]\ndelta = 0.01\nfrequency_hz = 0.7\nphase_deg = 40.0\n";
+        let wears = "\n[extension.wear]\nrelative_rate_per_s = 0.1\n";
+        let (cut, believed) = (case(SLOT, &[swings, wears].concat()), case(SLOT, swings));
+        let measured = [Quantity::Displacement];
+        let recording = recorded(&cut, entering(Entry::Feed, 1.0, SECONDS), &measured, 0.005);
+        let asked = |case: &Case| {
+            let recordings = std::slice::from_ref(&recording);
+            let diagnosis = diagnose(case, recordings, &Options::default()).unwrap();
+            let said = &diagnosis.warnings[0];
+            assert!(said.starts_with("cut.csv: in full cut from 1.9"), "{said}");
+            diagnosis
+        };
+        assert_eq!(asked(&cut).outcome, Outcome::None);
+        let diagnosis = asked(&believed);
+        let [cause] = &diagnosis.causes[..] else {
+            panic!("{:?}", diagnosis.causes)
+        };
+        assert_eq!(cause.name, "wear");
+        println!("{:?}", cause.parameters);
+        for figure in cause.parameters.values() {
+            assert!((figure.value / 0.1 - 1.0).abs() < 0.05, "{figure:?}");
+        }
+    }
+
+    #[test]
+    fn a_full_cut_that_is_too_short_is_refused() {
+        let case = case(SLOT, "");
+        let short = entering(Entry::Feed, 1.0, 2.0 * (AIR_S + WAY_S) + 0.2);
+        let recording = recorded(&case, short, &[Quantity::Displacement], 0.005);
+        let error = diagnose(&case, &[recording], &Options::default()).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.ends_with("at least 8 turns in full cut are needed"),
+            "{said}"
+        );
+    }
+}

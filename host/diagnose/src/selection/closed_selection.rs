@@ -1,0 +1,198 @@
+//! Which explanations are fitted in closed loop, where the records can be, and which of them to the end.
+
+use std::collections::VecDeque;
+
+use crate::fit::closed_fit::ClosedFit;
+use crate::fit::library::{Explanation, Library};
+use crate::fit::regression::{Regression, Share};
+use crate::selection::rebaselined::extended_around;
+use crate::selection::select::{APART, Scale};
+use crate::selection::stepwise::{distinct, extended, nested, without};
+
+/// χ² per number below which an explanation explains nearly all, and over that of another below which it is nearly as good; and how
+/// many times that another may leave along the measured motion and still be simulated.
+const NEARLY: f64 = 1.5;
+const FAR_OFF: f64 = 6.0;
+/// How many times further off one with fewer parameters may be.
+const SIMPLER: f64 = 30.0;
+/// Of how many the parameters are sought to the end where that asks for more readings.
+const POLISHED: usize = 4;
+/// Explanations that are simulated because of what a simulation with one cause less left: of the best, of the second.
+const EXTENDED: [usize; 2] = [6, 3];
+/// And because of what looks best around the machine as the best of those with one cause less has it.
+const AROUND: usize = 4;
+
+impl Scale<'_> {
+    /// The first of `found` as simulation has them, where it can; else all as they are. `fewer` are the best with one cause
+    /// less; what stays behind `rival` is given up.
+    pub(crate) fn simulated(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        found: Vec<Explanation>,
+        fewer: &[Explanation],
+        most: usize,
+        rival: Option<&Explanation>,
+    ) -> Vec<Explanation> {
+        let Some(closed) = &self.closed else {
+            return found;
+        };
+        let (tried, extended) = self.beside(closed.as_ref(), library, regression, fewer);
+        let tried = distinct(
+            tried
+                .into_iter()
+                .chain(found.iter().take(2 * most).cloned())
+                .collect(),
+        );
+        let mut tried = VecDeque::from(tried);
+        let mut spare = tried.split_off((extended + most).min(tried.len())).into_iter();
+        let (mut rival, mut freedoms) =
+            rival.map_or((f64::INFINITY, 0), |rival| (rival.fit.left, rival.freedoms));
+        // The same causes along more axes are simulated only where more axes gain something.
+        let mut leading: Option<Explanation> = None;
+        let mut simulated = Vec::new();
+        let noise = regression.count(Share::Whole) as f64;
+        let best_left = tried
+            .iter()
+            .map(|explanation| explanation.fit.left)
+            .fold(f64::INFINITY, f64::min);
+        while let Some(explanation) = tried.pop_front() {
+            // Where one explains nearly all, what is far from that along the measured motion need not be simulated.
+            // But a simpler one may be the truth that the other holds as a part.
+            let far_off = if explanation.freedoms < freedoms {
+                SIMPLER * FAR_OFF
+            } else {
+                FAR_OFF
+            };
+            if rival < NEARLY * noise && explanation.fit.left > far_off * rival.max(noise) {
+                continue;
+            }
+            if leading.as_ref().is_some_and(|leading| {
+                library.are_same_causes(leading, &explanation)
+                    && leading.freedoms < explanation.freedoms
+                    && self.gain(regression, leading, 1.0) > self.gain(regression, &explanation, 1.0)
+            }) {
+                continue;
+            }
+            let Some(fitted) = closed.fit(library, regression, &explanation, (rival, best_left)) else {
+                // What cannot be simulated, but might be true, stays as the regression has it; and the next has its turn.
+                if !closed.is_needed() {
+                    simulated.push(explanation);
+                }
+                tried.extend(spare.next());
+                continue;
+            };
+            if fitted.fit.left < rival {
+                (rival, freedoms) = (fitted.fit.left, fitted.freedoms);
+                leading = Some(explanation);
+            }
+            simulated.push(fitted);
+        }
+        if simulated.is_empty() && !closed.is_needed() {
+            found
+        } else {
+            simulated
+        }
+    }
+
+    /// What the best explanations with one cause less ask for beside them, and how many these are.
+    fn beside(
+        &self,
+        closed: &dyn ClosedFit,
+        library: &mut Library,
+        regression: &mut Regression,
+        fewer: &[Explanation],
+    ) -> (Vec<Explanation>, usize) {
+        let mut tried = Vec::new();
+        let bases = || fewer.iter().filter(|base| base.simulated.is_some());
+        // Cuts, whose libraries are costly, go without.
+        if let Some(base) = bases().next().filter(|_| self.coherent == 0.0) {
+            let around = extended_around(self.scene, self.recordings, library, regression, base);
+            tried.extend(around.into_iter().take(AROUND));
+        }
+        for (base, most) in bases().zip(EXTENDED) {
+            if let Some(left) = closed.left_of(library, base) {
+                tried.extend(
+                    extended(self.scene, library, regression, base, &left)
+                        .into_iter()
+                        .take(most),
+                );
+            }
+        }
+        let count = tried.len();
+        (tried, count)
+    }
+
+    /// The best of `found`, and what may come up to it, at the parameters where their own slopes end; sorted anew.
+    pub(crate) fn polish(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        found: &mut [Explanation],
+        inflation: f64,
+    ) {
+        let Some(closed) = &self.closed else { return };
+        let before: Vec<f64> = found
+            .iter()
+            .map(|explanation| self.gain(regression, explanation, inflation))
+            .collect();
+        let mut gained = 0.0;
+        for place in 0..found.len().min(POLISHED) {
+            // What was behind by more than twice what the best gained will not come up to it, unless it is simpler: of that the other
+            // may have mended what the slopes of the baseline got wrong.
+            let is_simpler = found[place].freedoms < found[0].freedoms
+                && found[place].fit.left < NEARLY * found[0].fit.left;
+            if place > 0 && !is_simpler && before[0] - before[place] > APART + 2.0 * gained {
+                continue;
+            }
+            if let Some(polished) = closed.polished(library, regression, &found[place]) {
+                if place == 0 {
+                    gained = (self.gain(regression, &polished, inflation) - before[0]).max(0.0);
+                }
+                found[place] = polished;
+            }
+        }
+        self.sort(regression, found, inflation);
+    }
+
+    /// The explanation without causes that others have made needless, and with simpler causes where these are enough.
+    pub(crate) fn pruned(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        best: Explanation,
+    ) -> Explanation {
+        let Some(closed) = self.closed.as_ref().filter(|_| best.simulated.is_some()) else {
+            return best;
+        };
+        let mut kept = best;
+        loop {
+            let inflation = self.inflation(regression, Some(&kept));
+            let reached = self.gain(regression, &kept, inflation);
+            let places = 0..kept.choices.len();
+            let fewer = places.clone().filter(|_| kept.choices.len() > 1);
+            let mut simpler: Vec<Explanation> = fewer.map(|place| without(library, &kept, place)).collect();
+            simpler.extend(places.flat_map(|place| nested(self.scene, library, &kept, place)));
+            let needless = simpler.into_iter().find_map(|fewer| {
+                let fewer = closed.fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))?;
+                let enough = |regression: &Regression, fewer: &Explanation| {
+                    self.gain(regression, fewer, inflation) > reached - self.least_gain(regression, true)
+                };
+                if enough(regression, &fewer) {
+                    return Some(fewer);
+                }
+                if fewer.fit.left > NEARLY * kept.fit.left {
+                    return None;
+                }
+                closed
+                    .polished(library, regression, &fewer)
+                    .filter(|fewer| enough(regression, fewer))
+            });
+            match needless {
+                Some(fewer) => kept = fewer,
+                None => break,
+            }
+        }
+        kept
+    }
+}

@@ -1,0 +1,106 @@
+//! Which causes may act together.
+
+use crate::candidates::cause::Place;
+use crate::fit::library::{Choice, Explanation, Library};
+
+/// What the force of a cause is a function of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Law {
+    OfDisplacement,
+    OfVelocity,
+}
+
+impl Library {
+    /// A case holds one extension of a name: the same cause does not act twice. And three terms of one law, of the displacement or
+    /// of the velocity along one axis, are the series of a law that nobody knows, and no causes: a spring that changes with time
+    /// counts as a spring, and a loop, which is what friction is before it slips, as friction.
+    pub(crate) fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
+        let new = self.cause(other.candidate).names();
+        let is_new = some.iter().all(|choice| {
+            self.cause(choice.candidate)
+                .names()
+                .iter()
+                .all(|name| !new.contains(name))
+        });
+        let alike = some
+            .iter()
+            .filter(|choice| self.are_alike(**choice, other))
+            .count();
+        is_new && alike < 2 && !some.iter().any(|choice| self.share_a_term(*choice, other))
+    }
+
+    /// True of explanations by the same causes, wherever these act.
+    pub(crate) fn are_same_causes(&self, one: &Explanation, other: &Explanation) -> bool {
+        let causes = |of: &Explanation| {
+            let mut causes: Vec<usize> = of
+                .choices
+                .iter()
+                .map(|choice| self.candidates[choice.candidate].cause)
+                .collect();
+            causes.sort_unstable();
+            causes
+        };
+        causes(one) == causes(other)
+    }
+
+    /// True of explanations by the same causes at the same places.
+    pub(crate) fn are_at_same_places(&self, one: &Explanation, other: &Explanation) -> bool {
+        let is_in = |choice: &Choice, of: &Explanation| {
+            let known = &self.candidates[choice.candidate];
+            of.choices.iter().any(|other| {
+                let other = &self.candidates[other.candidate];
+                other.cause == known.cause && other.place == known.place
+            })
+        };
+        one.choices.len() == other.choices.len() && one.choices.iter().all(|choice| is_in(choice, other))
+    }
+
+    /// True of a cubic spring beside softening and hardening, which has one, and of a gain beside a ratio for each mode of the same
+    /// channel: between the two nothing would be determined.
+    fn share_a_term(&self, one: Choice, other: Choice) -> bool {
+        let name = |choice: Choice| self.cause(choice.candidate).name();
+        let place = |choice: Choice| &self.candidates[choice.candidate].place;
+        let cubic = ["cubic-stiffness", "softening-hardening"];
+        let reading = ["sensor-gain", "sensor-offset-from-tool-tip"];
+        let is_by_mode = |choice: Choice| self.candidates[choice.candidate].shapes[choice.shape].1.len() > 1;
+        let are_both = |names: [&str; 2]| names.contains(&name(one)) && names.contains(&name(other));
+        are_both(cubic) && meet(place(one), place(other))
+            || are_both(reading) && place(one) == place(other) && (is_by_mode(one) || is_by_mode(other))
+    }
+
+    /// True of terms of one law along one axis.
+    fn are_alike(&self, one: Choice, other: Choice) -> bool {
+        match (self.law(one), self.law(other)) {
+            (Some((law, place)), Some((other_law, other_place))) => {
+                law == other_law && meet(place, other_place)
+            }
+            _ => false,
+        }
+    }
+
+    /// Of what a choice is a law, and where.
+    fn law(&self, choice: Choice) -> Option<(Law, &Place)> {
+        let law = match self.cause(choice.candidate).name() {
+            "stiffness"
+            | "drift"
+            | "quadratic-stiffness"
+            | "cubic-stiffness"
+            | "softening-hardening"
+            | "backlash" => Law::OfDisplacement,
+            "damping" | "cubic-damping" | "coulomb-friction" | "hysteresis" => Law::OfVelocity,
+            _ => return None,
+        };
+        Some((law, &self.candidates[choice.candidate].place))
+    }
+}
+
+/// True of places that are the same, or have an axis in common.
+fn meet(one: &Place, other: &Place) -> bool {
+    match (one, other) {
+        (Place::EachOf(axes), Place::Axis(axis)) | (Place::Axis(axis), Place::EachOf(axes)) => {
+            axes.contains(axis)
+        }
+        (Place::EachOf(axes), Place::EachOf(others)) => axes.iter().any(|axis| others.contains(axis)),
+        _ => one == other,
+    }
+}

@@ -1,0 +1,7 @@
+//! Which candidate model explains the records.
+
+pub(crate) mod closed_selection;
+pub(crate) mod compatibility;
+pub(crate) mod rebaselined;
+pub(crate) mod select;
+pub(crate) mod stepwise;

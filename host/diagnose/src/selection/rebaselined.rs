@@ -1,0 +1,79 @@
+//! One cause more, sought around the machine as the causes found so far have it.
+//!
+//! Columns are what a cause adds through the receptance of the baseline, y = H(iω)·f. Where a cause that was found moves a resonance
+//! by more than its width, that receptance is of another machine, and what acts beside it looks like nothing in the library. With the
+//! extended case for a baseline columns and residual are of the machine as it is (Gauss and Newton's linearization at the last
+//! point in place of the first).
+
+use nalgebra::DMatrix;
+
+use crate::conclusion::extended_case::joined;
+use crate::fit::library::{Explanation, Library};
+use crate::fit::regression::{Fit, Regression, Share};
+use crate::records::study::Scene;
+use quietcut_model::case::Case;
+use quietcut_recording::Recording;
+
+/// The best explanations of `base` and one cause more around the case that `base` makes, best first; none where `base` leaves the
+/// linear structure as it is, since there nothing would be new.
+pub(crate) fn extended_around(
+    scene: &Scene<'_>,
+    recordings: &[Recording],
+    library: &mut Library,
+    regression: &mut Regression,
+    base: &Explanation,
+) -> Vec<Explanation> {
+    let Some(extensions) = library.extensions(scene, base) else {
+        return Vec::new();
+    };
+    let mut case: Case = scene.baseline.case.clone();
+    case.extensions
+        .extend(joined(extensions.iter().map(|(name, table)| (*name, table))));
+    let Ok(around) = Scene::new(&case, recordings) else {
+        return Vec::new();
+    };
+    if around.baseline.first_order.a == scene.baseline.first_order.a {
+        return Vec::new();
+    }
+    let mut columns = Regression::new(&around);
+    let others = Library::new(&around, &mut columns);
+    let mut found: Vec<Explanation> = others
+        .singles(&around, &columns)
+        .into_iter()
+        .filter_map(|single| {
+            let choice = single.choices[0];
+            let known = &others.candidates[choice.candidate];
+            let candidate = library
+                .candidates
+                .iter()
+                .position(|other| other.cause == known.cause && other.place == known.place)?;
+            let shape = known.shapes[choice.shape].0.clone();
+            let choice = library.add_shape(scene, regression, candidate, shape)?;
+            if !library.may_act_together(&base.choices, choice) {
+                return None;
+            }
+            let mut choices = base.choices.clone();
+            choices.push(choice);
+            let coefficients = [&base.fit.coefficients[..], &single.fit.coefficients].concat();
+            let explanation = Explanation {
+                choices,
+                fit: Fit {
+                    covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
+                    coefficients,
+                    left: single.fit.left,
+                },
+                freedoms: base.freedoms + library.freedoms(choice),
+                simulated: None,
+            };
+            library
+                .parameters(scene, &explanation)
+                .is_some()
+                .then_some(explanation)
+        })
+        .collect();
+    regression.complete();
+    let price = (columns.count(Share::Whole).max(2) as f64).ln();
+    let cost = |explanation: &Explanation| explanation.fit.left + explanation.freedoms as f64 * price;
+    found.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    found
+}

@@ -1,0 +1,410 @@
+//! Which explanation is selected: causes are added while that gains more than it costs.
+
+use crate::fit::closed_fit::ClosedFit;
+use crate::fit::library::{Explanation, Library};
+use crate::fit::output_error::OutputError;
+use crate::fit::refine::refine;
+use crate::fit::regression::{Regression, Share};
+use crate::fit::relinearization::Relinearization;
+use crate::progress::Stage;
+use crate::records::record::TRUSTED_IN_CUTS;
+use crate::records::study::Scene;
+use crate::selection::stepwise::extended;
+use quietcut_recording::Recording;
+
+/// What a cause must gain to be believed (twice the logarithm of the likelihood, less the price of its parameters).
+const BELIEVED: f64 = 20.0;
+/// Two explanations whose gains differ by less are not told apart.
+pub(crate) const APART: f64 = 16.0;
+/// Share of the residual that a right explanation may leave for reasons of sampling alone.
+const SAMPLING: f64 = 2e-3;
+/// The same where the explanation is simulated.
+const SAMPLING_SIMULATED: f64 = 5e-5;
+/// Share of the residual's energy by which interpolation between samples may mislead the comparison of explanations.
+const NUMERICS: f64 = 1e-4;
+/// What may be left beyond the noise, as a share of the noise: that of the estimate of the noise and of chance.
+pub(crate) const WITHIN_NOISE: f64 = 0.15;
+/// What further causes must take of what is left beyond the noise: less is how one wrong equation mends another.
+const SHARE: f64 = 0.2;
+/// How many times what errors of the computation may be is plainly something else: twice their amplitude.
+const PLAIN: f64 = 4.0;
+/// Of a cut: what a cause more must take where fewer are enough, as a share of the noise: by so little the noise and
+/// the computation may be wrong near a resonance.
+const SHARE_BESIDE_ENOUGH: f64 = 5e-3;
+/// Most causes that act together.
+const CAUSES: usize = 3;
+/// Explanations of the regression that are simulated, by the number of their causes.
+const SIMULATED: [usize; CAUSES] = [9, 5, 3];
+
+/// What was selected: the best explanation, and those that are as good with as many causes.
+pub(crate) struct Selection {
+    pub(crate) best: Option<Explanation>,
+    pub(crate) others: Vec<Explanation>,
+    /// By how much the best is ahead of the next that is another.
+    pub(crate) ahead: f64,
+    /// By how much it is ahead of what fewer causes reach.
+    pub(crate) gained: f64,
+}
+
+/// What explanations are weighed by.
+pub(crate) struct Scale<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) recordings: &'a [Recording],
+    /// Fits in closed loop, where there are such.
+    pub(crate) closed: Option<Box<dyn ClosedFit + 'a>>,
+    /// How much what the whole library leaves, and what interpolation may leave, is above the noise: along the measured motion.
+    inflation: f64,
+    /// What the case alone leaves, in units of the noise.
+    pub(crate) reference: f64,
+    /// The most that errors of the computation, which go along with the signal, leave or give to a cause, in units of the noise.
+    pub(crate) coherent: f64,
+}
+
+impl<'a> Scale<'a> {
+    pub(crate) fn new(
+        scene: &'a Scene<'a>,
+        recordings: &'a [Recording],
+        library: &Library,
+        regression: &Regression,
+    ) -> Self {
+        let closed: Option<Box<dyn ClosedFit + 'a>> = match OutputError::new(scene) {
+            Some(output_error) => Some(Box::new(output_error)),
+            None => Relinearization::new(scene, recordings).map(|closed| Box::new(closed) as Box<_>),
+        };
+        // Simulations are free to begin elsewhere, and do not carry the noise of the measured motion: like is compared with like.
+        let by_baseline = closed
+            .as_ref()
+            .and_then(|closed| closed.left_by_baseline(library, regression));
+        let is_cut = scene.records.iter().any(|record| record.cut.is_some());
+        Self {
+            scene,
+            recordings,
+            closed,
+            coherent: if is_cut {
+                TRUSTED_IN_CUTS * TRUSTED_IN_CUTS * regression.signal(scene)
+            } else {
+                0.0
+            },
+            inflation: inflation(regression),
+            reference: by_baseline.unwrap_or_else(|| regression.residual(Share::Whole)),
+        }
+    }
+
+    /// How much the noise is above what it is taken for, by what `best` leaves of it.
+    pub(crate) fn inflation(&self, regression: &Regression, best: Option<&Explanation>) -> f64 {
+        match best {
+            Some(best) if best.simulated.is_some() => {
+                let free = regression
+                    .count(Share::Whole)
+                    .saturating_sub(best.freedoms)
+                    .max(1) as f64;
+                (best.fit.left / free).max(0.5)
+            }
+            _ => self.inflation,
+        }
+    }
+
+    /// What a cause must gain to be believed beside what errors of the computation may give it.
+    pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
+        let noise = regression.count(Share::Whole) as f64;
+        let share = if self.coherent > 0.0 && fewer_are_enough {
+            SHARE_BESIDE_ENOUGH
+        } else {
+            0.0
+        };
+        BELIEVED + PLAIN * self.coherent + share * noise
+    }
+
+    /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
+    pub(crate) fn gain(&self, regression: &Regression, explanation: &Explanation, inflation: f64) -> f64 {
+        let count = regression.count(Share::Whole).max(2) as f64;
+        // Like is compared with like.
+        let reference = match explanation.simulated {
+            Some(_) => self.reference,
+            None => regression.residual(Share::Whole),
+        };
+        (reference - explanation.fit.left) / inflation - explanation.freedoms as f64 * count.ln()
+    }
+
+    pub(crate) fn sort(&self, regression: &Regression, found: &mut [Explanation], inflation: f64) {
+        found.sort_by(|a, b| {
+            self.gain(regression, b, inflation)
+                .total_cmp(&self.gain(regression, a, inflation))
+        });
+    }
+
+    /// What is left beyond the noise, as a share of the noise and as a share of what was there beyond the noise.
+    pub(crate) fn excess(&self, regression: &Regression, best: Option<&Explanation>) -> (f64, f64) {
+        let noise = regression.count(Share::Whole) as f64;
+        let left = best.map_or(self.reference, |best| best.fit.left);
+        let reference = self.reference.max(regression.residual(Share::Whole));
+        let beyond = (left - noise - PLAIN * self.coherent).max(0.0);
+        let there = (reference - noise).max(1e-9 * noise);
+        (beyond / noise, beyond / there)
+    }
+
+    /// True where what is left is noise, or so little of what there was that sampling alone may leave it.
+    fn is_enough(&self, regression: &Regression, best: Option<&Explanation>) -> bool {
+        let (of_noise, of_excess) = self.excess(regression, best);
+        let count = regression.count(Share::Whole) as f64;
+        let simulated = best.is_some_and(|best| best.simulated.is_some());
+        let (inflation, sampling) = if simulated {
+            (1.0, SAMPLING_SIMULATED)
+        } else {
+            (self.inflation, SAMPLING)
+        };
+        of_noise / inflation < (4.0 * (2.0 / count).sqrt()).min(WITHIN_NOISE)
+            || (best.is_some() && of_excess < sampling)
+    }
+
+    /// True where what the best simulation of `found` leaves is like a cause more, although `best` leaves hardly more than noise.
+    fn asks_for_more(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        best: &Explanation,
+        found: &[Explanation],
+    ) -> bool {
+        let base = if best.simulated.is_some() {
+            Some(best)
+        } else {
+            found.iter().find(|other| other.simulated.is_some())
+        };
+        let closed = self.closed.as_ref();
+        let Some((base, left)) = base
+            .zip(closed)
+            .and_then(|(base, closed)| Some((base, closed.left_of(library, base)?)))
+        else {
+            return false;
+        };
+        let inflation = self.inflation(regression, Some(base));
+        let price = (regression.count(Share::Whole).max(2) as f64).ln();
+        let cost = |of: &Explanation| of.fit.left / inflation + of.freedoms as f64 * price;
+        extended(self.scene, library, regression, base, &left)
+            .first()
+            .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
+    }
+
+    /// True where `more` takes enough of what `fewer` leave beyond the noise; what has fewer parameters need not.
+    fn takes_its_share(
+        &self,
+        regression: &Regression,
+        fewer: Option<&Explanation>,
+        more: &Explanation,
+    ) -> bool {
+        if fewer.is_some_and(|fewer| more.freedoms < fewer.freedoms) {
+            return true;
+        }
+        let noise = regression.count(Share::Whole) as f64;
+        let before = fewer.map_or_else(
+            || match more.simulated {
+                Some(_) => self.reference,
+                None => regression.residual(Share::Whole),
+            },
+            |fewer| fewer.fit.left,
+        );
+        before - more.fit.left > SHARE * (before - noise).max(0.0)
+    }
+
+    /// What is left of the held-out parts if the parameters come from the fitted ones alone.
+    pub(crate) fn left_held_out(
+        &self,
+        library: &Library,
+        regression: &Regression,
+        explanation: &Explanation,
+    ) -> f64 {
+        self.closed
+            .as_ref()
+            .and_then(|closed| closed.left_held_out(library, regression, explanation))
+            .unwrap_or_else(|| library.left_held_out(regression, explanation))
+    }
+}
+
+/// How much what the whole library leaves, and what interpolation may leave, is above the noise.
+fn inflation(regression: &Regression) -> f64 {
+    let whole = regression.count(Share::Whole) as f64;
+    let free = (whole - regression.columns() as f64).max(1.0);
+    let sampling = NUMERICS * (regression.residual(Share::Whole) / whole - 1.0).max(0.0);
+    (regression.left_by_all() / free + sampling).max(1.0)
+}
+
+/// Selects by one cause, pairs and triples; more causes only where fewer leave something.
+pub(crate) fn select(
+    scale: &Scale<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    watch: &dyn Fn(Stage),
+) -> Selection {
+    let mut selection = Selection {
+        best: None,
+        others: Vec::new(),
+        ahead: f64::INFINITY,
+        gained: 0.0,
+    };
+    let scene = scale.scene;
+    let mut pairs = Vec::new();
+    let mut fewer: Vec<Explanation> = Vec::new();
+    for (index, most) in SIMULATED.into_iter().enumerate() {
+        let size = index + 1;
+        // Less than half of what the sensors' noise is at least: nothing is there to be explained.
+        let silent = regression.residual(Share::Whole) < 0.5 * regression.count(Share::Whole) as f64;
+        if silent {
+            break;
+        }
+        let enough = size > 1 && scale.is_enough(regression, selection.best.as_ref());
+        // Two causes with one parameter each may be what one with many imitates.
+        let mut imitated = None;
+        if enough {
+            let Some(best) = &selection.best else { break };
+            let asked = scale.asks_for_more(library, regression, best, &fewer);
+            imitated =
+                (!asked && size == 2 && best.freedoms > size && scale.closed.is_some()).then(|| best.clone());
+            if !asked && imitated.is_none() {
+                break;
+            }
+        }
+        watch(Stage::Causes(size));
+        regression.complete();
+        let mut found = match size {
+            1 => library.singles(scene, regression),
+            2 => library.pairs(scene, regression),
+            _ => library.triples(scene, regression, &pairs),
+        };
+        // Simulations of several causes begin at the shapes that were found of each alone.
+        if size == 1 || scale.closed.is_none() {
+            refine(scene, library, regression, &mut found);
+        }
+        scale.sort(regression, &mut found, scale.inflation);
+        if size == 2 {
+            pairs.clone_from(&found);
+        }
+        if let Some(imitated) = &imitated {
+            found.retain(|explanation| explanation.freedoms < imitated.freedoms);
+        }
+        let extended = if imitated.is_some() { &[] } else { &fewer[..] };
+        let mut found = scale.simulated(library, regression, found, extended, most, imitated.as_ref());
+        // What hardly shows is believed only of a simulation.
+        found.retain(|explanation| !enough || explanation.simulated.is_some());
+        found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
+        let inflation = scale.inflation(regression, found.first());
+        scale.sort(regression, &mut found, inflation);
+        // Where fewer causes are enough already, more of them are not to win by what errors of the computation gain there.
+        if !enough {
+            scale.polish(library, regression, &mut found, inflation);
+        }
+        let inflation = scale.inflation(regression, found.first());
+        tell(scale, library, regression, &found, inflation);
+        let Some(best) = found.first() else { break };
+        let best = simplest(scale, regression, &found, best);
+        let best = &scale.pruned(library, regression, best);
+        let earlier = std::mem::replace(&mut fewer, found.clone());
+        let gained = scale.gain(regression, best, inflation);
+        let reached = selection
+            .best
+            .as_ref()
+            .map_or(0.0, |best| scale.gain(regression, best, inflation));
+        let held_out = scale.left_held_out(library, regression, best);
+        // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
+        let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
+        let takes_its_share = scale.takes_its_share(regression, selection.best.as_ref(), best);
+        // Where two more take little, a third would mend what the others get wrong.
+        if size > 1 && !takes_its_share {
+            break;
+        }
+        if gained < reached + scale.least_gain(regression, enough)
+            || !takes_its_share
+            || held_out > regression.residual(Share::HeldOut) + chance
+        {
+            continue;
+        }
+        let rivals: Vec<&Explanation> = found
+            .iter()
+            .chain(&earlier)
+            .filter(|other| is_rival(library, best, other))
+            .collect();
+        let behind = |other: &Explanation| gained - scale.gain(regression, other, inflation);
+        selection.gained = gained - reached;
+        selection.ahead = rivals
+            .iter()
+            .map(|other| behind(other))
+            .fold(f64::INFINITY, f64::min);
+        selection.others = rivals
+            .iter()
+            .filter(|other| behind(other) < APART)
+            .map(|other| (*other).clone())
+            .collect();
+        let polished = scale.closed.as_ref().filter(|_| enough);
+        let polished = polished.and_then(|closed| closed.polished(library, regression, best));
+        selection.best = Some(polished.unwrap_or_else(|| best.clone()));
+    }
+    selection
+}
+
+/// True of an explanation by other causes that has no more parameters than `best`, or by the same causes at other places that has as
+/// many.
+fn is_rival(library: &Library, best: &Explanation, other: &Explanation) -> bool {
+    if names(library, other) != names(library, best) {
+        return other.freedoms <= best.freedoms;
+    }
+    other.freedoms == best.freedoms && !library.are_at_same_places(best, other)
+}
+
+fn tell(
+    scale: &Scale<'_>,
+    library: &Library,
+    regression: &Regression,
+    found: &[Explanation],
+    inflation: f64,
+) {
+    for explanation in found.iter().take(6) {
+        let names: Vec<String> = explanation
+            .choices
+            .iter()
+            .map(|choice| {
+                let known = &library.candidates[choice.candidate];
+                let shape = &known.shapes[choice.shape].0;
+                format!(
+                    "{} {} {shape:?}",
+                    library.cause(choice.candidate).name(),
+                    known.place
+                )
+            })
+            .collect();
+        tracing::debug!(
+            gain = scale.gain(regression, explanation, inflation),
+            left = explanation.fit.left / regression.count(Share::Whole) as f64,
+            simulated = explanation.simulated.is_some(),
+            "{}",
+            names.join(" + ")
+        );
+    }
+}
+
+/// `best`, or along the measured motion one with fewer parameters that leaves as little: more parameters may mend what
+/// sampling hides. In closed loop nothing is hidden.
+fn simplest(
+    scale: &Scale<'_>,
+    regression: &Regression,
+    found: &[Explanation],
+    best: &Explanation,
+) -> Explanation {
+    let inflation = scale.inflation;
+    let apart = APART.max(NUMERICS * regression.residual(Share::Whole) / inflation);
+    let as_good = |other: &&Explanation| {
+        other.simulated.is_none()
+            && other.freedoms < best.freedoms
+            && scale.excess(regression, Some(other)).1 < SAMPLING
+            && scale.gain(regression, other, inflation) > scale.gain(regression, best, inflation) - apart
+    };
+    found.iter().find(as_good).unwrap_or(best).clone()
+}
+
+pub(crate) fn names(library: &Library, explanation: &Explanation) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = explanation
+        .choices
+        .iter()
+        .flat_map(|choice| library.cause(choice.candidate).names())
+        .collect();
+    names.sort_unstable();
+    names
+}

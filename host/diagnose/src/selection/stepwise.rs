@@ -1,0 +1,179 @@
+//! Explanations with one cause more or one less, from what a simulation leaves.
+//!
+//! The residual of a simulated explanation holds neither the noise of the measured motion nor what sampling hides: which cause
+//! it asks for next is seen there (the score test), and what a later cause has made needless is taken out again: a whole cause, or
+//! what makes it more than a simpler one.
+
+use nalgebra::DMatrix;
+
+use crate::fit::library::{Choice, Explanation, Library};
+use crate::fit::regression::{Fit, Regression, Share};
+use crate::records::study::Scene;
+
+/// The best explanations of `base` and one cause more, best first; `left` is what is left of it, by record and channel.
+pub(crate) fn extended(
+    scene: &Scene<'_>,
+    library: &mut Library,
+    regression: &mut Regression,
+    base: &Explanation,
+    left: &[Vec<Vec<f64>>],
+) -> Vec<Explanation> {
+    let target = regression.add(left);
+    library.add_shapes_beside(scene, regression, left);
+    regression.complete();
+    let library = &*library;
+    let mut found: Vec<Explanation> = library
+        .choices()
+        .into_iter()
+        .filter(|choice| library.may_act_together(&base.choices, *choice))
+        .filter_map(|choice| with(scene, library, regression, base, choice, target))
+        .collect();
+    let price = (regression.count(Share::Whole).max(2) as f64).ln();
+    let inflation = (base.fit.left / regression.count(Share::Whole).max(1) as f64).max(1.0);
+    let cost =
+        |explanation: &Explanation| explanation.fit.left / inflation + explanation.freedoms as f64 * price;
+    found.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    let mut seen: Vec<usize> = Vec::new();
+    found.retain(|explanation| {
+        let candidate = explanation.choices.last().map_or(0, |choice| choice.candidate);
+        let new = !seen.contains(&candidate);
+        seen.push(candidate);
+        new
+    });
+    found
+}
+
+fn with(
+    scene: &Scene<'_>,
+    library: &Library,
+    regression: &Regression,
+    base: &Explanation,
+    choice: Choice,
+    target: usize,
+) -> Option<Explanation> {
+    let mut columns = library.columns_of(base);
+    let own = columns.len();
+    columns.extend(library.columns(choice));
+    let (change, taken) = regression.fit_column(Share::Whole, &columns, target)?;
+    let mut choices = base.choices.clone();
+    choices.push(choice);
+    let of = |share: f64| {
+        let coefficients: Vec<f64> = change
+            .iter()
+            .enumerate()
+            .map(|(index, change)| match base.fit.coefficients.get(index) {
+                Some(known) if index < own => known + share * change,
+                _ => *change,
+            })
+            .collect();
+        let explanation = Explanation {
+            choices: choices.clone(),
+            fit: Fit {
+                covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
+                coefficients,
+                left: (base.fit.left - taken).max(0.0),
+            },
+            freedoms: base.freedoms + library.freedoms(choice),
+            simulated: None,
+        };
+        library
+            .parameters(scene, &explanation)
+            .is_some()
+            .then_some(explanation)
+    };
+    of(1.0).or_else(|| of(0.0))
+}
+
+/// The explanation without one of its causes.
+pub(crate) fn without(library: &Library, explanation: &Explanation, place: usize) -> Explanation {
+    let mut coefficients = Vec::new();
+    for other in (0..explanation.choices.len()).filter(|other| *other != place) {
+        coefficients.extend(library.coefficients(explanation, other));
+    }
+    let mut choices = explanation.choices.clone();
+    let gone = choices.remove(place);
+    Explanation {
+        freedoms: explanation.freedoms - library.freedoms(gone),
+        choices,
+        fit: Fit {
+            covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
+            coefficients,
+            left: explanation.fit.left,
+        },
+        simulated: None,
+    }
+}
+
+/// The explanation with a simpler cause in the place of one of its own: at the same place, with some of its parameters and no others
+/// (a cubic spring for one that softens and hardens), at the values that they have.
+pub(crate) fn nested(
+    scene: &Scene<'_>,
+    library: &Library,
+    explanation: &Explanation,
+    place: usize,
+) -> Vec<Explanation> {
+    let Some(parameters) = library.parameters(scene, explanation) else {
+        return Vec::new();
+    };
+    let whole = explanation.choices[place];
+    let values = &parameters[place];
+    let acts_at = &library.candidates[whole.candidate].place;
+    let before = explanation.choices[..place].iter();
+    let from: usize = before.map(|choice| library.columns(*choice).len()).sum();
+    let to = from + library.columns(whole).len();
+    let simpler = |choice: Choice| {
+        let known = &library.candidates[choice.candidate];
+        let (shape, columns) = &known.shapes[choice.shape];
+        if known.place != *acts_at || !shape.is_empty() || library.freedoms(choice) >= library.freedoms(whole)
+        {
+            return None;
+        }
+        // Its coefficients are its parameters, or it has none of these values.
+        let cause = library.cause(choice.candidate);
+        let own: Vec<f64> = values
+            .iter()
+            .take(columns.len())
+            .map(|(_, value)| *value)
+            .collect();
+        let said = cause.parameters(scene, acts_at, shape, &own)?;
+        if said.is_empty() || !said.iter().all(|parameter| values.contains(parameter)) {
+            return None;
+        }
+        let mut coefficients = explanation.fit.coefficients.clone();
+        coefficients.splice(from..to, own);
+        let mut choices = explanation.choices.clone();
+        choices[place] = choice;
+        Some(Explanation {
+            freedoms: choices.iter().map(|choice| library.freedoms(*choice)).sum(),
+            choices,
+            fit: Fit {
+                covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
+                coefficients,
+                left: explanation.fit.left,
+            },
+            simulated: None,
+        })
+    };
+    library.choices().into_iter().filter_map(simpler).collect()
+}
+
+/// Those of `found` that no earlier one is the same as.
+pub(crate) fn distinct(found: Vec<Explanation>) -> Vec<Explanation> {
+    let mut seen: Vec<Vec<usize>> = Vec::new();
+    found
+        .into_iter()
+        .filter(|explanation| {
+            let mut who: Vec<usize> = explanation
+                .choices
+                .iter()
+                .map(|choice| choice.candidate)
+                .collect();
+            who.sort_unstable();
+            let new = !seen.contains(&who);
+            if new {
+                seen.push(who);
+            }
+            new
+        })
+        .collect()
+}

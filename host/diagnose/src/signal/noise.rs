@@ -1,0 +1,241 @@
+//! How much a sensor's noise is: the floor of what the model leaves.
+//!
+//! Sensor noise is taken to be white over the band of the record. Whatever else is in a residual stands above that floor
+//! somewhere and leaves it bare elsewhere.
+
+use crate::signal::grid::Stretch;
+
+/// Bands into which a spectrum is cut.
+pub(crate) const BANDS: usize = 32;
+/// White noise below this share of all noise in a band cannot be told from chance.
+const TOLD: f64 = 0.05;
+/// Nothing recorded is trusted beyond this share of its size: 90 dB, where errors of simulations add up to what is seen.
+const TRUSTED: f64 = 3e-5;
+
+/// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel itself.
+///
+/// The mean of the periodogram in each of 32 bands, the lower quartile of these, and then the mean of all bands that are
+/// within three deviations of it: with nothing but noise, all of them.
+pub(crate) fn white_floor(residual: &[f64], size: f64) -> f64 {
+    white_floor_beside(residual, size, &[0.0; BANDS])
+}
+
+/// [`white_floor`] of a residual in which there is other noise besides, of this power in each of the [`BANDS`] from zero to half the
+/// sample rate.
+pub(crate) fn white_floor_beside(residual: &[f64], size: f64, other: &[f64; BANDS]) -> f64 {
+    floor(residual, size, mean, 1.0, other)
+}
+
+/// [`white_floor`] of a residual that has lines in every band, as that of a cut: by the median of each band, which lines, being few
+/// of its bins, do not move.
+pub(crate) fn floor_between_lines(residual: &[f64], size: f64) -> f64 {
+    let of_band = |squares: &mut [f64]| median(squares) / MEDIAN;
+    floor(residual, size, of_band, MEDIAN_SPREAD, &[0.0; BANDS])
+}
+
+/// The median of the square of a normal deviate, and by how much a mean that is taken from it scatters more than the mean itself.
+const MEDIAN: f64 = 0.454_936;
+const MEDIAN_SPREAD: f64 = 1.65;
+
+fn mean(squares: &mut [f64]) -> f64 {
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
+}
+
+/// The middle of values that it puts in another order; 0 of none.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+fn floor(
+    residual: &[f64],
+    size: f64,
+    of_band: fn(&mut [f64]) -> f64,
+    scatter: f64,
+    other: &[f64; BANDS],
+) -> f64 {
+    let least = (TRUSTED * size).max(f64::MIN_POSITIVE);
+    let count = residual.len();
+    if count < 4 * BANDS {
+        return rms(residual).max(least);
+    }
+    // All noise, and how much of it is white as far as can be told.
+    let white = |all: f64, other: f64| (all - other).max(TOLD * all);
+    let bands: Vec<(f64, f64)> = band_means(residual, of_band).into_iter().zip(*other).collect();
+    let mut sorted: Vec<f64> = bands.iter().map(|(all, other)| white(*all, *other)).collect();
+    sorted.sort_by(f64::total_cmp);
+    let per_band = (count / (2 * BANDS)) as f64;
+    // Hann's window makes neighbouring bins alike: a third of them count.
+    let spread = 3.0 * scatter * (3.0 / per_band).sqrt();
+    let mut level = sorted[BANDS / 4];
+    for _ in 0..8 {
+        let near: Vec<(f64, f64)> = bands
+            .iter()
+            .copied()
+            .filter(|(all, other)| {
+                let expected = level + other;
+                *all <= expected * (1.0 + spread) && *all >= expected / (1.0 + spread)
+            })
+            .collect();
+        if near.is_empty() {
+            break;
+        }
+        // The power of a band scatters as it is large: where there is much of the other noise little is told of the white one.
+        let weight = |other: f64| (level / (level + other)).powi(2);
+        let whole: f64 = near.iter().map(|(_, other)| weight(*other)).sum();
+        let mean = |of: fn(&(f64, f64)) -> f64| {
+            near.iter().map(|band| weight(band.1) * of(band)).sum::<f64>() / whole
+        };
+        let next = white(mean(|band| band.0), mean(|band| band.1));
+        if (next - level).abs() <= 1e-9 * level {
+            break;
+        }
+        level = next;
+    }
+    level.sqrt().max(least)
+}
+
+/// Mean of the periodogram, per real part, in each band, taken by `of_band`: σ² where there is white noise.
+fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
+    let count = residual.len();
+    let mean = residual.iter().sum::<f64>() / count as f64;
+    let mut power = 0.0;
+    let windowed: Vec<f64> = residual
+        .iter()
+        .enumerate()
+        .map(|(n, x)| {
+            let hann = (std::f64::consts::PI * (n as f64 + 0.5) / count as f64)
+                .sin()
+                .powi(2);
+            power += hann * hann;
+            hann * (x - mean)
+        })
+        .collect();
+    let mut parts = Vec::with_capacity(count);
+    let bins = count / 2;
+    Stretch::new(count).parts(&windowed, bins, &mut parts);
+    let scale = count as f64 / power;
+    (0..BANDS)
+        .map(|band| {
+            let from = (parts.len() * band / BANDS).max(3);
+            let to = parts.len() * (band + 1) / BANDS;
+            let mut squares: Vec<f64> = parts[from..to].iter().map(|x| x * x).collect();
+            scale * of_band(&mut squares)
+        })
+        .collect()
+}
+
+/// Samples of a window of [`quiet_floor`].
+const QUIET: usize = 256;
+
+/// Standard deviation of the noise of a channel that is silent most of the time, as the force of a hammer is, whose blows reach to the end
+/// of the band: the lower quartile of that of windows. Infinite where it is too short.
+pub(crate) fn quiet_floor(samples: &[f64]) -> f64 {
+    let mut squares: Vec<f64> = samples
+        .chunks_exact(QUIET)
+        .map(|window| {
+            let mean = window.iter().sum::<f64>() / QUIET as f64;
+            window.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (QUIET - 1) as f64
+        })
+        .collect();
+    let quarter = squares.len() / 4;
+    if quarter == 0 {
+        return f64::INFINITY;
+    }
+    squares.select_nth_unstable_by(quarter, f64::total_cmp).1.sqrt()
+}
+
+/// Root mean square.
+pub(crate) fn rms(samples: &[f64]) -> f64 {
+    (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    #[test]
+    fn lines_in_every_band_do_not_raise_the_floor_between_them() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let residual: Vec<f64> = (0..6000)
+            .map(|n| {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                // A line in every forty-eighth bin, as of 24 turns of two teeth.
+                let t = std::f64::consts::TAU * f64::from(n) / 6000.0;
+                noise + (1..62).map(|k| (48.3 * f64::from(k) * t).sin()).sum::<f64>()
+            })
+            .collect();
+        let size = rms(&residual);
+        let floor = floor_between_lines(&residual, size);
+        // A line and what leaks from it through Hann's window stands above the noise in six bins of 48.3. The median of the power
+        // is then at most the quantile 0.5/0.876 of the noise's, -ln(1 - 0.571)/ln 2 = 1.22 of its median: 10.5 % more in
+        // amplitude; 5.5 % is three deviations of the median of 3 000 powers of which every second is independent.
+        assert!((0.945..1.16).contains(&floor), "{floor}");
+        assert!(white_floor(&residual, size) > 1.5);
+    }
+
+    #[test]
+    fn the_floor_is_that_of_the_sensor_beside_other_noise_that_is_known() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+        // Differences of noise of twice the size have the power 4·|1 − e^(−iω)|²: nothing at zero, sixteen at half the sample rate.
+        let mut last = 0.0;
+        let residual: Vec<f64> = (0..6000)
+            .map(|_| {
+                let next = 2.0 * draw();
+                let difference = next - last;
+                last = next;
+                draw() + difference
+            })
+            .collect();
+        let power = |band: usize| {
+            4.0 * (2.0 - 2.0 * (std::f64::consts::PI * (band as f64 + 0.5) / BANDS as f64).cos())
+        };
+        let size = rms(&residual);
+        let floor = white_floor_beside(&residual, size, &std::array::from_fn(power));
+        // Three deviations are 6 % where nothing else is; with up to sixteen times as much besides it is known half as well.
+        assert!((floor - 1.0).abs() < 0.12, "{floor}");
+        assert!(white_floor(&residual, size) > 1.3);
+    }
+
+    #[test]
+    fn the_floor_is_that_of_the_noise_with_and_without_a_signal() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        for loud in [0.0, 50.0] {
+            let signal: Vec<f64> = (0..6000)
+                .map(|n| {
+                    let noise: f64 = StandardNormal.sample(&mut random);
+                    let t = n as f64;
+                    noise + loud * ((0.31 * t).sin() + (0.2 * t + 1e-5 * t * t).sin())
+                })
+                .collect();
+            let floor = white_floor(&signal, rms(&signal));
+            // 6000 samples, most of them beside the tones: 2 % is three deviations.
+            assert!((floor - 1.0).abs() < 0.04, "{loud}: {floor}");
+        }
+    }
+
+    #[test]
+    fn the_floor_of_a_hammer_is_that_between_its_blows() {
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let force: Vec<f64> = (0..40_000)
+            .map(|n| {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                // Half a sine of 20 samples, every 5 s of 2 kHz.
+                let blow = (std::f64::consts::PI * f64::from(n % 10_000) / 20.0).sin();
+                noise + if n % 10_000 < 20 { 5000.0 * blow } else { 0.0 }
+            })
+            .collect();
+        let floor = quiet_floor(&force);
+        // The lower quartile of variances of 256 samples is 6 % below their mean, and 156 windows know it to 1 %.
+        assert!((0.95..0.99).contains(&floor), "{floor}");
+        assert!(white_floor(&force, rms(&force)) > 1.2);
+    }
+}

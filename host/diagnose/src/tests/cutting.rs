@@ -1,0 +1,288 @@
+//! Virtual cuts that hide something of the process, diagnosed with the plain case.
+
+use std::path::Path;
+
+use nalgebra::Matrix3;
+
+use crate::records::study::Scene;
+use crate::tests::virtual_records::record;
+use crate::{Diagnosis, Options, diagnose};
+use quietcut_model::case::Case;
+use quietcut_model::milling::{Engagement, ToothForce};
+use quietcut_recording::{Quantity, Recording};
+use quietcut_simulate::{Effects, Entry, VirtualCut};
+
+fn case(feed_mm: &str, more: &str) -> Case {
+    let path = format!(
+        "{}/../../tests/cases/kuka-kr90-half.toml",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let text = std::fs::read_to_string(&path).unwrap();
+    let text = text
+        .replace(
+            "feed_per_tooth_mm = 0.15",
+            &format!("feed_per_tooth_mm = {feed_mm}"),
+        )
+        .replace("teeth = 2", "teeth = 3");
+    Case::parse(Path::new("believed.toml"), &format!("{text}\n{more}")).unwrap()
+}
+
+/// Two cuts of four seconds at different speeds and feeds, with two percent of noise.
+fn records(effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
+    records_of(4.0, effects, forces, seed)
+}
+
+/// The same, of so many seconds.
+fn records_of(seconds: f64, effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
+    [(900.0, 0.8, "0.15"), (1230.0, 0.6, "0.09")]
+        .into_iter()
+        .enumerate()
+        .map(|(index, (rpm, depth_mm, feed_mm))| {
+            let mut measured = vec![Quantity::Displacement];
+            if forces {
+                measured.insert(0, Quantity::Force);
+            }
+            let cut = VirtualCut {
+                effects: Effects::parse_over(effects.iter().copied(), Some(seconds)).unwrap(),
+                entry: Entry::None,
+                measured,
+                ..VirtualCut::new(rpm, depth_mm, seconds)
+            };
+            let path = format!("cut-{index}.csv");
+            record(&case(feed_mm, ""), &cut, &path, 2048.0, 0.02, seed + index as u64)
+        })
+        .collect()
+}
+
+fn told(diagnosis: &Diagnosis) -> String {
+    format!(
+        "{:?} {:?} extended {:?} gain {:?}",
+        diagnosis.outcome,
+        diagnosis
+            .causes
+            .iter()
+            .map(|cause| (cause.name, &cause.parameters))
+            .collect::<Vec<_>>(),
+        diagnosis.extended,
+        diagnosis.gain
+    )
+}
+
+/// What is hidden, with or without force channels.
+const HIDDEN: [(&str, &[&str], bool); 6] = [
+    ("force-coefficients", &["force-coefficients=0.2"], true),
+    (
+        "edge-force",
+        &["edge-force=1.5", "edge-force.kre_n_per_mm=1"],
+        false,
+    ),
+    (
+        "force-exponent",
+        &["force-exponent=0.75", "force-exponent.reference_chip_mm=0.1"],
+        false,
+    ),
+    ("process-damping", &["process-damping=2e5"], false),
+    (
+        "speed-fluctuation",
+        &["speed-fluctuation=0.01", "speed-fluctuation.frequency_hz=2"],
+        false,
+    ),
+    ("wear", &["wear=0.1"], true),
+];
+
+#[test]
+fn what_a_cut_hides_is_named_with_and_without_force() {
+    let mut wrong = Vec::new();
+    for (name, effects, forces) in HIDDEN {
+        let diagnosis = diagnose(
+            &case("0.15", ""),
+            &records(effects, forces, 7),
+            &Options::default(),
+        )
+        .unwrap();
+        println!("{name}, forces {forces}: {}", told(&diagnosis));
+        if diagnosis.causes.first().map(|cause| cause.name) != Some(name) {
+            wrong.push((name, forces, told(&diagnosis)));
+        }
+        // What people are shown as left is noise too: nothing of a start that nobody knows.
+        for view in &diagnosis.views {
+            let [_, _, left] = view.sizes();
+            assert!(
+                left < 1.2 * view.deviation,
+                "{name}, {}: {left} of {}",
+                view.channel,
+                view.deviation
+            );
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn of_long_cuts_a_part_is_searched_and_all_is_checked() {
+    let recordings = records_of(30.0, &["process-damping=2e5"], false, 7);
+    let diagnosis = diagnose(&case("0.15", ""), &recordings, &Options::default()).unwrap();
+    assert_eq!(
+        diagnosis.causes[0].name,
+        "process-damping",
+        "{}",
+        told(&diagnosis)
+    );
+    let found = diagnosis.causes[0].parameters["process_damping_n_per_m"];
+    assert!((found.ci90[0]..found.ci90[1]).contains(&2e5), "{found:?}");
+    let said = &diagnosis.warnings;
+    assert!(
+        said.iter().any(|said| said.contains("8.0 s near the start")),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn a_cut_without_tachometer_or_depth_is_refused() {
+    let mut records = records(&[], false, 1);
+    records[0].channels.retain(|channel| channel.name != "tacho");
+    let error = diagnose(&case("0.15", ""), &records, &Options::default()).unwrap_err();
+    assert!(error.to_string().contains("tacho"), "{error}");
+}
+
+#[test]
+fn what_moves_a_resonance_is_found_beside_another_cause_and_no_third_is() {
+    // Of the believed machine, 97.0 and 188.0 kg. The second time slopes of the believed machine are far from those at the end.
+    let hidden: [(&[&str], _, _); 2] = [
+        (
+            &[
+                "mass=0.15",
+                "mass.direction=y",
+                "runout=20",
+                "runout.angle_deg=40",
+            ],
+            216.209,
+            ("runout", "runout_um", 20.0),
+        ),
+        (
+            &[
+                "mass=0.28",
+                "mass.direction=x",
+                "edge-force=2",
+                "edge-force.kre_n_per_mm=2",
+            ],
+            124.160,
+            ("edge-force", "kte_n_per_mm", 2.0),
+        ),
+    ];
+    for (effects, mass_kg, (other, key, value)) in hidden {
+        let diagnosis = diagnose(
+            &case("0.15", ""),
+            &records(effects, false, 7),
+            &Options::default(),
+        )
+        .unwrap();
+        println!("{}", told(&diagnosis));
+        let mut names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name).collect();
+        names.sort_unstable();
+        let mut expected = ["mass", other];
+        expected.sort_unstable();
+        assert_eq!(names, expected, "{}", told(&diagnosis));
+        // A thousandth of the mass, three percent of what only the steps of the force show.
+        for (name, key, truth, share) in [("mass", "mass_kg", mass_kg, 1e-3), (other, key, value, 0.03)] {
+            let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
+            let found = cause.parameters[key].value;
+            assert!((found / truth - 1.0).abs() < share, "{}", told(&diagnosis));
+        }
+    }
+}
+
+#[test]
+fn mean_slopes_of_a_cut_are_those_that_averaged_lobes_have() {
+    let believed = case("0.15", "");
+    let recordings = records(&[], false, 7);
+    let scene = Scene::new(&believed, &recordings).unwrap();
+    let (tool, cut) = (believed.tool().unwrap(), believed.cut().unwrap());
+    let force = ToothForce::new(tool, believed.material().unwrap());
+    // The deeper of the two: cut in feed direction x, 60 turns less what is lost at the ends.
+    let averaged = force.averaged(&Engagement::new(tool, cut), 1e-3 * cut.feed_per_tooth_mm);
+    let expected = averaged.directional * 0.8e-3;
+    let slopes = scene.records[0].cut.as_ref().unwrap().mean_slopes();
+    let sum: Matrix3<f64> = slopes.by_delay.iter().map(|(_, slope)| slope).sum();
+    // Where teeth leave the chip comes to nothing, and noise decides about contact.
+    assert!(
+        (sum - expected).norm() < 5e-3 * expected.norm(),
+        "{sum} {expected}"
+    );
+    let (delay_s, _) = slopes
+        .by_delay
+        .iter()
+        .max_by(|a, b| a.1.norm().total_cmp(&b.1.norm()))
+        .unwrap();
+    assert!((delay_s - 60.0 / 900.0 / 3.0).abs() < 1e-6, "{delay_s}");
+}
+
+#[test]
+fn much_process_damping_is_found_beside_runout() {
+    // Six times the damping of the structure: force and motion computed in turns, each from the other, run away from each other.
+    let effects = ["process-damping=2e7", "runout=20", "runout.angle_deg=40"];
+    let diagnosis = diagnose(
+        &case("0.15", ""),
+        &records(&effects, false, 7),
+        &Options::default(),
+    )
+    .unwrap();
+    let mut names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["process-damping", "runout"], "{}", told(&diagnosis));
+    for (name, key, truth) in [
+        ("process-damping", "process_damping_n_per_m", 2e7),
+        ("runout", "runout_um", 20.0),
+    ] {
+        let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
+        let found = cause.parameters[key].value;
+        // Of two percent of noise in some 30 000 samples less than two thousandths are left.
+        assert!((found / truth - 1.0).abs() < 2e-3, "{}", told(&diagnosis));
+    }
+}
+
+#[test]
+fn a_dynamometer_that_reads_too_much_is_no_harder_material() {
+    let cuts = records(&["sensor-gain=1.1", "sensor-gain.channel=fx,fy"], true, 17);
+    let diagnosis = diagnose(&case("0.15", ""), &cuts, &Options::default()).unwrap();
+    let said: Vec<_> = diagnosis
+        .causes
+        .iter()
+        .map(|cause| (cause.name, cause.channel.as_deref()))
+        .collect();
+    let expected = ["fx", "fy"].map(|name| ("sensor-gain", Some(name)));
+    assert_eq!(said, expected, "{}", told(&diagnosis));
+    for cause in &diagnosis.causes {
+        // 2 % of noise in 16 000 samples of each channel.
+        let gain = cause.parameters["gain"].value;
+        assert!((gain - 1.1).abs() < 2e-3, "{gain}");
+    }
+    // The case with it reads as the dynamometer does.
+    let extended = diagnosis.extended(&case("0.15", "")).unwrap();
+    let again = diagnose(&extended, &cuts, &Options::default()).unwrap();
+    assert_eq!(
+        again.outcome,
+        crate::conclusion::answer::Outcome::None,
+        "{}",
+        told(&again)
+    );
+}
+
+#[test]
+fn wrong_units_of_a_cut_are_said() {
+    for (name, factor) in [("x", 1e3), ("fx", 1e-3), ("fx", 1e3), ("y", 1e3)] {
+        let mut cuts = records_of(1.0, &["force-coefficients=0.2"], true, 3);
+        let channel = cuts[0]
+            .channels
+            .iter_mut()
+            .find(|channel| channel.name == name)
+            .unwrap();
+        channel.samples.iter_mut().for_each(|sample| *sample *= factor);
+        let error = diagnose(&case("0.15", ""), &cuts, &Options::default()).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.contains(&format!("{name} is")) && said.contains("its unit"),
+            "{said}"
+        );
+    }
+}

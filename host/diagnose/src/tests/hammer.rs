@@ -1,0 +1,53 @@
+//! Blows of a hammer, a minute of them: a search of the first, held against the rest.
+
+use std::path::Path;
+
+use crate::conclusion::answer::Outcome;
+use crate::tests::virtual_records::case;
+use crate::{Diagnosis, Options, diagnose};
+use quietcut_model::structure::Direction;
+use quietcut_recording::Quantity;
+use quietcut_simulate::Effects;
+use quietcut_simulate::rig::{Impact, Noise, Rig, Signal};
+
+/// Ten blows on the Stäubli, heard by accelerometers with 1 % of noise on every channel; their spectrum reaches to the end of the band.
+fn asked(effects: &[&str]) -> Diagnosis {
+    let believed = case("staubli-tx200", "");
+    let impacts = (0..10).map(|blow| Impact {
+        start_s: 0.5 + 5.0 * f64::from(blow),
+        peak_n: 200.0,
+        pulse_s: 0.01,
+    });
+    let signal = Signal::Impacts {
+        impacts: impacts.collect(),
+        seconds: 50.0,
+    };
+    let rig = Rig {
+        effects: Effects::parse(effects.iter().copied()).unwrap(),
+        measured: vec![Quantity::Acceleration],
+        ..Rig::new(Direction::X, signal, 2048.0)
+    };
+    let structure = believed.structure.as_ref().unwrap();
+    let (mut recording, _) = rig.record(structure, Path::new("blows.csv")).unwrap();
+    let noise = Noise {
+        relative: 0.01,
+        ..Noise::default()
+    };
+    noise.add(&mut recording, 4);
+    diagnose(&believed, &[recording], &Options::default()).unwrap()
+}
+
+#[test]
+fn a_right_case_is_right() {
+    let diagnosis = asked(&[]);
+    assert_eq!(diagnosis.outcome, Outcome::None, "{:?}", diagnosis.causes);
+    let said = diagnosis.warnings.last().unwrap();
+    assert!(said.starts_with("causes were sought in 16.0 s"), "{said}");
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let diagnosis = asked(&["stiffness=0.1", "stiffness.direction=x"]);
+    println!("{:?}", diagnosis.causes);
+    assert_eq!(diagnosis.names(), ["stiffness"]);
+}

@@ -1,0 +1,10 @@
+//! Diagnoses of virtual records, from end to end.
+
+mod chatter;
+mod cutting;
+mod hammer;
+mod sensor;
+pub(crate) mod structure;
+mod two_effects;
+mod velocity_jump;
+pub(crate) mod virtual_records;

@@ -1,0 +1,38 @@
+//! Cases and virtual cuts for the tests of this module.
+
+use std::path::Path;
+
+use quietcut_model::case::Case;
+use quietcut_recording::Recording;
+use quietcut_simulate::rig::Noise;
+use quietcut_simulate::{Recorder, TachometerModel, VirtualCut};
+
+/// A case of the tests with more lines behind it.
+pub(crate) fn case(name: &str, more: &str) -> Case {
+    let path = format!("{}/../../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).unwrap();
+    Case::parse(Path::new(&path), &format!("{text}\n{more}")).unwrap()
+}
+
+/// A cut as ideal sensors and a tachometer without jitter record it, with this share of noise on every channel.
+pub(crate) fn record(
+    case: &Case,
+    cut: &VirtualCut,
+    path: &str,
+    rate_hz: f64,
+    noise: f64,
+    seed: u64,
+) -> Recording {
+    let tachometer = TachometerModel {
+        jitter_s: 0.0,
+        ..TachometerModel::ONE_MARK
+    };
+    let recorder = Recorder::Ideal { rate_hz };
+    let (mut recording, _) = cut.record(case, recorder, tachometer, Path::new(path)).unwrap();
+    let noise = Noise {
+        relative: noise,
+        ..Noise::default()
+    };
+    noise.add(&mut recording, seed);
+    recording
+}
