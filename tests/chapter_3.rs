@@ -8,7 +8,7 @@
 use std::path::PathBuf;
 
 use quietcut::case::Case;
-use quietcut::continuation::ForcedProblem;
+use quietcut::orbit::ForcedProblem;
 use quietcut::stability::{Collocation, CubicTerms, FrequencyProblem, Method, MultiFrequency, Problem, Zoa};
 
 /// First limits at one speed, mm.

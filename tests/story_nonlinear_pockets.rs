@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use quietcut::case::Case;
-use quietcut::continuation::ForcedProblem;
 use quietcut::frf::FrfTable;
 use quietcut::identify::harmonic_balance::{Grid, Problem as HarmonicProblem};
 use quietcut::identify::law::{Extra, Law, Role};
+use quietcut::orbit::ForcedProblem;
 use quietcut::report::lobe_chart::{Column, lobe_chart};
 use quietcut::report::marks::Mark;
 use quietcut::simulate::{Entry, Room, Settings, SimulateError, VirtualCut};
@@ -28,7 +28,7 @@ use quietcut::stability::{
     Chart, Collocation, CubicTerms, FrequencyProblem, Method, MultiFrequency, Problem, chart,
 };
 use quietcut::structure::{Form, Matrices};
-use quietcut::test_cuts::{Calls, Outcome, TestCut};
+use quietcut::trial_cuts::{Calls, Outcome, TestCut};
 use quietcut_tests::command::{cases, folder, quietcut};
 use rayon::prelude::*;
 

@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use criterion::Criterion;
 use quietcut::case::Case;
-use quietcut::continuation::ForcedProblem;
+use quietcut::orbit::ForcedProblem;
 use quietcut::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, MultiFrequency, Nyquist,
     Pitched, Problem, Sdm, SdmOrder, SemiDiscretization, Zoa, cell_chart,

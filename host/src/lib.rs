@@ -11,7 +11,7 @@ pub use quietcut_recording as recording;
 pub use quietcut_recording::file;
 pub use quietcut_simulate as simulate;
 pub use quietcut_stability as stability;
-pub use quietcut_stability::{continuation, lobe_table, test_cuts};
+pub use quietcut_stability::{lobe_table, orbit, trial_cuts};
 
 pub mod cli;
 pub mod demo;

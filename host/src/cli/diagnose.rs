@@ -13,7 +13,7 @@ use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched
 use crate::recording::Recording;
 use crate::report::diagnosis::diagnosis_page;
 use crate::report::lobes_change::{called, sentences};
-use crate::test_cuts::{self, TestCut};
+use crate::trial_cuts::{self, TestCut};
 
 /// What the simulation gets wrong about recordings, why, what to add, and how much better that is.
 #[derive(Debug, clap::Args)]
@@ -45,7 +45,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case)?;
     let cuts = match &args.cuts {
-        Some(path) => test_cuts::read(path)?,
+        Some(path) => trial_cuts::read(path)?,
         None => Vec::new(),
     };
     let recordings = args

@@ -9,7 +9,7 @@ use crate::file::FileError;
 use crate::lobe_table::BuildError;
 use crate::plan::PlanError;
 use crate::stability::StabilityError;
-use crate::test_cuts::TestCutsError;
+use crate::trial_cuts::TestCutsError;
 
 type Cause = Box<dyn StdError + Send + Sync>;
 

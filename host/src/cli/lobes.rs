@@ -14,7 +14,7 @@ use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::marks::Mark;
 use crate::report::page::{figure, page};
 use crate::stability::{Chart, Label, LimitSpread, Method, Point, SpeedLine, Uncertainty, chart};
-use crate::test_cuts::{self, Calls, TestCut};
+use crate::trial_cuts::{self, Calls, TestCut};
 
 /// Stability limits over speed, or the dominant multiplier at points.
 #[derive(Debug, clap::Args)]
@@ -87,7 +87,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             } else {
                 Uncertainty::new(&case, &maker, args.seed)
             };
-            let cuts = args.cuts.as_deref().map(test_cuts::read).transpose()?;
+            let cuts = args.cuts.as_deref().map(trial_cuts::read).transpose()?;
             let ranges = Ranges {
                 rpm,
                 depth_mm,

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::{Error, non_negative};
 use crate::case::Case;
-use crate::continuation::collocation_of;
 use crate::frf::{FrfTable, Interpolation};
+use crate::orbit::collocation_of;
 use crate::stability::{
     Collocation, CubicTerms, Fdm, FrequencyProblem, FullDiscretization, Method, ModeCoupling, MultiFrequency,
     Nyquist, Pitched, Problem, RevolutionCollocation, Sdm, SdmOrder, SemiDiscretization, Zoa, after,

@@ -5,7 +5,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
 
 use super::picture::{Axes, CHATTER, Canvas, INK, ORANGE, PictureError, QUIET, text};
-use crate::test_cuts::{Outcome, TestCut};
+use crate::trial_cuts::{Outcome, TestCut};
 
 /// What a marked point is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,86 +1,54 @@
 //! Stability of the cut: multipliers, limits, their derivatives and spread, charts.
 //!
 //! Sign of the regenerative force: F = w K_tc α (u − u_τ), with α as in eq. 6.7, is stable at small depth w.
+//!
+//! Rooms, each of which uses only those above it: `criteria` and `error`; `process` (extensions of the case); `problem`
+//! (equation and meshes); `spectrum` (multipliers of a period map); `limits` (one speed, charts, derivatives, spread);
+//! `frequency` (loops of receptances); `methods` (one file per method); [`orbit`] (forced periodic orbits);
+//! [`lobe_table`]; [`trial_cuts`]. Tests across rooms are in `tests`.
 
-mod cells;
-mod characteristic;
-mod chart;
-pub(crate) mod collocation;
-pub mod continuation;
-mod discretized;
-mod eigenmotion;
-mod element;
-mod exponential;
-pub(crate) mod extension;
-mod fdm;
+mod criteria;
+mod error;
 mod frequency;
-pub(crate) mod gauss;
-mod hessenberg;
-mod krylov;
-pub(crate) mod line;
+mod limits;
 pub mod lobe_table;
-mod method;
-pub(crate) mod multiplier;
-mod one_period;
-pub(crate) mod passages;
-pub(crate) mod period;
-pub(crate) mod period_map;
-mod pitched;
-mod plane;
-pub(crate) mod point;
+mod methods;
+pub mod orbit;
 mod problem;
-mod range;
-mod revolution;
-mod revolution_map;
-pub(crate) mod revolution_mesh;
-mod root;
-pub mod sampling;
-mod sdm;
-mod sensitivity;
+mod process;
 mod spectrum;
-mod stepped;
-pub mod test_cuts;
-mod uncertainty;
-mod variable_pitch;
-mod winding;
+pub mod trial_cuts;
 
-pub use cells::{Cell, CellChart, CellLine, cell_chart};
-pub use chart::{Chart, Refinement, chart};
-pub use collocation::Collocation;
-pub use extension::{after, needs_orbit};
-pub use fdm::{Fdm, FullDiscretization};
-pub use frequency::{FrequencyProblem, ModeCoupling, MultiFrequency, Nyquist, Zoa};
-pub use line::{Limit, SpeedLine, Switch, line};
-pub use method::{Label, Method};
-pub use multiplier::{Kind, Verdict};
-pub use pitched::Pitched;
-pub use plane::{Linearized, Plane};
-pub use point::{LEAST_ERROR, Point, point};
-pub use problem::{CubicTerms, Problem, StabilityError};
-pub use range::{default_speeds, spaced};
-pub use sampling::Variable;
-pub use sdm::{Sdm, SdmOrder, SemiDiscretization};
-pub use sensitivity::{Sensitivity, Slope, Tangent};
-pub use uncertainty::{LimitSpread, Maker, Percentile, Percentiles, Uncertainty};
-pub use variable_pitch::RevolutionCollocation;
+pub use criteria::LEAST_ERROR;
+pub use error::StabilityError;
+pub use frequency::problem::FrequencyProblem;
+pub use limits::cell::Cell;
+pub use limits::cell_chart::{CellChart, CellLine, cell_chart};
+pub use limits::chart::{Chart, Refinement, chart};
+pub use limits::line::line;
+pub use limits::method::{Label, Method};
+pub use limits::plane::{Linearized, Plane};
+pub use limits::point::{Point, point};
+pub use limits::sampling::{Basis, Variable};
+pub use limits::sensitivity::{Sensitivity, Slope, Tangent};
+pub use limits::speed_line::{Limit, SpeedLine, Switch};
+pub use limits::speeds::{default_speeds, spaced};
+pub use limits::spread::{LimitSpread, Percentile, Percentiles};
+pub use limits::uncertainty::{Maker, Uncertainty};
+pub use methods::collocation::Collocation;
+pub use methods::fdm::{Fdm, FullDiscretization};
+pub use methods::mode_coupling::ModeCoupling;
+pub use methods::multi_frequency::MultiFrequency;
+pub use methods::nyquist::Nyquist;
+pub use methods::revolution_collocation::RevolutionCollocation;
+pub use methods::sdm::{Sdm, SdmOrder, SemiDiscretization};
+pub use methods::zoa::Zoa;
+pub use problem::linear::{CubicTerms, Problem};
+pub use problem::pitched::Pitched;
+pub use process::treatment::needs_orbit;
+pub use process::wear_and_drift::after;
+pub use spectrum::stability_loss::Kind;
+pub use spectrum::verdict::Verdict;
 
-#[cfg(test)]
-mod agreement;
-#[cfg(test)]
-mod cells_tests;
-#[cfg(test)]
-mod line_tests;
-#[cfg(test)]
-mod properties;
-#[cfg(test)]
-mod random_tests;
-#[cfg(test)]
-mod sensitivity_tests;
-#[cfg(test)]
-mod taylor;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod uncertainty_tests;
-#[cfg(test)]
-mod variable_pitch_tests;

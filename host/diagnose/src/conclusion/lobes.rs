@@ -6,8 +6,8 @@ use serde::Serialize;
 use crate::conclusion::recorded_cuts::recorded_cuts;
 use quietcut_model::case::Case;
 use quietcut_recording::{Kind as RecordKind, Recording};
-use quietcut_stability::continuation::{ForcedProblem, collocation_of};
-use quietcut_stability::test_cuts::{Call, Calls, TestCut, call, calls};
+use quietcut_stability::orbit::{ForcedProblem, collocation_of};
+use quietcut_stability::trial_cuts::{Call, Calls, TestCut, call, calls};
 use quietcut_stability::{
     CubicTerms, Kind, Limit, Method, Pitched, SpeedLine, StabilityError, after, chart, default_speeds,
     needs_orbit, spaced,
@@ -375,7 +375,7 @@ fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityErr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use quietcut_stability::test_cuts::Outcome;
+    use quietcut_stability::trial_cuts::Outcome;
 
     /// The robot with all its stiffness changed by this share.
     fn stiffened(change: f64) -> Case {

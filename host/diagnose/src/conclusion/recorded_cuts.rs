@@ -5,7 +5,7 @@ use quietcut_core::monitor::{Monitor, State};
 
 use quietcut_model::case::Case;
 use quietcut_recording::{Kind, RecordedCut, Recording, Sensed, Speed};
-use quietcut_stability::test_cuts::{Outcome, TestCut};
+use quietcut_stability::trial_cuts::{Outcome, TestCut};
 
 /// Immersion angles and feeds that are no further apart are those of the same chart.
 const SAME_DEG: f64 = 0.5;

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::steady_fit::NINETY_PERCENT;
-use quietcut_stability::sampling::Basis;
+use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine};
 
 /// Lobes that are looked at at each speed.

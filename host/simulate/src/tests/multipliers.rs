@@ -4,7 +4,7 @@
 //! Newton, which agree to 2e-8.
 
 use super::*;
-use quietcut_stability::continuation::ForcedProblem;
+use quietcut_stability::orbit::ForcedProblem;
 use quietcut_stability::{CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
 
 /// The force of a cut without vibration, thesis eq. 3.6, turned round: with it a tool at rest stays at rest.

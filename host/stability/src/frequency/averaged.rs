@@ -5,14 +5,15 @@ use num_complex::Complex64;
 
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::FrequencyProblem;
-use crate::{Kind, StabilityError};
+use crate::error::StabilityError;
+use crate::spectrum::stability_loss::Kind;
 use quietcut_numerics::complex_eigenvalues;
 
 /// u = H (κ α₀ − β₀) u with the averages α₀ (times K_tc) and β₀ = β_e + β_f over a tooth period.
 ///
 /// β₀ does not depend on the depth: with H̃ = (I + H β₀)⁻¹ H, u = κ H̃ α₀ u, and the eigenvalues of H̃ α₀ say all. Only
 /// displacements that change the chip thickness count in it.
-pub(super) struct AveragedLoop<'a> {
+pub(crate) struct AveragedLoop<'a> {
     problem: &'a FrequencyProblem,
     /// The delay, s; `None` where the displacement a tooth period ago is neglected.
     delay_s: Option<f64>,
@@ -26,7 +27,7 @@ pub(super) struct AveragedLoop<'a> {
 
 impl<'a> AveragedLoop<'a> {
     /// The loop at a speed, rev/min, or that of the cut without its own past.
-    pub(super) fn new(problem: &'a FrequencyProblem, rpm: Option<f64>) -> Self {
+    pub(crate) fn new(problem: &'a FrequencyProblem, rpm: Option<f64>) -> Self {
         let process = &problem.process;
         let averaged = process
             .force
@@ -55,7 +56,7 @@ impl<'a> AveragedLoop<'a> {
     ///
     /// # Errors
     /// The gain at the last line, with the displacement and its past in opposition, is 1 or more at that depth.
-    pub(super) fn check_reach(problem: &FrequencyProblem, depth_mm: f64) -> Result<(), StabilityError> {
+    pub(crate) fn check_reach(problem: &FrequencyProblem, depth_mm: f64) -> Result<(), StabilityError> {
         let Some((_, last_hz)) = problem.band_hz() else {
             return Ok(());
         };

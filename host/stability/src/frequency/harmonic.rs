@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use super::limits::{Limit, limits};
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::{FrequencyProblem, Resonance};
-use crate::Kind;
+use crate::spectrum::stability_loss::Kind;
 use quietcut_model::milling::Harmonic;
 use quietcut_numerics::complex_eigenvalues;
 use quietcut_numerics::eigenvalues;
@@ -18,7 +18,7 @@ use quietcut_numerics::eigenvalues;
 /// is a real eigenvalue, and the loop is real. s from 0 to iΩ/2 and the conjugate is all there is: what is true at
 /// s is true at s + iΩ. Forces jump where a tooth enters or leaves, so α_k falls as 1/k and H as 1/k²: what is left out
 /// changes limits as 1/K³, and as 1/K² for a structure whose residues do not sum to zero.
-pub(super) struct HarmonicLoop<'a> {
+pub(crate) struct HarmonicLoop<'a> {
     problem: &'a FrequencyProblem,
     /// Tooth-passing frequency Ω, rad/s.
     passing: f64,
@@ -32,7 +32,7 @@ pub(super) struct HarmonicLoop<'a> {
 
 impl<'a> HarmonicLoop<'a> {
     /// The loop at a speed, rev/min, with harmonics up to K.
-    pub(super) fn new(problem: &'a FrequencyProblem, rpm: f64, harmonics: usize) -> Self {
+    pub(crate) fn new(problem: &'a FrequencyProblem, rpm: f64, harmonics: usize) -> Self {
         let process = &problem.process;
         let most = 2 * harmonics as i32 + 1;
         let moves = problem.moves();
@@ -57,7 +57,7 @@ impl<'a> HarmonicLoop<'a> {
     }
 
     /// The fewest harmonics that reach beyond every resonance.
-    pub(super) fn least_harmonics(problem: &FrequencyProblem, rpm: f64) -> usize {
+    pub(crate) fn least_harmonics(problem: &FrequencyProblem, rpm: f64) -> usize {
         let fastest = problem
             .resonances()
             .iter()
@@ -68,12 +68,12 @@ impl<'a> HarmonicLoop<'a> {
     }
 
     /// K.
-    pub(super) fn harmonics(&self) -> usize {
+    pub(crate) fn harmonics(&self) -> usize {
         self.harmonics
     }
 
     /// The limits with every second line of a table, none where they cannot be had; `None` without a table.
-    pub(super) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<Limit>> {
+    pub(crate) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<Limit>> {
         let problem = self.problem.thinned()?;
         let thinned = HarmonicLoop {
             problem: &problem,
@@ -164,7 +164,7 @@ impl<'a> HarmonicLoop<'a> {
     }
 
     /// The frequency, Hz, of the largest displacement in the motion of a root s at a depth, m.
-    pub(super) fn vibration_hz(&self, s: Complex64, depth_m: f64) -> Option<f64> {
+    pub(crate) fn vibration_hz(&self, s: Complex64, depth_m: f64) -> Option<f64> {
         let kappa = self.regeneration(s) * depth_m;
         let (cut, forced) = self.matrices(s)?;
         let size = cut.nrows();
@@ -213,7 +213,7 @@ impl<'a> HarmonicLoop<'a> {
 
 impl HarmonicLoop<'_> {
     /// The frequency, Hz, of the largest displacement in the vibration at a limit.
-    pub(super) fn chatter_hz(&self, limit: &Limit) -> Option<f64> {
+    pub(crate) fn chatter_hz(&self, limit: &Limit) -> Option<f64> {
         let s = Complex64::new(0.0, limit.omega);
         self.vibration_hz(s, limit.depth_m)
     }

@@ -6,28 +6,31 @@ use num_complex::Complex64;
 
 use super::loci::{crossings, trace, turning};
 use super::open_loop::OpenLoop;
-use crate::{Kind, LEAST_ERROR, SpeedLine, StabilityError, Switch};
+use crate::criteria::LEAST_ERROR;
+use crate::error::StabilityError;
+use crate::limits::speed_line::{SpeedLine, Switch};
+use crate::spectrum::stability_loss::Kind;
 
 /// Distance from an end where loci are real, as a share of the frequency beside it, at which their direction is read.
 const BESIDE: f64 = 1e-5;
 
 /// A root on the imaginary axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Limit {
+pub(crate) struct Limit {
     /// Depth, m.
-    pub(super) depth_m: f64,
+    pub(crate) depth_m: f64,
     /// The root is iω; rad/s.
-    pub(super) omega: f64,
+    pub(crate) omega: f64,
     /// How it crosses.
-    pub(super) kind: Kind,
+    pub(crate) kind: Kind,
     /// True where it becomes unstable with growing depth.
-    pub(super) outward: bool,
+    pub(crate) outward: bool,
 }
 
 /// All crossings up to a depth, m, by depth.
 ///
 /// `None` where receptances are infinite or nothing finite comes out.
-pub(super) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Limit>> {
+pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Limit>> {
     let floor = depth_m.recip();
     let mut grid = open_loop.grid(floor)?;
     let real_end = open_loop.real_end();
@@ -81,7 +84,7 @@ pub(super) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Limi
 /// D(s) has the roots for zeros and the poles of the structure for poles; along the line from `sigma` to infinity its
 /// argument grows by π(P − N)/… of a full turn for each of the pair. `None` where the line meets a root, or where the table
 /// cannot be continued to it.
-pub(super) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
+pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
     let grid = open_loop.grid(depth_m.max(1e-9).recip())?;
     let determinant = |omega: f64| {
         let s = Complex64::new(sigma, omega);
@@ -119,7 +122,7 @@ fn error_m(limit: &Limit, others: &[Vec<Limit>]) -> Option<f64> {
 ///
 /// # Errors
 /// The number unstable at depth 0 cannot be told, or a vibration has a frequency that was not measured.
-pub(super) fn speed_line(
+pub(crate) fn speed_line(
     open_loop: &impl OpenLoop,
     rpm: f64,
     depth_mm: f64,
@@ -152,7 +155,7 @@ pub(super) fn speed_line(
 }
 
 /// How many roots are unstable at depth 0: with edge and feed terms that act on the axial vibration there may be some.
-pub(super) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
+pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
     if open_loop.problem().process.axial_depth_modulation {
         unstable_roots(open_loop, 0.0, 0.0)
     } else {
@@ -161,6 +164,6 @@ pub(super) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
 }
 
 /// ω as Hz.
-pub(super) fn hertz(limit: &Limit) -> Option<f64> {
+pub(crate) fn hertz(limit: &Limit) -> Option<f64> {
     Some(limit.omega / TAU)
 }

@@ -13,31 +13,31 @@ const BEND: f64 = 0.1;
 
 /// Eigenvalues at one frequency.
 #[derive(Clone, Debug)]
-pub(super) struct Sample {
-    pub(super) omega: f64,
-    pub(super) values: Vec<Complex64>,
+pub(crate) struct Sample {
+    pub(crate) omega: f64,
+    pub(crate) values: Vec<Complex64>,
 }
 
 /// A locus on the positive real axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Crossing {
+pub(crate) struct Crossing {
     /// Frequency, rad/s.
-    pub(super) omega: f64,
+    pub(crate) omega: f64,
     /// Where on the axis.
-    pub(super) value: f64,
+    pub(crate) value: f64,
     /// True where the imaginary part rises with the frequency.
-    pub(super) rises: bool,
+    pub(crate) rises: bool,
 }
 
 /// A function of frequency, rad/s, that gives its eigenvalues of absolute value `floor` and above.
-pub(super) trait Loci: Fn(f64) -> Option<Vec<Complex64>> {}
+pub(crate) trait Loci: Fn(f64) -> Option<Vec<Complex64>> {}
 impl<F: Fn(f64) -> Option<Vec<Complex64>>> Loci for F {}
 
 /// Samples over a grid, so dense that every locus of at least `floor` can be told from the others from one to the next,
 /// and is nearly straight in between: its middle is off by `bend` times a tenth of its size at most.
 ///
 /// `None` where the function is.
-pub(super) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Option<Vec<Sample>> {
+pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Option<Vec<Sample>> {
     let sample = |omega: f64| {
         Some(Sample {
             omega,
@@ -149,7 +149,7 @@ fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
 }
 
 /// A step from one sample to the next along a locus: frequency and value at both ends.
-pub(super) type Step = [(f64, Complex64); 2];
+pub(crate) type Step = [(f64, Complex64); 2];
 
 /// The steps from one sample to another, locus by locus.
 fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
@@ -162,7 +162,7 @@ fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
 }
 
 /// The steps from each sample to the next.
-pub(super) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
+pub(crate) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
     samples
         .windows(2)
         .flat_map(|pair| steps_between(&pair[0], &pair[1]))
@@ -172,7 +172,7 @@ pub(super) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
 ///
 /// Where it gives up on a step, because loci so near to each other were taken for one another, the samples are halved
 /// and all steps between them solved anew. `None` where it gives up however short the steps.
-pub(super) fn solve_steps<T>(
+pub(crate) fn solve_steps<T>(
     loci: &impl Loci,
     samples: &[Sample],
     solve: &impl Fn(Step) -> Option<Vec<T>>,
@@ -209,7 +209,7 @@ fn solve_between<T>(
 }
 
 /// Where loci of at least `floor` cross the positive real axis, largest first: solved for to 1e-12 of the value.
-pub(super) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Option<Vec<Crossing>> {
+pub(crate) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Option<Vec<Crossing>> {
     let mut found = solve_steps(loci, samples, &|[low, high]: Step| {
         if (low.1.im > 0.0) == (high.1.im > 0.0) || low.1.re.max(high.1.re) < 0.5 * floor {
             return Some(Vec::new());
@@ -241,10 +241,10 @@ pub(super) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Opt
 
 /// A point of a locus, and by how much it misses what is looked for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Mark {
-    pub(super) omega: f64,
-    pub(super) value: Complex64,
-    pub(super) miss: f64,
+pub(crate) struct Mark {
+    pub(crate) omega: f64,
+    pub(crate) value: Complex64,
+    pub(crate) miss: f64,
 }
 
 /// Where the miss is zero between two points of a locus with misses of either sign: the frequency, and the locus there.
@@ -252,7 +252,7 @@ pub(super) struct Mark {
 /// `at` gives all loci at a frequency with their misses; the one nearest to the straight line counts. Regula falsi with
 /// halving (Illinois), until the miss is below the tolerance. `None` where it jumps over zero: then two loci were taken for
 /// one.
-pub(super) fn zero(
+pub(crate) fn zero(
     mut low: Mark,
     mut high: Mark,
     tolerance: f64,
@@ -293,7 +293,7 @@ pub(super) fn zero(
 /// half turn at most, and its middle agrees.
 ///
 /// `None` where the function is, or vanishes.
-pub(super) fn turning(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
+pub(crate) fn turning(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
     let mut sum = 0.0;
     let Some((&first, rest)) = grid.split_first() else {
         return Some(sum);

@@ -5,23 +5,10 @@
 //! Fourier series one at the frequencies s + ikΩ. In both, the depth multiplies a matrix that does not depend on it:
 //! an eigenvalue λ(s) of it belongs to a root where κ λ = 1.
 
-mod averaged;
-mod harmonic;
-mod limits;
-mod loci;
-mod mode_coupling;
-mod multi_frequency;
-mod nyquist;
-mod open_loop;
-mod problem;
-mod root;
-mod zoa;
-
-pub use mode_coupling::ModeCoupling;
-pub use multi_frequency::MultiFrequency;
-pub use nyquist::Nyquist;
-pub use problem::FrequencyProblem;
-pub use zoa::Zoa;
-
-#[cfg(test)]
-mod tests;
+pub(crate) mod averaged;
+pub(crate) mod harmonic;
+pub(crate) mod limits;
+pub(crate) mod loci;
+pub(crate) mod open_loop;
+pub(crate) mod problem;
+pub(crate) mod root;

@@ -3,23 +3,23 @@
 use num_complex::Complex64;
 
 use super::problem::{FrequencyProblem, Resonance};
-use crate::Kind;
+use crate::spectrum::stability_loss::Kind;
 
 /// Where all loci are real or in conjugate pairs: multipliers cross there alone.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct RealEnd {
+pub(crate) struct RealEnd {
     /// Frequency, rad/s: 0, or half the tooth-passing frequency.
-    pub(super) omega: f64,
+    pub(crate) omega: f64,
     /// The real loci there, 1/m.
-    pub(super) loci: Vec<f64>,
+    pub(crate) loci: Vec<f64>,
     /// What crosses: fold at 0, flip at the other.
-    pub(super) kind: Kind,
+    pub(crate) kind: Kind,
 }
 
 /// The loop that the cut closes around the structure, opened at the regenerative force.
 ///
 /// Roots are the s with κ(s) λ(s) = 1 for an eigenvalue λ, 1/m, where κ = w·[`regeneration`](Self::regeneration).
-pub(super) trait OpenLoop: Sync {
+pub(crate) trait OpenLoop: Sync {
     /// The problem it is made of.
     fn problem(&self) -> &FrequencyProblem;
 
@@ -64,7 +64,7 @@ pub(super) trait OpenLoop: Sync {
 }
 
 /// Points about resonances up to `end`, ascending, with 0 and `end`: dense within the width, then ever wider apart.
-pub(super) fn around(resonances: &[Resonance], end: f64) -> Vec<f64> {
+pub(crate) fn around(resonances: &[Resonance], end: f64) -> Vec<f64> {
     let mut grid = vec![0.0, end];
     for Resonance { omega, width } in resonances {
         let width = width.max(1e-9 * end);
@@ -86,7 +86,7 @@ pub(super) fn around(resonances: &[Resonance], end: f64) -> Vec<f64> {
 }
 
 /// Sorted, without points that rounding alone tells apart.
-pub(super) fn ascending(mut grid: Vec<f64>) -> Vec<f64> {
+pub(crate) fn ascending(mut grid: Vec<f64>) -> Vec<f64> {
     grid.sort_by(f64::total_cmp);
     let end = grid.last().copied().unwrap_or(0.0);
     grid.dedup_by(|next, before| *next - *before < 1e-10 * end);

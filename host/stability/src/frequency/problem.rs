@@ -3,9 +3,9 @@
 use nalgebra::Matrix3;
 use num_complex::Complex64;
 
-use crate::extension::Treated;
-use crate::problem::cutting;
-use crate::{CubicTerms, Problem, StabilityError};
+use crate::error::StabilityError;
+use crate::problem::linear::{CubicTerms, Problem, cutting};
+use crate::process::treatment::Treated;
 use quietcut_frf::{FrfTable, Interpolation};
 use quietcut_model::case::Case;
 use quietcut_model::milling::Process;
@@ -35,9 +35,9 @@ enum Receptance {
 
 /// A frequency, rad/s, where receptances change fast, and within how many rad/s they do.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Resonance {
-    pub(super) omega: f64,
-    pub(super) width: f64,
+pub(crate) struct Resonance {
+    pub(crate) omega: f64,
+    pub(crate) width: f64,
 }
 
 impl FrequencyProblem {
@@ -82,12 +82,12 @@ impl FrequencyProblem {
     }
 
     /// Tooth period, s.
-    pub(super) fn tooth_period_s(&self, rpm: f64) -> f64 {
+    pub(crate) fn tooth_period_s(&self, rpm: f64) -> f64 {
         60.0 / (rpm * self.teeth as f64)
     }
 
     /// H(s), m/N, rows displacement, columns force; s in rad/s. `None` where s is a pole.
-    pub(super) fn transfer(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
+    pub(crate) fn transfer(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         match &self.receptance {
             Receptance::Model(structure, _) => structure.transfer(s),
             Receptance::Table(interpolation) => {
@@ -98,12 +98,12 @@ impl FrequencyProblem {
 
     /// Number of poles of the structure with a real part above `sigma`, 1/s, each of a pair counted; of a table none is
     /// known.
-    pub(super) fn poles_right_of(&self, sigma: f64) -> i32 {
+    pub(crate) fn poles_right_of(&self, sigma: f64) -> i32 {
         self.poles().iter().map(|pole| i32::from(pole.re > sigma)).sum()
     }
 
     /// The poles of the structure, 1/s; those of a table are not known.
-    pub(super) fn poles(&self) -> &[Complex64] {
+    pub(crate) fn poles(&self) -> &[Complex64] {
         match &self.receptance {
             Receptance::Model(_, poles) => poles,
             Receptance::Table(_) => &[],
@@ -111,7 +111,7 @@ impl FrequencyProblem {
     }
 
     /// The same with every second line of a table; `None` for a model, and for a table with too few lines.
-    pub(super) fn thinned(&self) -> Option<Self> {
+    pub(crate) fn thinned(&self) -> Option<Self> {
         let Receptance::Table(interpolation) = &self.receptance else {
             return None;
         };
@@ -122,7 +122,7 @@ impl FrequencyProblem {
     }
 
     /// The frequencies that were measured, Hz; `None` for a model, which knows all.
-    pub(super) fn band_hz(&self) -> Option<(f64, f64)> {
+    pub(crate) fn band_hz(&self) -> Option<(f64, f64)> {
         match &self.receptance {
             Receptance::Model(..) => None,
             Receptance::Table(interpolation) => Some(interpolation.band_hz()),
@@ -133,7 +133,7 @@ impl FrequencyProblem {
     ///
     /// # Errors
     /// The vibration at that speed and depth has a frequency that the table does not have.
-    pub(super) fn check_band(
+    pub(crate) fn check_band(
         &self,
         frequency_hz: Option<f64>,
         rpm: f64,
@@ -155,7 +155,7 @@ impl FrequencyProblem {
     }
 
     /// The directions, of feed, normal and axial, in which the tool moves at all.
-    pub(super) fn moves(&self) -> [bool; 3] {
+    pub(crate) fn moves(&self) -> [bool; 3] {
         std::array::from_fn(|axis| match &self.receptance {
             Receptance::Model(structure, _) => structure.c.row(axis).iter().any(|&entry| entry != 0.0),
             Receptance::Table(interpolation) => interpolation
@@ -166,7 +166,7 @@ impl FrequencyProblem {
     }
 
     /// Where receptances change fast: the poles of a model, the peaks of a table.
-    pub(super) fn resonances(&self) -> Vec<Resonance> {
+    pub(crate) fn resonances(&self) -> Vec<Resonance> {
         match &self.receptance {
             Receptance::Model(_, poles) => poles
                 .iter()
@@ -181,7 +181,7 @@ impl FrequencyProblem {
     }
 
     /// Frequencies, rad/s, between which nothing of H is hidden: those of the lines of a table, else none.
-    pub(super) fn lines(&self) -> Vec<f64> {
+    pub(crate) fn lines(&self) -> Vec<f64> {
         match &self.receptance {
             Receptance::Model(..) => Vec::new(),
             Receptance::Table(interpolation) => {

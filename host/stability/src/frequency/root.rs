@@ -2,12 +2,15 @@
 
 use num_complex::Complex64;
 
-use super::FrequencyProblem;
 use super::averaged::AveragedLoop;
 use super::limits::unstable_roots;
 use super::loci::{steps, trace};
 use super::open_loop::OpenLoop;
-use crate::{Kind, LEAST_ERROR, Point, StabilityError};
+use super::problem::FrequencyProblem;
+use crate::criteria::LEAST_ERROR;
+use crate::error::StabilityError;
+use crate::limits::point::Point;
+use crate::spectrum::stability_loss::Kind;
 
 /// Where the lines are laid along which roots are looked for: real parts as multiples of the slowest decay of a resonance.
 const LINES: [f64; 14] = [
@@ -22,7 +25,7 @@ const REACH: f64 = 0.05;
 /// First roots are looked for where they begin at depth 0, at the poles of the structure. Then loci are followed along
 /// lines Re s = σ: where one passes near 1/w its straight continuation beside the line hits a root, which is solved for.
 /// The rightmost root found so far is confirmed by counting the roots to the right of it. `None` where none is confirmed.
-pub(super) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
+pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
     let decay = open_loop
         .problem()
         .resonances()
@@ -120,7 +123,7 @@ fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Option<Vec<Co
 }
 
 /// The root near a guess, by secants on w − 1/locus, of the locus for which it is smallest.
-pub(super) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) -> Option<Complex64> {
+pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) -> Option<Complex64> {
     // Without depth roots are poles of the loop, where a locus is infinite: large ones are enough.
     const SHALLOW_M: f64 = 1e-3;
     let floor = 0.3 / depth_m.max(SHALLOW_M);
@@ -168,7 +171,7 @@ pub(super) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
 ///
 /// # Errors
 /// The root cannot be found or confirmed; it was not measured.
-pub(super) fn averaged_point(
+pub(crate) fn averaged_point(
     problem: &FrequencyProblem,
     rpm: f64,
     depth_mm: f64,
@@ -201,7 +204,7 @@ pub(super) fn averaged_point(
 }
 
 /// A point from its multiplier and the error of it.
-pub(super) fn point_of(
+pub(crate) fn point_of(
     rpm: f64,
     depth_mm: f64,
     multiplier: Complex64,

@@ -4,10 +4,11 @@ use quietcut_core::lobes::{Column, InterpolationError, LobeTable};
 use quietcut_core::units::{Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
 
+use super::encoding::towards;
 use super::entries::{Entry, surely_stable, unstable, with_all_of};
 use super::layers::{Family, Span};
-use super::towards;
-use crate::{SpeedLine, StabilityError};
+use crate::error::StabilityError;
+use crate::limits::speed_line::SpeedLine;
 
 /// Where in a gap it is checked, in turn: refinement has looked at the middle.
 const SHARES: [f64; 2] = [0.38, 0.62];

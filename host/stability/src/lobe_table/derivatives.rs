@@ -6,10 +6,11 @@ use quietcut_core::lobes::{IntervalSlopes, LayerMode, MODES_MAX, Slopes};
 use quietcut_core::units::Hertz;
 use rayon::prelude::*;
 
-use super::BuildError;
 use super::entries::Entry;
+use super::error::BuildError;
 use super::layers::Family;
-use crate::{Sensitivity, SpeedLine, Switch, Tangent};
+use crate::limits::sensitivity::{Sensitivity, Tangent};
+use crate::limits::speed_line::{SpeedLine, Switch};
 use quietcut_model::structure::ModalPart;
 
 /// Derivatives of a layer.

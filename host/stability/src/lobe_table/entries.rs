@@ -3,7 +3,8 @@
 use quietcut_core::lobes::{Interval, Kind as TableKind, format::MAX_INTERVALS};
 use quietcut_core::units::{Hertz, Millimeters};
 
-use crate::{Kind, SpeedLine};
+use crate::limits::speed_line::SpeedLine;
+use crate::spectrum::stability_loss::Kind;
 
 /// Depths that are not stable, with their ends in full precision.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,9 @@
 //! Which speeds and depths a table covers.
 
 use super::layers::Family;
-use crate::{Refinement, StabilityError, chart, spaced};
+use crate::error::StabilityError;
+use crate::limits::chart::{Refinement, chart};
+use crate::limits::speeds::spaced;
 
 /// Four times the lowest limit, found by doubling: deep enough for every pocket that is worth while.
 pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> Result<f64, StabilityError> {

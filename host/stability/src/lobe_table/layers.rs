@@ -6,12 +6,18 @@ use quietcut_core::lobes::{FEED_DIRECTION_SPAN, Validity};
 use quietcut_core::units::{Degrees, Millimeters};
 use rayon::prelude::*;
 
-use super::{BuildError, TableRequest};
-use crate::continuation::collocation_of;
-use crate::{
-    CubicTerms, Limit, Method, Percentile, Pitched, Problem, SpeedLine, StabilityError, Uncertainty, chart,
-    needs_orbit,
-};
+use super::error::BuildError;
+use super::request::TableRequest;
+use crate::error::StabilityError;
+use crate::limits::chart::chart;
+use crate::limits::method::Method;
+use crate::limits::speed_line::{Limit, SpeedLine};
+use crate::limits::spread::Percentile;
+use crate::limits::uncertainty::Uncertainty;
+use crate::orbit::collocation_of;
+use crate::problem::linear::{CubicTerms, Problem};
+use crate::problem::pitched::Pitched;
+use crate::process::treatment::needs_orbit;
 use quietcut_model::case::Case;
 
 /// Feed per tooth, mm, up to which a layer holds whose limits do not depend on the feed.

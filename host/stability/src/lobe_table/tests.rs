@@ -5,10 +5,17 @@ use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
 use super::accuracy::Miss;
+use super::encoding::towards;
+use super::entries::{self, Entry};
 use super::*;
-use crate::continuation;
-use crate::{CubicTerms, Method, Pitched, Problem, RevolutionCollocation, SpeedLine, line};
-use quietcut_model::case::{Deviation, Parameter};
+use crate::limits::line::line;
+use crate::limits::method::Method;
+use crate::limits::speed_line::SpeedLine;
+use crate::methods::revolution_collocation::RevolutionCollocation;
+use crate::orbit;
+use crate::problem::linear::{CubicTerms, Problem};
+use crate::problem::pitched::Pitched;
+use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_testkit::case;
 
 fn problem(case: &Case) -> Problem {
@@ -267,7 +274,7 @@ fn the_stated_error_of_a_5_percent_table_holds() {
 }
 
 /// From the case with cubic terms through the table's bytes and the lookup of the device: about two CPU minutes,
-/// `cargo test --release -p quietcut --lib cubic_terms_through -- --ignored --nocapture`
+/// `cargo test --release -p quietcut-stability --lib cubic_terms_through -- --ignored --nocapture`
 #[test]
 #[ignore = "forced orbits at some hundred speeds; see the comment above for the command"]
 fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
@@ -291,7 +298,7 @@ fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
         let mut there = case.clone();
         let (feed_mm, rpm) = (rng.random_range(0.1..0.15), rng.random_range(526.0..559.0));
         there.cut.as_mut().unwrap().feed_per_tooth_mm = feed_mm;
-        let forced = continuation::ForcedProblem::new(&there).unwrap();
+        let forced = orbit::ForcedProblem::new(&there).unwrap();
         let direct = forced.line(rpm, depth_mm, 40).unwrap();
         trial.check(&point(&case, 1.0, feed_mm), None, &direct);
         // It is the limit with the cubic terms, not that without.
@@ -544,7 +551,7 @@ fn a_structure_with_cubic_terms_has_layers_over_feed() {
             .iter()
             .all(|family| family.validity.feed_from == family.validity.feed_to)
     );
-    let forced = continuation::ForcedProblem::new(&case).unwrap();
+    let forced = orbit::ForcedProblem::new(&case).unwrap();
     let direct = forced.line(rpm, depth_mm, 40).unwrap();
     assert_eq!(families[1].lines(&[rpm], depth_mm).unwrap()[0], direct);
     // What is not surely stable is an entry.

@@ -1,0 +1,312 @@
+//! Cell charts: the dominant multiplier over a grid of speeds and depths.
+//!
+//! At one speed all multipliers are computed at a few depths only. Between two of them each multiplier that may be the dominant
+//! one is a cubic in depth through both ends with their derivatives. One step of Newton on the characteristic matrix
+//! half way says how far the cubic is off there; where that is too much, or where multipliers cannot be told apart, the
+//! interval is halved, down to the cells themselves.
+
+use num_complex::Complex64;
+
+use super::bounds::{check_depth, check_speed};
+use super::cell::Cell;
+use crate::criteria::{LEAST_ERROR, UNCONFIRMED};
+use crate::error::StabilityError;
+use crate::spectrum::along_depth::Spectrum;
+use crate::spectrum::root::Root;
+use crate::spectrum::verdict::Verdict;
+
+/// Error of the cubic, relative, below which an interval is not halved: half of the 1e-4 that a cell may have.
+const TOLERANCE: f64 = 5e-5;
+
+/// The same for multipliers beyond [`FAR`], of which only the verdict matters.
+const TOLERANCE_FAR: f64 = 5e-3;
+
+/// Multipliers beyond this size need not be known well.
+const FAR: f64 = 2.1;
+
+/// Multipliers below this share of the largest are not followed: between two samples none of them overtakes it, or the
+/// branches bend so much that the samples lie closer.
+const FOLLOWED: f64 = 0.4;
+
+/// Intervals in depth that are begun with; cells that are fewer are all computed.
+const INTERVALS: usize = 10;
+
+/// Share of the depth range that is computed first; then ranges double.
+const FIRST_PART: f64 = 0.125;
+
+/// [`Method::cells`] of any method that has multipliers; `spectrum` gives them at this speed, good for depths up to its
+/// argument, m.
+pub(crate) fn cells_of<S: Spectrum>(
+    rpm: f64,
+    depths_mm: &[f64],
+    spectrum: impl Fn(f64) -> S,
+) -> Result<Vec<Cell>, StabilityError> {
+    check_speed(rpm)?;
+    for &depth_mm in depths_mm {
+        check_depth(depth_mm)?;
+    }
+    let mut order: Vec<usize> = (0..depths_mm.len()).collect();
+    order.sort_by(|&a, &b| depths_mm[a].total_cmp(&depths_mm[b]));
+    let depths_m: Vec<f64> = order.iter().map(|&index| depths_mm[index] * 1e-3).collect();
+    let Some(&last_m) = depths_m.last() else {
+        return Ok(Vec::new());
+    };
+    let mut deepest_m = last_m * FIRST_PART;
+    let mut column = Column {
+        rpm,
+        spectrum: spectrum(deepest_m),
+        cells: vec![Cell::new(0.0, f64::INFINITY); depths_m.len()],
+        depths_m,
+    };
+    let mut low: Option<Sample> = None;
+    let stride = column.depths_m.len().div_ceil(INTERVALS);
+    let mut index = 0;
+    loop {
+        let depth_m = column.depths_m[index];
+        if depth_m > deepest_m {
+            // The deeper, the finer must a period be cut: shallow depths need not pay for deep ones.
+            deepest_m = (2.0 * deepest_m).max(depth_m).min(last_m);
+            column.spectrum = spectrum(deepest_m);
+        }
+        let high = column.sample(index)?;
+        if let Some(low) = &low {
+            column.between(low, &high)?;
+        }
+        if index + 1 == column.depths_m.len() {
+            break;
+        }
+        index = (index + stride).min(column.depths_m.len() - 1);
+        low = Some(high);
+    }
+    let mut cells = column.cells.clone();
+    for (cell, index) in column.cells.into_iter().zip(order) {
+        cells[index] = cell;
+    }
+    Ok(cells)
+}
+
+/// All multipliers that may dominate at the depth of one cell.
+struct Sample {
+    index: usize,
+    depth_m: f64,
+    /// Where derivatives could be had; a multiplier without ends the sample's use for following.
+    roots: Option<Vec<Root>>,
+}
+
+impl Sample {
+    /// The size of the largest multiplier.
+    fn largest(&self) -> f64 {
+        let sizes = self.roots.iter().flatten().map(|root| root.multiplier.norm());
+        sizes.fold(0.0, f64::max)
+    }
+}
+
+/// A cubic in the share t of an interval, with a quartic that vanishes with its slope at both ends.
+#[derive(Clone, Copy)]
+struct Curve {
+    from: Root,
+    to: Root,
+    step_m: f64,
+    /// What the cubic lacks where it was checked, over t²(1 − t)² there.
+    correction: Complex64,
+}
+
+impl Curve {
+    fn at(&self, t: f64) -> Complex64 {
+        let (u, product) = (1.0 - t, t * (1.0 - t));
+        self.from.multiplier * (u * u * (1.0 + 2.0 * t))
+            + self.to.multiplier * (t * t * (3.0 - 2.0 * t))
+            + (self.from.slope * u - self.to.slope * t) * (self.step_m * product)
+            + self.correction * (product * product)
+    }
+
+    /// Corrects the curve for an error that it has at a share; returns the error that the cubic had half way.
+    fn correct(&mut self, share: f64, error: Complex64) -> f64 {
+        let product = share * (1.0 - share);
+        self.correction = error / (product * product);
+        self.correction.norm() / 16.0
+    }
+}
+
+/// The cells at one speed while they are computed, by ascending depth.
+struct Column<S> {
+    rpm: f64,
+    spectrum: S,
+    depths_m: Vec<f64>,
+    cells: Vec<Cell>,
+}
+
+impl<S: Spectrum> Column<S> {
+    /// Computes all multipliers at a cell, and the cell.
+    fn sample(&mut self, index: usize) -> Result<Sample, StabilityError> {
+        let depth_m = self.depths_m[index];
+        let broke_down = StabilityError::BrokeDown {
+            rpm: self.rpm,
+            depth_mm: depth_m * 1e3,
+            what: "the equations of the period have no finite solution",
+        };
+        let all = self.spectrum.multipliers(depth_m).ok_or(broke_down)?;
+        let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
+        let mut sizes = (0.0_f64, 0.0_f64);
+        let mut roots = Some(Vec::with_capacity(4));
+        for &multiplier in all
+            .iter()
+            .take_while(|multiplier| multiplier.norm() >= FOLLOWED * largest)
+            .filter(|multiplier| multiplier.im >= 0.0)
+        {
+            let Some(root) = self.spectrum.root_near(multiplier, depth_m) else {
+                let size = multiplier.norm();
+                sizes = (sizes.0.max(size), sizes.1.max(UNCONFIRMED * size.max(1.0)));
+                roots = None;
+                continue;
+            };
+            // What Newton changed is the error of the map; what is left after it is far less.
+            let size = root.multiplier.norm();
+            sizes = (sizes.0.max(size), sizes.1.max(LEAST_ERROR * size.max(1.0)));
+            if let Some(roots) = &mut roots {
+                roots.push(root);
+            }
+        }
+        self.cells[index] = Cell::new(sizes.0, sizes.1);
+        Ok(Sample {
+            index,
+            depth_m,
+            roots,
+        })
+    }
+
+    /// The cells between two samples.
+    fn between(&mut self, low: &Sample, high: &Sample) -> Result<(), StabilityError> {
+        if high.index - low.index < 2 {
+            return Ok(());
+        }
+        let middle = match self.follow(low, high) {
+            Followed::Filled => return Ok(()),
+            Followed::Bent(middle) => middle,
+            Followed::Lost => self.sample(middle_of(low, high))?,
+        };
+        self.between(low, &middle)?;
+        self.between(&middle, high)
+    }
+
+    /// Follows every multiplier that may dominate, and fills the cells.
+    fn follow(&mut self, low: &Sample, high: &Sample) -> Followed {
+        let Some(mut curves) = curves(low, high) else {
+            return Followed::Lost;
+        };
+        let index = middle_of(low, high);
+        let depth_m = self.depths_m[index];
+        let share = (depth_m - low.depth_m) / (high.depth_m - low.depth_m);
+        let mut roots = Vec::with_capacity(curves.len());
+        let (mut fits, mut worst) = (true, 0.0_f64);
+        let least = low.largest().min(high.largest());
+        let tolerance = if least > FAR { TOLERANCE_FAR } else { TOLERANCE };
+        for curve in &mut curves {
+            let guess = curve.at(share);
+            let root = self.polished(guess, depth_m);
+            let Some(root) = root.filter(|root| is_new(root, &roots)) else {
+                return Followed::Lost;
+            };
+            let error = curve.correct(share, root.multiplier - guess);
+            roots.push(root);
+            fits &= error <= tolerance * least;
+            worst = worst.max(error);
+        }
+        let middle = Sample {
+            index,
+            depth_m,
+            roots: Some(roots),
+        };
+        self.cells[index] = Cell::exact(middle.largest());
+        // The correction makes the curve much better than the cubic was; over wide intervals less so.
+        let error = if least > FAR { 4.0 * worst } else { 2.0 * worst };
+        if fits && self.fill(low, high, &curves, error).is_some() {
+            Followed::Filled
+        } else {
+            Followed::Bent(middle)
+        }
+    }
+
+    /// The multiplier near a guess: a second step of Newton where the first was long.
+    fn polished(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
+        let root = self.spectrum.root_near(guess, depth_m)?;
+        // The error that is left is about the square of the step.
+        if (root.multiplier - guess).norm() < 1e-5 * guess.norm() {
+            return Some(root);
+        }
+        self.spectrum.root_near(root.multiplier, depth_m)
+    }
+
+    /// Fills the cells between two samples from curves with an error; `None` where one that is undecided cannot be solved for.
+    fn fill(&mut self, low: &Sample, high: &Sample, curves: &[Curve], error: f64) -> Option<()> {
+        for index in low.index + 1..high.index {
+            if index == middle_of(low, high) {
+                continue;
+            }
+            let depth_m = self.depths_m[index];
+            let share = (depth_m - low.depth_m) / (high.depth_m - low.depth_m);
+            let largest = curves
+                .iter()
+                .map(|curve| curve.at(share))
+                .max_by(|a, b| a.norm_sqr().total_cmp(&b.norm_sqr()))?;
+            let size = largest.norm();
+            let mut cell = Cell::new(size, error + LEAST_ERROR * size.max(1.0));
+            if cell.verdict == Verdict::Undecided {
+                let root = self.polished(largest, depth_m)?;
+                cell = Cell::exact(root.multiplier.norm());
+            }
+            self.cells[index] = cell;
+        }
+        Some(())
+    }
+}
+
+/// What following multipliers from one sample to the next came to.
+enum Followed {
+    /// The cells are filled.
+    Filled,
+    /// The curves are off; the roots half way are known.
+    Bent(Sample),
+    /// Multipliers cannot be told apart.
+    Lost,
+}
+
+/// True where no other guess has led to the same root.
+fn is_new(root: &Root, others: &[Root]) -> bool {
+    let distance = |other: &Root| (other.multiplier - root.multiplier).norm();
+    others
+        .iter()
+        .all(|other| distance(other) > 1e-6 * root.multiplier.norm())
+}
+
+fn middle_of(low: &Sample, high: &Sample) -> usize {
+    (low.index + high.index) / 2
+}
+
+/// The curves of all multipliers that may dominate between two samples.
+fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
+    let step_m = high.depth_m - low.depth_m;
+    let mut free = high.roots.clone()?;
+    let mut strays = Vec::new();
+    let mut curves = Vec::with_capacity(free.len());
+    for root in low.roots.as_ref()? {
+        match root.take_next(&mut free, step_m) {
+            Some(to) => curves.push(Curve {
+                from: *root,
+                to,
+                step_m,
+                correction: Complex64::ZERO,
+            }),
+            None => strays.push(*root),
+        }
+    }
+    strays.extend(free);
+    let half_way = curves
+        .iter()
+        .map(|curve| curve.at(0.5).norm())
+        .fold(0.0, f64::max);
+    let least = half_way.min(low.largest()).min(high.largest());
+    // What has no partner must stay below the largest all along: twice its way is not enough to reach it.
+    let reach = |root: &Root| root.multiplier.norm() + 2.0 * root.slope.norm() * step_m;
+    strays.iter().all(|root| reach(root) < least).then_some(curves)
+}

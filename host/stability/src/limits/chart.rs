@@ -1,0 +1,146 @@
+//! Charts: the line of every speed, by any method.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::method::{Label, Method};
+use super::speed_line::SpeedLine;
+use super::spread::LimitSpread;
+use super::uncertainty::Uncertainty;
+use crate::error::StabilityError;
+
+/// The fewest steps in depth at which multipliers are followed, however coarse the chart.
+const SAMPLES_MIN: usize = 40;
+
+/// A stability chart.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Chart {
+    /// The method that computed it.
+    #[serde(flatten)]
+    pub label: Label,
+    /// One line per speed, in the order asked for.
+    pub speeds: Vec<SpeedLine>,
+    /// The depths, mm, at which lines have a share of stable machines; empty where that was not asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cells_mm: Vec<f64>,
+}
+
+/// The lines at given speeds, from depth 0 to `depth_mm`, with at least `samples` steps in depth.
+///
+/// The result does not depend on the number of threads.
+///
+/// # Errors
+/// Those of [`Method::line`], of the first speed that fails.
+pub fn chart<M: Method + ?Sized>(
+    method: &M,
+    speeds_rpm: &[f64],
+    depth_mm: f64,
+    samples: usize,
+) -> Result<Chart, StabilityError> {
+    Ok(Chart {
+        label: Label::of(method),
+        speeds: method.lines(speeds_rpm, depth_mm, samples.max(SAMPLES_MIN))?,
+        cells_mm: Vec::new(),
+    })
+}
+
+/// How a chart is refined in speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// Between neighbouring speeds every limit may differ from the straight line by this share of the largest depth.
+    pub tolerance: f64,
+    /// Speeds closer than this share of their value are not divided further.
+    pub least_step: f64,
+    /// No further round is begun with this many speeds.
+    pub most_speeds: usize,
+}
+
+impl Chart {
+    /// Adds to every line how far its limit may lie from there: see [`Uncertainty::spread`].
+    ///
+    /// The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// Those of [`Uncertainty::spread`], of the first speed that fails.
+    pub fn with_spread(
+        mut self,
+        uncertainty: &Uncertainty<'_>,
+        depth_mm: f64,
+        cells_mm: &[f64],
+    ) -> Result<Self, StabilityError> {
+        let spreads: Vec<Result<LimitSpread, StabilityError>> = self
+            .speeds
+            .par_iter()
+            .map(|line| uncertainty.spread(line, depth_mm, cells_mm))
+            .collect();
+        for (line, spread) in self.speeds.iter_mut().zip(spreads) {
+            line.spread = Some(spread?);
+        }
+        self.cells_mm = cells_mm.to_vec();
+        Ok(self)
+    }
+
+    /// Adds speeds where limits bend, kinds change, and islands begin or end; speeds must be ascending.
+    ///
+    /// # Errors
+    /// Those of [`Method::line`].
+    pub fn refined<M: Method + ?Sized>(
+        mut self,
+        method: &M,
+        depth_mm: f64,
+        refinement: Refinement,
+    ) -> Result<Self, StabilityError> {
+        let tolerance_mm = refinement.tolerance * depth_mm;
+        // Every interval is tried once; then those whose middle was not where the ends said.
+        let mut open: Vec<bool> = vec![true; self.speeds.len().saturating_sub(1)];
+        while open.iter().any(|&is_open| is_open) && self.speeds.len() < refinement.most_speeds {
+            let middles: Vec<f64> = self
+                .speeds
+                .windows(2)
+                .zip(&open)
+                .filter(|(pair, is_open)| {
+                    **is_open && pair[1].rpm - pair[0].rpm > 2.0 * refinement.least_step * pair[0].rpm
+                })
+                .map(|(pair, _)| 0.5 * (pair[0].rpm + pair[1].rpm))
+                .collect();
+            let between = chart(method, &middles, depth_mm, SAMPLES_MIN)?.speeds;
+            let mut between = between.into_iter().peekable();
+            let mut speeds = Vec::with_capacity(self.speeds.len() + middles.len());
+            let mut next_open = Vec::with_capacity(speeds.capacity());
+            let mut old = self.speeds.into_iter().peekable();
+            while let Some(left) = old.next() {
+                let right = old.peek();
+                let middle = right.and_then(|right| between.next_if(|middle| middle.rpm < right.rpm));
+                match (right, middle) {
+                    (Some(right), Some(middle)) => {
+                        let expected = is_between(&left, &middle, right, tolerance_mm);
+                        speeds.extend([left, middle]);
+                        next_open.extend([!expected, !expected]);
+                    }
+                    (Some(_), None) => {
+                        speeds.push(left);
+                        next_open.push(false);
+                    }
+                    (None, _) => speeds.push(left),
+                }
+            }
+            self.speeds = speeds;
+            open = next_open;
+        }
+        Ok(self)
+    }
+}
+
+/// True where the middle line has the same switches as both ends, each near the straight line between them.
+fn is_between(left: &SpeedLine, middle: &SpeedLine, right: &SpeedLine, tolerance_mm: f64) -> bool {
+    let share = (middle.rpm - left.rpm) / (right.rpm - left.rpm);
+    let (a, m, b) = (&left.stable_mm, &middle.stable_mm, &right.stable_mm);
+    let kinds = [left, middle, right].map(|line| line.first_limit.map(|limit| limit.kind));
+    a.len() == m.len()
+        && m.len() == b.len()
+        && kinds[0] == kinds[1]
+        && kinds[1] == kinds[2]
+        && a.iter().zip(m).zip(b).all(|((a, m), b)| {
+            (0..2).all(|end| (a[end] + (b[end] - a[end]) * share - m[end]).abs() <= tolerance_mm)
+        })
+}

@@ -1,0 +1,330 @@
+//! One speed: every depth at which a multiplier crosses the unit circle.
+
+use num_complex::Complex64;
+
+use super::bounds::{check_depth, check_speed};
+use super::speed_line::{SpeedLine, Switch};
+use crate::error::StabilityError;
+use crate::problem::linear::Problem;
+use crate::problem::period::check_length;
+use crate::spectrum::along_depth::Spectrum;
+use crate::spectrum::collocated::Collocated;
+use crate::spectrum::crossing::Crossing;
+use crate::spectrum::root::Root;
+use crate::spectrum::stability_loss::Kind;
+
+/// How often an interval of depths is halved where its multipliers cannot be followed from end to end.
+const LEVELS: u32 = 12;
+
+/// Multipliers below this size are not followed: from one sampled depth to the next none of them reaches the circle
+/// unseen, since the number outside is compared at every depth.
+const FOLLOWED: f64 = 0.3;
+
+/// Share of the depth range that is scanned first; then ranges double.
+const FIRST_PART: f64 = 0.125;
+
+/// Distance from the circle beyond which multipliers are only counted: with the steps of a chart none comes from there to
+/// the circle and back unseen.
+const FAR: f64 = 0.5;
+
+/// Distance from the circle within which multipliers are polished: far above the error of the scan.
+const POLISHED: f64 = 1e-3;
+
+/// To what crossings are solved for, relative to the depth.
+const ROOT: f64 = 1e-9;
+
+/// All crossings from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where needed.
+///
+/// Crossings are solved for with the characteristic matrix, to about 1e-9 relative. Between samples each multiplier
+/// near the circle is followed with its derivative; where a cubic through both ends says that it may reach the
+/// circle and return, or where it cannot be followed, the interval is halved, up to 12 times. The number of
+/// multipliers outside must agree with the crossings found, at every sample.
+///
+/// # Errors
+/// Speed or depth out of range, or a computation that leaves the range of numbers.
+pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+    check_length(problem, rpm, depth_mm)?;
+    line_of(rpm, depth_mm, samples, |deepest_m| {
+        Collocated::new(problem, rpm, deepest_m)
+    })
+}
+
+/// [`line()`] of any method that has multipliers; `spectrum` gives them at this speed, good for depths up to its
+/// argument, m.
+pub(crate) fn line_of<S: Spectrum>(
+    rpm: f64,
+    depth_mm: f64,
+    samples: usize,
+    spectrum: impl Fn(f64) -> S,
+) -> Result<SpeedLine, StabilityError> {
+    check_speed(rpm)?;
+    check_depth(depth_mm)?;
+    let depth_m = depth_mm * 1e-3;
+    let samples = samples.max(1);
+    let mut deepest_m = depth_m * FIRST_PART;
+    let mut scan = Scan {
+        rpm,
+        spectrum: spectrum(deepest_m),
+        crossings: Vec::new(),
+    };
+    let mut low = scan.sample(0.0)?;
+    let start = low.outside();
+    for index in 1..=samples {
+        let share = index as f64 / samples as f64;
+        if share * depth_m > deepest_m {
+            // The deeper, the finer must a period be cut: shallow depths need not pay for deep ones.
+            deepest_m = (2.0 * deepest_m).max(share * depth_m).min(depth_m);
+            scan.spectrum = spectrum(deepest_m);
+        }
+        let high = scan.sample(depth_m * share)?;
+        let found = scan.between(&low, &high, 0)?;
+        scan.crossings.extend(found);
+        low = high;
+    }
+    Ok(scan.finish(start, depth_mm))
+}
+
+/// True where the circle may be reached within a step.
+fn is_near(root: &Root, step_m: f64) -> bool {
+    root.excess().abs() < (3.0 * root.slope.norm() * step_m + 0.02).min(FAR)
+}
+
+#[derive(Clone, Debug)]
+struct Sample {
+    depth_m: f64,
+    roots: Vec<Root>,
+}
+
+impl Sample {
+    /// Number of multipliers outside the unit circle.
+    fn outside(&self) -> i32 {
+        self.roots
+            .iter()
+            .filter(|root| root.excess() > 0.0)
+            .map(|root| Kind::of(root.multiplier).count())
+            .sum()
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    crossing: Crossing,
+    outward: bool,
+}
+
+struct Scan<S> {
+    rpm: f64,
+    spectrum: S,
+    crossings: Vec<Found>,
+}
+
+impl<S: Spectrum> Scan<S> {
+    fn broke_down(&self, depth_m: f64, what: &'static str) -> StabilityError {
+        StabilityError::BrokeDown {
+            rpm: self.rpm,
+            depth_mm: depth_m * 1e3,
+            what,
+        }
+    }
+
+    fn sample(&mut self, depth_m: f64) -> Result<Sample, StabilityError> {
+        let all = self
+            .spectrum
+            .multipliers(depth_m)
+            .ok_or_else(|| self.broke_down(depth_m, "the equations of the period have no finite solution"))?;
+        let roots = all
+            .into_iter()
+            .take_while(|multiplier| multiplier.norm() > FOLLOWED)
+            .filter(|multiplier| multiplier.im >= 0.0)
+            .map(|multiplier| self.root(multiplier, depth_m))
+            .collect();
+        Ok(Sample { depth_m, roots })
+    }
+
+    /// A multiplier with its derivative; near the circle it is polished first, so that its side is right.
+    fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
+        let spectrum = &mut self.spectrum;
+        let multiplier = if (coarse.norm() - 1.0).abs() < POLISHED {
+            spectrum
+                .multiplier_near(coarse, depth_m, POLISHED)
+                .unwrap_or(coarse)
+        } else {
+            coarse
+        };
+        let slope = if (multiplier.norm() - 1.0).abs() < FAR {
+            spectrum.sensitivity(multiplier, depth_m)
+        } else {
+            None
+        };
+        Root {
+            multiplier,
+            slope: slope.unwrap_or(Complex64::ZERO),
+        }
+    }
+
+    /// The crossings between two samples, by depth.
+    fn between(&mut self, low: &Sample, high: &Sample, level: u32) -> Result<Vec<Found>, StabilityError> {
+        if let Some(found) = self.follow(low, high)
+            && balance(&found) == high.outside() - low.outside()
+        {
+            return Ok(found);
+        }
+        if level == LEVELS {
+            return self.by_halving(low, high);
+        }
+        let middle = self.sample(0.5 * (low.depth_m + high.depth_m))?;
+        let mut found = self.between(low, &middle, level + 1)?;
+        found.extend(self.between(&middle, high, level + 1)?);
+        Ok(found)
+    }
+
+    /// Follows each multiplier near the circle from end to end; `None` where one cannot be followed or may touch the
+    /// circle in between.
+    fn follow(&mut self, low: &Sample, high: &Sample) -> Option<Vec<Found>> {
+        let step_m = high.depth_m - low.depth_m;
+        let mut free: Vec<Root> = high.roots.clone();
+        let mut found = Vec::new();
+        for from in low.roots.iter().filter(|root| is_near(root, step_m)) {
+            let to = from.take_next(&mut free, step_m)?;
+            if (from.excess() > 0.0) != (to.excess() > 0.0) {
+                found.push(self.cross(low, high, from, &to)?);
+            } else if may_touch(from, &to, step_m) {
+                return None;
+            }
+        }
+        // What is left over must be far from the circle.
+        if free.iter().any(|root| is_near(root, step_m)) {
+            return None;
+        }
+        found.sort_by(|a, b| a.crossing.depth_m.total_cmp(&b.crossing.depth_m));
+        Some(found)
+    }
+
+    fn cross(&mut self, low: &Sample, high: &Sample, from: &Root, to: &Root) -> Option<Found> {
+        let share = from.excess() / (from.excess() - to.excess());
+        let guess = Crossing {
+            depth_m: low.depth_m + share * (high.depth_m - low.depth_m),
+            multiplier: from.multiplier + (to.multiplier - from.multiplier) * share,
+        };
+        let crossing = self.spectrum.crossing_near(guess, low.depth_m, high.depth_m)?;
+        // The multiplier found must lie on this branch, not on another that crosses nearby.
+        let distance = (crossing.multiplier - guess.multiplier).norm();
+        (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(Found {
+            crossing,
+            outward: to.excess() > 0.0,
+        })
+    }
+
+    /// Halves on the number outside: for an interval so short that nothing else is worth while.
+    fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<Found>, StabilityError> {
+        let (mut low, mut high) = (low.clone(), high.clone());
+        if low.outside() == high.outside() {
+            return Ok(Vec::new());
+        }
+        while high.depth_m - low.depth_m > 1e-10 * high.depth_m {
+            let middle = self.sample(0.5 * (low.depth_m + high.depth_m))?;
+            if middle.outside() == low.outside() {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let outward = high.outside() > low.outside();
+        let outer = if outward { &high } else { &low };
+        let crossed = outer
+            .roots
+            .iter()
+            .filter(|root| root.excess() > 0.0)
+            .min_by(|a, b| a.excess().total_cmp(&b.excess()))
+            .ok_or_else(|| self.broke_down(high.depth_m, "a multiplier was lost while halving"))?;
+        Ok(vec![Found {
+            crossing: Crossing {
+                depth_m: 0.5 * (low.depth_m + high.depth_m),
+                multiplier: crossed.multiplier / crossed.multiplier.norm(),
+            },
+            outward,
+        }])
+    }
+
+    fn finish(mut self, start: i32, depth_mm: f64) -> SpeedLine {
+        let crossings = std::mem::take(&mut self.crossings);
+        let switches = crossings
+            .iter()
+            .map(|Found { crossing, outward }| Switch {
+                depth_mm: crossing.depth_m * 1e3,
+                error_mm: Some(1e3 * self.error_m(crossing, *outward, depth_mm * 1e-3)),
+                kind: Kind::of(crossing.multiplier),
+                gain: !outward,
+                chatter_hz: self.spectrum.chatter_hz(crossing),
+            })
+            .collect();
+        SpeedLine::of_switches(self.rpm, depth_mm, start, switches)
+    }
+
+    /// How far from a crossing, m, |μ| of its branch is beyond the error of the multiplier on both sides.
+    ///
+    /// First that error over d|μ|/dw; where |μ| bends too much for that, twice as far, and so on. `deepest_m` where it never is.
+    fn error_m(&mut self, crossing: &Crossing, outward: bool, deepest_m: f64) -> f64 {
+        let Crossing { multiplier, depth_m } = *crossing;
+        let (Some(error), Some(slope)) = (
+            self.spectrum.error(crossing),
+            self.spectrum.sensitivity(multiplier, depth_m),
+        ) else {
+            return deepest_m;
+        };
+        let mut reach_m = 1.01 * error / (multiplier.conj() * slope).re.abs() + ROOT * depth_m;
+        while reach_m < deepest_m {
+            let sides = [(-reach_m, outward), (reach_m, !outward)];
+            let mut is_beyond = |(shift_m, inside): (f64, bool)| {
+                // No cut is shallower than none.
+                depth_m + shift_m <= 0.0 || {
+                    let guess = multiplier + slope * shift_m;
+                    let there = self.spectrum.multiplier_near(guess, depth_m + shift_m, 0.1);
+                    there.is_some_and(|there| {
+                        if inside {
+                            there.norm() <= 1.0 - error
+                        } else {
+                            there.norm() >= 1.0 + error
+                        }
+                    })
+                }
+            };
+            if sides.into_iter().all(&mut is_beyond) {
+                return reach_m;
+            }
+            reach_m *= 2.0;
+        }
+        deepest_m
+    }
+}
+
+/// By how many the number outside changes.
+fn balance(found: &[Found]) -> i32 {
+    found
+        .iter()
+        .map(|found| {
+            let count = Kind::of(found.crossing.multiplier).count();
+            if found.outward { count } else { -count }
+        })
+        .sum()
+}
+
+/// True where the cubic through both ends of |μ| − 1 comes near zero in between, though both ends are on one side.
+fn may_touch(from: &Root, to: &Root, step_m: f64) -> bool {
+    let (a, b) = (from.excess(), to.excess());
+    let (da, db) = (from.excess_slope() * step_m, to.excess_slope() * step_m);
+    // Only an end that heads for the circle can reach it and return.
+    if a.signum() * da >= 0.0 || b.signum() * db <= 0.0 {
+        return false;
+    }
+    let side = a.signum();
+    // Nine points of the cubic: its extremum is missed by a few percent of its height at most.
+    let nearest = (1..10)
+        .map(|i| {
+            let t = f64::from(i) * 0.1;
+            let (u, t2) = (1.0 - t, t * t);
+            side * (u * u * ((1.0 + 2.0 * t) * a + t * da) + t2 * ((3.0 - 2.0 * t) * b - u * db))
+        })
+        .fold(f64::INFINITY, f64::min);
+    nearest < 0.3 * a.abs().min(b.abs())
+}

@@ -1,0 +1,18 @@
+//! Stability limits: one working point, one speed, charts and cells; derivatives and spread of limits. `Method` is the interface of all methods.
+
+pub(crate) mod bounds;
+pub(crate) mod cell;
+pub(crate) mod cell_chart;
+pub(crate) mod cells;
+pub(crate) mod chart;
+pub(crate) mod line;
+pub(crate) mod method;
+pub(crate) mod percentiles;
+pub(crate) mod plane;
+pub(crate) mod point;
+pub(crate) mod sampling;
+pub(crate) mod sensitivity;
+pub(crate) mod speed_line;
+pub(crate) mod speeds;
+pub(crate) mod spread;
+pub(crate) mod uncertainty;

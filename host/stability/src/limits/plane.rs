@@ -1,0 +1,91 @@
+//! Limits as planes over the variables of a case: what exact derivatives say of every loss of stability.
+
+use std::f64::consts::TAU;
+
+use nalgebra::DVector;
+
+use super::sampling::Variable;
+use super::sensitivity::{Sensitivity, Slope, Tangent};
+use super::speed_line::{SpeedLine, Switch};
+use crate::problem::linear::{CubicTerms, Problem};
+use quietcut_model::case::Case;
+
+/// A difference over a tenth of a deviation; where only one side is a machine, over that side.
+const STEP: f64 = 0.05;
+
+/// The linear problem of a case with its change along each variable, per standard deviation.
+#[derive(Clone, Debug)]
+pub struct Linearized {
+    problem: Problem,
+    tangents: Vec<Tangent>,
+}
+
+/// A loss of stability as a plane over the variables.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane {
+    /// Its depth, mm.
+    pub depth_mm: f64,
+    /// Gradient of the depth, mm per standard deviation.
+    pub gradient: DVector<f64>,
+    /// Chatter frequency, Hz, with its gradient, Hz per standard deviation; `None` at a flip, whose frequency only the
+    /// spindle sets.
+    pub chatter_hz: Option<(f64, DVector<f64>)>,
+}
+
+impl Linearized {
+    /// `None` where the linear part of the case is no problem, or does not stay one along some variable.
+    pub fn new(case: &Case, variables: &[Variable]) -> Option<Self> {
+        let problem = Problem::new(case, CubicTerms::LeaveOut).ok()?;
+        let tangents = variables.iter().map(|variable| {
+            let at = |deviations: f64| {
+                let mut moved = case.clone();
+                let is_possible = variable.shift(&mut moved, deviations);
+                is_possible.then(|| Problem::new(&moved, CubicTerms::LeaveOut).ok())?
+            };
+            match (at(-STEP), at(STEP)) {
+                (Some(low), Some(high)) => Some(Tangent::between(&low, &high, 2.0 * STEP)),
+                (None, Some(high)) => Some(Tangent::between(&problem, &high, STEP)),
+                (Some(low), None) => Some(Tangent::between(&low, &problem, STEP)),
+                (None, None) => None,
+            }
+        });
+        let tangents = tangents.collect::<Option<Vec<_>>>()?;
+        Some(Self { problem, tangents })
+    }
+
+    /// The losses of stability along a line, the first limit first; those that do not follow the variables are left out.
+    pub fn planes(&self, line: &SpeedLine) -> Vec<Plane> {
+        let losses = line.switches.iter().filter(|switch| !switch.gain);
+        losses.filter_map(|switch| self.plane(line.rpm, switch)).collect()
+    }
+
+    fn plane(&self, rpm: f64, switch: &Switch) -> Option<Plane> {
+        let sensitivity = Sensitivity::new(&self.problem, rpm, switch).ok()?;
+        let slopes: Option<Vec<Slope>> = self
+            .tangents
+            .iter()
+            .map(|tangent| sensitivity.slope(tangent))
+            .collect();
+        let slopes = slopes?;
+        let count = slopes.len();
+        let chatter_hz = switch
+            .chatter_hz
+            .filter(|_| slopes.iter().any(|slope| slope.angle != 0.0));
+        let chatter_hz = chatter_hz.map(|hz| {
+            let period_s = self.problem.tooth_period_s(rpm);
+            // ωτ is the angle of the multiplier or its negative, up to whole turns; slopes are those of the angle above
+            // the real axis.
+            let sign = if (hz * period_s).fract() > 0.5 { -1.0 } else { 1.0 };
+            let per_angle = sign / (TAU * period_s);
+            (
+                hz,
+                DVector::from_fn(count, |index, _| slopes[index].angle * per_angle),
+            )
+        });
+        Some(Plane {
+            depth_mm: switch.depth_mm,
+            gradient: DVector::from_fn(count, |index, _| slopes[index].depth_mm),
+            chatter_hz,
+        })
+    }
+}

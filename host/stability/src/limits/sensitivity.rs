@@ -1,0 +1,316 @@
+//! How a limit moves with the parameters of the problem: exact derivatives, all from one pair of motions.
+//!
+//! At a crossing F = lᵀ(Φ(κ; p) − μ)r = 0 with κ = w (1 − 1/μ) and μ = e^{iθ}. Along a change dp of a parameter
+//!
+//!   lᵀΦ_κ r [(1 − 1/μ) dw + (w/μ) i dθ] + lᵀΦ_p r dp − iμ lᵀr dθ = 0,
+//!
+//! two real equations for dw and dθ; at a flip μ stays −1 and the first alone is left. lᵀ dΦ r = ∫ yᵀ dG x dt is a
+//! quadrature over the motion and its adjoint, [`Eigenmotion`].
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use num_complex::Complex64;
+
+use super::speed_line::Switch;
+use crate::error::StabilityError;
+use crate::problem::linear::Problem;
+use crate::spectrum::floquet_mode::{Eigenmotion, Node};
+use crate::spectrum::stability_loss::Kind;
+use quietcut_model::milling::{ToothForce, TurningVector};
+use quietcut_model::structure::{FirstOrder, ModalPart};
+
+/// dp ↦ change of the problem, per unit of a parameter.
+#[derive(Clone, Debug)]
+pub struct Tangent {
+    /// Change of A, B and C in feed, normal and axial direction.
+    structure: Option<FirstOrder>,
+    /// Change of the force on a tooth.
+    force: Option<ToothForce>,
+    feed_per_tooth_m: f64,
+    start: f64,
+    exit: f64,
+}
+
+impl Tangent {
+    const NONE: Self = Self {
+        structure: None,
+        force: None,
+        feed_per_tooth_m: 0.0,
+        start: 0.0,
+        exit: 0.0,
+    };
+
+    /// Per rad/s of the natural frequency of a mode, its damping ratio and shapes kept.
+    pub fn omega(problem: &Problem, mode: &ModalPart) -> Self {
+        Self::of_flow(problem, mode.by_omega())
+    }
+
+    /// Per unit of the damping ratio of a mode, its frequency and shapes kept.
+    pub fn damping_ratio(problem: &Problem, mode: &ModalPart) -> Self {
+        Self::of_flow(problem, mode.by_damping_ratio())
+    }
+
+    /// Per relative change of K_tc with K_rc and K_ac in fixed ratio to it; edge coefficients stay.
+    pub fn cutting_force(problem: &Problem) -> Self {
+        let zero = TurningVector {
+            constant: Vector3::zeros(),
+            cosine: Vector3::zeros(),
+            sine: Vector3::zeros(),
+        };
+        Self {
+            force: Some(ToothForce {
+                cutting: problem.process.force.cutting,
+                normal: zero,
+                edge: zero,
+            }),
+            ..Self::NONE
+        }
+    }
+
+    /// From one problem to another that is `length` units of the parameter further on, both with the same teeth and
+    /// the same number of states; a central difference where they lie on both sides of a problem.
+    pub fn between(low: &Problem, high: &Problem, length: f64) -> Self {
+        let (p, q) = (&low.structure, &high.structure);
+        let (f, g) = (&low.process, &high.process);
+        Self {
+            structure: Some(FirstOrder {
+                a: (&q.a - &p.a) / length,
+                b: (&q.b - &p.b) / length,
+                c: (&q.c - &p.c) / length,
+            }),
+            force: Some(ToothForce {
+                cutting: slope(&f.force.cutting, &g.force.cutting, length),
+                normal: slope(&f.force.normal, &g.force.normal, length),
+                edge: slope(&f.force.edge, &g.force.edge, length),
+            }),
+            feed_per_tooth_m: (g.feed_per_tooth_m - f.feed_per_tooth_m) / length,
+            start: (g.engagement.start - f.engagement.start) / length,
+            exit: (g.engagement.exit - f.engagement.exit) / length,
+        }
+    }
+
+    fn of_flow(problem: &Problem, a: DMatrix<f64>) -> Self {
+        let mut structure = problem.structure.clone();
+        structure.a = a;
+        structure.b.fill(0.0);
+        structure.c.fill(0.0);
+        Self {
+            structure: Some(structure),
+            ..Self::NONE
+        }
+    }
+}
+
+fn slope(low: &TurningVector, high: &TurningVector, length: f64) -> TurningVector {
+    TurningVector {
+        constant: (high.constant - low.constant) / length,
+        cosine: (high.cosine - low.cosine) / length,
+        sine: (high.sine - low.sine) / length,
+    }
+}
+
+/// How a crossing moves, per unit of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slope {
+    /// dw/dp, mm.
+    pub depth_mm: f64,
+    /// dθ/dp, rad, of the angle of the multiplier; 0 at a flip.
+    pub angle: f64,
+}
+
+/// A crossing of the unit circle with all that its derivatives need.
+#[derive(Clone, Debug)]
+pub struct Sensitivity<'a> {
+    problem: &'a Problem,
+    seconds_per_radian: f64,
+    kappa: Complex64,
+    depth_m: f64,
+    multiplier: Complex64,
+    motion: Eigenmotion,
+    /// lᵀΦ_κ r, 1/m.
+    by_kappa: Complex64,
+}
+
+impl<'a> Sensitivity<'a> {
+    /// Of one of the switches that [`line`](crate::line()) found.
+    ///
+    /// # Errors
+    /// The switch is none of this problem: no motion belongs to it.
+    pub fn new(problem: &'a Problem, rpm: f64, switch: &Switch) -> Result<Self, StabilityError> {
+        let broke_down = StabilityError::BrokeDown {
+            rpm,
+            depth_mm: switch.depth_mm,
+            what: "no motion belongs to this limit",
+        };
+        let multiplier = match (switch.kind, switch.chatter_hz) {
+            (Kind::Flip, _) => -Complex64::ONE,
+            // ω τ is the angle of the multiplier, up to whole turns.
+            (Kind::Hopf, Some(hz)) => {
+                let angle = std::f64::consts::TAU * (hz * problem.tooth_period_s(rpm)).fract();
+                Complex64::new(angle.cos(), angle.sin().abs())
+            }
+            // At κ = 0 the depth has no influence: such a limit does not exist.
+            _ => return Err(broke_down),
+        };
+        Self::of_crossing(problem, rpm, switch.depth_mm * 1e-3, multiplier).ok_or(broke_down)
+    }
+
+    fn of_crossing(problem: &'a Problem, rpm: f64, depth_m: f64, multiplier: Complex64) -> Option<Self> {
+        let motion = Eigenmotion::new(problem, rpm, depth_m, multiplier)?;
+        let mut sensitivity = Self {
+            problem,
+            seconds_per_radian: problem.tooth_period_s(rpm) / problem.process.engagement.pitch,
+            kappa: (Complex64::ONE - multiplier.inv()) * depth_m,
+            depth_m,
+            multiplier,
+            motion,
+            by_kappa: Complex64::ZERO,
+        };
+        sensitivity.by_kappa = sensitivity.along(|node| {
+            let (seen, pushed) = sensitivity.ends(node);
+            bilinear(&pushed, &sensitivity.directional(node), &seen)
+        });
+        Some(sensitivity)
+    }
+
+    /// How the crossing moves along a change of the problem.
+    ///
+    /// `None` where the depth of the limit does not follow the parameter: at the tip of an island.
+    pub fn slope(&self, tangent: &Tangent) -> Option<Slope> {
+        let by_parameter = self.by_parameter(tangent);
+        let mu = self.multiplier;
+        let by_depth = self.by_kappa * (Complex64::ONE - mu.inv());
+        let by_angle = if mu.im == 0.0 {
+            // μ stays real: any imaginary number keeps dθ at zero where the rest is real.
+            None
+        } else {
+            let turning = self.by_kappa * self.depth_m / mu - mu * self.motion.overlap;
+            Some(turning * Complex64::I)
+        };
+        let slope = match by_angle {
+            None => Slope {
+                depth_mm: -1e3 * (by_parameter / by_depth).re,
+                angle: 0.0,
+            },
+            Some(by_angle) => {
+                let determinant = by_depth.re * by_angle.im - by_depth.im * by_angle.re;
+                let p = by_parameter;
+                Slope {
+                    depth_mm: -1e3 * (p.re * by_angle.im - p.im * by_angle.re) / determinant,
+                    angle: -(by_depth.re * p.im - by_depth.im * p.re) / determinant,
+                }
+            }
+        };
+        (slope.depth_mm.is_finite() && slope.angle.is_finite()).then_some(slope)
+    }
+
+    /// ∫ yᵀ … x dt.
+    fn along(&self, integrand: impl Fn(&Node) -> Complex64) -> Complex64 {
+        let nodes = &self.motion.nodes;
+        nodes.iter().map(|node| integrand(node) * node.weight_s).sum()
+    }
+
+    /// C x and Bᵀ y.
+    fn ends(&self, node: &Node) -> (Vector3<Complex64>, Vector3<Complex64>) {
+        let structure = &self.problem.structure;
+        let seen = structure.c.map(Complex64::from) * &node.right;
+        let pushed = structure.b.map(Complex64::from).transpose() * &node.left;
+        (seen, pushed)
+    }
+
+    fn angles(&self, node: &Node) -> impl Iterator<Item = f64> {
+        let engagement = self.problem.process.engagement;
+        let phase = node.phase;
+        (0..node.teeth).map(move |tooth| engagement.angle(tooth, phase))
+    }
+
+    /// Σ cutting·normalᵀ of the teeth that cut.
+    fn directional(&self, node: &Node) -> Matrix3<f64> {
+        let force = &self.problem.process.force;
+        self.angles(node).map(|angle| force.directional(angle)).sum()
+    }
+
+    /// M of one tooth: κ cutting·normalᵀ − β.
+    fn of_tooth(&self, angle: f64) -> Matrix3<Complex64> {
+        let process = &self.problem.process;
+        let mut coupling = process.force.directional(angle).map(|entry| self.kappa * entry);
+        if process.axial_depth_modulation {
+            let forced = process.force.forced(angle, process.feed_per_tooth_m);
+            for i in 0..3 {
+                coupling[(i, 2)] -= forced[i];
+            }
+        }
+        coupling
+    }
+
+    /// lᵀΦ_p r.
+    fn by_parameter(&self, tangent: &Tangent) -> Complex64 {
+        let mut sum = self.along(|node| self.integrand(tangent, node));
+        // A later entry leaves out what a tooth at the start angle does, a later exit adds what one at the exit does.
+        let engagement = &self.problem.process.engagement;
+        for (node, angle, later) in [
+            (&self.motion.entry, engagement.start, -tangent.start),
+            (&self.motion.exit, engagement.exit, tangent.exit),
+        ] {
+            if later != 0.0 {
+                let (seen, pushed) = self.ends(node);
+                let coupling = self.of_tooth(angle);
+                sum += (pushed.transpose() * coupling * seen)[(0, 0)] * (later * self.seconds_per_radian);
+            }
+        }
+        sum
+    }
+
+    /// yᵀ dG x with G = A + B M C.
+    fn integrand(&self, tangent: &Tangent, node: &Node) -> Complex64 {
+        let (seen, pushed) = self.ends(node);
+        let mut sum = Complex64::ZERO;
+        if let Some(change) = &tangent.structure {
+            let coupling: Matrix3<Complex64> = self.angles(node).map(|angle| self.of_tooth(angle)).sum();
+            let own = node.left.transpose() * change.a.map(Complex64::from) * &node.right;
+            let pushed_otherwise = change.b.map(Complex64::from).transpose() * &node.left;
+            let seen_otherwise = change.c.map(Complex64::from) * &node.right;
+            sum += own[(0, 0)]
+                + (pushed_otherwise.transpose() * coupling * seen)[(0, 0)]
+                + (pushed.transpose() * coupling * seen_otherwise)[(0, 0)];
+        }
+        if tangent.force.is_some() || tangent.feed_per_tooth_m != 0.0 {
+            let change: Matrix3<Complex64> = self
+                .angles(node)
+                .map(|angle| self.change_of_tooth(tangent, angle))
+                .sum();
+            sum += (pushed.transpose() * change * seen)[(0, 0)];
+        }
+        sum
+    }
+
+    /// dM of one tooth.
+    fn change_of_tooth(&self, tangent: &Tangent, angle: f64) -> Matrix3<Complex64> {
+        let process = &self.problem.process;
+        let (cutting, normal) = (process.force.cutting.at(angle), process.force.normal.at(angle));
+        let none = Vector3::zeros();
+        let (cutting_change, normal_change, edge_change) =
+            tangent.force.as_ref().map_or((none, none, none), |force| {
+                (
+                    force.cutting.at(angle),
+                    force.normal.at(angle),
+                    force.edge.at(angle),
+                )
+            });
+        let directional = cutting_change * normal.transpose() + cutting * normal_change.transpose();
+        let mut change = directional.map(|entry| self.kappa * entry);
+        if process.axial_depth_modulation {
+            let feed = process.feed_per_tooth_m;
+            let forced = cutting_change * (normal.x * feed)
+                + cutting * (normal_change.x * feed + normal.x * tangent.feed_per_tooth_m)
+                + edge_change;
+            for i in 0..3 {
+                change[(i, 2)] -= forced[i];
+            }
+        }
+        change
+    }
+}
+
+fn bilinear(left: &Vector3<Complex64>, matrix: &Matrix3<f64>, right: &Vector3<Complex64>) -> Complex64 {
+    (left.transpose() * matrix.map(Complex64::from) * right)[(0, 0)]
+}

@@ -1,0 +1,125 @@
+//! One speed: its limits, its crossings of the unit circle, its stable depths.
+
+use serde::Serialize;
+
+use super::spread::LimitSpread;
+use crate::spectrum::stability_loss::Kind;
+
+/// A crossing of the unit circle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Switch {
+    /// Axial depth, mm.
+    pub depth_mm: f64,
+    /// An estimate of its error, mm: within it |μ| is as near to 1 as the error of the multiplier. Absent where the method has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_mm: Option<f64>,
+    /// How the multiplier crosses.
+    pub kind: Kind,
+    /// True where it goes inside: stability is gained (if no other is outside).
+    pub gain: bool,
+    /// Frequency of the vibration that is born or dies there, Hz.
+    pub chatter_hz: Option<f64>,
+}
+
+/// Where stability is first lost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Limit {
+    /// Axial depth, mm.
+    pub depth_mm: f64,
+    /// As that of its [`Switch`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_mm: Option<f64>,
+    /// How.
+    pub kind: Kind,
+    /// Chatter frequency, Hz.
+    pub chatter_hz: Option<f64>,
+}
+
+/// What is known of all depths at one speed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpeedLine {
+    /// Spindle speed, rev/min.
+    pub rpm: f64,
+    /// Depths that are stable, mm, as intervals in order, from 0 to the last depth.
+    pub stable_mm: Vec<[f64; 2]>,
+    /// Depths, mm, at which the error leaves open on which side they are, as intervals in order: around the ends of those that are
+    /// stable.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub undecided_mm: Vec<[f64; 2]>,
+    /// Depths at which two stable forced orbits exist, mm: only nonlinear structures have them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bistable_mm: Vec<[f64; 2]>,
+    /// Where stability is first lost; `None` where nothing is lost up to the last depth.
+    pub first_limit: Option<Limit>,
+    /// Every crossing of the unit circle, also while another multiplier is outside, by depth.
+    pub switches: Vec<Switch>,
+    /// How far the limit may lie from here; `None` where the case has no deviations, or it was not asked for.
+    #[serde(flatten)]
+    pub spread: Option<LimitSpread>,
+}
+
+impl SpeedLine {
+    /// The line that switches, by depth, make of depths from 0 to `depth_mm`, where `outside` multipliers are outside
+    /// at depth 0.
+    pub(crate) fn of_switches(rpm: f64, depth_mm: f64, mut outside: i32, switches: Vec<Switch>) -> Self {
+        let mut stable_from = (outside == 0).then_some(0.0);
+        let mut stable_mm = Vec::new();
+        let mut undecided_mm = Vec::new();
+        let mut first_limit = None;
+        for switch in &switches {
+            let count = switch.kind.count();
+            outside += if switch.gain { -count } else { count };
+            match (stable_from, outside) {
+                (Some(from), 1..) => {
+                    stable_mm.push([from, switch.depth_mm]);
+                    stable_from = None;
+                    first_limit = first_limit.or(Some(Limit::from(switch)));
+                }
+                (None, ..=0) => stable_from = Some(switch.depth_mm),
+                _ => continue,
+            }
+            undecided_mm.extend(switch.error_mm.map(|error_mm| {
+                [
+                    (switch.depth_mm - error_mm).max(0.0),
+                    (switch.depth_mm + error_mm).min(depth_mm),
+                ]
+            }));
+        }
+        if let Some(from) = stable_from {
+            stable_mm.push([from, depth_mm]);
+        }
+        Self {
+            rpm,
+            stable_mm,
+            undecided_mm: union(undecided_mm),
+            bistable_mm: Vec::new(),
+            first_limit,
+            switches,
+            spread: None,
+        }
+    }
+}
+
+impl From<&Switch> for Limit {
+    fn from(switch: &Switch) -> Self {
+        Self {
+            depth_mm: switch.depth_mm,
+            error_mm: switch.error_mm,
+            kind: switch.kind,
+            chatter_hz: switch.chatter_hz,
+        }
+    }
+}
+
+/// Overlapping intervals joined, in order.
+pub(crate) fn union(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut joined: Vec<[f64; 2]> = Vec::with_capacity(intervals.len());
+    for interval in intervals {
+        match joined.last_mut() {
+            Some(last) if interval[0] <= last[1] => last[1] = last[1].max(interval[1]),
+            _ => joined.push(interval),
+        }
+    }
+    joined
+}

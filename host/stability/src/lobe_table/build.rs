@@ -1,0 +1,105 @@
+//! From cases to the bytes of a table.
+
+use quietcut_core::lobes::{InterpolationError, LobeTable};
+
+use super::accuracy::Checks;
+use super::derivatives::{self, Derivatives};
+use super::encoding::Table;
+use super::entries::{self, Entry};
+use super::error::BuildError;
+use super::request::TableRequest;
+use super::{grid, layers};
+use crate::limits::chart::Refinement;
+use crate::limits::speeds::{default_speeds, spaced};
+use quietcut_model::case::Case;
+
+/// Bytes that a table should have: a quarter of a slot of the board, so that refinement, which stops only after it
+/// is exceeded, stays within. A speed takes 4 bytes, and in each layer 2 and 8 for each of one or two unstable intervals.
+const BYTES: usize = 32 * 1024;
+
+/// Share of the largest depth by which a limit may differ from the straight line between its neighbours.
+const TOLERANCE: f64 = 0.003;
+
+/// Speeds before refinement.
+const SPEEDS: usize = 121;
+
+/// The bytes of a lobe table, header and CRC included: one layer per case, feed and feed direction.
+///
+/// Speeds are refined until every limit differs from the straight line between its neighbours by less than 0.3 % of
+/// the largest depth, or the table is as long as it should be; feeds and directions likewise. Then every gap between speeds is
+/// checked against the method itself at one more speed, in every layer and half way between layers. Where the table is too deep there,
+/// on flanks too steep for its speeds, the entries around are made as shallow as the gap: see [`InterpolationError`] for what it
+/// states. Depths with two stable orbits, which only cubic terms make, count as unstable.
+///
+/// # Errors
+/// No case, cases of different tools, two layers for the same cut, or a case whose stability cannot be computed.
+pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, BuildError> {
+    let first = cases.first().ok_or(BuildError::NoCase)?;
+    let asked = layers::families(cases, request)?;
+    let (from_rpm, to_rpm) = match (request.rpm, asked.first()) {
+        (Some(rpm), _) => rpm,
+        (None, Some(family)) => default_speeds(first, &family.linear.structure, family.teeth),
+        (None, None) => return Err(BuildError::NoCase),
+    };
+    let depth_mm = match request.depth_mm {
+        Some(depth_mm) => depth_mm,
+        None => grid::default_depth(&asked, from_rpm, to_rpm)?,
+    };
+    let probes = spaced(from_rpm, to_rpm, layers::PROBES);
+    let families = layers::refined(cases, request, &probes, depth_mm, TOLERANCE * depth_mm)?;
+    let modes = if request.derivatives {
+        derivatives::mode_count(&families)?
+    } else {
+        0
+    };
+    let slopes_bytes = if modes == 0 { 0 } else { 4 * (2 * modes + 1) };
+    let bytes_of_speed = 4 + families.len() * (2 + 3 * (8 + slopes_bytes) / 2);
+    let refinement = Refinement {
+        tolerance: TOLERANCE,
+        least_step: 2e-4,
+        most_speeds: (BYTES / bytes_of_speed).max(SPEEDS),
+    };
+    let coarse = spaced(from_rpm, to_rpm, request.speeds.unwrap_or(SPEEDS).max(2));
+    let speeds = grid::speeds_of_all(&families, &coarse, depth_mm, refinement)?;
+    let mut lines = Vec::with_capacity(families.len());
+    for family in &families {
+        lines.push(family.lines(&speeds, depth_mm)?);
+    }
+    let derivatives = if modes > 0 {
+        let of_layers = families.iter().zip(&lines);
+        of_layers
+            .map(|(family, lines)| Derivatives::new(family, lines, modes))
+            .collect::<Result<_, _>>()?
+    } else {
+        Vec::new()
+    };
+    let mut entries: Vec<Vec<Vec<Entry>>> = lines
+        .iter()
+        .map(|lines| {
+            lines
+                .iter()
+                .map(|line| entries::unstable(line, depth_mm))
+                .collect()
+        })
+        .collect();
+    let bytes = |entries: &[Vec<Vec<Entry>>], error: Option<InterpolationError>| {
+        let table = Table {
+            first,
+            families: &families,
+            speeds: &speeds,
+            entries,
+            derivatives: &derivatives,
+            depth_mm,
+        };
+        table.bytes(error)
+    };
+    let tolerance_mm = TOLERANCE * depth_mm;
+    let spans = layers::spans(&families)?;
+    let checks = Checks::new(&spans, &speeds, depth_mm)?;
+    let plain = bytes(&entries, None)?;
+    let plain = LobeTable::parse(&plain).map_err(BuildError::Format)?;
+    checks.guard(&plain, &mut entries, tolerance_mm);
+    let guarded = bytes(&entries, None)?;
+    let guarded = LobeTable::parse(&guarded).map_err(BuildError::Format)?;
+    bytes(&entries, Some(checks.stated(&guarded, tolerance_mm)))
+}

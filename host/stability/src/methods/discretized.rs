@@ -1,0 +1,134 @@
+//! Methods that discretize the period into steps, as the field knows them: with the steps asked for, and with an error.
+
+use num_complex::Complex64;
+
+use super::step_error::step_error;
+use super::stepped::{Mesh, Stepped};
+use crate::error::StabilityError;
+use crate::limits::bounds::{check_depth, check_speed};
+use crate::limits::line::line_of;
+use crate::limits::method::Method;
+use crate::limits::point::Point;
+use crate::limits::speed_line::SpeedLine;
+use crate::problem::pitched::Pitched;
+use crate::spectrum::krylov::Dominant;
+use crate::spectrum::map_spectrum::{MapSpectrum, PeriodMap};
+
+/// Relative error that rounding leaves in multipliers of a period of some hundred steps.
+const ROUNDING: f64 = 1e-9;
+
+/// How a step is made.
+pub(crate) trait Discretization: Sync {
+    /// The name in answers.
+    fn name(&self) -> &'static str;
+
+    /// The power of the step with which multipliers converge.
+    fn order(&self) -> u32;
+
+    /// The map of a period at a depth, m; `None` where a step has no solution.
+    fn map<'a>(&self, pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64) -> Option<Stepped<'a>>;
+}
+
+/// A discretization with a number of steps on a problem.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Discretized<D> {
+    /// The problem that it solves.
+    pub pitched: Pitched,
+    /// How a step is made.
+    pub discretization: D,
+    /// Steps in each tooth period, at least 1.
+    pub steps: usize,
+}
+
+/// What `answer` says of the largest multipliers of a method at a point, with `steps` steps.
+pub(crate) fn with_dominant<D: Discretization, T>(
+    method: &Discretized<D>,
+    rpm: f64,
+    depth_mm: f64,
+    steps: usize,
+    answer: impl FnOnce(&Dominant, &Stepped) -> Option<T>,
+) -> Result<T, StabilityError> {
+    let mesh = Mesh::new(&method.pitched, rpm, steps);
+    let broke_down = || StabilityError::BrokeDown {
+        rpm,
+        depth_mm,
+        what: "the steps of the period have no finite solution",
+    };
+    let map = method
+        .discretization
+        .map(&method.pitched, &mesh, depth_mm * 1e-3)
+        .ok_or_else(broke_down)?;
+    let dominant = Dominant::any(&map).ok_or_else(broke_down)?;
+    answer(&dominant, &map).ok_or_else(broke_down)
+}
+
+#[expect(private_bounds, reason = "sealed: discretizations are those of this module")]
+impl<D: Discretization> Discretized<D> {
+    /// The dominant multiplier of the steps asked for, without an estimate of its error: a seventh of the work of
+    /// [`point()`](Method::point).
+    ///
+    /// # Errors
+    /// As [`Method::point`].
+    pub fn multiplier(&self, rpm: f64, depth_mm: f64) -> Result<Complex64, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        with_dominant(self, rpm, depth_mm, self.steps, |dominant, _| {
+            dominant.eigenvalues.first().copied()
+        })
+    }
+
+    /// The error of a multiplier of the steps asked for, from twice and four times as many.
+    fn error(&self, rpm: f64, depth_mm: f64, multiplier: Complex64) -> Result<f64, StabilityError> {
+        let finer = |times: usize| {
+            with_dominant(self, rpm, depth_mm, times * self.steps, |dominant, _| {
+                let distance = |value: &Complex64| (value - multiplier).norm();
+                let values = dominant.eigenvalues.iter().copied();
+                values.min_by(|p, q| distance(p).total_cmp(&distance(q)))
+            })
+        };
+        let order = self.discretization.order();
+        Ok(step_error(multiplier, finer(2)?, finer(4)?, order, ROUNDING))
+    }
+}
+
+impl<D: Discretization> Method for Discretized<D> {
+    fn name(&self) -> &'static str {
+        self.discretization.name()
+    }
+
+    fn settings(&self) -> Option<String> {
+        let order = self.discretization.order();
+        Some(format!(
+            "{} steps per tooth period, error of order {order} in the step",
+            self.steps
+        ))
+    }
+
+    /// The multiplier is that of the steps asked for; its error is told from twice and four times as many.
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        let (multiplier, chatter_hz) = with_dominant(self, rpm, depth_mm, self.steps, |dominant, map| {
+            let multiplier = *dominant.eigenvalues.first()?;
+            let chatter_hz = dominant
+                .vector(multiplier)
+                .and_then(|vector| map.chatter_hz(multiplier, &vector));
+            Some((multiplier, chatter_hz))
+        })?;
+        let error = self.error(rpm, depth_mm, multiplier)?;
+        Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
+    }
+
+    /// Limits are those of the steps asked for, their errors those of the multipliers there.
+    fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+        check_speed(rpm)?;
+        let mesh = Mesh::new(&self.pitched, rpm, self.steps);
+        line_of(rpm, depth_mm, samples, |deepest_m| {
+            MapSpectrum::new(
+                deepest_m,
+                |depth_m| self.discretization.map(&self.pitched, &mesh, depth_m),
+                |multiplier, depth_m| self.error(rpm, depth_m * 1e3, multiplier).ok(),
+            )
+        })
+    }
+}

@@ -1,0 +1,199 @@
+//! The multi-frequency solution (Budak & Altintas 1998, Merdol & Altintas 2004): the harmonics of the coefficients.
+
+use num_complex::Complex64;
+
+use crate::error::StabilityError;
+use crate::frequency::averaged::AveragedLoop;
+use crate::frequency::harmonic::HarmonicLoop;
+use crate::frequency::limits::{Limit, limits, speed_line};
+use crate::frequency::problem::FrequencyProblem;
+use crate::frequency::root::{point_of, polish, rightmost};
+use crate::limits::bounds::{check_depth, check_speed};
+use crate::limits::method::Method;
+use crate::limits::point::Point;
+use crate::limits::speed_line::SpeedLine;
+use crate::spectrum::stability_loss::Kind;
+
+/// Largest relative change of a limit with twice the harmonics at which they are enough. What is left out then falls by
+/// four or more with each doubling: the limits with twice the harmonics are right to a third of it.
+const LIMIT_SETTLED: f64 = 1e-4;
+
+/// The same for multipliers.
+const MULTIPLIER_SETTLED: f64 = 1e-6;
+
+/// The most harmonics: beyond them the matrices are too large to be of use.
+const HARMONICS_MAX: usize = 400;
+
+/// Limits that move by more than this share with twice the harmonics are not the same limits.
+const SAME: f64 = 0.1;
+
+/// The multi-frequency solution on modelled or measured receptances.
+///
+/// The harmonic transfer matrix with harmonics from −K−1 to K of the tooth-passing frequency: flips included. Without
+/// a given K there are as many harmonics as limits need to settle, tried by doubling.
+#[derive(Clone, Debug)]
+pub struct MultiFrequency {
+    /// Receptances and cutting process.
+    pub problem: FrequencyProblem,
+    /// K; `None` for as many as it takes.
+    pub harmonics: Option<usize>,
+}
+
+impl MultiFrequency {
+    fn open_loop(&self, rpm: f64, harmonics: usize) -> HarmonicLoop<'_> {
+        HarmonicLoop::new(&self.problem, rpm, harmonics)
+    }
+
+    /// The limits with as many harmonics as they need, the loop they belong to, and the limits with another number of harmonics.
+    fn settled(&self, rpm: f64, depth_mm: f64) -> Result<Settled<'_>, StabilityError> {
+        let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
+        let find = |harmonics| {
+            let open_loop = self.open_loop(rpm, harmonics);
+            limits(&open_loop, depth_mm * 1e-3)
+                .map(|limits| (open_loop, limits))
+                .ok_or(broke_down("receptances are not finite"))
+        };
+        if let Some(harmonics) = self.harmonics {
+            let (open_loop, limits) = find(harmonics)?;
+            let (_, other) = find(2 * harmonics + 1)?;
+            return Ok((open_loop, limits, other));
+        }
+        let mut harmonics = HarmonicLoop::least_harmonics(&self.problem, rpm);
+        let mut found = find(harmonics)?;
+        while 2 * harmonics <= HARMONICS_MAX {
+            harmonics *= 2;
+            let finer = find(harmonics)?;
+            let change = largest_change(&found.1, &finer.1, depth_mm * 1e-3);
+            let (_, coarser) = std::mem::replace(&mut found, finer);
+            if change.is_some_and(|change| change <= LIMIT_SETTLED) {
+                return Ok((found.0, found.1, coarser));
+            }
+        }
+        Err(broke_down(
+            "limits do not settle with the harmonics that can be computed",
+        ))
+    }
+}
+
+type Settled<'a> = (HarmonicLoop<'a>, Vec<Limit>, Vec<Limit>);
+
+/// The largest relative change from one list of limits to another; `None` where they are not the same limits.
+fn largest_change(coarse: &[Limit], fine: &[Limit], depth_m: f64) -> Option<f64> {
+    // Near the last depth a limit may come or go.
+    let inside = |limits: &[Limit]| -> Vec<Limit> {
+        let within = limits
+            .iter()
+            .filter(|limit| limit.depth_m < (1.0 - LIMIT_SETTLED) * depth_m);
+        within.copied().collect()
+    };
+    let (coarse, fine) = (inside(coarse), inside(fine));
+    if coarse.len() != fine.len() {
+        return None;
+    }
+    let mut free = fine;
+    let mut largest = 0.0_f64;
+    for limit in coarse {
+        let change = |other: &Limit| (other.depth_m / limit.depth_m - 1.0).abs();
+        let (index, nearest) = free
+            .iter()
+            .enumerate()
+            .filter(|(_, other)| other.kind == limit.kind && other.outward == limit.outward)
+            .map(|(index, other)| (index, change(other)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        if nearest > SAME {
+            return None;
+        }
+        free.swap_remove(index);
+        largest = largest.max(nearest);
+    }
+    Some(largest)
+}
+
+impl Method for MultiFrequency {
+    fn name(&self) -> &'static str {
+        "multi-frequency"
+    }
+
+    /// The error is what changes with twice the harmonics; the multiplier is that with twice the harmonics.
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
+        let not_found = broke_down("the rightmost root cannot be found by receptances; limits can");
+        let depth_m = depth_mm * 1e-3;
+        let delay_s = self.problem.tooth_period_s(rpm);
+        let mut harmonics = self
+            .harmonics
+            .unwrap_or_else(|| HarmonicLoop::least_harmonics(&self.problem, rpm));
+        let mut root = rightmost(&self.open_loop(rpm, harmonics), depth_m).ok_or(not_found)?;
+        loop {
+            let finer = self.open_loop(rpm, 2 * harmonics + 1);
+            let before = (root * delay_s).exp();
+            root = polish(&finer, depth_m, root)
+                .ok_or(broke_down("the rightmost root is lost with more harmonics"))?;
+            let multiplier = (root * delay_s).exp();
+            let change = (multiplier - before).norm();
+            harmonics = 2 * harmonics + 1;
+            let is_enough = change <= MULTIPLIER_SETTLED * multiplier.norm().max(1.0);
+            if self.harmonics.is_some() || is_enough || 2 * harmonics > HARMONICS_MAX {
+                return self.judged(&finer, rpm, depth_mm, root, change);
+            }
+        }
+    }
+
+    fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        AveragedLoop::check_reach(&self.problem, depth_mm)?;
+        let (open_loop, limits, other) = self.settled(rpm, depth_mm)?;
+        let mut others = vec![other];
+        others.extend(open_loop.thinned_limits(depth_mm * 1e-3));
+        speed_line(&open_loop, rpm, depth_mm, &limits, &others, |limit| {
+            open_loop.chatter_hz(limit)
+        })
+    }
+}
+
+impl MultiFrequency {
+    /// The point of a root, with the error that fewer harmonics and a table make.
+    fn judged(
+        &self,
+        open_loop: &HarmonicLoop<'_>,
+        rpm: f64,
+        depth_mm: f64,
+        root: Complex64,
+        change: f64,
+    ) -> Result<Point, StabilityError> {
+        let delay_s = self.problem.tooth_period_s(rpm);
+        let depth_m = depth_mm * 1e-3;
+        let multiplier = (root * delay_s).exp();
+        let of_lines = match self.problem.thinned() {
+            Some(thinned) => {
+                let coarse = HarmonicLoop::new(&thinned, rpm, open_loop.harmonics());
+                polish(&coarse, depth_m, root).map_or(f64::INFINITY, |other| {
+                    ((other * delay_s).exp() - multiplier).norm()
+                })
+            }
+            None => 0.0,
+        };
+        // On the real axis to what the harmonics leave: a flip is one exactly.
+        let is_real = multiplier.im.abs() <= 1e-9 * multiplier.norm();
+        let multiplier = if is_real {
+            Complex64::from(multiplier.re)
+        } else {
+            multiplier
+        };
+        let chatter_hz = open_loop.vibration_hz(root, depth_m);
+        self.problem.check_band(chatter_hz, rpm, depth_mm)?;
+        let kind = Kind::of(multiplier);
+        Ok(point_of(
+            rpm,
+            depth_mm,
+            multiplier,
+            change + of_lines,
+            kind,
+            chatter_hz,
+        ))
+    }
+}

@@ -1,0 +1,86 @@
+//! The default method for tools with variable pitch: collocation of the map over one revolution.
+
+use std::rc::Rc;
+
+use num_complex::Complex64;
+
+use crate::criteria::LEAST_ERROR;
+use crate::error::StabilityError;
+use crate::limits::bounds::{check_depth, check_speed};
+use crate::limits::line::line_of;
+use crate::limits::method::Method;
+use crate::limits::point::Point;
+use crate::limits::speed_line::SpeedLine;
+use crate::problem::pitched::Pitched;
+use crate::problem::revolution::Revolution;
+use crate::problem::revolution_mesh::Fineness;
+use crate::spectrum::krylov::Dominant;
+use crate::spectrum::map_spectrum::{self, MapSpectrum, PeriodMap};
+use crate::spectrum::revolution_map::RevolutionMap;
+
+/// Collocation over the revolution, for teeth at any angles.
+///
+/// Multipliers are over the revolution: with N equal pitches they are the N-th power of those over the tooth period, and
+/// Hopf, flip and fold are meant with respect to the revolution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RevolutionCollocation {
+    /// The problem that it solves.
+    pub pitched: Pitched,
+}
+
+impl Method for RevolutionCollocation {
+    fn name(&self) -> &'static str {
+        "collocation over the revolution"
+    }
+
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        let depth_m = depth_mm * 1e-3;
+        let broke_down = || StabilityError::BrokeDown {
+            rpm,
+            depth_mm,
+            what: "motions grow beyond the range of numbers, or multipliers of nearly one size are too many to tell apart",
+        };
+        let map = |fineness| {
+            let revolution = Revolution::new(&self.pitched, rpm, depth_m, fineness)?;
+            RevolutionMap::new(Rc::new(revolution), depth_m)
+        };
+        let coarse = map(Fineness::WORKING)
+            .and_then(|map| Dominant::any(&map)?.eigenvalues.first().copied())
+            .ok_or_else(broke_down)?;
+        let fine = map(Fineness::FINE).ok_or_else(broke_down)?;
+        let dominant = Dominant::any(&fine).ok_or_else(broke_down)?;
+        let distance = |value: &Complex64| (value - coarse).norm();
+        let values = dominant.eigenvalues.iter().copied();
+        let multiplier = values
+            .min_by(|p, q| distance(p).total_cmp(&distance(q)))
+            .ok_or_else(broke_down)?;
+        let chatter_hz = dominant
+            .vector(multiplier)
+            .and_then(|vector| fine.chatter_hz(multiplier, &vector));
+        let error = error(coarse, multiplier);
+        Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
+    }
+
+    fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+        line_of(rpm, depth_mm, samples, |deepest_m| {
+            let revolution = Revolution::new(&self.pitched, rpm, deepest_m, Fineness::WORKING).map(Rc::new);
+            MapSpectrum::new(
+                deepest_m,
+                move |depth_m| RevolutionMap::new(revolution.clone()?, depth_m),
+                |multiplier, depth_m| {
+                    let finer = Revolution::new(&self.pitched, rpm, depth_m, Fineness::FINE)?;
+                    let finer = Dominant::any(&RevolutionMap::new(Rc::new(finer), depth_m)?)?;
+                    let nearest = map_spectrum::nearest(&finer.eigenvalues, multiplier)?;
+                    Some(error(multiplier, nearest))
+                },
+            )
+        })
+    }
+}
+
+/// The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
+fn error(coarse: Complex64, fine: Complex64) -> f64 {
+    (10.0 * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
+}

@@ -1,0 +1,300 @@
+//! One period in steps: x_{i+1} = P_i x_i + Σ_j R_ij y_j with y = C x at earlier steps. What semi-discretization and
+//! full discretization have in common.
+//!
+//! Of the delayed state only displacements act. The map of a period is never formed: a step changes n states and
+//! appends one displacement, everything else moves along by one place.
+
+use nalgebra::{DMatrix, DVector, Matrix3};
+use num_complex::Complex64;
+
+use crate::problem::exponential::Exponential;
+use crate::problem::passages::{Coefficients, Passages};
+use crate::problem::pitched::Pitched;
+use crate::spectrum::chatter_frequency::loudest_hz;
+use crate::spectrum::krylov::LinearMap;
+use crate::spectrum::map_spectrum::PeriodMap;
+
+/// Share of a step within which a delay ends at a step.
+const ON_STEP: f64 = 1e-9;
+
+/// Nodes and shares of the mean over a step: three Gauss nodes, exact for coefficients of fifth order.
+const GAUSS: [(f64, f64); 3] = [
+    (0.112_701_665_379_258_3, 5.0 / 18.0),
+    (0.5, 8.0 / 18.0),
+    (0.887_298_334_620_741_7, 5.0 / 18.0),
+];
+
+/// The times of the steps of a period, with every entry and exit of a tooth among them.
+#[derive(Clone, Debug)]
+pub(crate) struct Mesh {
+    /// From 0 to the period, s.
+    pub(crate) times_s: Vec<f64>,
+    pub(crate) passages: Passages,
+}
+
+impl Mesh {
+    /// About `steps` steps in each tooth period, at least one between two switches.
+    pub(crate) fn new(pitched: &Pitched, rpm: f64, steps: usize) -> Self {
+        let passages = Passages::new(pitched, rpm);
+        let shortest_s = passages
+            .list
+            .iter()
+            .map(|passage| passage.delay_s)
+            .fold(pitched.problem.tooth_period_s(rpm), f64::min);
+        // A delay shorter than a step would make the step implicit in the displacement at its own end.
+        let longest_s = (pitched.problem.tooth_period_s(rpm) / steps.max(1) as f64).min(shortest_s);
+        let mut times_s = vec![0.0];
+        for ends in passages.switches_s().windows(2) {
+            let count = ((ends[1] - ends[0]) / longest_s - ON_STEP).ceil().max(1.0) as usize;
+            times_s.extend((1..=count).map(|i| ends[0] + (ends[1] - ends[0]) * i as f64 / count as f64));
+        }
+        Self { times_s, passages }
+    }
+
+    /// Number of steps.
+    pub(crate) fn count(&self) -> usize {
+        self.times_s.len() - 1
+    }
+
+    /// Start and duration of a step, s.
+    pub(crate) fn step(&self, index: usize) -> (f64, f64) {
+        let start_s = self.times_s[index];
+        (start_s, self.times_s[index + 1] - start_s)
+    }
+
+    /// The mean of the coefficients over a step.
+    pub(crate) fn mean(&self, pitched: &Pitched, index: usize) -> Coefficients {
+        let (start_s, duration_s) = self.step(index);
+        let nodes = GAUSS
+            .iter()
+            .map(|(node, share)| (start_s + duration_s * node, *share));
+        Coefficients::mean(pitched, &self.passages, start_s + 0.5 * duration_s, nodes)
+    }
+
+    /// The coefficients at a share of a step; at its ends those of the teeth that cut within it.
+    pub(crate) fn at(&self, pitched: &Pitched, index: usize, share: f64) -> Coefficients {
+        let (start_s, duration_s) = self.step(index);
+        let node = std::iter::once((start_s + duration_s * share, 1.0));
+        Coefficients::mean(pitched, &self.passages, start_s + 0.5 * duration_s, node)
+    }
+
+    /// The two steps between which a time up to 0 or within the period lies, with their shares in a straight line;
+    /// negative numbers are steps of the period before.
+    fn around(&self, time_s: f64) -> [(isize, f64); 2] {
+        let (period_s, count) = (self.passages.period_s, self.count() as isize);
+        let turns = (time_s / period_s).floor();
+        let within_s = time_s - turns * period_s;
+        let first = self
+            .times_s
+            .partition_point(|&start_s| start_s <= within_s)
+            .saturating_sub(1)
+            .min(self.count() - 1);
+        let (start_s, duration_s) = self.step(first);
+        let mut share = (within_s - start_s) / duration_s;
+        if share < ON_STEP {
+            share = 0.0;
+        } else if share > 1.0 - ON_STEP {
+            share = 1.0;
+        }
+        let index = first as isize + turns as isize * count;
+        [(index, 1.0 - share), (index + 1, share)]
+    }
+}
+
+/// One step.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    /// P, n × n.
+    pub(crate) flow: DMatrix<f64>,
+    /// The steps whose displacements act, and how, n × 3.
+    past: Vec<(isize, DMatrix<f64>)>,
+}
+
+impl Step {
+    /// A step that so far knows the present only.
+    pub(crate) fn new(flow: DMatrix<f64>) -> Self {
+        Self {
+            flow,
+            past: Vec::new(),
+        }
+    }
+
+    /// Adds `response` (n × 3) times the displacement at a time, s, in a straight line between steps.
+    pub(crate) fn add_past(&mut self, mesh: &Mesh, time_s: f64, response: &DMatrix<f64>) {
+        for (index, share) in mesh.around(time_s) {
+            if share == 0.0 {
+                continue;
+            }
+            match self.past.iter_mut().find(|(known, _)| *known == index) {
+                Some((_, sum)) => *sum += response * share,
+                None => self.past.push((index, response * share)),
+            }
+        }
+    }
+}
+
+/// The map of one period at one depth: (x_0, y_{−1}, …, y_{−K}) one period later.
+#[derive(Clone, Debug)]
+pub(crate) struct Stepped<'a> {
+    pitched: &'a Pitched,
+    mesh: &'a Mesh,
+    depth_m: f64,
+    steps: Vec<Step>,
+    /// K.
+    history: usize,
+    /// Number of displacements d that are kept: those of directions that move.
+    seen: Vec<usize>,
+    /// The rows of C of those directions, d × n.
+    observe: DMatrix<f64>,
+}
+
+impl<'a> Stepped<'a> {
+    /// From all steps of a mesh at a depth, m.
+    pub(crate) fn new(pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64, mut steps: Vec<Step>) -> Self {
+        let structure = &pitched.problem.structure;
+        let seen: Vec<usize> = (0..3)
+            .filter(|&axis| structure.c.row(axis).amax() > 0.0)
+            .collect();
+        for (_, response) in steps.iter_mut().flat_map(|step| &mut step.past) {
+            *response = response.select_columns(&seen);
+        }
+        let earliest = steps
+            .iter()
+            .flat_map(|step| &step.past)
+            .map(|(index, _)| *index)
+            .fold(0, isize::min);
+        Self {
+            pitched,
+            mesh,
+            depth_m,
+            steps,
+            history: earliest.unsigned_abs(),
+            observe: DMatrix::from_fn(seen.len(), structure.order(), |i, j| structure.c[(seen[i], j)]),
+            seen,
+        }
+    }
+
+    fn order(&self) -> usize {
+        self.observe.ncols()
+    }
+
+    /// The last state, and the displacements y_{−K} … y_N below one another.
+    fn trace(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (order, kept, width) = (self.order(), self.seen.len(), columns.ncols());
+        let mut trace = DMatrix::zeros((self.history + self.steps.len() + 1) * kept, width);
+        for back in 1..=self.history {
+            let from = columns.rows(order + (back - 1) * kept, kept);
+            trace
+                .rows_mut((self.history - back) * kept, kept)
+                .copy_from(&from);
+        }
+        let mut state = columns.rows(0, order).into_owned();
+        let mut next = state.clone();
+        let mut place = self.history * kept;
+        self.observe.mul_to(&state, &mut trace.rows_mut(place, kept));
+        for step in &self.steps {
+            step.flow.mul_to(&state, &mut next);
+            for (index, response) in &step.past {
+                // The earliest index is −K: the row is not negative.
+                let row = (index + self.history as isize) as usize * kept;
+                next.gemm(1.0, response, &trace.rows(row, kept), 1.0);
+            }
+            std::mem::swap(&mut state, &mut next);
+            place += kept;
+            self.observe.mul_to(&state, &mut trace.rows_mut(place, kept));
+        }
+        (state, trace)
+    }
+}
+
+impl LinearMap for Stepped<'_> {
+    fn size(&self) -> usize {
+        self.order() + self.history * self.seen.len()
+    }
+
+    fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let (order, kept) = (self.order(), self.seen.len());
+        let (state, trace) = self.trace(columns);
+        let mut image = DMatrix::zeros(self.size(), columns.ncols());
+        image.rows_mut(0, order).copy_from(&state);
+        let last = self.history + self.steps.len();
+        for back in 1..=self.history {
+            image
+                .rows_mut(order + (back - 1) * kept, kept)
+                .copy_from(&trace.rows((last - back) * kept, kept));
+        }
+        image.iter().all(|entry| entry.is_finite()).then_some(image)
+    }
+}
+
+impl PeriodMap for Stepped<'_> {
+    fn chatter_hz(&self, multiplier: Complex64, vector: &DVector<Complex64>) -> Option<f64> {
+        let kept = self.seen.len();
+        let parts = DMatrix::from_fn(
+            vector.len(),
+            2,
+            |i, j| {
+                if j == 0 { vector[i].re } else { vector[i].im }
+            },
+        );
+        let (_, trace) = self.trace(&parts);
+        loudest_hz(
+            &self.pitched.problem,
+            self.depth_m,
+            self.mesh.passages.period_s,
+            multiplier,
+            |s| {
+                let mut harmonic = DVector::<Complex64>::zeros(kept);
+                for index in 0..self.steps.len() {
+                    let (start_s, duration_s) = self.mesh.step(index);
+                    let factor = (-s * start_s).exp() * duration_s;
+                    for i in 0..kept {
+                        let row = (self.history + index) * kept + i;
+                        harmonic[i] += factor * Complex64::new(trace[(row, 0)], trace[(row, 1)]);
+                    }
+                }
+                Some(harmonic.norm())
+            },
+        )
+    }
+}
+
+/// B K as n × 3.
+pub(crate) fn pushed(response: &DMatrix<f64>, force: &Matrix3<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(response.nrows(), 3, |i, j| {
+        (0..3).map(|axis| response[(i, axis)] * force[(axis, j)]).sum()
+    })
+}
+
+/// ∫₀^h e^{A(h−s)} (s/h)^q ds B for q = 0 … `moments` − 1, each n × 3, after e^{Ah}.
+pub(crate) fn moments(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    duration_s: f64,
+    moments: usize,
+) -> (DMatrix<f64>, Vec<DMatrix<f64>>) {
+    let order = a.nrows();
+    let inputs = b.ncols();
+    // ẋ = A x + B z_0, ż_0 = z_1/h, …: z_0 = (s/h)^q/q! where z_q starts at 1 (Van Loan 1978).
+    let mut augmented = DMatrix::zeros(order + inputs * moments, order + inputs * moments);
+    augmented
+        .view_mut((0, 0), (order, order))
+        .copy_from(&(a * duration_s));
+    augmented
+        .view_mut((0, order), (order, inputs))
+        .copy_from(&(b * duration_s));
+    for index in 1..moments {
+        let (row, column) = (order + inputs * (index - 1), order + inputs * index);
+        augmented
+            .view_mut((row, column), (inputs, inputs))
+            .fill_with_identity();
+    }
+    let whole = Exponential::new(&augmented).at(1.0);
+    let mut factorial = 1.0;
+    let parts = (0..moments).map(|q| {
+        factorial *= q.max(1) as f64;
+        whole.view((0, order + inputs * q), (order, inputs)) * factorial
+    });
+    let parts = parts.collect();
+    (whole.view((0, 0), (order, order)).into_owned(), parts)
+}

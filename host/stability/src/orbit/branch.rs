@@ -1,0 +1,144 @@
+//! A branch of forced orbits as the depth grows, with the points where multipliers cross the unit circle.
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+use crate::limits::speed_line::{Limit, SpeedLine, Switch, union};
+use crate::spectrum::stability_loss::Kind;
+
+/// A point on a branch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BranchPoint {
+    /// Axial depth, mm.
+    pub depth_mm: f64,
+    /// Half the peak-to-peak displacement of the orbit in feed, normal and axial direction, mm.
+    pub amplitude_mm: [f64; 3],
+    /// Absolute value of the largest multiplier.
+    pub multiplier_abs: f64,
+    /// Number of multipliers outside the unit circle.
+    pub outside: i32,
+}
+
+/// A point where a multiplier crosses the unit circle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// Axial depth, mm.
+    pub depth_mm: f64,
+    /// An estimate of its error, mm: within it |μ| is as near to 1 as the error of the multiplier.
+    pub error_mm: f64,
+    /// How it crosses; a fold is where the branch turns back in depth. With unequal teeth with respect to the revolution.
+    pub kind: Kind,
+    /// True where the number outside falls along the branch.
+    pub gain: bool,
+    /// The multiplier there.
+    #[serde(skip)]
+    pub multiplier: Complex64,
+    /// Frequency of the vibration that is born or dies there, Hz; `None` at a fold.
+    pub chatter_hz: Option<f64>,
+}
+
+/// Orbits from rest at no depth on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Branch {
+    /// Spindle speed, rev/min.
+    pub rpm: f64,
+    /// The points, in the order of the branch.
+    pub points: Vec<BranchPoint>,
+    /// The events, in the order of the branch.
+    pub events: Vec<Event>,
+}
+
+/// How far a branch is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// To the first loss of stability, which is all that a limit needs.
+    FirstLoss,
+    /// To the last depth, through folds.
+    Whole,
+}
+
+impl Branch {
+    /// Depths at which the forced orbit is stable, mm, in the order of the branch.
+    pub fn stable_mm(&self) -> Vec<[f64; 2]> {
+        let mut outside = self.points.first().map_or(0, |point| point.outside);
+        let mut from = (outside == 0).then_some(0.0);
+        let mut stable = Vec::new();
+        for event in &self.events {
+            let count = event.kind.count();
+            outside += if event.gain { -count } else { count };
+            match (from, outside) {
+                (Some(start), 1..) => {
+                    stable.push([start, event.depth_mm]);
+                    from = None;
+                }
+                (None, ..=0) => from = Some(event.depth_mm),
+                _ => {}
+            }
+        }
+        if let (Some(start), Some(last)) = (from, self.points.last()) {
+            stable.push([start, last.depth_mm]);
+        }
+        stable.retain_mut(|interval| {
+            interval.sort_by(f64::total_cmp);
+            interval[1] > interval[0]
+        });
+        stable
+    }
+
+    /// Depths at which the errors of the events leave open whether some forced orbit is stable, mm: around the ends of those that
+    /// are stable.
+    fn undecided_mm(&self) -> Vec<[f64; 2]> {
+        let ends = union(self.stable_mm()).into_iter().flatten();
+        let around = ends.filter_map(|end_mm| {
+            let event = self.events.iter().find(|event| event.depth_mm == end_mm)?;
+            Some([(end_mm - event.error_mm).max(0.0), end_mm + event.error_mm])
+        });
+        union(around.collect())
+    }
+
+    /// Depths at which two stable forced orbits exist, mm.
+    pub fn bistable_mm(&self) -> Vec<[f64; 2]> {
+        let stable = self.stable_mm();
+        let mut both = Vec::new();
+        for (i, a) in stable.iter().enumerate() {
+            for b in &stable[i + 1..] {
+                let (from, to) = (a[0].max(b[0]), a[1].min(b[1]));
+                if from < to {
+                    both.push([from, to]);
+                }
+            }
+        }
+        both
+    }
+
+    /// The branch as a line of the chart.
+    ///
+    /// The first limit is the first loss along the branch; stable depths are those at which some forced orbit is stable.
+    pub fn speed_line(&self) -> SpeedLine {
+        let switches: Vec<Switch> = self
+            .events
+            .iter()
+            .map(|event| Switch {
+                depth_mm: event.depth_mm,
+                error_mm: Some(event.error_mm),
+                kind: event.kind,
+                gain: event.gain,
+                chatter_hz: event.chatter_hz,
+            })
+            .collect();
+        let starts_stable = self.points.first().is_some_and(|point| point.outside == 0);
+        let first_limit = switches
+            .iter()
+            .find(|switch| starts_stable && !switch.gain)
+            .map(Limit::from);
+        SpeedLine {
+            rpm: self.rpm,
+            stable_mm: union(self.stable_mm()),
+            undecided_mm: self.undecided_mm(),
+            bistable_mm: self.bistable_mm(),
+            first_limit,
+            switches,
+            spread: None,
+        }
+    }
+}

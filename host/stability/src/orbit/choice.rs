@@ -1,0 +1,33 @@
+//! The collocation that a case needs.
+
+use super::equivalent::EquivalentProblem;
+use super::forced::ForcedProblem;
+use crate::error::StabilityError;
+use crate::limits::method::Method;
+use crate::methods::collocation::Collocation;
+use crate::methods::revolution_collocation::RevolutionCollocation;
+use crate::problem::linear::{CubicTerms, Problem};
+use crate::problem::pitched::Pitched;
+use crate::process::treatment::{is_not_smooth, needs_orbit};
+use quietcut_model::case::Case;
+
+/// Collocation of the one-period map; over the revolution where teeth stand at unequal angles; about the forced orbit where
+/// limits depend on it, with equivalent stiffness and damping of what is not smooth.
+///
+/// # Errors
+/// What the method cannot treat.
+pub fn collocation_of(case: &Case) -> Result<Box<dyn Method>, StabilityError> {
+    Ok(if is_not_smooth(case) {
+        Box::new(EquivalentProblem::new(case)?)
+    } else if needs_orbit(case) {
+        Box::new(ForcedProblem::new(case)?)
+    } else if case.tool()?.has_variable_pitch() {
+        Box::new(RevolutionCollocation {
+            pitched: Pitched::new(case, CubicTerms::Refuse)?,
+        })
+    } else {
+        Box::new(Collocation {
+            problem: Problem::new(case, CubicTerms::Refuse)?,
+        })
+    })
+}

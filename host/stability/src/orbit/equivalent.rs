@@ -1,0 +1,462 @@
+//! Friction, backlash and hysteresis in stability: the stiffness and damping that stand for them on the forced orbit.
+//!
+//! Along the forced orbit x = x̄ + x̃ of period T a term that is not smooth has the force f(t). What stands for it is the line
+//! f̄ + k x̃ + c ẋ that is nearest to f in the mean square over the period,
+//!
+//!   k = ⟨f x̃⟩/⟨x̃²⟩,   c = ⟨f ẋ⟩/⟨ẋ²⟩   (⟨x̃ ẋ⟩ = 0 on a periodic orbit),
+//!
+//! the describing function where the orbit is harmonic, and what it becomes over all harmonics where it is not. The orbit and
+//! k, c, f̄ hang together and are solved for together. Multipliers are those of the delay equation with this spring and damper.
+//!
+//! A small disturbance beside a large orbit feels something else: the change of the force over the disturbance (the incremental
+//! describing function; for dry friction on a harmonic orbit half of c). The distance to the multiplier with these slopes is the
+//! error that is stated.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::anderson::Anderson;
+use super::follower::size_at;
+use super::forced::ForcedProblem;
+use super::periodic_orbit::{Orbit, PeriodMap, Scale};
+use super::restoring::{Samples, Spring, equivalent, incremental};
+use super::tooth_period::ToothPeriod;
+use crate::criteria::LEAST_ERROR;
+use crate::error::StabilityError;
+use crate::limits::bounds::{check_depth, check_speed};
+use crate::limits::method::Method;
+use crate::limits::point::Point;
+use crate::limits::speed_line::{SpeedLine, Switch};
+use crate::process::extension::not_smooth;
+use crate::process::treatment::NOT_SMOOTH;
+use crate::spectrum::stability_loss::Kind;
+use quietcut_model::Term;
+use quietcut_model::case::Case;
+
+/// Steps in depth, at least, at which multipliers are counted.
+const SAMPLES: usize = 32;
+
+/// Multipliers below this size are not followed.
+const FOLLOWED: f64 = 0.5;
+
+/// To what spring and orbit agree, relative to the stiffness of the structure.
+const SETTLED: f64 = 1e-7;
+
+/// The most rounds to there.
+const ROUNDS: usize = 200;
+
+/// Rounds that are remembered on the way.
+const REMEMBERED: usize = 5;
+
+/// To what a crossing is found, relative to the last depth.
+const CROSSING: f64 = 1e-6;
+
+/// The depth that stands for none, mm: without any motion nothing has an amplitude.
+const NONE_MM: f64 = 1e-4;
+
+/// Where friction sticks a damper of this many times k/ω of the slowest mode holds the tool: it still gives way by a twentieth.
+const HOLDS: f64 = 20.0;
+
+/// A case with friction, backlash or hysteresis.
+#[derive(Debug)]
+pub struct EquivalentProblem {
+    /// All but these terms.
+    smooth: ForcedProblem,
+    terms: Vec<Box<dyn Term>>,
+    feed_direction_deg: f64,
+    /// Displacement and velocity along the machine's axes by states.
+    displacement: DMatrix<f64>,
+    velocity: DMatrix<f64>,
+    /// Static stiffness along each axis, N/m; 0 for one that does not move.
+    stiffness: [f64; 3],
+    /// The largest damping along each axis, N s/m.
+    most_damping: [f64; 3],
+}
+
+/// An orbit with the springs that it makes.
+#[derive(Clone)]
+struct Settled {
+    springs: [Spring; 3],
+    orbit: Orbit,
+}
+
+/// Multipliers at a depth.
+#[derive(Clone)]
+struct Sample {
+    settled: Settled,
+    /// In the upper half plane or on the real axis, largest first.
+    roots: Vec<Complex64>,
+}
+
+impl Sample {
+    fn depth_m(&self) -> f64 {
+        self.settled.orbit.depth_m
+    }
+
+    fn outside(&self) -> i32 {
+        let outside = self.roots.iter().filter(|root| root.norm() > 1.0);
+        outside.map(|root| Kind::of(*root).count()).sum()
+    }
+
+    /// The largest |μ|, less one.
+    fn excess(&self) -> f64 {
+        self.roots.first().map_or(-1.0, |root| root.norm() - 1.0)
+    }
+}
+
+impl EquivalentProblem {
+    /// The problem that a case poses.
+    ///
+    /// # Errors
+    /// As [`ForcedProblem::new`]; a structure without a mass at the tool.
+    pub fn new(case: &Case) -> Result<Self, StabilityError> {
+        let mut rest = case.clone();
+        for name in NOT_SMOOTH {
+            rest.extensions.remove(name);
+        }
+        let smooth = ForcedProblem::new(&rest)?;
+        if !smooth.is_inertial() {
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "its modes add up to no mass (their residues do not sum to zero), so that friction, backlash and \
+                       hysteresis have no motion of their own; use mass, damping and stiffness matrices",
+            });
+        }
+        if smooth.uneven.is_some() {
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "friction, backlash and hysteresis go with teeth that are all alike only: leave out runout, and unequal pitch",
+            });
+        }
+        let feed_direction_deg = case.cut()?.feed_direction_deg;
+        let machine = smooth.linear.structure.turned(-feed_direction_deg);
+        let order = machine.order();
+        let at_rest = machine.receptance(0.0);
+        let stiffness = std::array::from_fn(|axis| {
+            let flexibility = at_rest.map_or(0.0, |receptance| receptance[(axis, axis)].re);
+            if flexibility > 0.0 {
+                flexibility.recip()
+            } else {
+                0.0
+            }
+        });
+        let slowest = machine
+            .poles()
+            .iter()
+            .map(|pole| pole.norm())
+            .fold(f64::INFINITY, f64::min);
+        Ok(Self {
+            terms: not_smooth(case)?,
+            feed_direction_deg,
+            displacement: DMatrix::from_fn(3, order, |i, j| machine.c[(i, j)]),
+            velocity: DMatrix::from_fn(3, order, |i, j| {
+                machine.c.row(i).dot(&machine.a.column(j).transpose())
+            }),
+            most_damping: stiffness.map(|stiffness: f64| HOLDS * stiffness / slowest),
+            stiffness,
+            smooth,
+        })
+    }
+
+    fn with(&self, springs: &[Spring; 3]) -> ForcedProblem {
+        self.smooth.with_springs(
+            self.feed_direction_deg,
+            springs.map(|spring| spring.stiffness),
+            springs.map(|spring| spring.damping),
+            springs.map(|spring| -spring.force_n),
+        )
+    }
+}
+
+/// A speed at which the branch of orbits is followed.
+struct Follower<'a> {
+    problem: &'a EquivalentProblem,
+    rpm: f64,
+    period_s: f64,
+    map: ToothPeriod<'a>,
+}
+
+impl<'a> Follower<'a> {
+    fn new(problem: &'a EquivalentProblem, rpm: f64) -> Self {
+        Self {
+            problem,
+            rpm,
+            period_s: problem.smooth.linear.tooth_period_s(rpm),
+            map: ToothPeriod::new(&problem.smooth, rpm),
+        }
+    }
+
+    fn broke_down(&self, depth_m: f64, what: &'static str) -> StabilityError {
+        StabilityError::BrokeDown {
+            rpm: self.rpm,
+            depth_mm: 1e3 * depth_m,
+            what,
+        }
+    }
+
+    fn samples(&self, orbit: &Orbit) -> Samples {
+        let seen = [&self.problem.displacement, &self.problem.velocity];
+        Samples::new(&self.map.spans(), orbit, self.period_s, seen)
+    }
+
+    /// Rest, with no springs.
+    fn rest(&self) -> Settled {
+        Settled {
+            springs: [Spring::default(); 3],
+            orbit: Orbit::rest(&self.map),
+        }
+    }
+
+    /// The orbit and the springs that belong together at a depth, from a guess.
+    fn settle(&self, depth_m: f64, guess: &Settled) -> Result<Settled, StabilityError> {
+        let all = self.problem;
+        let mut now = guess.clone();
+        now.orbit.depth_m = depth_m;
+        let mut mixing = Anderson::new(REMEMBERED);
+        let mut units = None;
+        for _ in 0..ROUNDS {
+            now.orbit = self.orbit(&now.springs, &now.orbit)?;
+            let samples = self.samples(&now.orbit);
+            let found = equivalent(&all.terms, &samples, all.most_damping);
+            let units = units.get_or_insert_with(|| Units::new(all, &samples, self.period_s));
+            let (at, to) = (units.vector(&now.springs), units.vector(&found));
+            if (&to - &at).amax() <= SETTLED * at.amax().max(1.0) {
+                return Ok(now);
+            }
+            now.springs = units.springs(&mixing.next(&at, &to), all.most_damping);
+        }
+        Err(self.broke_down(
+            depth_m,
+            "the forced orbit and the equivalent stiffness and damping at its amplitude do not come to agree",
+        ))
+    }
+
+    /// The orbit with these springs at the depth of a guess.
+    fn orbit(&self, springs: &[Spring; 3], guess: &Orbit) -> Result<Orbit, StabilityError> {
+        let problem = self.problem.with(springs);
+        let map = self.map.of(&problem);
+        let none = |_| {
+            self.broke_down(
+                guess.depth_m,
+                "no forced orbit is found with the equivalent springs",
+            )
+        };
+        if problem.is_linear() {
+            return Orbit::of_linear(&map, guess.depth_m).map_err(none);
+        }
+        let scale = Scale {
+            state: size_at(&map, guess.depth_m),
+            depth_m: guess.depth_m,
+        };
+        let mut along_depth = DVector::zeros(map.size() + 1);
+        along_depth[map.size()] = 1.0;
+        Orbit::correct(&map, guess, scale, &along_depth)
+            .map(|(orbit, _)| orbit)
+            .map_err(none)
+    }
+
+    fn sample(&self, depth_m: f64, guess: &Settled) -> Result<Sample, StabilityError> {
+        let settled = self.settle(depth_m, guess)?;
+        let roots = self.roots(&settled.springs, &settled.orbit)?;
+        Ok(Sample { settled, roots })
+    }
+
+    /// The multipliers with these springs about an orbit.
+    fn roots(&self, springs: &[Spring; 3], orbit: &Orbit) -> Result<Vec<Complex64>, StabilityError> {
+        let problem = self.problem.with(springs);
+        let all = self.map.of(&problem).multipliers(orbit);
+        let all = all.ok_or_else(|| {
+            self.broke_down(orbit.depth_m, "the equations of the forced orbit are singular")
+        })?;
+        Ok(all
+            .into_iter()
+            .take_while(|multiplier| multiplier.norm() > FOLLOWED)
+            .filter(|multiplier| multiplier.im >= 0.0)
+            .collect())
+    }
+
+    fn chatter_hz(&self, sample: &Sample, root: Complex64) -> Option<f64> {
+        let problem = self.problem.with(&sample.settled.springs);
+        self.map.of(&problem).chatter_hz(&sample.settled.orbit, root)
+    }
+
+    /// How far |μ| is from that of what a small disturbance feels.
+    fn error(
+        &self,
+        sample: &Sample,
+        root: Complex64,
+        chatter_hz: Option<f64>,
+    ) -> Result<f64, StabilityError> {
+        let samples = self.samples(&sample.settled.orbit);
+        let frequency_hz = chatter_hz.unwrap_or_else(|| self.period_s.recip());
+        let slopes = incremental(
+            &self.problem.terms,
+            &samples,
+            frequency_hz,
+            &sample.settled.springs,
+            self.problem.most_damping,
+        );
+        let small = self.roots(&slopes, &sample.settled.orbit)?;
+        let nearest = small
+            .iter()
+            .map(|other| (other - root).norm())
+            .fold(f64::INFINITY, f64::min);
+        // A multiplier that is not followed any more is far inside.
+        Ok(nearest.min(root.norm()).max(LEAST_ERROR * root.norm().max(1.0)))
+    }
+
+    /// Where the number outside changes between two samples, by depth.
+    fn between(&self, low: &Sample, high: &Sample, last_m: f64) -> Result<Vec<Switch>, StabilityError> {
+        let (mut low, mut high) = (low.clone(), high.clone());
+        let mut switches = Vec::new();
+        let top = high.clone();
+        while low.outside() != top.outside() {
+            high.clone_from(&top);
+            // The largest multiplier crosses where nothing is outside on one side; else it is one of several, and halves it is.
+            let is_largest = |low: &Sample, high: &Sample| (low.outside() == 0) != (high.outside() == 0);
+            let mut halves = 0;
+            while high.depth_m() - low.depth_m() > CROSSING * last_m {
+                let share = if is_largest(&low, &high) && halves < 3 {
+                    (low.excess() / (low.excess() - high.excess())).clamp(0.05, 0.95)
+                } else {
+                    0.5
+                };
+                let depth_m = low.depth_m() + share * (high.depth_m() - low.depth_m());
+                let middle = self.sample(depth_m, &low.settled)?;
+                halves = if share == 0.5 { 0 } else { halves + 1 };
+                if middle.outside() == low.outside() {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            switches.push(self.switch(&low, &high, last_m)?);
+            low = high.clone();
+        }
+        Ok(switches)
+    }
+
+    /// The switch between two samples that are as near as they come.
+    fn switch(&self, low: &Sample, high: &Sample, last_m: f64) -> Result<Switch, StabilityError> {
+        let gain = high.outside() < low.outside();
+        let outer = if gain { low } else { high };
+        let crossed = outer
+            .roots
+            .iter()
+            .filter(|root| root.norm() > 1.0)
+            .min_by(|a, b| a.norm().total_cmp(&b.norm()))
+            .copied()
+            .ok_or_else(|| self.broke_down(high.depth_m(), "a multiplier was lost while halving"))?;
+        let chatter_hz = match Kind::of(crossed) {
+            Kind::Fold => None,
+            _ => self.chatter_hz(outer, crossed),
+        };
+        let error = self.error(outer, crossed, chatter_hz)?;
+        // The slope of |μ| over a thousandth of the depth.
+        let step_m = 1e-3 * high.depth_m();
+        let beyond = self.sample(high.depth_m() + step_m, &high.settled)?;
+        let next = beyond
+            .roots
+            .iter()
+            .map(|root| (root - crossed).norm())
+            .zip(&beyond.roots)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(crossed.norm(), |(_, root)| root.norm());
+        let slope = (next - crossed.norm()).abs() / step_m;
+        let error_m = if error < slope * last_m {
+            error / slope
+        } else {
+            last_m
+        };
+        Ok(Switch {
+            depth_mm: 0.5e3 * (low.depth_m() + high.depth_m()),
+            error_mm: Some(1e3 * error_m),
+            kind: Kind::of(crossed),
+            gain,
+            chatter_hz,
+        })
+    }
+}
+
+/// Units in which force, stiffness and damping of all axes are of one size.
+struct Units([[f64; 3]; 3]);
+
+impl Units {
+    fn new(problem: &EquivalentProblem, samples: &Samples, period_s: f64) -> Self {
+        let length_m = samples.largest_m().max(f64::MIN_POSITIVE);
+        let seconds = period_s / std::f64::consts::TAU;
+        Self(
+            problem
+                .stiffness
+                .map(|stiffness| [stiffness * length_m, stiffness, stiffness * seconds]),
+        )
+    }
+
+    fn vector(&self, springs: &[Spring; 3]) -> DVector<f64> {
+        let values = springs.iter().zip(&self.0).flat_map(|(spring, units)| {
+            [spring.force_n, spring.stiffness, spring.damping]
+                .into_iter()
+                .zip(*units)
+                .map(|(value, unit)| if unit > 0.0 { value / unit } else { 0.0 })
+        });
+        DVector::from_iterator(9, values)
+    }
+
+    fn springs(&self, vector: &DVector<f64>, most_damping: [f64; 3]) -> [Spring; 3] {
+        std::array::from_fn(|axis| {
+            let value = |which: usize| vector[3 * axis + which] * self.0[axis][which];
+            Spring {
+                force_n: value(0),
+                stiffness: value(1),
+                damping: value(2).clamp(0.0, most_damping[axis]),
+            }
+        })
+    }
+}
+
+impl Method for EquivalentProblem {
+    fn name(&self) -> &'static str {
+        "collocation about the forced orbit, with equivalent stiffness and damping of what is not smooth"
+    }
+
+    /// On the branch of orbits that is reached when the depth grows from 0. The error is the distance to the multiplier with what
+    /// a small disturbance feels in place of the equivalent stiffness and damping.
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        let follower = Follower::new(self, rpm);
+        let last_m = 1e-3 * depth_mm.max(NONE_MM);
+        let mut settled = follower.rest();
+        // In a few steps: at an amplitude that jumps it is the lower one.
+        for share in [1e-2, 0.1, 0.3, 0.6, 0.8, 1.0] {
+            settled = follower.settle((share * last_m).max(1e-3 * NONE_MM), &settled)?;
+        }
+        let sample = Sample {
+            roots: follower.roots(&settled.springs, &settled.orbit)?,
+            settled,
+        };
+        let root = sample.roots.first().copied().unwrap_or_default();
+        let chatter_hz = follower.chatter_hz(&sample, root);
+        let error = follower.error(&sample, root, chatter_hz)?;
+        Ok(Point::new(rpm, depth_mm, root, error, chatter_hz))
+    }
+
+    fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
+        check_speed(rpm)?;
+        check_depth(depth_mm)?;
+        let follower = Follower::new(self, rpm);
+        let last_m = 1e-3 * depth_mm;
+        let samples = samples.max(SAMPLES);
+        let none_m = (1e-3 * NONE_MM).min(last_m / samples as f64);
+        let mut low = follower.sample(none_m, &follower.rest())?;
+        let start = low.outside();
+        let mut switches = Vec::new();
+        for index in 1..=samples {
+            let depth_m = last_m * index as f64 / samples as f64;
+            let high = follower.sample(depth_m, &low.settled)?;
+            switches.extend(follower.between(&low, &high, last_m)?);
+            low = high;
+        }
+        Ok(SpeedLine::of_switches(rpm, depth_mm, start, switches))
+    }
+}

@@ -1,0 +1,377 @@
+//! Follows a branch of forced orbits.
+//!
+//! Pseudo-arclength continuation: the branch is followed through folds. At every point all multipliers of the delay
+//! equation about the orbit are computed; steps are so short that each one near the circle is recognized again.
+
+use nalgebra::DVector;
+use num_complex::Complex64;
+
+use super::branch::{Branch, BranchPoint, Event, Extent};
+use super::forced::ForcedProblem;
+use super::pairing::{FOLLOWED, nearest, pair};
+use super::periodic_orbit::{Orbit, OrbitError, PeriodMap, Scale, Tangent};
+use super::revolution_period::RevolutionPeriod;
+use super::tooth_period::ToothPeriod;
+use crate::criteria::LEAST_ERROR;
+use crate::spectrum::stability_loss::Kind;
+
+/// The longest step, as a share of the last depth (or of the size of the orbit there).
+const STEP_MAX: f64 = 1.0 / 30.0;
+
+/// The shortest step: below it multipliers that come together cannot be told apart, and are paired as they are.
+const STEP_MIN: f64 = 1e-5;
+
+/// By how much less a mesh twice as fine errs, at the least: what changes to it times this is an estimate with room to spare.
+const ROOM: f64 = 10.0;
+
+/// The most steps of a branch: with the longest step a branch that is followed up and down needs about a hundred.
+const STEPS_MAX: usize = 1000;
+
+/// Follows the forced orbits at one speed from depth 0 until the depth passes `depth_mm` or returns to 0.
+///
+/// # Errors
+/// The branch cannot be followed further with the shortest step.
+pub fn follow_depth(
+    problem: &ForcedProblem,
+    rpm: f64,
+    depth_mm: f64,
+    extent: Extent,
+) -> Result<Branch, OrbitError> {
+    let depth_m = depth_mm * 1e-3;
+    match &problem.uneven {
+        None => Follower::new(ToothPeriod::new(problem, rpm), rpm, depth_m).follow(extent),
+        Some(uneven) => {
+            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_m)
+                .ok_or(OrbitError::Singular { depth_mm })?;
+            Follower::new(map, rpm, depth_m).follow(extent)
+        }
+    }
+}
+
+/// The dominant multiplier of an orbit.
+pub(super) struct Dominant {
+    /// Of a pair the one above the real axis.
+    pub(super) multiplier: Complex64,
+    /// Frequency of the motion that belongs to it, Hz.
+    pub(super) chatter_hz: Option<f64>,
+}
+
+/// The dominant multiplier about the orbit at a depth, from the working mesh and from one twice as fine.
+pub(super) fn multiplier_at(
+    problem: &ForcedProblem,
+    rpm: f64,
+    depth_mm: f64,
+) -> Result<[Dominant; 2], OrbitError> {
+    match &problem.uneven {
+        None => dominant_of(ToothPeriod::new(problem, rpm), rpm, depth_mm),
+        Some(uneven) => {
+            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_mm * 1e-3)
+                .ok_or(OrbitError::Singular { depth_mm })?;
+            dominant_of(map, rpm, depth_mm)
+        }
+    }
+}
+
+/// The orbit at a depth, reached from depth 0.
+#[cfg(test)]
+pub(super) fn orbit_at(problem: &ForcedProblem, rpm: f64, depth_mm: f64) -> Result<Orbit, OrbitError> {
+    let depth_m = depth_mm * 1e-3;
+    Ok(match &problem.uneven {
+        None => Follower::new(ToothPeriod::new(problem, rpm), rpm, depth_m).up_to(depth_m)?,
+        Some(uneven) => {
+            let map = RevolutionPeriod::new(problem, uneven, rpm, depth_m)
+                .ok_or(OrbitError::Singular { depth_mm })?;
+            Follower::new(map, rpm, depth_m).up_to(depth_m)?
+        }
+    }
+    .orbit)
+}
+
+fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominant; 2], OrbitError> {
+    let singular = OrbitError::Singular { depth_mm };
+    let finer = map.finer().ok_or(singular)?;
+    let at = |map: M| {
+        let follower = Follower::new(map, rpm, depth_mm * 1e-3);
+        let orbit = follower.up_to(depth_mm * 1e-3)?.orbit;
+        let multiplier = follower
+            .map
+            .multipliers(&orbit)
+            .and_then(|all| all.first().copied())
+            .ok_or(singular)?;
+        let multiplier = Complex64::new(multiplier.re, multiplier.im.abs());
+        Ok(Dominant {
+            multiplier,
+            chatter_hz: follower.map.chatter_hz(&orbit, multiplier),
+        })
+    };
+    Ok([at(map)?, at(finer)?])
+}
+
+/// How large the state at the start of the period is at a depth, if cubic terms are left out.
+pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
+    let rest = Orbit::rest(map);
+    let linear = map.pass(&rest.start, 0.0, &rest.states).and_then(|passage| {
+        let by_depth = passage.by.column(map.size()) * depth_m;
+        passage.periodic().lu().solve(&by_depth)
+    });
+    // Without a force the orbit is rest, and any length will do.
+    linear
+        .map(|state| state.norm())
+        .filter(|size| *size > 0.0)
+        .unwrap_or(1.0)
+}
+
+pub(super) struct Follower<M> {
+    map: M,
+    rpm: f64,
+    scale: Scale,
+}
+
+/// An orbit with its multipliers.
+#[derive(Clone)]
+struct Sample {
+    orbit: Orbit,
+    tangent: Tangent,
+    /// Multipliers in the upper half plane or on the real axis that are near the circle or outside.
+    roots: Vec<Complex64>,
+    largest: f64,
+}
+
+impl Sample {
+    fn outside(&self) -> i32 {
+        self.roots
+            .iter()
+            .filter(|root| root.norm() > 1.0)
+            .map(|root| Kind::of(*root).count())
+            .sum()
+    }
+}
+
+impl<M: PeriodMap> Follower<M> {
+    pub(super) fn new(map: M, rpm: f64, depth_m: f64) -> Self {
+        // At depth 0 there is nothing to follow; any scale serves.
+        let depth_m = if depth_m > 0.0 { depth_m } else { 1e-3 };
+        let scale = Scale {
+            state: size_at(&map, depth_m),
+            depth_m,
+        };
+        Self { map, rpm, scale }
+    }
+
+    /// The orbit at a depth, reached from depth 0.
+    fn up_to(&self, depth_m: f64) -> Result<Sample, OrbitError> {
+        let order = self.map.size();
+        let mut along_depth = DVector::zeros(order + 1);
+        along_depth[order] = 1.0;
+        let mut here = self.sample(&Orbit::rest(&self.map), &along_depth)?;
+        let mut step = STEP_MAX;
+        while here.orbit.depth_m < depth_m {
+            let depth_mm = here.orbit.depth_m * 1e3;
+            let towards = here.tangent.along[order] * self.scale.depth_m;
+            if towards <= 0.0 {
+                return Err(OrbitError::Lost { depth_mm });
+            }
+            let next = if here.orbit.depth_m + towards * step >= depth_m {
+                // The last step ends at the depth itself.
+                let rest = (depth_m - here.orbit.depth_m) / towards;
+                let mut guess = here.orbit.along(&here.tangent, rest, self.scale);
+                guess.depth_m = depth_m;
+                self.sample(&guess, &along_depth)
+            } else {
+                self.step(&here, step)
+            };
+            match next {
+                Ok(next) => here = next,
+                Err(_) if step > STEP_MIN => step *= 0.5,
+                Err(error) => return Err(error),
+            }
+            if (here.orbit.depth_m - depth_m).abs() <= 1e-12 * depth_m {
+                break;
+            }
+        }
+        Ok(here)
+    }
+
+    pub(super) fn follow(&self, extent: Extent) -> Result<Branch, OrbitError> {
+        let order = self.map.size();
+        let mut along_depth = DVector::zeros(order + 1);
+        along_depth[order] = 1.0;
+        let mut here = self.sample(&Orbit::rest(&self.map), &along_depth)?;
+        let mut branch = Branch {
+            rpm: self.rpm,
+            points: vec![self.point(&here)],
+            events: Vec::new(),
+        };
+        let mut step = STEP_MAX;
+        for _ in 0..STEPS_MAX {
+            let depth_mm = here.orbit.depth_m * 1e3;
+            let next = self.step(&here, step).ok().and_then(|next| {
+                let pairs = pair(&here.roots, &next.roots, step <= 2.0 * STEP_MIN)?;
+                Some((next, pairs))
+            });
+            let Some((next, pairs)) = next else {
+                if step <= STEP_MIN {
+                    return Err(OrbitError::NoConvergence { depth_mm });
+                }
+                step = (0.5 * step).max(STEP_MIN);
+                continue;
+            };
+            let mut events: Vec<(f64, Event)> = pairs
+                .iter()
+                .filter(|(from, to)| (from.norm() > 1.0) != (to.norm() > 1.0))
+                .filter_map(|&(from, to)| self.refine(&here, step, from, to))
+                .collect();
+            events.sort_by(|a, b| a.0.total_cmp(&b.0));
+            branch.events.extend(events.into_iter().map(|(_, event)| event));
+            here = next;
+            branch.points.push(self.point(&here));
+            let lost = extent == Extent::FirstLoss && branch.events.iter().any(|event| !event.gain);
+            if lost || here.orbit.depth_m >= self.scale.depth_m || here.orbit.depth_m <= 0.0 {
+                return Ok(branch);
+            }
+            step = (1.5 * step).min(STEP_MAX);
+        }
+        Err(OrbitError::NoConvergence {
+            depth_mm: here.orbit.depth_m * 1e3,
+        })
+    }
+
+    /// The sample a step further along the branch.
+    fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
+        let guess = from.orbit.along(&from.tangent, step, self.scale);
+        self.sample(&guess, &from.tangent.along)
+    }
+
+    /// The depth a step further along the branch, m.
+    fn depth_m(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
+        let guess = from.orbit.along(&from.tangent, step, self.scale);
+        let (orbit, _) = Orbit::correct(&self.map, &guess, self.scale, &from.tangent.along)?;
+        Ok(orbit.depth_m)
+    }
+
+    fn sample(&self, guess: &Orbit, normal: &DVector<f64>) -> Result<Sample, OrbitError> {
+        let (orbit, tangent) = Orbit::correct(&self.map, guess, self.scale, normal)?;
+        let depth_mm = orbit.depth_m * 1e3;
+        let all = self
+            .map
+            .multipliers(&orbit)
+            .ok_or(OrbitError::Singular { depth_mm })?;
+        let largest = all.first().map_or(0.0, |multiplier| multiplier.norm());
+        let roots = all
+            .into_iter()
+            .take_while(|multiplier| multiplier.norm() > FOLLOWED)
+            .filter(|multiplier| multiplier.im >= 0.0)
+            .collect();
+        Ok(Sample {
+            orbit,
+            tangent,
+            roots,
+            largest,
+        })
+    }
+
+    /// The crossing of the multiplier that goes from one value to another over a step, with the length of the step to
+    /// it: regula falsi, in which an end that stays is weighed less by what its last step gained (Anderson and Björck), which
+    /// keeps the crossing enclosed.
+    fn refine(&self, here: &Sample, step: f64, from: Complex64, to: Complex64) -> Option<(f64, Event)> {
+        let (mut low, mut high) = ((0.0, from.norm() - 1.0), (step, to.norm() - 1.0));
+        let outward = high.1 > 0.0;
+        let (mut low_root, mut high_root) = (from, to);
+        let mut sample = here.clone();
+        let mut root = from;
+        let mut stays = None;
+        for _ in 0..60 {
+            let middle = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+            let share = ((middle - low.0) / (high.0 - low.0)).clamp(0.0, 1.0);
+            let expected = low_root + (high_root - low_root) * share;
+            sample = self.step(here, middle).ok()?;
+            root = nearest(&sample.roots, expected)?;
+            let excess = root.norm() - 1.0;
+            if excess.abs() < 1e-11 || high.0 - low.0 < 1e-11 {
+                break;
+            }
+            let is_high = (excess > 0.0) == outward;
+            let (new, new_root, old) = if is_high {
+                (&mut high, &mut high_root, &mut low)
+            } else {
+                (&mut low, &mut low_root, &mut high)
+            };
+            if stays == Some(!is_high) {
+                let gained = 1.0 - excess / new.1;
+                old.1 *= if gained > 0.0 { gained } else { 0.5 };
+            }
+            stays = Some(!is_high);
+            (*new, *new_root) = ((middle, excess), root);
+        }
+        let on_circle = root / root.norm();
+        let kind = Kind::of(root);
+        let event = Event {
+            depth_mm: sample.orbit.depth_m * 1e3,
+            error_mm: 1e3 * self.error_m(&sample, root).unwrap_or(self.scale.depth_m),
+            kind,
+            gain: !outward,
+            multiplier: on_circle,
+            chatter_hz: match kind {
+                // The orbit jumps to another of the same period.
+                Kind::Fold => None,
+                _ => self.map.chatter_hz(&sample.orbit, on_circle),
+            },
+        };
+        Some((low.0, event))
+    }
+
+    /// How far the depth of a crossing may be off, m: over as much of the branch as takes the multiplier by its error to either
+    /// side, and what a finer mesh changes of the depth itself; `None` where it cannot be told.
+    fn error_m(&self, at: &Sample, root: Complex64) -> Option<f64> {
+        let order = self.map.problem().order();
+        let finer = Follower {
+            map: self.map.finer()?,
+            rpm: self.rpm,
+            scale: self.scale,
+        };
+        // Across the branch as far as states of the structure go, which are the same on both meshes.
+        let mut normal = DVector::zeros(finer.map.size() + 1);
+        normal
+            .rows_mut(0, order)
+            .copy_from(&at.tangent.along.rows(0, order));
+        normal[finer.map.size()] = at.tangent.along[self.map.size()];
+        let length = normal.norm();
+        let there = finer
+            .sample(&at.orbit.onto(&self.map, &finer.map), &(normal / length))
+            .ok()?;
+        let change = (nearest(&there.roots, root)? - root).norm();
+        let error = (ROOM * change).max(LEAST_ERROR);
+        let beside = self.step(at, STEP_MIN).ok()?;
+        let slope = (nearest(&beside.roots, root)?.norm() - root.norm()).abs() / STEP_MIN;
+        let reach = error / slope;
+        if reach.is_nan() || reach > STEP_MAX {
+            return None;
+        }
+        let depth_m = at.orbit.depth_m;
+        let shift_m = |step: f64| Some((self.depth_m(at, step).ok()? - depth_m).abs());
+        let along_m = shift_m(reach)?.max(shift_m(-reach)?);
+        // At a fold the depth does not change along the branch: there, what has been checked of orbits is the least.
+        Some(along_m.max(LEAST_ERROR * depth_m) + ROOM * (there.orbit.depth_m - depth_m).abs())
+    }
+
+    fn point(&self, sample: &Sample) -> BranchPoint {
+        let c = &self.map.problem().linear.structure.c;
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for states in &sample.orbit.states {
+            for state in states.column_iter() {
+                let displacement = c * state;
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(displacement[axis]);
+                    high[axis] = high[axis].max(displacement[axis]);
+                }
+            }
+        }
+        BranchPoint {
+            depth_mm: sample.orbit.depth_m * 1e3,
+            amplitude_mm: std::array::from_fn(|axis| 0.5e3 * (high[axis] - low[axis])),
+            multiplier_abs: sample.largest,
+            outside: sample.outside(),
+        }
+    }
+}

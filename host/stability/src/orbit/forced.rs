@@ -1,0 +1,389 @@
+//! The forced problem: a structure with smooth terms under the forces of feed and edges.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use crate::error::StabilityError;
+use crate::problem::linear::{CubicTerms, Problem};
+use crate::problem::pitched::Pitched;
+use crate::process::extension::{about_orbit, radial_m};
+use crate::process::treatment::is_not_smooth;
+use quietcut_model::case::Case;
+use quietcut_model::structure::FirstOrder;
+use quietcut_model::{At, ChipLaw, ProcessDamping, Term};
+
+/// ẋ = A x + B F(t, x) − N(x), u = C x: eqs 6.1 and 3.6 in first-order form.
+///
+/// States x as in [`FirstOrder`](quietcut_model::structure::FirstOrder): for matrices x = (q, q̇/s). N holds the cubic terms
+/// M⁻¹(C₃ q̇∘³ + K₃ q∘³)/s in the lower half. On an orbit of the tooth period
+/// F = (w − z)·Σ_teeth (cutting·n_x f_t + edge), with z the axial displacement where the depth follows it, else 0.
+///
+/// Where teeth stand at unequal angles, or run at unequal radii on a nonlinear structure, an orbit has the period of the
+/// revolution, and a chip on it is n_x f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ with the feed f_j of its own delay τ_j. It is
+/// linear through zero: a tooth that would leave the surface pulls, as in the linear problem.
+///
+/// Extensions of the case add smooth terms −B f_r(u, u̇), a chip law in place of n_x f_t, and the damping of the flank
+/// −w D(φ) u̇.
+#[derive(Clone, Debug)]
+pub struct ForcedProblem {
+    /// The linear part and the cutting process, with the mean pitch.
+    pub linear: Problem,
+    /// `None` where one tooth is like the other.
+    pub(super) uneven: Option<Uneven>,
+    /// The cubic terms; `None` where the structure is linear.
+    pub(super) cubic: Option<Cubic>,
+    /// Smooth terms of the equation of motion, and the structure in whose axes they are.
+    smooth: Option<Smooth>,
+    /// `None` for a force in proportion to the chip.
+    chip: Option<ChipLaw>,
+    /// `None` where the flank does not touch.
+    flank: Option<Flank>,
+    /// B times a constant force; empty for none.
+    push: Option<DVector<f64>>,
+    /// True where a force does not make the velocity jump.
+    inertial: bool,
+}
+
+/// Teeth of which one is not like the other.
+#[derive(Clone, Debug)]
+pub(super) struct Uneven {
+    /// The linear problem over the revolution.
+    pub(super) pitched: Pitched,
+    /// By how much the chip of each tooth is thicker since the one before runs on another radius, m.
+    pub(super) runout_m: Vec<f64>,
+}
+
+impl Uneven {
+    /// `None` where one tooth is like the other.
+    fn of(case: &Case, pitched: &Pitched) -> Result<Option<Self>, StabilityError> {
+        let sin_edge = case.tool()?.edge_angle_deg.to_radians().sin();
+        let radial_m = radial_m(case)?;
+        let before = radial_m.iter().cycle().skip(1);
+        let runout_m: Vec<f64> = radial_m
+            .iter()
+            .zip(before)
+            .map(|(own, before)| (own - before) * sin_edge)
+            .collect();
+        let runs_out = runout_m.iter().any(|chip_m| *chip_m != 0.0);
+        Ok((runs_out || pitched.has_variable_pitch()).then(|| Self {
+            pitched: pitched.clone().over_revolution(),
+            runout_m,
+        }))
+    }
+}
+
+/// f_r along the machine's axes.
+#[derive(Clone, Debug)]
+struct Smooth {
+    terms: Vec<Arc<dyn Term>>,
+    /// B in the machine's axes.
+    b: DMatrix<f64>,
+    /// C and C A in the machine's axes.
+    displacement: DMatrix<f64>,
+    velocity: DMatrix<f64>,
+}
+
+/// The damping of the flank.
+#[derive(Clone, Debug)]
+struct Flank {
+    law: ProcessDamping,
+    radius_m: f64,
+    /// C A in feed, normal and axial direction.
+    velocity: DMatrix<f64>,
+}
+
+impl Smooth {
+    fn new(terms: Vec<Arc<dyn Term>>, machine: &FirstOrder) -> Self {
+        let part = |rows: usize, columns: usize, of: &dyn Fn(usize, usize) -> f64| {
+            DMatrix::from_fn(rows, columns, of)
+        };
+        let order = machine.order();
+        Self {
+            terms,
+            b: part(order, 3, &|i, j| machine.b[(i, j)]),
+            displacement: part(3, order, &|i, j| machine.c[(i, j)]),
+            velocity: part(3, order, &|i, j| {
+                machine.c.row(i).dot(&machine.a.column(j).transpose())
+            }),
+        }
+    }
+
+    fn at(&self, state: &[f64]) -> At {
+        let row =
+            |matrix: &DMatrix<f64>, axis: usize| matrix.row(axis).iter().zip(state).map(|(a, b)| a * b).sum();
+        At {
+            t: 0.0,
+            x: std::array::from_fn(|axis| row(&self.displacement, axis)),
+            v: std::array::from_fn(|axis| row(&self.velocity, axis)),
+        }
+    }
+}
+
+/// N(x) = stiffness·q∘³ + damping·(q̇/s)∘³ in the lower half of the states.
+#[derive(Clone, Debug)]
+pub(super) struct Cubic {
+    /// M⁻¹ K₃/s.
+    stiffness: DMatrix<f64>,
+    /// M⁻¹ C₃ s².
+    damping: DMatrix<f64>,
+}
+
+impl ForcedProblem {
+    /// The forced problem of a case.
+    ///
+    /// # Errors
+    /// As [`Problem::new`], but for cubic terms, which are kept; friction, backlash or hysteresis, which
+    /// [`EquivalentProblem`](super::EquivalentProblem) treats.
+    pub fn new(case: &Case) -> Result<Self, StabilityError> {
+        if is_not_smooth(case) {
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "friction, backlash and hysteresis have no slopes about a forced orbit; their equivalent stiffness and \
+                       damping are needed",
+            });
+        }
+        let pitched = Pitched::new(case, CubicTerms::Kept)?;
+        let linear = pitched.with_mean_pitch().clone();
+        let uneven = Uneven::of(case, &pitched)?;
+        let structure = case.structure()?;
+        let cubic = match structure.equation() {
+            Some(matrices) if structure.is_nonlinear() => {
+                let size = matrices.mass.nrows();
+                // q̇ = s·(lower half): the scale of the first-order form stands in its own upper right corner.
+                let scale = linear.structure.a[(0, size)];
+                let inverse_mass =
+                    matrices
+                        .mass
+                        .clone()
+                        .try_inverse()
+                        .ok_or_else(|| StabilityError::Structure {
+                            path: case.path.clone(),
+                            cause: quietcut_model::structure::StructureError::SingularMass,
+                        })?;
+                let part = |matrix: &Option<DMatrix<f64>>, factor: f64| match matrix {
+                    Some(matrix) => &inverse_mass * matrix * factor,
+                    None => DMatrix::zeros(size, size),
+                };
+                Some(Cubic {
+                    stiffness: part(&matrices.cubic_stiffness, scale.recip()),
+                    damping: part(&matrices.cubic_damping, scale * scale),
+                })
+            }
+            _ => None,
+        };
+        let about = about_orbit(case)?;
+        let machine = linear.structure.turned(-case.cut()?.feed_direction_deg);
+        let jump = (&machine.c * &machine.b).amax();
+        let inertial = jump <= 1e-6 * machine.c.amax() * machine.b.amax() * machine.order() as f64;
+        if !inertial && (about.law.process_damping.is_some() || !about.terms.is_empty()) {
+            return Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what: "its modes add up to no mass (their residues do not sum to zero), so that a force on the velocity or \
+                       on a nonlinear spring has no motion of its own; use mass, damping and stiffness matrices for \
+                       process-damping and smooth terms",
+            });
+        }
+        let flank = match (about.law.process_damping, case.tool()?.diameter_mm) {
+            (Some(law), Some(diameter_mm)) => Some(Flank {
+                law,
+                radius_m: 0.5e-3 * diameter_mm,
+                velocity: Smooth::new(Vec::new(), &linear.structure).velocity,
+            }),
+            _ => None,
+        };
+        let is_linear = cubic.is_none() && about.terms.is_empty();
+        let refuse = |what| {
+            Err(StabilityError::NotCovered {
+                path: case.path.clone(),
+                what,
+            })
+        };
+        if uneven.is_some() && about.law.chip.is_some() {
+            return refuse(
+                "tool.pitch_deg or runout beside extension.force-exponent: chips of unequal teeth vanish and turn round within the \
+                 forced orbit, and there a power of the chip has no slope; equal pitch without runout is needed",
+            );
+        }
+        if is_linear && pitched.has_variable_pitch() {
+            return refuse(
+                "tool.pitch_deg: on a linear structure the forced orbit of teeth at unequal pitch is not followed, it grows beyond \
+                 all bounds where a multiplier over the revolution reaches 1; equal pitch is needed beside process-damping",
+            );
+        }
+        Ok(Self {
+            // On a linear structure runout moves the orbit and not what is about it.
+            uneven: uneven.filter(|_| !is_linear),
+            smooth: (!about.terms.is_empty()).then(|| Smooth::new(about.terms, &machine)),
+            chip: about.law.chip,
+            flank,
+            push: None,
+            inertial,
+            linear,
+            cubic,
+        })
+    }
+
+    /// The same with springs and dampers between the tool and the ground and a constant force, along the machine's axes, into
+    /// which x is turned by `feed_direction_deg`: f_r = `stiffness` x + `damping` ẋ, N/m and N s/m, under `force_n`.
+    pub(super) fn with_springs(
+        &self,
+        feed_direction_deg: f64,
+        stiffness: [f64; 3],
+        damping: [f64; 3],
+        force_n: [f64; 3],
+    ) -> Self {
+        let machine = self.linear.structure.turned(-feed_direction_deg);
+        let mut changed = self.clone();
+        for axis in 0..3 {
+            let displacement = machine.c.row(axis);
+            let force = displacement * stiffness[axis] + displacement * &machine.a * damping[axis];
+            changed.linear.structure.a -= machine.b.column(axis) * force;
+        }
+        changed.push = Some(&machine.b * Vector3::from(force_n));
+        changed
+    }
+
+    /// True where a force does not make the velocity jump: the structure has a mass at the tool.
+    pub(super) fn is_inertial(&self) -> bool {
+        self.inertial
+    }
+
+    /// True where orbits are those of the whole revolution: a speed costs a hundred times that of a tooth period.
+    pub fn is_over_revolution(&self) -> bool {
+        self.uneven.is_some()
+    }
+
+    /// True where an orbit is the solution of linear equations.
+    pub(super) fn is_linear(&self) -> bool {
+        self.cubic.is_none() && self.smooth.is_none()
+    }
+
+    /// The damping of the flank per depth, N s/m², of teeth at immersion angles, rad, while the tool turns at a speed,
+    /// rad/s, in feed, normal and axial direction; `None` where there is none.
+    pub(super) fn damping_per_depth(
+        &self,
+        angles: impl Iterator<Item = f64>,
+        speed_rad_per_s: f64,
+    ) -> Option<Matrix3<f64>> {
+        let flank = self.flank.as_ref()?;
+        let size = flank.law.n_per_m / (flank.radius_m * speed_rad_per_s);
+        let process = &self.linear.process;
+        let sum: Matrix3<f64> = angles
+            .map(|angle| {
+                let normal = process.force.normal.at(angle);
+                let tangent = Vector3::new(-angle.cos(), angle.sin(), 0.0);
+                (normal - tangent * flank.law.friction) * normal.transpose()
+            })
+            .sum();
+        Some(sum * size)
+    }
+
+    /// B D C A: what the damping of the flank makes of a state, per depth.
+    pub(super) fn damped(&self, damping: &Matrix3<f64>) -> DMatrix<f64> {
+        let Some(flank) = &self.flank else {
+            return DMatrix::zeros(self.order(), self.order());
+        };
+        &self.linear.structure.b * damping * &flank.velocity
+    }
+
+    /// The slope of the chip law about the forced chip at an angle, rad.
+    pub(super) fn chip_slope(&self, angle: f64) -> f64 {
+        let process = &self.linear.process;
+        self.chip.map_or(1.0, |chip| {
+            chip.slope(process.force.normal.at(angle).x * process.feed_per_tooth_m)
+        })
+    }
+
+    /// Angular speed at which a tooth period takes `period_s`, rad/s.
+    pub(super) fn speed_rad_per_s(&self, period_s: f64) -> f64 {
+        TAU / (period_s * self.linear.teeth as f64)
+    }
+
+    /// Number of states.
+    pub fn order(&self) -> usize {
+        self.linear.structure.order()
+    }
+
+    /// Force per depth, N/m, of all cutting teeth at a phase of the tooth period, rad, on an orbit: that of feed and
+    /// edges.
+    pub(super) fn force_per_depth(&self, teeth: usize, phase: f64) -> Vector3<f64> {
+        let process = &self.linear.process;
+        (0..teeth)
+            .map(|tooth| {
+                let angle = process.engagement.angle(tooth, phase);
+                match self.chip {
+                    None => process.force.forced(angle, process.feed_per_tooth_m),
+                    Some(chip) => {
+                        let thickness_m = process.force.normal.at(angle).x * process.feed_per_tooth_m;
+                        process.force.cutting.at(angle) * chip.effective_m(thickness_m)
+                            + process.force.edge.at(angle)
+                    }
+                }
+            })
+            .sum()
+    }
+
+    /// N(x) and B f_r, added to `rate` with a minus sign, and the constant force.
+    pub(super) fn subtract_smooth(&self, state: &[f64], rate: &mut DVector<f64>) {
+        if let Some(push) = &self.push {
+            *rate += push;
+        }
+        if let Some(smooth) = &self.smooth {
+            let at = smooth.at(state);
+            for term in &smooth.terms {
+                *rate -= &smooth.b * Vector3::from(term.restoring_n(0, &at, &[]));
+            }
+        }
+        let Some(cubic) = &self.cubic else { return };
+        let size = cubic.stiffness.nrows();
+        for i in 0..size {
+            let mut sum = 0.0;
+            for j in 0..size {
+                sum += cubic.stiffness[(i, j)] * state[j].powi(3)
+                    + cubic.damping[(i, j)] * state[size + j].powi(3);
+            }
+            rate[size + i] -= sum;
+        }
+    }
+
+    /// The depth, m, that a state leaves of a depth: less by the axial displacement where the depth follows it.
+    pub(super) fn depth_at(&self, state: &DVector<f64>, depth_m: f64) -> f64 {
+        if self.linear.process.axial_depth_modulation {
+            depth_m - (self.linear.structure.c.row(2) * state)[0]
+        } else {
+            depth_m
+        }
+    }
+
+    /// A − ∂N/∂x − B ∂f_r/∂x − (force per depth)·∂z/∂x: the Jacobian of the orbit's equation at a state, without the damping
+    /// of the flank.
+    pub(super) fn jacobian(&self, state: &[f64], force_per_depth: &Vector3<f64>) -> DMatrix<f64> {
+        let structure = &self.linear.structure;
+        let mut jacobian = structure.a.clone();
+        if let Some(cubic) = &self.cubic {
+            let size = cubic.stiffness.nrows();
+            for i in 0..size {
+                for j in 0..size {
+                    jacobian[(size + i, j)] -= 3.0 * cubic.stiffness[(i, j)] * state[j] * state[j];
+                    jacobian[(size + i, size + j)] -=
+                        3.0 * cubic.damping[(i, j)] * state[size + j] * state[size + j];
+                }
+            }
+        }
+        if let Some(smooth) = &self.smooth {
+            let at = smooth.at(state);
+            for slopes in smooth.terms.iter().filter_map(|term| term.slopes(&at)) {
+                let part = |rows: [[f64; 3]; 3]| Matrix3::from_fn(|i, j| rows[i][j]);
+                jacobian -= &smooth.b
+                    * (part(slopes.stiffness) * &smooth.displacement
+                        + part(slopes.damping) * &smooth.velocity);
+            }
+        }
+        if self.linear.process.axial_depth_modulation {
+            jacobian -= (&structure.b * force_per_depth) * structure.c.row(2);
+        }
+        jacobian
+    }
+}

@@ -1,0 +1,54 @@
+//! Charts and points of structures whose limits depend on the forced orbit.
+
+use super::branch::Extent;
+use super::follower::{follow_depth, multiplier_at};
+use super::forced::ForcedProblem;
+use super::periodic_orbit::OrbitError;
+use crate::criteria::LEAST_ERROR;
+use crate::error::StabilityError;
+use crate::limits::method::Method;
+use crate::limits::point::Point;
+use crate::limits::speed_line::SpeedLine;
+
+/// Multipliers about the forced orbit at the feed of the case, followed from depth 0.
+impl Method for ForcedProblem {
+    fn name(&self) -> &'static str {
+        match self.uneven {
+            None => "collocation about the forced orbit",
+            Some(_) => "collocation about the forced orbit of the revolution",
+        }
+    }
+
+    fn blind_to(&self) -> Option<&'static str> {
+        self.uneven
+            .as_ref()
+            .map(|_| "teeth that leave the surface within the forced orbit")
+    }
+
+    /// About the orbit that is reached when the depth grows from 0; the error is that of a mesh twice as fine.
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+        let fail = |cause| broke_down(rpm, depth_mm, cause);
+        let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;
+        let multiplier = fine.multiplier;
+        // The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
+        let error =
+            (10.0 * (coarse.multiplier - multiplier).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
+        Ok(Point::new(rpm, depth_mm, multiplier, error, fine.chatter_hz))
+    }
+
+    /// The branch of orbits is followed with steps of its own; `samples` is not needed.
+    fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
+        follow_depth(self, rpm, depth_mm, Extent::Whole)
+            .map(|branch| branch.speed_line())
+            .map_err(|cause| broke_down(rpm, depth_mm, cause))
+    }
+}
+
+fn broke_down(rpm: f64, depth_mm: f64, cause: OrbitError) -> StabilityError {
+    let what = match cause {
+        OrbitError::NoConvergence { .. } => "the forced orbit cannot be followed to this depth",
+        OrbitError::Singular { .. } => "the equations of the forced orbit are singular",
+        OrbitError::Lost { .. } => "the forced orbit is lost in a fold before this depth",
+    };
+    StabilityError::BrokeDown { rpm, depth_mm, what }
+}

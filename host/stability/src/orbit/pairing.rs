@@ -1,0 +1,109 @@
+//! Multipliers of one orbit of a branch recognized among those of the next.
+
+use num_complex::Complex64;
+
+use crate::spectrum::stability_loss::Kind;
+
+/// How far a multiplier near the circle may move in one step.
+const MOVE_MAX: f64 = 0.12;
+
+/// Multipliers below this size are not followed: they are more than two steps away from the circle.
+pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MOVE_MAX;
+
+/// Pairs the multipliers of two samples; `None` where one near the circle cannot be recognized again.
+///
+/// With `anyhow` the nearest is taken however far: two real multipliers that meet on the circle and leave the axis move
+/// infinitely fast there, and no step is short enough.
+pub(super) fn pair(
+    from: &[Complex64],
+    to: &[Complex64],
+    anyhow: bool,
+) -> Option<Vec<(Complex64, Complex64)>> {
+    let (mut from, mut free) = (from.to_vec(), to.to_vec());
+    take_met(&mut from, &mut free);
+    take_met(&mut free, &mut from);
+    let mut pairs = Vec::with_capacity(from.len());
+    for root in from {
+        let best = free
+            .iter()
+            .enumerate()
+            .min_by(|(_, a), (_, b)| (*a - root).norm().total_cmp(&(*b - root).norm()));
+        match best {
+            Some((index, &next))
+                if anyhow
+                    || ((next - root).norm() < MOVE_MAX * root.norm().max(1.0)
+                        && (Kind::of(root) == Kind::of(next) || is_far(root) && is_far(next))) =>
+            {
+                pairs.push((root, next));
+                free.swap_remove(index);
+            }
+            // A multiplier that has sunk below what is followed, or half of a pair that met on the axis.
+            None if is_far(root) || anyhow => {}
+            _ if is_far(root) => {}
+            _ => return None,
+        }
+    }
+    (anyhow || free.iter().all(|&root| is_far(root))).then_some(pairs)
+}
+
+/// Takes out conjugate pairs of one sample that are two real multipliers in the other, on the same side of the circle: they have
+/// met on the axis over the step, and none of them has crossed.
+fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
+    conjugate.retain(|&root| {
+        let reach = MOVE_MAX * root.norm().max(1.0);
+        let is_near = |other: &Complex64| (other - root).norm() < reach;
+        if root.im == 0.0 || real.iter().any(|other| other.im != 0.0 && is_near(other)) {
+            return true;
+        }
+        let is_half = |other: &Complex64| {
+            other.im == 0.0 && is_near(other) && (other.norm() > 1.0) == (root.norm() > 1.0)
+        };
+        if real.iter().filter(|other| is_half(other)).count() != 2 {
+            return true;
+        }
+        real.retain(|other| !is_half(other));
+        false
+    });
+}
+
+/// True where a multiplier cannot reach the circle in a step.
+fn is_far(multiplier: Complex64) -> bool {
+    (multiplier.norm() - 1.0).abs() > MOVE_MAX
+}
+
+/// The multiplier nearest to one that is expected.
+pub(super) fn nearest(roots: &[Complex64], expected: Complex64) -> Option<Complex64> {
+    roots
+        .iter()
+        .copied()
+        .min_by(|a, b| (a - expected).norm().total_cmp(&(b - expected).norm()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(re: f64, im: f64) -> Complex64 {
+        Complex64::new(re, im)
+    }
+
+    #[test]
+    fn multipliers_that_meet_inside_the_circle_cost_no_steps_and_on_it_they_do() {
+        let pair_before = [at(0.9, 0.05), at(0.3, 0.75)];
+        let real_after = [at(0.95, 0.0), at(0.86, 0.0), at(0.31, 0.74)];
+        let rest = vec![(at(0.3, 0.75), at(0.31, 0.74))];
+        assert_eq!(pair(&pair_before, &real_after, false), Some(rest));
+        let back = vec![(at(0.31, 0.74), at(0.3, 0.75))];
+        assert_eq!(pair(&real_after, &pair_before, false), Some(back));
+        // One of the two has crossed: that is a fold to be found.
+        let crossed = [at(1.01, 0.0), at(0.86, 0.0), at(0.31, 0.74)];
+        assert_eq!(pair(&[at(0.95, 0.05), at(0.3, 0.75)], &crossed, false), None);
+    }
+
+    #[test]
+    fn what_moves_too_far_near_the_circle_is_not_recognized() {
+        assert_eq!(pair(&[at(0.0, 0.99)], &[at(0.2, 1.0)], false), None);
+        let near = [(at(0.0, 0.99), at(0.05, 1.0))];
+        assert_eq!(pair(&[near[0].0], &[near[0].1], false), Some(near.to_vec()));
+    }
+}

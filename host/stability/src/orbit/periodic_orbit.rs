@@ -1,0 +1,295 @@
+//! The forced periodic orbit at one speed and depth: the fixed point of a map over a period, by Newton.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::collocated::Advanced;
+use super::forced::ForcedProblem;
+use crate::problem::gauss::Gauss;
+
+/// Why there is no orbit.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum OrbitError {
+    /// Newton did not settle.
+    #[error("no periodic orbit was found near the guess at {depth_mm} mm: the iteration does not settle")]
+    NoConvergence {
+        /// Axial depth, mm.
+        depth_mm: f64,
+    },
+    /// The branch turns back before the depth is reached.
+    #[error("the forced orbit is lost in a fold at {depth_mm} mm")]
+    Lost {
+        /// Axial depth of the fold, mm.
+        depth_mm: f64,
+    },
+    /// The equations are singular: a fold or a branch point.
+    #[error("the equations of the periodic orbit are singular at {depth_mm} mm")]
+    Singular {
+        /// Axial depth, mm.
+        depth_mm: f64,
+    },
+}
+
+/// An orbit, by what it is at the start of the period, where a tooth enters.
+#[derive(Clone, Debug)]
+pub struct Orbit {
+    /// Axial depth, m.
+    pub depth_m: f64,
+    /// What the map over the period takes: the states of the structure, and behind them what else of the past acts.
+    pub start: DVector<f64>,
+    /// For each piece the states at its nodes, n × m.
+    pub(super) states: Vec<DMatrix<f64>>,
+}
+
+/// Newton's step over the period at a start and a depth: what the equations linearized about the states at the nodes make of it.
+pub(super) struct Passage {
+    pub(super) end: DVector<f64>,
+    /// ∂end/∂(start, depth); the last column is that of the depth, 1/m.
+    pub(super) by: DMatrix<f64>,
+    /// For each piece the states at its nodes.
+    pub(super) states: Vec<DMatrix<f64>>,
+    /// For each piece the derivatives of the states at its nodes, (n m) × those of the end.
+    pub(super) values: Vec<DMatrix<f64>>,
+    /// The largest change of a state at a node, as a share of the largest in its piece: what the states before were off.
+    pub(super) moved: f64,
+}
+
+impl Passage {
+    /// Before the first piece: a state with `columns` derivatives, the first of them in its own numbers.
+    pub(super) fn from(start: DVector<f64>, columns: usize) -> Self {
+        Self {
+            by: DMatrix::identity(start.len(), columns),
+            end: start,
+            states: Vec::new(),
+            values: Vec::new(),
+            moved: 0.0,
+        }
+    }
+
+    /// Goes over a piece.
+    pub(super) fn take(&mut self, piece: Advanced) {
+        self.end = piece.end;
+        self.by = piece.end_by;
+        self.states.push(piece.states);
+        self.values.push(piece.values);
+        self.moved = self.moved.max(piece.moved);
+    }
+
+    /// I − ∂end/∂start: what a periodic start is solved with.
+    pub(super) fn periodic(&self) -> DMatrix<f64> {
+        let size = self.end.len();
+        let mut periodic = -self.by.columns(0, size);
+        for i in 0..size {
+            periodic[(i, i)] += 1.0;
+        }
+        periodic
+    }
+}
+
+/// Which way a branch goes at an orbit.
+#[derive(Clone, Debug)]
+pub(super) struct Tangent {
+    /// The unit vector along (start/size, depth/depth size).
+    pub(super) along: DVector<f64>,
+    /// For each piece the change of the states at its nodes over a unit of length, n × m.
+    states: Vec<DMatrix<f64>>,
+}
+
+/// A part of the period without a switch: when, and where its nodes are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span<'a> {
+    pub(super) start_s: f64,
+    pub(super) duration_s: f64,
+    pub(super) gauss: &'a Gauss,
+}
+
+/// Newton stops where the step after the last would be below this, relative to the orbit.
+///
+/// Steps of Newton shrink as e' = C e², so that two of them, e and then e', foretell the next: C e'² = e'³/e².
+const SETTLED: f64 = 1e-12;
+
+/// Steps above this foretell nothing yet.
+const NEAR: f64 = 1e-3;
+
+/// The map of a forced problem over a period at one speed, on one mesh. Orbits are its fixed points.
+pub(super) trait PeriodMap: Sized {
+    /// What it is the map of.
+    fn problem(&self) -> &ForcedProblem;
+
+    /// How many numbers it maps; the first are the states of the structure.
+    fn size(&self) -> usize;
+
+    /// The pieces of the period, in order.
+    fn spans(&self) -> Vec<Span<'_>>;
+
+    /// The map, with derivatives, linearized about states at the nodes: exact where `guess` holds those of the motion from the start.
+    /// `None` where a piece is singular.
+    fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage>;
+
+    /// What the map takes of a motion with a state at the start and with states at the nodes.
+    fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64>;
+
+    /// All multipliers about an orbit, largest first.
+    fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>>;
+
+    /// The frequency of the vibration of a multiplier about an orbit, Hz.
+    fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64>;
+
+    /// The same map on a finer mesh, to tell errors by; `None` where it cannot be cut.
+    fn finer(&self) -> Option<Self>;
+}
+
+impl Orbit {
+    /// Rest: the orbit at no depth.
+    pub(super) fn rest(map: &impl PeriodMap) -> Self {
+        let order = map.problem().order();
+        let states = map.spans().into_iter();
+        Self {
+            depth_m: 0.0,
+            start: DVector::zeros(map.size()),
+            states: states
+                .map(|span| DMatrix::zeros(order, span.gauss.nodes.len()))
+                .collect(),
+        }
+    }
+
+    /// The orbit of one mesh on the nodes of another.
+    pub(super) fn onto(&self, own: &impl PeriodMap, other: &impl PeriodMap) -> Self {
+        let spans = own.spans();
+        let at = |time_s: f64| -> DVector<f64> {
+            let index = spans
+                .partition_point(|span| span.start_s <= time_s)
+                .saturating_sub(1);
+            let span = &spans[index];
+            let weights = span.gauss.lagrange((time_s - span.start_s) / span.duration_s);
+            &self.states[index] * DVector::from_vec(weights)
+        };
+        let states = other.spans().into_iter().map(|span| {
+            let times = span.gauss.nodes.iter();
+            let columns: Vec<DVector<f64>> = times
+                .map(|node| at(span.start_s + span.duration_s * node))
+                .collect();
+            DMatrix::from_columns(&columns)
+        });
+        let states: Vec<DMatrix<f64>> = states.collect();
+        let state = self.start.rows(0, own.problem().order()).into_owned();
+        Self {
+            depth_m: self.depth_m,
+            start: other.start_of(state, &states),
+            states,
+        }
+    }
+
+    /// The orbit of a problem whose equations are linear.
+    pub(super) fn of_linear(map: &impl PeriodMap, depth_m: f64) -> Result<Self, OrbitError> {
+        let depth_mm = depth_m * 1e3;
+        let singular = OrbitError::Singular { depth_mm };
+        let rest = Self::rest(map);
+        let from_rest = map.pass(&rest.start, depth_m, &rest.states).ok_or(singular)?;
+        let periodic = from_rest.periodic();
+        let start = periodic.lu().solve(&from_rest.end).ok_or(singular)?;
+        let around = map.pass(&start, depth_m, &rest.states).ok_or(singular)?;
+        Ok(Self {
+            depth_m,
+            start,
+            states: around.states,
+        })
+    }
+
+    /// A guess at the orbit a length further along a branch.
+    pub(super) fn along(&self, tangent: &Tangent, length: f64, scale: Scale) -> Self {
+        let order = self.start.len();
+        let states = self.states.iter().zip(&tangent.states);
+        Self {
+            depth_m: self.depth_m + tangent.along[order] * length * scale.depth_m,
+            start: &self.start + tangent.along.rows(0, order) * (length * scale.state),
+            states: states.map(|(states, by)| states + by * length).collect(),
+        }
+    }
+
+    /// Corrects a guess to the orbit on the hyperplane ⟨normal, (start/size, depth/depth_size) − guess⟩ = 0.
+    ///
+    /// With a normal along depth alone this is Newton at fixed depth; with the tangent it passes folds. States at the nodes
+    /// are corrected together with the start. Returns the orbit and the tangent there, oriented along `normal`.
+    pub(super) fn correct(
+        map: &impl PeriodMap,
+        guess: &Self,
+        scale: Scale,
+        normal: &DVector<f64>,
+    ) -> Result<(Self, Tangent), OrbitError> {
+        let order = map.size();
+        let mut orbit = guess.clone();
+        let mut distance = 0.0;
+        let mut last = f64::INFINITY;
+        for iteration in 0..25 {
+            let depth_mm = orbit.depth_m * 1e3;
+            let passage = map
+                .pass(&orbit.start, orbit.depth_m, &orbit.states)
+                .ok_or(OrbitError::NoConvergence { depth_mm })?;
+            let mut matrix = DMatrix::zeros(order + 1, order + 1);
+            matrix
+                .view_mut((0, 0), (order, order))
+                .copy_from(&passage.periodic());
+            matrix
+                .view_mut((0, order), (order, 1))
+                .copy_from(&(passage.by.column(order) * (-scale.depth_m / scale.state)));
+            matrix.row_mut(order).copy_from(&normal.transpose());
+            let lu = matrix.lu();
+            let mut residual = DVector::zeros(order + 1);
+            residual
+                .rows_mut(0, order)
+                .copy_from(&((&passage.end - &orbit.start) / scale.state));
+            residual[order] = -distance;
+            let step = lu.solve(&residual).ok_or(OrbitError::Singular { depth_mm })?;
+            let change = scale.unscaled(&step);
+            orbit.start += change.rows(0, order);
+            orbit.depth_m += change[order];
+            distance += normal.dot(&step);
+            orbit.states = passage.states;
+            for (states, values) in orbit.states.iter_mut().zip(&passage.values) {
+                *states += shaped(values * &change, states.nrows());
+            }
+            let size = step.norm().max(passage.moved);
+            if !size.is_finite() || (iteration > 4 && size > 2.0 * last) {
+                return Err(OrbitError::NoConvergence { depth_mm });
+            }
+            if size < SETTLED || (last < NEAR && size * (size / last).powi(2) < SETTLED) {
+                let mut unit = DVector::zeros(order + 1);
+                unit[order] = 1.0;
+                let tangent = lu.solve(&unit).ok_or(OrbitError::Singular { depth_mm })?;
+                let along = tangent.normalize();
+                let change = scale.unscaled(&along);
+                let states = passage.values.iter().zip(&orbit.states);
+                let states = states.map(|(values, states)| shaped(values * &change, states.nrows()));
+                let states = states.collect();
+                return Ok((orbit, Tangent { along, states }));
+            }
+            last = size;
+        }
+        Err(OrbitError::NoConvergence {
+            depth_mm: orbit.depth_m * 1e3,
+        })
+    }
+}
+
+/// Values at the nodes, one under the other, side by side.
+fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
+    let nodes = values.len() / order;
+    DMatrix::from_column_slice(order, nodes, values.as_slice())
+}
+
+/// What states and depth are divided by before lengths along a branch are taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scale {
+    pub(super) state: f64,
+    pub(super) depth_m: f64,
+}
+
+impl Scale {
+    /// A change of (start/size, depth/depth size) as one of start and depth.
+    fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
+        let mut change = step * self.state;
+        change[step.len() - 1] = step[step.len() - 1] * self.depth_m;
+        change
+    }
+}

@@ -1,0 +1,325 @@
+//! What stands for a restoring force on a forced orbit: a spring, a damper and a constant force.
+
+use std::f64::consts::TAU;
+
+use nalgebra::DMatrix;
+
+use super::periodic_orbit::{Orbit, Span};
+use quietcut_model::Term;
+use quietcut_model::path::{Motion, restoring_along, restoring_from};
+
+/// Samples of a piece of the mesh, over which nothing turns by more than a few radians.
+const PER_PIECE: usize = 128;
+
+/// The least samples of a period.
+const LEAST: usize = 1024;
+
+/// Periods after which terms with states of their own must have come to a loop that closes.
+const PERIODS: usize = 64;
+
+/// How nearly it closes, relative to the size of the force.
+const CLOSED: f64 = 1e-8;
+
+/// Size of a small disturbance, as a share of the orbit.
+const SMALL: f64 = 0.02;
+
+/// Periods of the orbit over which a disturbance of another frequency is watched, to the nearest of its own periods.
+const WATCHED: usize = 40;
+
+/// f_r = force + stiffness·x + damping·ẋ along one axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Spring {
+    /// N.
+    pub(super) force_n: f64,
+    /// N/m.
+    pub(super) stiffness: f64,
+    /// N s/m.
+    pub(super) damping: f64,
+}
+
+/// A period of an orbit in even steps, along the machine's axes.
+pub(super) struct Samples {
+    step_s: f64,
+    x: [Vec<f64>; 3],
+    v: [Vec<f64>; 3],
+}
+
+impl Samples {
+    /// From the states at the nodes of the pieces of a period; `seen` gives displacement and velocity by states.
+    pub(super) fn new(spans: &[Span<'_>], orbit: &Orbit, period_s: f64, seen: [&DMatrix<f64>; 2]) -> Self {
+        let count = (PER_PIECE * spans.len()).max(LEAST);
+        let step_s = period_s / count as f64;
+        let (mut x, mut v) = ([(); 3].map(|()| Vec::new()), [(); 3].map(|()| Vec::new()));
+        let mut index = 0;
+        for (place, (span, states)) in spans.iter().zip(&orbit.states).enumerate() {
+            let at_nodes = seen.map(|seen| seen * states);
+            let is_last = place + 1 == spans.len();
+            let end_s = span.start_s + span.duration_s;
+            while index < count && (is_last || (index as f64 + 0.5) * step_s <= end_s) {
+                let share = ((index as f64 + 0.5) * step_s - span.start_s) / span.duration_s;
+                let weights = span.gauss.lagrange(share);
+                for (signal, at_nodes) in [&mut x, &mut v].into_iter().zip(&at_nodes) {
+                    for (signal, row) in signal.iter_mut().zip(at_nodes.row_iter()) {
+                        signal.push(row.iter().zip(&weights).map(|(a, b)| a * b).sum());
+                    }
+                }
+                index += 1;
+            }
+        }
+        Self { step_s, x, v }
+    }
+
+    fn len(&self) -> usize {
+        self.x[0].len()
+    }
+
+    /// The largest displacement, m.
+    pub(super) fn largest_m(&self) -> f64 {
+        self.x.iter().flatten().fold(0.0, |most, x| x.abs().max(most))
+    }
+
+    /// So many periods, with something added to one axis.
+    fn motion(&self, periods: usize, axis: usize, added: impl Fn(f64) -> [f64; 2]) -> Motion {
+        let count = self.len();
+        let mut x: [Vec<f64>; 3] = std::array::from_fn(|axis| self.x[axis].repeat(periods));
+        let mut v: [Vec<f64>; 3] = std::array::from_fn(|axis| self.v[axis].repeat(periods));
+        for sample in 0..count * periods {
+            let [by_x, by_v] = added((sample as f64 + 0.5) * self.step_s);
+            x[axis][sample] += by_x;
+            v[axis][sample] += by_v;
+        }
+        // Where the velocity changes sign within a step, friction counts as its mean over the step.
+        let rest_m_per_s = std::array::from_fn(|axis| {
+            let velocity = &self.v[axis];
+            let steps = (0..count).map(|n| (velocity[(n + 1) % count] - velocity[n]).abs());
+            0.5 * steps.fold(0.0, f64::max)
+        });
+        Motion {
+            step_s: self.step_s,
+            start_s: 0.0,
+            x,
+            v,
+            rest_m_per_s,
+        }
+    }
+
+    /// The force of a term over a period, once its loop closes.
+    ///
+    /// A state of its own is the fixed point of what a period makes of it, by the secant: what begins later forgets earlier.
+    fn force_n(&self, term: &dyn Term) -> [Vec<f64>; 3] {
+        if term.states() == 0 {
+            return restoring_along(term, &self.motion(1, 0, |_| [0.0; 2]));
+        }
+        // One sample more: the first of the next period.
+        let mut period = self.motion(1, 0, |_| [0.0; 2]);
+        for signal in period.x.iter_mut().chain(&mut period.v) {
+            signal.push(signal[0]);
+        }
+        let mut start = vec![0.0; term.states()];
+        term.begin(&period.at(0), &mut start);
+        let size_m = self.largest_m();
+        let mut before: Option<(f64, f64)> = None;
+        for _ in 0..PERIODS {
+            let mut own = start.clone();
+            let mut force = restoring_from(term, &period, &mut own);
+            let miss = own.iter().zip(&start).map(|(to, from)| (to - from).abs());
+            if miss.fold(0.0, f64::max) <= CLOSED * size_m {
+                for signal in &mut force {
+                    signal.truncate(self.len());
+                }
+                return force;
+            }
+            let (from, to) = (start[0], own[0]);
+            let slope = before.map_or(0.0, |(from_before, to_before)| {
+                (to - to_before) / (from - from_before)
+            });
+            before = Some((from, to));
+            start = own;
+            // What forgets has a slope between 0 and 1.
+            if term.states() == 1 && (0.0..0.999).contains(&slope) {
+                start[0] = from + (to - from) / (1.0 - slope);
+            }
+        }
+        let mut own = start.clone();
+        let mut force = restoring_from(term, &period, &mut own);
+        for signal in &mut force {
+            signal.truncate(self.len());
+        }
+        force
+    }
+}
+
+fn mean(a: &[f64]) -> f64 {
+    a.iter().sum::<f64>() / a.len().max(1) as f64
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// ⟨a b⟩/⟨b²⟩; 0 where b is nothing.
+fn share(a: &[f64], b: &[f64]) -> f64 {
+    let whole = dot(b, b);
+    if whole > 0.0 { dot(a, b) / whole } else { 0.0 }
+}
+
+/// The spring and damper nearest to the force of all terms along the orbit, with its mean, by axis. A damper
+/// of `most_damping` holds the tool: friction sticks.
+pub(super) fn equivalent(terms: &[Box<dyn Term>], samples: &Samples, most_damping: [f64; 3]) -> [Spring; 3] {
+    let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples.len()]);
+    for term in terms {
+        for (sum, added) in force.iter_mut().zip(samples.force_n(&**term)) {
+            sum.iter_mut().zip(added).for_each(|(sum, added)| *sum += added);
+        }
+    }
+    std::array::from_fn(|axis| {
+        let middle_m = mean(&samples.x[axis]);
+        let centered: Vec<f64> = samples.x[axis].iter().map(|x| x - middle_m).collect();
+        let stiffness = share(&force[axis], &centered);
+        let damping = share(&force[axis], &samples.v[axis]);
+        if damping >= most_damping[axis] {
+            return Spring {
+                damping: most_damping[axis],
+                ..Spring::default()
+            };
+        }
+        Spring {
+            force_n: mean(&force[axis]) - stiffness * middle_m,
+            stiffness,
+            damping: damping.max(0.0),
+        }
+    })
+}
+
+/// What a small disturbance of a frequency, Hz, feels beside the orbit, by axis: the part of the force that it changes in phase with its
+/// displacement and with its velocity. What holds the tool, of `springs`, holds it against a disturbance too.
+pub(super) fn incremental(
+    terms: &[Box<dyn Term>],
+    samples: &Samples,
+    frequency_hz: f64,
+    springs: &[Spring; 3],
+    most_damping: [f64; 3],
+) -> [Spring; 3] {
+    let omega = TAU * frequency_hz;
+    std::array::from_fn(|axis| {
+        let middle_m = mean(&samples.x[axis]);
+        let centered: Vec<f64> = samples.x[axis].iter().map(|x| x - middle_m).collect();
+        let size_m = SMALL * (dot(&centered, &centered) / centered.len().max(1) as f64).sqrt();
+        if size_m == 0.0 || springs[axis].damping >= most_damping[axis] {
+            return springs[axis];
+        }
+        let disturbance = |t: f64| [size_m * (omega * t).sin(), size_m * omega * (omega * t).cos()];
+        let mut spring = Spring::default();
+        let first = WATCHED / 2 * samples.len();
+        for term in terms {
+            let plain = restoring_along(&**term, &samples.motion(WATCHED, axis, |_| [0.0; 2]));
+            let disturbed = restoring_along(&**term, &samples.motion(WATCHED, axis, disturbance));
+            let change: Vec<f64> = (first..plain[axis].len())
+                .map(|n| disturbed[axis][n] - plain[axis][n])
+                .collect();
+            let added: Vec<[f64; 2]> = (first..plain[axis].len())
+                .map(|n| disturbance((n as f64 + 0.5) * samples.step_s))
+                .collect();
+            let part = |which: usize| added.iter().map(|added| added[which]).collect::<Vec<f64>>();
+            spring.stiffness += share(&change, &part(0));
+            spring.damping += share(&change, &part(1));
+        }
+        spring.damping = spring.damping.clamp(0.0, most_damping[axis]);
+        spring
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quietcut_model::effects::Effects;
+
+    const SIZE_M: f64 = 3e-5;
+    const OMEGA: f64 = 110.0;
+
+    /// A harmonic orbit along y.
+    fn harmonic() -> Samples {
+        let count = 2048;
+        let step_s = TAU / OMEGA / count as f64;
+        let at = |sample: usize| OMEGA * (sample as f64 + 0.5) * step_s;
+        Samples {
+            step_s,
+            x: [
+                vec![0.0; count],
+                (0..count).map(|n| SIZE_M * at(n).sin()).collect(),
+                vec![0.0; count],
+            ],
+            v: [
+                vec![0.0; count],
+                (0..count).map(|n| SIZE_M * OMEGA * at(n).cos()).collect(),
+                vec![0.0; count],
+            ],
+        }
+    }
+
+    fn terms(effects: &[&str]) -> Vec<Box<dyn Term>> {
+        let case = quietcut_testkit::case("kuka-kr90-half");
+        let effects = Effects::parse(effects.iter().copied()).unwrap();
+        effects.dynamics(case.structure().unwrap()).unwrap().1
+    }
+
+    #[test]
+    fn friction_on_a_harmonic_orbit_has_its_describing_function() {
+        let friction = terms(&["coulomb-friction=2", "coulomb-friction.direction=y"]);
+        let [_, spring, _] = equivalent(&friction, &harmonic(), [1e9; 3]);
+        // 4 f_c/(π A ω), and for a small disturbance half of it.
+        let exact = 8.0 / (std::f64::consts::PI * SIZE_M * OMEGA);
+        assert!((spring.damping / exact - 1.0).abs() < 1e-5, "{spring:?} {exact}");
+        assert!(spring.stiffness.abs() < 1e-5 * exact * OMEGA);
+        let springs = [spring; 3];
+        // A frequency that is no simple multiple.
+        let [_, small, _] = incremental(&friction, &harmonic(), OMEGA / TAU * 0.7236, &springs, [1e9; 3]);
+        assert!((small.damping / exact - 0.5).abs() < 0.02, "{small:?} {exact}");
+        // Where more than the most is needed, friction holds.
+        let [_, held, _] = equivalent(&friction, &harmonic(), [0.5 * exact; 3]);
+        assert_eq!(held.damping, 0.5 * exact);
+    }
+
+    #[test]
+    fn play_on_a_harmonic_orbit_has_its_describing_function() {
+        let gap_mm = 0.02;
+        let play = terms(&[
+            "backlash=0.02",
+            "backlash.stiffness_fraction=0.3",
+            "backlash.direction=y",
+        ]);
+        let [_, spring, _] = equivalent(&play, &harmonic(), [1e9; 3]);
+        let case = quietcut_testkit::case("kuka-kr90-half");
+        let structure = case.structure().unwrap().first_order().unwrap();
+        let stiffness = 0.3 / structure.receptance(0.0).unwrap()[(1, 1)].re;
+        // Within ±g the spring is missing, beyond it pulls as if it began there: a dead zone.
+        let share = 0.5e-3 * gap_mm / SIZE_M;
+        let missing = 2.0 / std::f64::consts::PI * (share.asin() + share * (1.0 - share * share).sqrt());
+        let exact = -stiffness * missing;
+        assert!(
+            (spring.stiffness / exact - 1.0).abs() < 1e-3,
+            "{spring:?} {exact}"
+        );
+        assert!(spring.damping.abs() < 1e-6 * stiffness / OMEGA);
+    }
+
+    #[test]
+    fn hysteresis_dissipates_the_area_of_its_loop() {
+        let loops = terms(&[
+            "hysteresis=2e5",
+            "hysteresis.yield_m=1e-5",
+            "hysteresis.direction=y",
+        ]);
+        let samples = harmonic();
+        let [_, spring, _] = equivalent(&loops, &samples, [1e9; 3]);
+        // Forty periods from rest, and the area of the last one.
+        let motion = samples.motion(40, 1, |_| [0.0; 2]);
+        let force = &restoring_along(&*loops[0], &motion)[1];
+        let work: f64 = (39 * samples.len()..40 * samples.len())
+            .map(|n| force[n] * motion.v[1][n] * motion.step_s)
+            .sum();
+        let exact = work / (std::f64::consts::PI * SIZE_M * SIZE_M * OMEGA);
+        assert!((spring.damping / exact - 1.0).abs() < 1e-5, "{spring:?} {exact}");
+        assert!(spring.stiffness < 0.0 && spring.stiffness > -2e5, "{spring:?}");
+    }
+}

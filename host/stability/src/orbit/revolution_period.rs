@@ -1,0 +1,367 @@
+//! The forced orbit of unequal teeth, over one revolution: several delays, all of them collocated.
+//!
+//! Teeth at unequal pitch, or on unequal radii, cut unequal chips: on an orbit of the revolution u is not u(t − τ_j), and the
+//! surface that was cut before acts. With p_j = n_jᵀ u along the chip of tooth j and w − z the depth,
+//!
+//!   ẋ = A x + B Σ_j ((w − z)(cutting_j (c_j + p_j − p_{j−1}(t − τ_j)) + edge_j)) − N(x),
+//!
+//! with c_j what feed and runout make of the chip. The map over the revolution takes x and those p of the revolution before that are
+//! still to be cut again, as the linear one does; its fixed points are the orbits, and the eigenvalues of its derivative
+//! there are the multipliers about them.
+
+use nalgebra::{DMatrix, DVector, RowDVector, Vector3};
+use num_complex::Complex64;
+
+use super::collocated::Linearized;
+use super::forced::{ForcedProblem, Uneven};
+use super::periodic_orbit::{Orbit, Passage, PeriodMap, Span};
+use crate::problem::revolution_mesh::{Fineness, Flight, RevolutionMesh, Source, Stretch};
+use crate::spectrum::chatter_frequency::loudest_hz;
+use crate::spectrum::eigenvector::eigenvector;
+use crate::spectrum::period_map;
+
+/// A cutting tooth at a node.
+struct Tooth {
+    /// Force per depth and chip, Pa.
+    cutting: Vector3<f64>,
+    /// Force per depth, N/m, of the edge.
+    edge: Vector3<f64>,
+    /// What it sees of the states: nᵀ C.
+    seen: RowDVector<f64>,
+    /// What feed and runout make of its chip, m.
+    chip_m: f64,
+}
+
+/// What acts in a stretch.
+struct Forces {
+    /// Of all nodes, those of one node together.
+    teeth: Vec<Tooth>,
+    /// B D C A per depth of the damping of the flank at the nodes; empty where there is none.
+    damping: Vec<DMatrix<f64>>,
+}
+
+/// The revolution at one speed.
+pub(super) struct RevolutionPeriod<'a> {
+    problem: &'a ForcedProblem,
+    uneven: &'a Uneven,
+    rpm: f64,
+    depth_m: f64,
+    mesh: RevolutionMesh,
+    /// Of each stretch.
+    forces: Vec<Forces>,
+}
+
+impl<'a> RevolutionPeriod<'a> {
+    /// For depths up to `depth_m`; `None` where a tooth finds no surface before it.
+    pub(super) fn new(
+        problem: &'a ForcedProblem,
+        uneven: &'a Uneven,
+        rpm: f64,
+        depth_m: f64,
+    ) -> Option<Self> {
+        Self::cut(problem, uneven, (rpm, depth_m), Fineness::WORKING)
+    }
+
+    fn cut(
+        problem: &'a ForcedProblem,
+        uneven: &'a Uneven,
+        (rpm, depth_m): (f64, f64),
+        fineness: Fineness,
+    ) -> Option<Self> {
+        let mesh = RevolutionMesh::new(&uneven.pitched, rpm, depth_m, fineness, Flight::Cut)?;
+        let forces = mesh.stretches.iter();
+        Some(Self {
+            forces: forces
+                .map(|stretch| Forces::new(problem, uneven, &mesh, stretch))
+                .collect(),
+            problem,
+            uneven,
+            rpm,
+            depth_m,
+            mesh,
+        })
+    }
+
+    /// What every port of a stretch sees of the past, ports × 1 and its derivatives, ports × (size + 1).
+    fn past(
+        &self,
+        stretch: &Stretch,
+        start: &DVector<f64>,
+        seen: &[(DVector<f64>, DMatrix<f64>)],
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let ports = stretch.pasts.len();
+        let mut past = DVector::zeros(ports);
+        let mut by = DMatrix::zeros(ports, self.mesh.size + 1);
+        for (port, of) in stretch.pasts.iter().enumerate() {
+            for (node, weight) in of.weights.iter().enumerate() {
+                match of.source {
+                    Source::Earlier(first) => {
+                        past[port] += weight * start[first + node];
+                        by[(port, first + node)] += weight;
+                    }
+                    Source::Own(series) => {
+                        // A delay shorter than a stretch would end in the stretch itself.
+                        let (values, derivatives) = seen.get(series.stretch)?;
+                        let teeth = self.mesh.stretches[series.stretch].cutting.len();
+                        let row = node * teeth + series.tooth;
+                        past[port] += weight * values[row];
+                        let mut sum = by.row_mut(port);
+                        sum += derivatives.row(row) * *weight;
+                    }
+                }
+            }
+        }
+        Some((past, by))
+    }
+}
+
+impl Forces {
+    fn new(problem: &ForcedProblem, uneven: &Uneven, mesh: &RevolutionMesh, stretch: &Stretch) -> Self {
+        let process = &problem.linear.process;
+        let passages = &mesh.passages;
+        let mut teeth = Vec::with_capacity(stretch.cutting.len() * stretch.gauss.nodes.len());
+        let mut damping = Vec::new();
+        for node in &stretch.gauss.nodes {
+            let time_s = stretch.start_s + stretch.duration_s * node;
+            let angle = |passage| passages.angle(&uneven.pitched, passage, time_s);
+            for passage in &stretch.cutting {
+                let angle = angle(passage);
+                let normal = process.force.normal.at(angle);
+                teeth.push(Tooth {
+                    cutting: process.force.cutting.at(angle),
+                    edge: process.force.edge.at(angle),
+                    seen: RowDVector::from_row_slice(
+                        (normal.transpose() * &problem.linear.structure.c).as_slice(),
+                    ),
+                    chip_m: normal.x * passage.feed_m + uneven.runout_m[passage.tooth],
+                });
+            }
+            let angles = stretch.cutting.iter().map(angle);
+            let of_flank = problem.damping_per_depth(angles, passages.rad_per_s);
+            damping.extend(of_flank.map(|damping| problem.damped(&damping)));
+        }
+        Self { teeth, damping }
+    }
+
+    /// The teeth at a node, each with the number of its port.
+    fn teeth_at(&self, node: usize, nodes: usize) -> impl Iterator<Item = (usize, &Tooth)> {
+        let count = self.teeth.len() / nodes;
+        self.teeth.iter().enumerate().skip(node * count).take(count)
+    }
+
+    /// Force per depth, N/m, at a node.
+    fn push(&self, node: usize, nodes: usize, past: &DVector<f64>, state: &DVector<f64>) -> Vector3<f64> {
+        self.teeth_at(node, nodes)
+            .map(|(port, tooth)| {
+                let chip_m = tooth.chip_m + (&tooth.seen * state)[0] - past[port];
+                tooth.cutting * chip_m + tooth.edge
+            })
+            .sum()
+    }
+
+    /// f(t_j, Y_j) at the nodes.
+    fn rates(
+        &self,
+        problem: &ForcedProblem,
+        past: &DVector<f64>,
+        states: &DMatrix<f64>,
+        depth_m: f64,
+    ) -> Vec<DVector<f64>> {
+        let structure = &problem.linear.structure;
+        let nodes = states.ncols();
+        let at = |node: usize| {
+            let state = states.column(node).into_owned();
+            let push = self.push(node, nodes, past, &state);
+            let depth_here_m = problem.depth_at(&state, depth_m);
+            let mut rate = &structure.a * &state + &structure.b * (push * depth_here_m);
+            problem.subtract_smooth(state.as_slice(), &mut rate);
+            if let Some(damping) = self.damping.get(node) {
+                rate -= damping * &state * depth_m;
+            }
+            rate
+        };
+        (0..nodes).map(at).collect()
+    }
+
+    /// ∂f/∂x at the nodes.
+    fn jacobians(
+        &self,
+        problem: &ForcedProblem,
+        past: &DVector<f64>,
+        states: &DMatrix<f64>,
+        depth_m: f64,
+    ) -> Vec<DMatrix<f64>> {
+        let b = &problem.linear.structure.b;
+        let nodes = states.ncols();
+        let at = |node: usize| {
+            let state = states.column(node).into_owned();
+            let push = self.push(node, nodes, past, &state);
+            let mut jacobian = problem.jacobian(state.as_slice(), &push);
+            let depth_here_m = problem.depth_at(&state, depth_m);
+            for (_, tooth) in self.teeth_at(node, nodes) {
+                jacobian += (b * tooth.cutting) * &tooth.seen * depth_here_m;
+            }
+            if let Some(damping) = self.damping.get(node) {
+                jacobian -= damping * depth_m;
+            }
+            jacobian
+        };
+        (0..nodes).map(at).collect()
+    }
+
+    /// What the past, by its derivatives, and depth add to the rates at the nodes, n × (size + 1) each.
+    fn pushes(
+        &self,
+        problem: &ForcedProblem,
+        past: &DVector<f64>,
+        past_by: &DMatrix<f64>,
+        states: &DMatrix<f64>,
+        depth_m: f64,
+    ) -> Vec<DMatrix<f64>> {
+        let b = &problem.linear.structure.b;
+        let (nodes, columns) = (states.ncols(), past_by.ncols());
+        let at = |node: usize| {
+            let state = states.column(node).into_owned();
+            let depth_here_m = problem.depth_at(&state, depth_m);
+            let mut force = DMatrix::zeros(state.len(), columns);
+            for (port, tooth) in self.teeth_at(node, nodes) {
+                let unit: DVector<f64> = b * (tooth.cutting * -depth_here_m);
+                force.ger(1.0, &unit, &past_by.row(port).transpose(), 1.0);
+            }
+            let mut by_depth: DVector<f64> = b * self.push(node, nodes, past, &state);
+            if let Some(damping) = self.damping.get(node) {
+                by_depth -= damping * &state;
+            }
+            let mut last = force.column_mut(columns - 1);
+            last += by_depth;
+            force
+        };
+        (0..nodes).map(at).collect()
+    }
+
+    /// p of every port and its derivatives.
+    fn seen(&self, states: &DMatrix<f64>, values: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let (order, nodes) = states.shape();
+        let mut seen = DVector::zeros(self.teeth.len());
+        let mut by = DMatrix::zeros(self.teeth.len(), values.ncols());
+        for node in 0..nodes {
+            for (port, tooth) in self.teeth_at(node, nodes) {
+                seen[port] = tooth.seen.dot(&states.column(node).transpose());
+                by.row_mut(port)
+                    .copy_from(&(&tooth.seen * values.rows(node * order, order)));
+            }
+        }
+        (seen, by)
+    }
+}
+
+impl PeriodMap for RevolutionPeriod<'_> {
+    fn problem(&self) -> &ForcedProblem {
+        self.problem
+    }
+
+    fn size(&self) -> usize {
+        self.mesh.size
+    }
+
+    fn spans(&self) -> Vec<Span<'_>> {
+        let stretches = self.mesh.stretches.iter();
+        stretches
+            .map(|stretch| Span {
+                start_s: stretch.start_s,
+                duration_s: stretch.duration_s,
+                gauss: stretch.gauss,
+            })
+            .collect()
+    }
+
+    fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage> {
+        let (order, size) = (self.problem.order(), self.mesh.size);
+        let mut passage = Passage::from(start.rows(0, order).into_owned(), size + 1);
+        let mut seen: Vec<(DVector<f64>, DMatrix<f64>)> = Vec::with_capacity(self.forces.len());
+        for ((stretch, forces), states) in self.mesh.stretches.iter().zip(&self.forces).zip(guess) {
+            let (past, past_by) = self.past(stretch, start, &seen)?;
+            let pushes = forces.pushes(self.problem, &past, &past_by, states, depth_m);
+            let rates = forces.rates(self.problem, &past, states, depth_m);
+            let jacobians = forces.jacobians(self.problem, &past, states, depth_m);
+            let linearized = Linearized::new(stretch.gauss, stretch.duration_s, jacobians);
+            let advanced = linearized.advance(&passage.end, &passage.by, states, &rates, &pushes)?;
+            seen.push(forces.seen(&advanced.states, &advanced.values));
+            passage.take(advanced);
+        }
+        let mut image = DVector::zeros(size);
+        let mut image_by = DMatrix::zeros(size, size + 1);
+        image.rows_mut(0, order).copy_from(&passage.end);
+        image_by.rows_mut(0, order).copy_from(&passage.by);
+        for (series, first) in &self.mesh.kept {
+            let stretch = &self.mesh.stretches[series.stretch];
+            let (values, derivatives) = &seen[series.stretch];
+            for node in 0..stretch.gauss.nodes.len() {
+                let row = node * stretch.cutting.len() + series.tooth;
+                image[first + node] = values[row];
+                image_by.row_mut(first + node).copy_from(&derivatives.row(row));
+            }
+        }
+        (passage.end, passage.by) = (image, image_by);
+        Some(passage)
+    }
+
+    fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64> {
+        let mut start = state.resize_vertically(self.mesh.size, 0.0);
+        for (series, first) in &self.mesh.kept {
+            let (states, forces) = (&states[series.stretch], &self.forces[series.stretch]);
+            for node in 0..states.ncols() {
+                let mut teeth = forces.teeth_at(node, states.ncols());
+                let tooth = teeth.nth(series.tooth);
+                start[first + node] =
+                    tooth.map_or(0.0, |(_, tooth)| tooth.seen.dot(&states.column(node).transpose()));
+            }
+        }
+        start
+    }
+
+    fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>> {
+        let passage = self.pass(&orbit.start, orbit.depth_m, &orbit.states)?;
+        period_map::of_matrix(passage.by.columns(0, self.mesh.size).into_owned())
+    }
+
+    fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64> {
+        let passage = self.pass(&orbit.start, orbit.depth_m, &orbit.states)?;
+        let (size, order) = (self.mesh.size, self.problem.order());
+        let by_start = passage.by.columns(0, size);
+        let vector = eigenvector(&by_start.map(Complex64::from), multiplier)?;
+        let c = self.problem.linear.structure.c.map(Complex64::from);
+        // The displacement at every node, with its time and its weight.
+        let mut motion: Vec<(f64, Vector3<Complex64>)> = Vec::new();
+        for (stretch, values) in self.mesh.stretches.iter().zip(&passage.values) {
+            let states = values.columns(0, size).map(Complex64::from) * &vector;
+            for (node, (place, weight)) in stretch.gauss.nodes.iter().zip(&stretch.gauss.weights).enumerate()
+            {
+                let displacement = &c * states.rows(node * order, order);
+                let weight = Complex64::from(weight * stretch.duration_s);
+                motion.push((
+                    stretch.start_s + stretch.duration_s * place,
+                    displacement * weight,
+                ));
+            }
+        }
+        let period_s = self.mesh.passages.period_s;
+        let linear = &self.problem.linear;
+        loudest_hz(linear, orbit.depth_m, period_s, multiplier, |s| {
+            let mut harmonic = Vector3::<Complex64>::zeros();
+            for (time_s, displacement) in &motion {
+                harmonic += displacement * (-s * *time_s).exp();
+            }
+            Some(harmonic.norm())
+        })
+    }
+
+    fn finer(&self) -> Option<Self> {
+        Self::cut(
+            self.problem,
+            self.uneven,
+            (self.rpm, self.depth_m),
+            Fineness::FINE,
+        )
+    }
+}

@@ -1,0 +1,71 @@
+//! The map of a forced problem over a tooth period.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::forced::ForcedProblem;
+use super::periodic_orbit::{Orbit, Passage, PeriodMap, Span};
+use super::tooth_period::{ToothPeriod, per_depth, rates};
+use super::variation;
+use crate::spectrum::chatter_frequency::chatter_hz;
+use crate::spectrum::period_map;
+
+impl PeriodMap for ToothPeriod<'_> {
+    fn problem(&self) -> &ForcedProblem {
+        self.problem
+    }
+
+    fn size(&self) -> usize {
+        self.problem.order()
+    }
+
+    fn spans(&self) -> Vec<Span<'_>> {
+        let mut start_s = 0.0;
+        let spans = self.pieces.iter().map(|piece| {
+            let span = Span {
+                start_s,
+                duration_s: piece.duration,
+                gauss: &self.gauss,
+            };
+            start_s += piece.duration;
+            span
+        });
+        spans.collect()
+    }
+
+    fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage> {
+        let order = self.size();
+        let structure = &self.problem.linear.structure;
+        let mut passage = Passage::from(start.clone(), order + 1);
+        for (piece, guess) in self.pieces.iter().zip(guess) {
+            let forces: Vec<DMatrix<f64>> = (0..guess.ncols())
+                .map(|node| {
+                    let mut force = DMatrix::zeros(order, order + 1);
+                    force.set_column(order, &per_depth(structure, piece, guess, node));
+                    force
+                })
+                .collect();
+            let rates = rates(self.problem, piece, guess, depth_m);
+            let linearized = self.linearized(piece, guess, depth_m);
+            passage.take(linearized.advance(&passage.end, &passage.by, guess, &rates, &forces)?);
+        }
+        Some(passage)
+    }
+
+    fn start_of(&self, state: DVector<f64>, _states: &[DMatrix<f64>]) -> DVector<f64> {
+        state
+    }
+
+    fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>> {
+        period_map::multipliers(&variation::about(self, orbit)?, orbit.depth_m)
+    }
+
+    fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64> {
+        let period = variation::about(self, orbit)?;
+        chatter_hz(&self.problem.linear, self.rpm, &period, multiplier, orbit.depth_m)
+    }
+
+    fn finer(&self) -> Option<Self> {
+        Some(Self::with_pieces(self.problem, self.rpm, 0.5 * self.piece_angle))
+    }
+}

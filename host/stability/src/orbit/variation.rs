@@ -1,0 +1,100 @@
+//! The delay equation linearized about a forced orbit, in the same form as the linear problem: all that is known of
+//! that, collocated multipliers and the characteristic matrix, serves for orbits too.
+//!
+//! About the orbit x*(t), ẋ = J(t) x + B Σ (w − z*) cutting·n ᵀ(u − u_τ) with J the Jacobian of the orbit's own equation.
+//! With axial-depth modulation the whole of eq. 3.6 acts this way: the depth is w − z*(t) in the regenerative term.
+
+use nalgebra::DMatrix;
+
+use super::collocated::Linearized;
+use super::periodic_orbit::Orbit;
+use super::tooth_period::{Piece, ToothPeriod};
+use crate::problem::period::{Element, Period, Port};
+
+/// The tooth period linearized about an orbit; `None` where a piece is singular.
+pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
+    let order = map.problem.order();
+    let mut elements = Vec::new();
+    let mut flight = DMatrix::identity(order, order);
+    for (piece, states) in map.pieces.iter().zip(&orbit.states) {
+        let linearized = map.linearized(piece, states, orbit.depth_m);
+        if piece.teeth == 0 {
+            flight = linearized.flow()?.1 * flight;
+        } else {
+            elements.push(element(map, piece, states, orbit.depth_m, &linearized)?);
+        }
+    }
+    Some(Period { elements, flight })
+}
+
+fn element(
+    map: &ToothPeriod<'_>,
+    piece: &Piece,
+    states: &DMatrix<f64>,
+    depth_m: f64,
+    linearized: &Linearized<'_>,
+) -> Option<Element> {
+    let (problem, gauss) = (map.problem, &map.gauss);
+    let structure = &problem.linear.structure;
+    let process = &problem.linear.process;
+    let (order, nodes, teeth) = (problem.order(), gauss.nodes.len(), piece.teeth);
+    let seconds_per_radian = piece.duration / piece.turn;
+    let mut seen = DMatrix::zeros(nodes * teeth, order);
+    let mut push = DMatrix::zeros(order, nodes * teeth);
+    let mut ports = Vec::with_capacity(nodes * teeth);
+    for (j, node) in gauss.nodes.iter().enumerate() {
+        let phase = piece.phase + piece.turn * node;
+        let modulation = if process.axial_depth_modulation && depth_m > 0.0 {
+            1.0 - (structure.c.row(2) * states.column(j))[0] / depth_m
+        } else {
+            1.0
+        };
+        for tooth in 0..teeth {
+            let angle = process.engagement.angle(tooth, phase);
+            let port = j * teeth + tooth;
+            let force = process.force.cutting.at(angle) * (modulation * problem.chip_slope(angle));
+            seen.row_mut(port)
+                .copy_from(&(process.force.normal.at(angle).transpose() * &structure.c));
+            push.column_mut(port).copy_from(&(&structure.b * force));
+            ports.push(Port {
+                time_s: phase * seconds_per_radian,
+                weight_s: gauss.weights[j] * piece.duration,
+                force,
+            });
+        }
+    }
+    let (by_start, flow) = linearized.flow()?;
+    let right = DMatrix::from_fn(order * nodes, nodes * teeth, |row, port| {
+        let (i, state) = (row / order, row % order);
+        piece.duration * gauss.integrals[(i, port / teeth)] * push[(state, port)]
+    });
+    let by_port = linearized.solve(&right)?;
+    let mut drive = linearized.gather(&by_port);
+    for port in 0..nodes * teeth {
+        let mut column = drive.column_mut(port);
+        column.axpy(
+            piece.duration * gauss.weights[port / teeth],
+            &push.column(port),
+            1.0,
+        );
+    }
+    // What each port sees of values at its own node.
+    let look = |values: &DMatrix<f64>| {
+        let mut looked = DMatrix::zeros(nodes * teeth, values.ncols());
+        for port in 0..nodes * teeth {
+            let node = port / teeth;
+            looked
+                .row_mut(port)
+                .copy_from(&(seen.row(port) * values.rows(node * order, order)));
+        }
+        looked
+    };
+    Some(Element {
+        observe: look(&by_start),
+        kernel: look(&by_port),
+        flow,
+        drive,
+        ports,
+        axial: None,
+    })
+}

@@ -1,0 +1,201 @@
+//! Which tooth cuts when, and how long after the tooth before it: what methods need that step through the period.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::pitched::Pitched;
+
+/// One tooth on its way through the cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Passage {
+    /// When it enters, s; may lie before the period.
+    pub(crate) entry_s: f64,
+    /// When it leaves, s; may lie after the period.
+    pub(crate) exit_s: f64,
+    /// Time since the tooth before it was at the same place, s.
+    pub(crate) delay_s: f64,
+    /// How far the tool feeds in that time, m.
+    pub(crate) feed_m: f64,
+    /// Number of the tooth, and of the one before it in the cut; both 0 where one tooth is like the other.
+    pub(crate) tooth: usize,
+    /// See `tooth`.
+    pub(crate) before: usize,
+}
+
+/// All teeth that cut within one period, at one speed.
+///
+/// The period is the tooth period where the teeth stand evenly, else the revolution. It starts when a tooth enters.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Passages {
+    /// Period T, s.
+    pub(crate) period_s: f64,
+    /// Spindle speed, rad/s.
+    pub(crate) rad_per_s: f64,
+    /// By entry, the latest first.
+    pub(crate) list: Vec<Passage>,
+}
+
+impl Passages {
+    /// The passages of a problem at a speed.
+    pub(crate) fn new(pitched: &Pitched, rpm: f64) -> Self {
+        let rad_per_s = rpm * TAU / 60.0;
+        match &pitched.pitch_rad {
+            None => Self::of_tooth_period(pitched, rad_per_s),
+            Some(pitch_rad) => Self::of_revolution(pitched, pitch_rad, rad_per_s),
+        }
+    }
+
+    fn of_tooth_period(pitched: &Pitched, rad_per_s: f64) -> Self {
+        let process = &pitched.problem.process;
+        let period_s = process.engagement.pitch / rad_per_s;
+        let width_s = (process.engagement.exit - process.engagement.start) / rad_per_s;
+        // A tooth that leaves within rounding of the start of the period is out.
+        let count = (width_s / period_s - 1e-9).ceil().max(1.0) as usize;
+        let list = (0..count).map(|index| {
+            let entry_s = -(index as f64) * period_s;
+            Passage {
+                entry_s,
+                exit_s: entry_s + width_s,
+                delay_s: period_s,
+                feed_m: process.feed_per_tooth_m,
+                tooth: 0,
+                before: 0,
+            }
+        });
+        Self {
+            period_s,
+            rad_per_s,
+            list: list.collect(),
+        }
+    }
+
+    fn of_revolution(pitched: &Pitched, pitch_rad: &[f64], rad_per_s: f64) -> Self {
+        let process = &pitched.problem.process;
+        let width_s = (process.engagement.exit - process.engagement.start) / rad_per_s;
+        let count = pitch_rad.len();
+        let period_s = TAU / rad_per_s;
+        let mut list = Vec::with_capacity(2 * count);
+        // Tooth j stands at the angle ψ_j = Σ_{k ≤ j} pitch_k ahead of tooth 0, which enters at time 0.
+        let mut ahead_rad = 0.0;
+        for tooth in 0..count {
+            if tooth > 0 {
+                ahead_rad += pitch_rad[tooth];
+            }
+            let before = (tooth + 1) % count;
+            let enters_s = if tooth == 0 {
+                0.0
+            } else {
+                period_s - ahead_rad / rad_per_s
+            };
+            for entry_s in [enters_s, enters_s - period_s] {
+                list.push(Passage {
+                    entry_s,
+                    exit_s: entry_s + width_s,
+                    delay_s: pitch_rad[before] / rad_per_s,
+                    feed_m: process.feed_per_tooth_m * pitch_rad[before] / process.engagement.pitch,
+                    tooth,
+                    before,
+                });
+            }
+        }
+        list.retain(|passage| passage.exit_s > 1e-9 * period_s);
+        list.sort_by(|a, b| b.entry_s.total_cmp(&a.entry_s));
+        Self {
+            period_s,
+            rad_per_s,
+            list,
+        }
+    }
+
+    /// Where a tooth enters or leaves, s, ascending, with both ends of the period.
+    pub(crate) fn switches_s(&self) -> Vec<f64> {
+        let ends = self
+            .list
+            .iter()
+            .flat_map(|passage| [passage.entry_s, passage.exit_s]);
+        distinct(ends.chain([0.0, self.period_s]).collect(), self.period_s)
+    }
+
+    /// The passages that cut at a time, s, which is not that of a switch.
+    pub(crate) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &Passage> {
+        self.list
+            .iter()
+            .filter(move |passage| passage.entry_s < time_s && time_s < passage.exit_s)
+    }
+
+    /// Immersion angle of a passage at a time, rad.
+    pub(crate) fn angle(&self, pitched: &Pitched, passage: &Passage, time_s: f64) -> f64 {
+        pitched.problem.process.engagement.start + (time_s - passage.entry_s) * self.rad_per_s
+    }
+}
+
+/// The times within [0, period], ascending, no two closer than rounding.
+pub(crate) fn distinct(mut times_s: Vec<f64>, period_s: f64) -> Vec<f64> {
+    // Angles are given in degrees with a few digits: what is closer than this is the same angle.
+    let least = 1e-9 * period_s;
+    for time_s in &mut times_s {
+        if time_s.abs() < least {
+            *time_s = 0.0;
+        } else if (*time_s - period_s).abs() < least {
+            *time_s = period_s;
+        }
+    }
+    times_s.retain(|time_s| (0.0..=period_s).contains(time_s));
+    times_s.sort_by(f64::total_cmp);
+    times_s.dedup_by(|later, earlier| *later - *earlier < least);
+    times_s
+}
+
+/// What a displacement makes of forces at one time, or in the mean over a while.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Coefficients {
+    /// Σ K α of the teeth with one delay, Pa, with that delay, s.
+    pub(crate) regenerative: Vec<(f64, Matrix3<f64>)>,
+    /// β_e + β_f, N/m²: −β u is the force of edges and feed (eq. 3.7). It acts on the axial displacement only.
+    pub(crate) modulation: Matrix3<f64>,
+}
+
+impl Coefficients {
+    /// The mean of the passages that cut at `inside_s` over Gauss nodes (time, share of the whole).
+    pub(crate) fn mean(
+        pitched: &Pitched,
+        passages: &Passages,
+        inside_s: f64,
+        nodes: impl Iterator<Item = (f64, f64)> + Clone,
+    ) -> Self {
+        let process = &pitched.problem.process;
+        let mut coefficients = Self {
+            regenerative: Vec::new(),
+            modulation: Matrix3::zeros(),
+        };
+        for passage in passages.cutting_at(inside_s) {
+            let mut directional = Matrix3::zeros();
+            let mut forced = Vector3::zeros();
+            for (time_s, share) in nodes.clone() {
+                let angle = passages.angle(pitched, passage, time_s);
+                directional += process.force.directional(angle) * share;
+                if process.axial_depth_modulation {
+                    forced += process.force.forced(angle, passage.feed_m) * share;
+                }
+            }
+            let mut column = coefficients.modulation.column_mut(2);
+            column += forced;
+            let same = coefficients
+                .regenerative
+                .iter_mut()
+                .find(|(delay_s, _)| (delay_s - passage.delay_s).abs() < 1e-12 * passage.delay_s);
+            match same {
+                Some((_, sum)) => *sum += directional,
+                None => coefficients.regenerative.push((passage.delay_s, directional)),
+            }
+        }
+        coefficients
+    }
+
+    /// w Σ K α − β: force on the tool per displacement, N/m, without what the surface before did.
+    pub(crate) fn present(&self, depth_m: f64) -> Matrix3<f64> {
+        let regenerative: Matrix3<f64> = self.regenerative.iter().map(|(_, directional)| directional).sum();
+        regenerative * depth_m - self.modulation
+    }
+}

@@ -1,0 +1,77 @@
+//! One revolution of a tool with variable pitch, collocated: several delays that end between the nodes.
+//!
+//! The state of the delay equation is x at the start of the revolution, and p of the stretches of the revolution before
+//! that are still to be cut again.
+
+use nalgebra::DMatrix;
+
+use super::element::{CuttingTooth, Element, Step};
+use super::exponential::Exponential;
+use super::pitched::Pitched;
+use super::revolution_mesh::{Fineness, Flight, RevolutionMesh, Stretch};
+
+/// One revolution at one speed.
+pub(crate) struct Revolution<'a> {
+    pub(crate) pitched: &'a Pitched,
+    pub(crate) mesh: RevolutionMesh,
+    /// Of each stretch.
+    pub(crate) elements: Vec<Element>,
+}
+
+impl<'a> Revolution<'a> {
+    /// Cuts the revolution at a speed for depths up to `depth_m`; `None` where a tooth finds no surface before it.
+    pub(crate) fn new(pitched: &'a Pitched, rpm: f64, depth_m: f64, fineness: Fineness) -> Option<Self> {
+        let mesh = RevolutionMesh::new(pitched, rpm, depth_m, fineness, Flight::Whole)?;
+        let exponential = Exponential::new(&pitched.problem.structure.a);
+        let mut elements: Vec<Element> = Vec::with_capacity(mesh.stretches.len());
+        // Stretches between the same two kinks are equally long.
+        let mut step: Option<(usize, f64, Step<'_>)> = None;
+        for stretch in &mesh.stretches {
+            if stretch.cutting.is_empty() {
+                elements.push(free_flight(&exponential, stretch.duration_s));
+                continue;
+            }
+            let (nodes, duration_s) = (stretch.gauss.nodes.len(), stretch.duration_s);
+            let step = match &mut step {
+                Some((of_nodes, of_s, step)) if (*of_nodes, *of_s) == (nodes, duration_s) => &*step,
+                other => {
+                    let made = Step::new(&pitched.problem, &exponential, stretch.gauss, duration_s);
+                    &other.insert((nodes, duration_s, made)).2
+                }
+            };
+            elements.push(element(pitched, mesh.passages.rad_per_s, step, stretch));
+        }
+        Some(Self {
+            pitched,
+            mesh,
+            elements,
+        })
+    }
+}
+
+fn free_flight(exponential: &Exponential, duration_s: f64) -> Element {
+    let flow = exponential.at(duration_s);
+    let order = flow.nrows();
+    Element {
+        flow,
+        observe: DMatrix::zeros(0, order),
+        kernel: DMatrix::zeros(0, 0),
+        drive: DMatrix::zeros(order, 0),
+        ports: Vec::new(),
+        axial: None,
+    }
+}
+
+fn element(pitched: &Pitched, rad_per_s: f64, step: &Step<'_>, stretch: &Stretch) -> Element {
+    let start = pitched.problem.process.engagement.start;
+    let teeth: Vec<CuttingTooth> = stretch
+        .cutting
+        .iter()
+        .map(|passage| CuttingTooth {
+            immersion: start - passage.entry_s * rad_per_s,
+            feed_m: passage.feed_m,
+        })
+        .collect();
+    let (phase, turn) = (stretch.start_s * rad_per_s, stretch.duration_s * rad_per_s);
+    step.element_of(&pitched.problem, &teeth, phase, turn)
+}

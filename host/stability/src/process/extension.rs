@@ -1,0 +1,128 @@
+//! What the extensions of a case make of its structure and its cutting process.
+
+use std::sync::Arc;
+
+use super::treatment::{ABOUT_FORCED_CHIP, NOT_SMOOTH, OF_LINEAR_STRUCTURE, SMOOTH};
+use crate::error::StabilityError;
+use quietcut_model::case::Case;
+use quietcut_model::milling::Material;
+use quietcut_model::structure::FirstOrder;
+use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, Term};
+
+/// The effects of a case with these names.
+fn effects(case: &Case, names: &[&str]) -> Result<Effects, StabilityError> {
+    let all = Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
+    Ok(Effects(
+        all.0
+            .into_iter()
+            .filter(|effect| names.contains(&effect.name()))
+            .collect(),
+    ))
+}
+
+pub(super) fn wrong(case: &Case, cause: ModelError) -> StabilityError {
+    StabilityError::Extension {
+        path: case.path.clone(),
+        cause: Box::new(cause),
+    }
+}
+
+/// The linear structure with its extensions, in the machine's axes.
+///
+/// # Errors
+/// The case has none, it is indefinite, or it cannot have an extension.
+pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
+    let structure = case.structure()?;
+    let effects = effects(case, &OF_LINEAR_STRUCTURE)?;
+    let whole = if effects.0.is_empty() {
+        structure.first_order().map_err(ModelError::from)
+    } else {
+        effects
+            .dynamics(structure)
+            .map(|(dynamics, _)| dynamics.first_order())
+    };
+    whole.map_err(|cause| match cause {
+        ModelError::Structure(cause) => StabilityError::Structure {
+            path: case.path.clone(),
+            cause,
+        },
+        other => wrong(case, other),
+    })
+}
+
+/// The coefficients of the material with those that extensions give.
+///
+/// # Errors
+/// The case has none.
+pub(crate) fn material(case: &Case) -> Result<Material, StabilityError> {
+    let names = ["force-coefficients", "edge-force"];
+    if !case.extensions.keys().any(|name| names.contains(&name.as_str())) {
+        return Ok(*case.material()?);
+    }
+    Ok(law(case, &names)?.material())
+}
+
+/// The force law with these extensions.
+fn law(case: &Case, names: &[&str]) -> Result<ForceLaw, StabilityError> {
+    Ok(cutter(case, names)?.force)
+}
+
+/// The tool with these extensions.
+fn cutter(case: &Case, names: &[&str]) -> Result<Cutter, StabilityError> {
+    // The depth is no part of what is asked.
+    let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3);
+    let effects = effects(case, names)?;
+    let cutter = cutter.and_then(|cutter| effects.cutter(cutter));
+    cutter.map_err(|cause| wrong(case, cause))
+}
+
+/// How far the radius of each tooth exceeds the mean, m, in the order of the teeth: runout.
+///
+/// # Errors
+/// A section is missing, or an extension that the case cannot have.
+pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
+    let teeth = cutter(case, &["runout"])?.teeth;
+    Ok(teeth.iter().map(|tooth| tooth.radial_m).collect())
+}
+
+/// What acts about a forced orbit: smooth terms, the chip law, the damping of the flank.
+///
+/// # Errors
+/// An extension that the case cannot have.
+pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
+    let structure = case.structure()?;
+    let mut terms = Vec::new();
+    for effect in &effects(case, &SMOOTH)?.0 {
+        let found = effect
+            .terms(structure)
+            .map_err(|cause| wrong(case, cause.into()))?;
+        terms.extend(found.into_iter().map(Arc::from));
+    }
+    Ok(AboutOrbit {
+        terms,
+        law: law(case, &ABOUT_FORCED_CHIP)?,
+    })
+}
+
+/// The terms of a case that are not smooth, on the structure as the other extensions leave it.
+///
+/// # Errors
+/// An extension that the case cannot have.
+pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn Term>>, StabilityError> {
+    let structure = case.structure()?;
+    let names: Vec<&str> = OF_LINEAR_STRUCTURE.into_iter().chain(NOT_SMOOTH).collect();
+    match effects(case, &names)?.dynamics(structure) {
+        Ok((_, terms)) => Ok(terms),
+        Err(ModelError::Structure(cause)) => Err(StabilityError::Structure {
+            path: case.path.clone(),
+            cause,
+        }),
+        Err(other) => Err(wrong(case, other)),
+    }
+}
+
+/// See [`about_orbit`].
+pub(crate) struct AboutOrbit {
+    pub(crate) terms: Vec<Arc<dyn Term>>,
+    pub(crate) law: ForceLaw,
+}

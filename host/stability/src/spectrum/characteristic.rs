@@ -1,0 +1,409 @@
+//! The characteristic matrix: multipliers and limits to rounding, one at a time.
+//!
+//! On a motion that one period multiplies by μ, u_τ = u/μ: the delay equation becomes
+//! ẋ = (A + B[κ K α(t) − β(t)] C) x with the complex depth κ = w (1 − 1/μ). Its transition matrix Φ over the period
+//! depends on κ alone, is entire in κ, and
+//!
+//!   det(Φ(w (1 − 1/μ)) − μ I) = 0
+//!
+//! holds for every multiplier μ and no other number. Φ is a product over elements of real polynomials in κ.
+
+use num_complex::Complex64;
+
+use super::crossing::Crossing;
+use super::root::Root;
+use crate::problem::period::{Element, Period};
+
+/// Coefficients are dropped once a whole term is below this share of the largest: rounding level.
+const TERM: f64 = 1e-17;
+
+/// How far beyond their scale polynomials may be used: 20 terms lose three digits more.
+const RADIUS: f64 = 1.5;
+
+/// The most terms of a polynomial: elements are so short that far fewer are needed.
+const TERMS_MAX: usize = 60;
+
+/// Φ(κ) at one speed.
+#[derive(Clone, Debug)]
+pub(crate) struct Characteristic {
+    order: usize,
+    /// The depth, m, by which κ is divided before powers are taken.
+    scale: f64,
+    /// For each element the coefficients of its polynomial in κ/scale, n × n by rows.
+    elements: Vec<Vec<f64>>,
+    /// Free flight, n × n by rows.
+    flight: Vec<f64>,
+}
+
+/// Room for an evaluation, to be used again and again.
+#[derive(Clone, Debug)]
+pub(crate) struct Workspace {
+    value: Vec<Complex64>,
+    slope: Vec<Complex64>,
+    factor: Vec<Complex64>,
+    factor_slope: Vec<Complex64>,
+    product: Vec<Complex64>,
+}
+
+/// What is known of F = det(Φ − μI) at a point: derivatives of ln F.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Logarithmic {
+    /// ∂ ln F/∂μ.
+    pub(crate) by_multiplier: Complex64,
+    /// ∂ ln F/∂w, 1/m.
+    pub(crate) by_depth: Complex64,
+}
+
+impl Characteristic {
+    /// Φ of a period, for |κ| up to about `depth_m`.
+    pub(crate) fn new(period: &Period, depth_m: f64) -> Self {
+        // No cut is that shallow; with a depth of 0 the polynomials are constants.
+        let depth_m = depth_m.max(1e-12);
+        Self {
+            order: period.order(),
+            scale: depth_m,
+            elements: period
+                .elements
+                .iter()
+                .map(|element| polynomial(element, depth_m))
+                .collect(),
+            flight: by_rows(&period.flight),
+        }
+    }
+
+    /// Number of states, n.
+    pub(crate) fn order(&self) -> usize {
+        self.order
+    }
+
+    /// About how many operations an evaluation takes.
+    pub(crate) fn operations(&self) -> f64 {
+        let n = self.order as f64;
+        let entries: usize = self.elements.iter().map(Vec::len).sum();
+        16.0 * entries as f64 + 32.0 * n.powi(3) * (self.elements.len() as f64 + 3.0)
+    }
+
+    /// Room for evaluations.
+    pub(crate) fn workspace(&self) -> Workspace {
+        let zero = vec![Complex64::ZERO; self.order * self.order];
+        Workspace {
+            value: zero.clone(),
+            slope: zero.clone(),
+            factor: zero.clone(),
+            factor_slope: zero.clone(),
+            product: zero,
+        }
+    }
+
+    /// Φ and dΦ/dκ into `work.value` and `work.slope`.
+    fn evaluate(&self, kappa: Complex64, work: &mut Workspace) {
+        let n = self.order;
+        let xi = kappa / self.scale;
+        let Some((first, rest)) = self.elements.split_first() else {
+            for (value, entry) in work.value.iter_mut().zip(&self.flight) {
+                *value = Complex64::from(*entry);
+            }
+            work.slope.fill(Complex64::ZERO);
+            return;
+        };
+        polynomial_at(first, n, xi, &mut work.value, &mut work.slope);
+        for element in rest {
+            polynomial_at(element, n, xi, &mut work.factor, &mut work.factor_slope);
+            // (P T)' = P' T + P T'
+            multiply(&work.factor, &work.slope, n, &mut work.product);
+            multiply_add(&work.factor_slope, &work.value, n, &mut work.product);
+            std::mem::swap(&mut work.slope, &mut work.product);
+            multiply(&work.factor, &work.value, n, &mut work.product);
+            std::mem::swap(&mut work.value, &mut work.product);
+        }
+        multiply_real(&self.flight, &work.value, n, &mut work.product);
+        std::mem::swap(&mut work.value, &mut work.product);
+        multiply_real(&self.flight, &work.slope, n, &mut work.product);
+        std::mem::swap(&mut work.slope, &mut work.product);
+        for entry in &mut work.slope {
+            *entry /= self.scale;
+        }
+    }
+
+    /// Derivatives of ln F at (μ, w); `None` where F vanishes to rounding or nothing finite comes out.
+    pub(crate) fn logarithmic(
+        &self,
+        multiplier: Complex64,
+        depth_m: f64,
+        work: &mut Workspace,
+    ) -> Option<Logarithmic> {
+        let n = self.order;
+        let inverse = inverse(multiplier);
+        self.evaluate((Complex64::ONE - inverse) * depth_m, work);
+        // Squares of large multipliers would leave the range of numbers.
+        let unit = multiplier.l1_norm().max(1.0);
+        for i in 0..n {
+            work.value[i * n + i] -= multiplier;
+        }
+        for entry in work.value.iter_mut().chain(&mut work.slope) {
+            *entry /= unit;
+        }
+        let (trace, trace_slope) = traces(&mut work.value, &mut work.slope, &mut work.factor, n)?;
+        let trace = trace / unit;
+        let logarithmic = Logarithmic {
+            by_multiplier: trace_slope * depth_m * inverse * inverse - trace,
+            by_depth: trace_slope * (Complex64::ONE - inverse),
+        };
+        (logarithmic.by_multiplier.is_finite() && logarithmic.by_depth.is_finite()).then_some(logarithmic)
+    }
+
+    /// The multiplier at a depth near a guess, by Newton; real guesses stay real.
+    ///
+    /// `None` where the iteration leaves the neighbourhood of the guess, |Δ| < `reach`, or does not settle.
+    pub(crate) fn multiplier_near(
+        &self,
+        guess: Complex64,
+        depth_m: f64,
+        reach: f64,
+        work: &mut Workspace,
+    ) -> Option<Complex64> {
+        let mut multiplier = guess;
+        for _ in 0..20 {
+            let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
+                // F is zero to the last bit, or the range was left.
+                return multiplier.is_finite().then_some(multiplier);
+            };
+            let step = -inverse(logarithmic.by_multiplier);
+            multiplier += step;
+            if !multiplier.is_finite() || (multiplier - guess).norm() > reach {
+                return None;
+            }
+            // Quadratic convergence: the step after this one would be below rounding.
+            if step.norm() < 1e-9 * multiplier.norm() {
+                return Some(multiplier);
+            }
+        }
+        None
+    }
+
+    /// The multiplier near a guess, with its derivative, by one step of Newton; real guesses stay real.
+    ///
+    /// Its error is about the square of that of the guess, which must be below a hundredth. `None` where it is not, or where
+    /// κ is too large for the polynomials.
+    pub(crate) fn root_near(&self, guess: Complex64, depth_m: f64, work: &mut Workspace) -> Option<Root> {
+        // At the root itself both logarithmic derivatives are infinite; their ratio is smooth.
+        let beside = guess + Complex64::new(1e-7, 1e-7) * guess.norm();
+        if (Complex64::ONE - beside.inv()).norm() * depth_m > RADIUS * self.scale {
+            return None;
+        }
+        let logarithmic = self.logarithmic(beside, depth_m, work)?;
+        let mut multiplier = beside - inverse(logarithmic.by_multiplier);
+        let mut slope = -logarithmic.by_depth / logarithmic.by_multiplier;
+        if guess.im == 0.0 {
+            (multiplier.im, slope.im) = (0.0, 0.0);
+        }
+        // A second root close by makes steps too short: the terms of two roots add up in the logarithmic derivative.
+        let step = (multiplier - guess).norm();
+        (step < 0.01 * guess.norm() && slope.is_finite()).then_some(Root { multiplier, slope })
+    }
+
+    /// dμ/dw, 1/m, along the branch of multipliers through (μ, w).
+    pub(crate) fn sensitivity(
+        &self,
+        multiplier: Complex64,
+        depth_m: f64,
+        work: &mut Workspace,
+    ) -> Option<Complex64> {
+        // At the root itself both logarithmic derivatives are infinite; their ratio is smooth.
+        let beside = multiplier + Complex64::new(1e-7, 1e-7) * multiplier.norm();
+        let logarithmic = self.logarithmic(beside, depth_m, work)?;
+        let ratio = -logarithmic.by_depth / logarithmic.by_multiplier;
+        ratio.is_finite().then_some(ratio)
+    }
+
+    /// The depth between `low_m` and `high_m` where a multiplier crosses the unit circle, by Newton in depth and angle.
+    pub(crate) fn crossing_near(
+        &self,
+        guess: Crossing,
+        low_m: f64,
+        high_m: f64,
+        work: &mut Workspace,
+    ) -> Option<Crossing> {
+        let real = guess.multiplier.im == 0.0;
+        let mut depth_m = guess.depth_m;
+        let mut angle = guess.multiplier.arg();
+        let mut multiplier = guess.multiplier / guess.multiplier.norm();
+        for _ in 0..30 {
+            let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
+                break;
+            };
+            let by_angle = logarithmic.by_multiplier * multiplier * Complex64::I;
+            let (by_depth, one) = (logarithmic.by_depth, Complex64::ONE);
+            let (step, turn) = if real {
+                (-by_depth.re.recip(), 0.0)
+            } else {
+                // 1 + (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 0, real and imaginary part.
+                let determinant = by_depth.re * by_angle.im - by_depth.im * by_angle.re;
+                (
+                    -(one.re * by_angle.im - one.im * by_angle.re) / determinant,
+                    -(by_depth.re * one.im - by_depth.im * one.re) / determinant,
+                )
+            };
+            depth_m += step;
+            angle += turn;
+            if !real {
+                multiplier = Complex64::cis(angle);
+            }
+            let margin = 0.5 * (high_m - low_m);
+            if !(low_m - margin..=high_m + margin).contains(&depth_m) {
+                return None;
+            }
+            if step.abs() < 1e-9 * high_m && turn.abs() < 1e-9 {
+                break;
+            }
+        }
+        (low_m..=high_m).contains(&depth_m).then_some(Crossing {
+            depth_m,
+            multiplier: Complex64::new(multiplier.re, multiplier.im.abs()),
+        })
+    }
+
+    /// Φ(κ), n × n by rows.
+    #[cfg(test)]
+    pub(crate) fn transition(&self, kappa: Complex64) -> Vec<Complex64> {
+        let mut work = self.workspace();
+        self.evaluate(kappa, &mut work);
+        work.value
+    }
+}
+
+/// 1/z, also where |z|² is no number.
+fn inverse(z: Complex64) -> Complex64 {
+    let size = z.re.abs().max(z.im.abs());
+    (z / size).inv() / size
+}
+
+/// The polynomial G + κ T E + κ² T Q E + … of an element in κ/scale.
+fn polynomial(element: &Element, scale: f64) -> Vec<f64> {
+    let mut coefficients = by_rows(&element.flow);
+    let mut largest = element.flow.amax();
+    let mut seen = element.observe.clone();
+    let drive = &element.drive * scale;
+    let kernel = &element.kernel * scale;
+    let mut next = seen.clone();
+    let mut term = element.flow.clone();
+    for _ in 1..TERMS_MAX {
+        drive.mul_to(&seen, &mut term);
+        for row in 0..term.nrows() {
+            coefficients.extend(term.row(row).iter());
+        }
+        let size = term.amax();
+        largest = largest.max(size);
+        if size < TERM * largest {
+            break;
+        }
+        kernel.mul_to(&seen, &mut next);
+        std::mem::swap(&mut seen, &mut next);
+    }
+    coefficients
+}
+
+fn by_rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<f64> {
+    matrix.transpose().as_slice().to_vec()
+}
+
+/// Value and derivative of a matrix polynomial.
+fn polynomial_at(
+    coefficients: &[f64],
+    n: usize,
+    xi: Complex64,
+    value: &mut [Complex64],
+    slope: &mut [Complex64],
+) {
+    value.fill(Complex64::ZERO);
+    slope.fill(Complex64::ZERO);
+    // By powers: of complex numbers only products with real ones are taken, for all entries at once.
+    let (mut power, mut power_slope) = (Complex64::ONE, Complex64::ZERO);
+    for (j, term) in coefficients.chunks_exact(n * n).enumerate() {
+        for ((value, slope), coefficient) in value.iter_mut().zip(slope.iter_mut()).zip(term) {
+            value.re += coefficient * power.re;
+            value.im += coefficient * power.im;
+            slope.re += coefficient * power_slope.re;
+            slope.im += coefficient * power_slope.im;
+        }
+        power_slope = power * (j + 1) as f64;
+        power *= xi;
+    }
+}
+
+fn multiply(a: &[Complex64], b: &[Complex64], n: usize, out: &mut [Complex64]) {
+    out.fill(Complex64::ZERO);
+    multiply_add(a, b, n, out);
+}
+
+fn multiply_add(a: &[Complex64], b: &[Complex64], n: usize, out: &mut [Complex64]) {
+    for (row, out) in a.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
+        for (factor, b) in row.iter().zip(b.chunks_exact(n)) {
+            for (out, entry) in out.iter_mut().zip(b) {
+                *out += factor * entry;
+            }
+        }
+    }
+}
+
+fn multiply_real(a: &[f64], b: &[Complex64], n: usize, out: &mut [Complex64]) {
+    out.fill(Complex64::ZERO);
+    for (row, out) in a.chunks_exact(n).zip(out.chunks_exact_mut(n)) {
+        for (factor, b) in row.iter().zip(b.chunks_exact(n)) {
+            for (out, entry) in out.iter_mut().zip(b) {
+                *out += entry * *factor;
+            }
+        }
+    }
+}
+
+/// tr(M⁻¹) and tr(M⁻¹ S) by elimination with row exchange; M and S are overwritten. `None` where M is singular.
+fn traces(
+    m: &mut [Complex64],
+    s: &mut [Complex64],
+    identity: &mut [Complex64],
+    n: usize,
+) -> Option<(Complex64, Complex64)> {
+    identity.fill(Complex64::ZERO);
+    for i in 0..n {
+        identity[i * n + i] = Complex64::ONE;
+    }
+    for column in 0..n {
+        let pivot = (column..n).max_by(|&a, &b| {
+            m[a * n + column]
+                .norm_sqr()
+                .total_cmp(&m[b * n + column].norm_sqr())
+        })?;
+        if pivot != column {
+            for j in 0..n {
+                m.swap(pivot * n + j, column * n + j);
+                s.swap(pivot * n + j, column * n + j);
+                identity.swap(pivot * n + j, column * n + j);
+            }
+        }
+        let inverse = m[column * n + column].inv();
+        if !inverse.is_finite() {
+            return None;
+        }
+        for j in 0..n {
+            m[column * n + j] *= inverse;
+            s[column * n + j] *= inverse;
+            identity[column * n + j] *= inverse;
+        }
+        for i in 0..n {
+            if i == column {
+                continue;
+            }
+            let factor = m[i * n + column];
+            for j in 0..n {
+                let (a, b, c) = (m[column * n + j], s[column * n + j], identity[column * n + j]);
+                m[i * n + j] -= factor * a;
+                s[i * n + j] -= factor * b;
+                identity[i * n + j] -= factor * c;
+            }
+        }
+    }
+    let trace = (0..n).map(|i| identity[i * n + i]).sum();
+    let trace_s = (0..n).map(|i| s[i * n + i]).sum();
+    Some((trace, trace_s))
+}

@@ -1,0 +1,168 @@
+//! The vibration frequency that belongs to a multiplier.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use num_complex::Complex64;
+
+use super::eigenvector::eigenvector;
+use crate::problem::element::Port;
+use crate::problem::linear::Problem;
+use crate::problem::period::{Period, Rates};
+
+/// How much more than the motion of a multiplier anything may grow over a part of the period: as many digits are lost.
+const GROWTH: f64 = 1e3;
+
+/// The largest system of parts that is solved.
+const CYCLIC_MAX: usize = 256;
+
+/// The vibration frequency, Hz, of the motion u(t) = e^{st} v(t) with v of tooth period τ and e^{sτ} = μ.
+///
+/// The motion has the frequencies |Im ln μ + 2πk|/(2πτ). Named is the one whose harmonic of the displacement of the tool,
+/// û_k = 1/τ ∫₀^τ u(t) e^{−s_k t} dt as a vector, is largest. With F̂_k the k-th harmonic of all forces along the eigenfunction,
+/// û_k is H(s_k) F̂_k; without forces the motion has the frequency of its mode alone.
+pub(crate) fn chatter_hz(
+    problem: &Problem,
+    rpm: f64,
+    period: &Period,
+    multiplier: Complex64,
+    depth_m: f64,
+) -> Option<f64> {
+    let forces = eigenfunction_forces(period, multiplier, depth_m)?;
+    let period_s = problem.tooth_period_s(rpm);
+    if forces.iter().all(|(_, force)| force.norm() == 0.0) {
+        return free_hz(problem, period_s, multiplier);
+    }
+    // e^{−s t} at every time, and what the next exponent multiplies it by: exponentials of all would take seconds.
+    let mut factors: Vec<(Complex64, Complex64)> = Vec::new();
+    loudest_hz(problem, depth_m, period_s, multiplier, |s| {
+        let mut harmonic = Vector3::<Complex64>::zeros();
+        if factors.is_empty() {
+            let times = forces.iter().map(|(time_s, _)| *time_s);
+            factors
+                .extend(times.map(|time_s| ((-s * time_s).exp(), Complex64::cis(-TAU * time_s / period_s))));
+        }
+        for ((_, force), (factor, turn)) in forces.iter().zip(&mut factors) {
+            harmonic += force * *factor;
+            *factor *= *turn;
+        }
+        Some((problem.structure.transfer(s)? * harmonic).norm())
+    })
+}
+
+/// The frequency, Hz, of the mode that a period of free vibration multiplies by about μ.
+fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f64> {
+    let miss = |pole: &Complex64| ((pole * period_s).exp() - multiplier).norm();
+    let poles = problem.structure.poles();
+    let pole = poles.iter().min_by(|p, q| miss(p).total_cmp(&miss(q)))?;
+    Some(pole.im.abs() / TAU)
+}
+
+/// The frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest; `size` gives its size at an exponent
+/// s with e^{sT} = μ, and is asked for one after the other, each 2πi/T above the one before.
+pub(crate) fn loudest_hz(
+    problem: &Problem,
+    depth_m: f64,
+    period_s: f64,
+    multiplier: Complex64,
+    mut size: impl FnMut(Complex64) -> Option<f64>,
+) -> Option<f64> {
+    let growth = multiplier.ln();
+    // The cut makes modes stiffer; above the fastest the motion only falls, and one harmonic beyond is enough.
+    let kappa_m = (Complex64::ONE - multiplier.inv()).norm() * depth_m;
+    let highest = (Rates::new(problem).at(kappa_m) * period_s / TAU).ceil() as i32 + 1;
+    (-highest..=highest)
+        .filter_map(|k| {
+            let s = (growth + Complex64::new(0.0, TAU * f64::from(k))) / period_s;
+            Some((size(s)?, s.im.abs() / TAU))
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, frequency_hz)| frequency_hz)
+}
+
+/// Force times quadrature weight of every port along the eigenfunction, with its time.
+fn eigenfunction_forces(
+    period: &Period,
+    multiplier: Complex64,
+    depth_m: f64,
+) -> Option<Vec<(f64, Vector3<Complex64>)>> {
+    let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
+    let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
+    // The period in parts, each from a state of its own, and what is seen in each element from the state of its part.
+    let identity = DMatrix::<Complex64>::identity(period.order(), period.order());
+    let mut parts = Vec::new();
+    let mut part = identity.clone();
+    let mut seen_from = Vec::with_capacity(period.elements.len());
+    let (mut length, share) = (0.0, 1.0 / period.elements.len().max(1) as f64);
+    for element in &period.elements {
+        // What grows faster than the motion itself would drown it.
+        if part.norm() > GROWTH * multiplier.norm().powf(length) {
+            parts.push(std::mem::replace(&mut part, identity.clone()));
+            length = 0.0;
+        }
+        let ports = element.kernel.nrows();
+        let implicit = DMatrix::identity(ports, ports) - complex(&element.kernel) * kappa;
+        let chips = implicit.lu().solve(&(complex(&element.observe) * &part))?;
+        let axial = element
+            .axial
+            .as_ref()
+            .map(|axial| complex(&axial.observe) * &part + complex(&axial.kernel) * &chips * kappa);
+        part = complex(&element.flow) * &part + complex(&element.drive) * &chips * kappa;
+        seen_from.push((parts.len(), chips, axial));
+        length += share;
+    }
+    parts.push(complex(&period.flight) * part);
+    let starts = cyclic_vector(&parts, multiplier)?;
+    let mut forces: Vec<(f64, Vector3<Complex64>)> = Vec::new();
+    for (element, (part, chips, axial)) in period.elements.iter().zip(seen_from) {
+        let start = &starts[part];
+        let mut push = |ports: &[Port], seen: DVector<Complex64>, factor: Complex64| {
+            for (port, seen) in ports.iter().zip(seen.iter()) {
+                let force = port.force.map(Complex64::from) * (seen * factor * port.weight_s);
+                match forces.last_mut() {
+                    // Of another tooth at the same node.
+                    Some((time_s, sum)) if *time_s == port.time_s => *sum += force,
+                    _ => forces.push((port.time_s, force)),
+                }
+            }
+        };
+        push(&element.ports, chips * start, kappa);
+        if let (Some(ports), Some(seen)) = (&element.axial, axial) {
+            push(&ports.ports, seen * start, Complex64::ONE);
+        }
+    }
+    Some(forces)
+}
+
+/// The states x_g at the start of each part with T_g x_g = x_{g+1}, and μ x_0 after the last.
+///
+/// All at once: a start that is good to rounding would be of no use where parts together grow by far more than μ.
+fn cyclic_vector(parts: &[DMatrix<Complex64>], multiplier: Complex64) -> Option<Vec<DVector<Complex64>>> {
+    let [single] = parts else {
+        let (order, count) = (parts.first()?.nrows(), parts.len());
+        if order * count > CYCLIC_MAX {
+            return None;
+        }
+        let mut whole = DMatrix::zeros(order * count, order * count);
+        for (g, part) in parts.iter().enumerate() {
+            whole
+                .view_mut((g * order, g * order), (order, order))
+                .copy_from(part);
+            let (to, factor) = if g + 1 < count {
+                ((g + 1) * order, Complex64::ONE)
+            } else {
+                (0, multiplier)
+            };
+            for i in 0..order {
+                whole[(g * order + i, to + i)] -= factor;
+            }
+        }
+        let vector = eigenvector(&whole, Complex64::ZERO)?;
+        return Some(
+            (0..count)
+                .map(|g| vector.rows(g * order, order).into_owned())
+                .collect(),
+        );
+    };
+    Some(vec![eigenvector(single, multiplier)?])
+}

@@ -1,0 +1,95 @@
+//! The multipliers at one speed by collocation of the tooth period.
+
+use num_complex::Complex64;
+
+use super::along_depth::Spectrum;
+use super::characteristic::{Characteristic, Workspace};
+use super::chatter_frequency::chatter_hz;
+use super::crossing::Crossing;
+use super::period_map;
+use super::root::Root;
+use crate::criteria::LEAST_ERROR;
+use crate::problem::linear::Problem;
+use crate::problem::period::{Period, Resolution};
+
+/// Multipliers below this size are not needed to follow others along the depth.
+const FOLLOWED: f64 = 0.25;
+
+/// The same as a share of the largest, where all are small.
+const SHARE: f64 = 0.3;
+
+/// The multipliers at one speed: all of them by collocation, single ones from the characteristic matrix.
+pub(crate) struct Collocated<'a> {
+    problem: &'a Problem,
+    rpm: f64,
+    deepest_m: f64,
+    /// For all multipliers at once.
+    coarse: Period,
+    /// For limits.
+    period: Period,
+    characteristic: Characteristic,
+    workspace: Workspace,
+    /// For errors, once one is asked for.
+    finer: Option<Characteristic>,
+}
+
+impl<'a> Collocated<'a> {
+    /// Fine enough for depths up to `deepest_m`.
+    pub(crate) fn new(problem: &'a Problem, rpm: f64, deepest_m: f64) -> Self {
+        // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
+        let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::WORKING);
+        let characteristic = Characteristic::new(&period, 2.0 * deepest_m);
+        Self {
+            problem,
+            rpm,
+            deepest_m,
+            coarse: Period::new(problem, rpm, deepest_m, Resolution::SCAN),
+            period,
+            workspace: characteristic.workspace(),
+            characteristic,
+            finer: None,
+        }
+    }
+}
+
+impl Spectrum for Collocated<'_> {
+    fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
+        period_map::larger_than(&self.coarse, depth_m, FOLLOWED, SHARE)
+    }
+
+    fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64> {
+        self.characteristic
+            .multiplier_near(guess, depth_m, reach, &mut self.workspace)
+    }
+
+    fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64> {
+        self.characteristic
+            .sensitivity(multiplier, depth_m, &mut self.workspace)
+    }
+
+    fn root_near(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
+        self.characteristic.root_near(guess, depth_m, &mut self.workspace)
+    }
+
+    fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
+        self.characteristic
+            .crossing_near(guess, low_m, high_m, &mut self.workspace)
+    }
+
+    fn chatter_hz(&self, crossing: &Crossing) -> Option<f64> {
+        let Crossing { multiplier, depth_m } = *crossing;
+        chatter_hz(self.problem, self.rpm, &self.period, multiplier, depth_m)
+    }
+
+    /// As that of a point: what a finer period changes, with room.
+    fn error(&mut self, crossing: &Crossing) -> Option<f64> {
+        let Crossing { multiplier, depth_m } = *crossing;
+        let (problem, rpm, deepest_m) = (self.problem, self.rpm, self.deepest_m);
+        let finer = self.finer.get_or_insert_with(|| {
+            let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::FINE);
+            Characteristic::new(&period, 2.0 * deepest_m)
+        });
+        let fine = finer.multiplier_near(multiplier, depth_m, 0.05, &mut self.workspace)?;
+        Some((10.0 * (fine - multiplier).norm()).max(LEAST_ERROR))
+    }
+}

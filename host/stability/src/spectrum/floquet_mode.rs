@@ -1,0 +1,301 @@
+//! The motion that belongs to a multiplier, and its adjoint, along one tooth period.
+//!
+//! With G(t) = A + B M(t) C, M = κ Σ cutting·normalᵀ − β, of the characteristic matrix: ẋ = G x with x(τ) = μ x(0), and
+//! ẏ = −Gᵀ y with y(τ) = l, lᵀΦ = μ lᵀ. Then lᵀ dΦ r = ∫ yᵀ dG x dt for any change of G: one pair of motions gives
+//! the derivatives with respect to all parameters.
+//!
+//! Both are computed on pieces of the period with Gauss nodes, as in [`period`](super::period): the structure's own motion by
+//! matrix exponentials, the force by collocation. The adjoint is the motion of the transposed structure in reversed time,
+//! with what is seen and what is pushed exchanged.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use num_complex::Complex64;
+
+use super::eigenvector::eigenvector;
+use crate::problem::gauss::Gauss;
+use crate::problem::linear::Problem;
+use crate::problem::period::{DECAY_MAX, Rates, degree};
+use quietcut_model::structure::FirstOrder;
+
+/// Angle of the fastest motion over a piece, rad.
+const ANGLE: f64 = 3.0;
+
+/// Error of a piece that is aimed at. States within a piece are good to about its root only; that root times the length is what
+/// the quadrature of yᵀ dG x keeps.
+const TOLERANCE: f64 = 1e-16;
+
+type Matrix = DMatrix<Complex64>;
+
+/// x and y at one node of the quadrature.
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    /// Quadrature weight, s; 0 at the ends of the cut, which are given beside the nodes.
+    pub(crate) weight_s: f64,
+    /// Phase of the tooth period, rad.
+    pub(crate) phase: f64,
+    /// Number of teeth that cut.
+    pub(crate) teeth: usize,
+    /// x.
+    pub(crate) right: DVector<Complex64>,
+    /// y.
+    pub(crate) left: DVector<Complex64>,
+}
+
+/// Both motions.
+#[derive(Clone, Debug)]
+pub(crate) struct Eigenmotion {
+    /// At the nodes, in order of time.
+    pub(crate) nodes: Vec<Node>,
+    /// Where a tooth enters: the start of the period.
+    pub(crate) entry: Node,
+    /// Where a tooth leaves.
+    pub(crate) exit: Node,
+    /// lᵀ r.
+    pub(crate) overlap: Complex64,
+}
+
+/// A piece of the period.
+struct Piece {
+    basis: usize,
+    teeth: usize,
+    phase: f64,
+    turn: f64,
+}
+
+/// What pieces of one duration share.
+struct Basis {
+    gauss: Gauss,
+    duration: f64,
+    flow: DMatrix<f64>,
+    /// e^{A t_i}.
+    forward: Vec<DMatrix<f64>>,
+    /// e^{−A t_i}.
+    backward: Vec<DMatrix<f64>>,
+}
+
+/// At one node: what ports see of the displacement, and what force they make of it.
+type Ports = Vec<(Vector3<Complex64>, Vector3<Complex64>)>;
+
+impl Eigenmotion {
+    /// The motions of a multiplier at a depth; `None` where it is none, or the numbers leave their range.
+    pub(crate) fn new(problem: &Problem, rpm: f64, depth_m: f64, multiplier: Complex64) -> Option<Self> {
+        let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
+        let (bases, pieces) = pieces(problem, rpm, kappa.norm());
+        let ports: Vec<Vec<Ports>> = pieces
+            .iter()
+            .map(|piece| {
+                let nodes = &bases[piece.basis].gauss.nodes;
+                let at = |node: &f64| ports(problem, kappa, piece.teeth, piece.phase + piece.turn * node);
+                nodes.iter().map(at).collect()
+            })
+            .collect();
+        let structure = &problem.structure;
+        let transposed = FirstOrder {
+            a: structure.a.transpose(),
+            b: structure.c.transpose(),
+            c: structure.b.transpose(),
+        };
+        let mut forward = Vec::with_capacity(pieces.len());
+        let mut adjoint = Vec::with_capacity(pieces.len());
+        let reversed: Vec<Basis> = bases.iter().map(Basis::transposed).collect();
+        for (piece, ports) in pieces.iter().zip(&ports) {
+            forward.push(Passage::new(structure, &bases[piece.basis], ports)?);
+            let exchanged: Vec<Ports> = ports
+                .iter()
+                .rev()
+                .map(|ports| ports.iter().map(|&(seen, force)| (force, seen)).collect())
+                .collect();
+            adjoint.push(Passage::new(&transposed, &reversed[piece.basis], &exchanged)?);
+        }
+        let order = problem.structure.order();
+        let mut transition = Matrix::identity(order, order);
+        for passage in &forward {
+            transition = &passage.transition * transition;
+        }
+        let mut right = eigenvector(&transition, multiplier)?;
+        let mut left = eigenvector(&transition.transpose(), multiplier)?;
+        let overlap = left.dot(&right);
+        let mut rights = vec![right.clone()];
+        for passage in &forward {
+            right = &passage.transition * right;
+            rights.push(right.clone());
+        }
+        let mut lefts = vec![left.clone()];
+        for passage in adjoint.iter().rev() {
+            left = &passage.transition * left;
+            lefts.push(left.clone());
+        }
+        lefts.reverse();
+        let mut nodes = Vec::new();
+        for (index, piece) in pieces.iter().enumerate() {
+            let basis = &bases[piece.basis];
+            let count = basis.gauss.nodes.len();
+            for i in 0..count {
+                nodes.push(Node {
+                    weight_s: basis.gauss.weights[i] * basis.duration,
+                    phase: piece.phase + piece.turn * basis.gauss.nodes[i],
+                    teeth: piece.teeth,
+                    right: &forward[index].states[i] * &rights[index],
+                    left: &adjoint[index].states[count - 1 - i] * &lefts[index + 1],
+                });
+            }
+        }
+        // The first interval has a tooth more than the second; where there is only one, teeth leave at its end.
+        let most = pieces.first().map_or(0, |piece| piece.teeth);
+        let leaving = pieces.iter().take_while(|piece| piece.teeth == most).count();
+        let end = |at: usize| Node {
+            weight_s: 0.0,
+            phase: pieces
+                .get(at)
+                .map_or(problem.process.engagement.pitch, |piece| piece.phase),
+            teeth: most,
+            right: rights[at].clone(),
+            left: lefts[at].clone(),
+        };
+        Some(Self {
+            nodes,
+            entry: end(0),
+            exit: end(leaving),
+            overlap,
+        })
+    }
+}
+
+/// The period in pieces over which nothing turns by more than [`ANGLE`].
+fn pieces(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<Piece>) {
+    let engagement = &problem.process.engagement;
+    let seconds_per_radian = problem.tooth_period_s(rpm) / engagement.pitch;
+    let rates = Rates::new(problem);
+    let (mut bases, mut pieces) = (Vec::new(), Vec::new());
+    for interval in engagement.intervals() {
+        let length = interval.to - interval.from;
+        let duration = length * seconds_per_radian;
+        // In free flight as well: the quadrature of yᵀ dG x wants short pieces.
+        let angle = rates.at(if interval.teeth == 0 { 0.0 } else { kappa_m }) * duration + 2.0 * length;
+        let decay = problem.fastest_decay() * duration;
+        let count = (angle / ANGLE).max(decay / DECAY_MAX).ceil().max(1.0);
+        for index in 0..count as usize {
+            pieces.push(Piece {
+                basis: bases.len(),
+                teeth: interval.teeth,
+                phase: interval.from + length * index as f64 / count,
+                turn: length / count,
+            });
+        }
+        let gauss = Gauss::new(degree(angle / count, TOLERANCE));
+        bases.push(Basis::new(&problem.structure.a, gauss, duration / count));
+    }
+    (bases, pieces)
+}
+
+fn ports(problem: &Problem, kappa: Complex64, teeth: usize, phase: f64) -> Ports {
+    let process = &problem.process;
+    let angles = (0..teeth).map(|tooth| process.engagement.angle(tooth, phase));
+    let mut ports: Ports = angles
+        .clone()
+        .map(|angle| {
+            let force = process.force.cutting.at(angle).map(|part| kappa * part);
+            (process.force.normal.at(angle).map(Complex64::from), force)
+        })
+        .collect();
+    if process.axial_depth_modulation && teeth > 0 {
+        let forced: Vector3<f64> = angles
+            .map(|angle| process.force.forced(angle, process.feed_per_tooth_m))
+            .sum();
+        ports.push((
+            Vector3::<f64>::z().map(Complex64::from),
+            -forced.map(Complex64::from),
+        ));
+    }
+    ports
+}
+
+impl Basis {
+    fn new(a: &DMatrix<f64>, gauss: Gauss, duration: f64) -> Self {
+        let flow_over = |share: f64| (a * (duration * share)).exp();
+        Self {
+            flow: flow_over(1.0),
+            forward: gauss.nodes.iter().map(|&node| flow_over(node)).collect(),
+            backward: gauss.nodes.iter().map(|&node| flow_over(-node)).collect(),
+            gauss,
+            duration,
+        }
+    }
+
+    /// That of Aᵀ.
+    fn transposed(&self) -> Self {
+        let transpose = |all: &[DMatrix<f64>]| all.iter().map(DMatrix::transpose).collect();
+        Self {
+            gauss: self.gauss.clone(),
+            duration: self.duration,
+            flow: self.flow.transpose(),
+            forward: transpose(&self.forward),
+            backward: transpose(&self.backward),
+        }
+    }
+}
+
+/// How a piece carries the state from its start to its nodes and to its end.
+struct Passage {
+    /// n × n.
+    transition: Matrix,
+    /// n × n, one for each node.
+    states: Vec<Matrix>,
+}
+
+impl Passage {
+    /// From x(t) = e^{At}(x₀ + ∫ e^{−As} B f ds) with f = force·seenᵀ C x collocated at the nodes.
+    fn new(structure: &FirstOrder, basis: &Basis, ports: &[Ports]) -> Option<Self> {
+        let order = structure.order();
+        let nodes = basis.gauss.nodes.len();
+        let per_node = ports.first().map_or(0, Vec::len);
+        let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
+        // Rows seenᵀ C e^{A t_i} and columns e^{−A t_j} B force, ports by node.
+        let mut rows = Matrix::zeros(nodes * per_node, order);
+        let mut columns = Matrix::zeros(order, nodes * per_node);
+        for (i, ports) in ports.iter().enumerate() {
+            let observed = (&structure.c * &basis.forward[i]).map(Complex64::from);
+            let pushed = (&basis.backward[i] * &structure.b).map(Complex64::from);
+            for (p, (seen, force)) in ports.iter().enumerate() {
+                rows.row_mut(i * per_node + p)
+                    .copy_from(&(seen.transpose() * &observed));
+                columns.column_mut(i * per_node + p).copy_from(&(&pushed * force));
+            }
+        }
+        let mut implicit = -(&rows * &columns);
+        for i in 0..nodes * per_node {
+            for j in 0..nodes * per_node {
+                let weight = basis.gauss.integrals[(i / per_node, j / per_node)] * basis.duration;
+                implicit[(i, j)] *= weight;
+            }
+            implicit[(i, i)] += 1.0;
+        }
+        let seen = if per_node == 0 {
+            rows
+        } else {
+            implicit.lu().solve(&rows)?
+        };
+        // x_i = e^{A t_i} (1 + Σ_j S_ij h column_j seen_j)
+        let pushes: Vec<Matrix> = (0..nodes)
+            .map(|j| {
+                let ports = j * per_node;
+                columns.columns(ports, per_node)
+                    * seen.rows(ports, per_node)
+                    * Complex64::from(basis.duration)
+            })
+            .collect();
+        let carried = |flow: &DMatrix<f64>, weight: &dyn Fn(usize) -> f64| {
+            let mut sum = Matrix::identity(order, order);
+            for (j, push) in pushes.iter().enumerate() {
+                sum += push * Complex64::from(weight(j));
+            }
+            complex(flow) * sum
+        };
+        Some(Self {
+            transition: carried(&basis.flow, &|j| basis.gauss.weights[j]),
+            states: (0..nodes)
+                .map(|i| carried(&basis.forward[i], &|j| basis.gauss.integrals[(i, j)]))
+                .collect(),
+        })
+    }
+}

@@ -1,0 +1,195 @@
+//! Eigenvectors of matrices with few diagonals below the main one, as Krylov spaces make them.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+/// H − s I in triangular factors, s a little beside an eigenvalue of the real n × n matrix H.
+///
+/// With b diagonals below the main one that takes about 4 b n² operations, where full matrices take 8/3 n³.
+#[derive(Clone, Debug)]
+pub(crate) struct Shifted {
+    size: usize,
+    band: usize,
+    /// U by rows.
+    upper: Vec<Complex64>,
+    /// For each column the factors of the rows below it, `band` of them.
+    factors: Vec<Complex64>,
+    /// The row that took the place of each row.
+    pivots: Vec<usize>,
+}
+
+/// Relative distance of the shift from the eigenvalue: the vector is separated from others by its inverse at each step.
+const BESIDE: f64 = 1e-8;
+
+impl Shifted {
+    /// For an eigenvalue of a matrix that is zero below its `band`th lower diagonal.
+    pub(crate) fn new(matrix: &DMatrix<f64>, band: usize, eigenvalue: Complex64) -> Self {
+        let size = matrix.nrows();
+        let shift = if eigenvalue == Complex64::ZERO {
+            Complex64::from(1e-10 * matrix.amax())
+        } else {
+            eigenvalue * (1.0 + BESIDE)
+        };
+        let mut upper = vec![Complex64::ZERO; size * size];
+        for (j, column) in matrix.column_iter().enumerate() {
+            for (i, entry) in column.iter().enumerate().take(j + band + 1) {
+                upper[i * size + j] = Complex64::from(*entry);
+            }
+            upper[j * size + j] -= shift;
+        }
+        // What takes the place of a pivot that vanishes.
+        let least = (f64::EPSILON * matrix.amax()).max(f64::MIN_POSITIVE);
+        let mut factors = vec![Complex64::ZERO; size * band];
+        let mut pivots = Vec::with_capacity(size);
+        for column in 0..size {
+            let end = (column + band + 1).min(size);
+            let pivot = (column..end)
+                .max_by(|&p, &q| {
+                    let entry = |row: usize| upper[row * size + column].l1_norm();
+                    entry(p).total_cmp(&entry(q))
+                })
+                .unwrap_or(column);
+            pivots.push(pivot);
+            if pivot != column {
+                for j in column..size {
+                    upper.swap(column * size + j, pivot * size + j);
+                }
+            }
+            if upper[column * size + column].l1_norm() < least {
+                upper[column * size + column] = Complex64::from(least);
+            }
+            let (above, below) = upper[column * size..end * size].split_at_mut(size);
+            for (row, factor) in below.chunks_exact_mut(size).zip(&mut factors[column * band..]) {
+                *factor = row[column] / above[column];
+                if *factor != Complex64::ZERO {
+                    for (entry, known) in row[column..].iter_mut().zip(&above[column..]) {
+                        *entry -= *factor * known;
+                    }
+                }
+            }
+        }
+        Self {
+            size,
+            band,
+            upper,
+            factors,
+            pivots,
+        }
+    }
+
+    /// x with (H − s I) x = b, in place of b.
+    fn solve(&self, vector: &mut DVector<Complex64>) {
+        let (size, band) = (self.size, self.band);
+        for column in 0..size {
+            vector.swap_rows(column, self.pivots[column]);
+            let known = vector[column];
+            let end = (column + band + 1).min(size);
+            for (row, factor) in (column + 1..end).zip(&self.factors[column * band..]) {
+                vector[row] -= factor * known;
+            }
+        }
+        for row in (0..size).rev() {
+            let entries = &self.upper[row * size..(row + 1) * size];
+            let known: Complex64 = entries[row + 1..]
+                .iter()
+                .zip(&vector.as_slice()[row + 1..])
+                .map(|(entry, x)| entry * x)
+                .sum();
+            vector[row] = (vector[row] - known) / entries[row];
+        }
+    }
+
+    /// y with (H − s I)ᵀ y = b, in place of b.
+    #[cfg(test)]
+    fn solve_transposed(&self, vector: &mut DVector<Complex64>) {
+        let (size, band) = (self.size, self.band);
+        for row in 0..size {
+            let entries = &self.upper[row * size..(row + 1) * size];
+            let known = vector[row] / entries[row];
+            vector[row] = known;
+            for (entry, y) in entries[row + 1..]
+                .iter()
+                .zip(&mut vector.as_mut_slice()[row + 1..])
+            {
+                *y -= entry * known;
+            }
+        }
+        for column in (0..size).rev() {
+            let end = (column + band + 1).min(size);
+            let below: Complex64 = (column + 1..end)
+                .zip(&self.factors[column * band..])
+                .map(|(row, factor)| factor * vector[row])
+                .sum();
+            vector[column] -= below;
+            vector.swap_rows(column, self.pivots[column]);
+        }
+    }
+
+    /// The eigenvector, of length 1; `None` where nothing finite comes out.
+    pub(crate) fn right(&self) -> Option<DVector<Complex64>> {
+        self.iterate(Self::solve)
+    }
+
+    /// The left eigenvector y, yᵀ H = μ yᵀ, of length 1.
+    #[cfg(test)]
+    fn left(&self) -> Option<DVector<Complex64>> {
+        self.iterate(Self::solve_transposed)
+    }
+
+    /// By how much the eigenvalue changes per change of the matrix, 1/|yᵀ x| ≥ 1.
+    #[cfg(test)]
+    pub(crate) fn condition(&self) -> Option<f64> {
+        let along: Complex64 = self.left()?.dot(&self.right()?);
+        Some(along.norm().recip().max(1.0))
+    }
+
+    fn iterate(&self, solve: fn(&Self, &mut DVector<Complex64>)) -> Option<DVector<Complex64>> {
+        let mut vector = DVector::from_fn(self.size, |i, _| {
+            Complex64::new(1.0, (i as f64 * 0.618).fract() - 0.3)
+        });
+        for _ in 0..3 {
+            solve(self, &mut vector);
+            let norm = vector.norm();
+            if !(norm.is_finite() && norm > 0.0) {
+                return None;
+            }
+            vector.unscale_mut(norm);
+        }
+        Some(vector)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quietcut_numerics::eigenvalues::eigenvalues;
+
+    #[test]
+    fn vectors_of_bands_are_eigenvectors_from_both_sides() {
+        for (size, band) in [(1, 1), (5, 1), (40, 1), (41, 3), (7, 12)] {
+            let matrix = DMatrix::from_fn(size, size, |i, j| {
+                if i > j + band {
+                    0.0
+                } else {
+                    ((i * size + j + 1) as f64 * 2.0_f64.sqrt()).fract() - 0.5
+                }
+            });
+            let complex = matrix.map(Complex64::from);
+            for value in eigenvalues(matrix.clone()).unwrap() {
+                let shifted = Shifted::new(&matrix, band, value);
+                let (right, left) = (shifted.right().unwrap(), shifted.left().unwrap());
+                let miss = &complex * &right - &right * value;
+                let missed = complex.tr_mul(&left) - &left * value;
+                // Rounding of the matrix, whose norm is below 20.
+                assert!(
+                    miss.norm() < 1e-12 && missed.norm() < 1e-12,
+                    "{size} {band} {value}"
+                );
+            }
+        }
+        // [[1, 1e6], [0, 2]]: y = (1, −1e6)ᵀ/1e6 of eigenvalue 1, x = (1, 0)ᵀ.
+        let far = DMatrix::from_row_slice(2, 2, &[1.0, 1e6, 0.0, 2.0]);
+        let condition = Shifted::new(&far, 1, Complex64::ONE).condition().unwrap();
+        assert!((condition / 1e6 - 1.0).abs() < 1e-3, "{condition}");
+    }
+}

@@ -1,0 +1,413 @@
+//! The largest eigenvalues of a linear map that is known by what it does to vectors.
+//!
+//! One-period maps of delay equations are compact: all but a few eigenvalues lie close to zero, and block Arnoldi finds
+//! those few in a space of some dozens of vectors. Blocks also find the eigenvalues of structures with equal modes,
+//! of which a single vector would show one only.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::eigenvector::eigenvector;
+use super::hessenberg::Shifted;
+use quietcut_numerics::eigenvalues::eigenvalues;
+
+/// Vectors in a block: as many directions may have the same mode.
+const BLOCK: usize = 3;
+
+/// Up to this size all eigenvalues are computed from the whole matrix: it is as fast.
+const WHOLE: usize = 90;
+
+/// After so many blocks the eigenvalues are looked at, and again after a third more, but not fewer.
+const LOOK: usize = 10;
+
+/// Residual ‖M v − μ v‖ with ‖v‖ = 1 below which an eigenvalue is taken: rounding in a map of some hundred steps.
+const RESIDUAL: f64 = 1e-11;
+
+/// The same where Newton goes on from there.
+const ROUGH: f64 = 1e-7;
+
+/// Eigenvalues above this size are all of interest.
+const ANY: f64 = 0.25;
+
+/// So many eigenvalues of nearly one size are no candidates for the largest but a crowd near zero.
+const CROWD: usize = 24;
+
+/// The most vectors of a space: looks at it take a second or two then, and maps that need more have a crowd of eigenvalues of one
+/// size.
+const SPACE_MAX: usize = 480;
+
+/// The same where a search without the map can go on.
+const ROUGH_SPACE_MAX: usize = 240;
+
+/// The largest map of which all eigenvalues are computed; they cost about 10 n³ operations, some ten seconds.
+pub(crate) const WHOLE_MAX: usize = 1200;
+
+/// What is left of a vector that depends on others, relative to it: rounding of a map of some hundred steps, and far below
+/// any residual.
+const DEPENDENT: f64 = 1e-14;
+
+/// A linear map of ℝⁿ.
+pub(crate) trait LinearMap {
+    /// n.
+    fn size(&self) -> usize;
+
+    /// What the map makes of each column, n × columns; `None` where the equations have no solution.
+    fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>>;
+}
+
+/// Eigenvalues above a size, largest first, and a space that holds their eigenvectors.
+#[derive(Clone, Debug)]
+pub(crate) struct Dominant {
+    /// The eigenvalues; complex ones in exact pairs.
+    pub(crate) eigenvalues: Vec<Complex64>,
+    /// Orthonormal columns; `None` for the whole space.
+    basis: Option<DMatrix<f64>>,
+    /// The map within that space.
+    projected: DMatrix<f64>,
+}
+
+impl Dominant {
+    /// All eigenvalues larger than `least`. `None` where nothing finite comes out, or where the map is large and the eigenvalues do
+    /// not settle.
+    pub(crate) fn of(map: &impl LinearMap, least: f64) -> Option<Self> {
+        Self::kept(map, &|values| values.retain(|value| value.norm() > least))
+    }
+
+    /// All eigenvalues larger than 0.25; where there is none the largest, but no more than [`CROWD`].
+    pub(crate) fn any(map: &impl LinearMap) -> Option<Self> {
+        Self::kept(map, &|values| {
+            let largest = values.first().map_or(0.0, |value| value.norm());
+            if largest > ANY {
+                values.retain(|value| value.norm() > ANY);
+            } else {
+                values.retain(|value| value.norm() >= 0.5 * largest);
+                values.truncate(CROWD);
+            }
+        })
+    }
+
+    fn kept(map: &impl LinearMap, keep: &dyn Fn(&mut Vec<Complex64>)) -> Option<Self> {
+        // Beyond half the size the whole matrix is cheaper.
+        let most = (map.size() / 2).min(SPACE_MAX);
+        if map.size() > WHOLE
+            && let Some(found) = arnoldi(map, most, RESIDUAL, keep)
+            && found.is_settled
+        {
+            return Some(found.dominant);
+        }
+        if map.size() > WHOLE_MAX {
+            return None;
+        }
+        let projected = map.apply(&DMatrix::identity(map.size(), map.size()))?;
+        let mut eigenvalues = larger(&projected, 0.0)?;
+        keep(&mut eigenvalues);
+        Some(Self {
+            eigenvalues,
+            basis: None,
+            projected,
+        })
+    }
+
+    /// The eigenvector of one of the eigenvalues, of length 1.
+    pub(crate) fn vector(&self, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
+        let within = eigenvector(&self.projected.map(Complex64::from), eigenvalue)?;
+        Some(match &self.basis {
+            Some(basis) => basis.map(Complex64::from) * within,
+            None => within,
+        })
+    }
+}
+
+/// The eigenvalues that seem the largest, largest first, to begin Newton with.
+#[derive(Clone, Debug)]
+pub(crate) struct Largest {
+    /// The eigenvalues, to a residual of about 1e-7 where they are settled.
+    pub(crate) eigenvalues: Vec<Complex64>,
+    /// False where block Arnoldi did not settle.
+    pub(crate) is_settled: bool,
+    /// The largest entry of the map within the space.
+    pub(crate) norm: f64,
+}
+
+/// The eigenvalues within `share` of the largest, but no more than [`CROWD`].
+///
+/// `None` where nothing finite comes out.
+pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Option<Largest> {
+    let most = (map.size() / 2).min(ROUGH_SPACE_MAX);
+    let found = arnoldi(map, most, ROUGH, &|values| {
+        let largest = values.first().map_or(0.0, |value| value.norm());
+        values.retain(|value| value.norm() >= share * largest);
+        values.truncate(CROWD);
+    })?;
+    Some(Largest {
+        norm: found.dominant.projected.amax(),
+        eigenvalues: found.dominant.eigenvalues,
+        is_settled: found.is_settled,
+    })
+}
+
+/// The eigenvalues larger than `least`, or than `share` of the largest where that is less, largest first, to a relative residual of
+/// about 1e-7.
+///
+/// `None` where block Arnoldi does not settle in a space of half the size, or nothing finite comes out.
+pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Option<Vec<Complex64>> {
+    let most = (map.size() / 2).min(SPACE_MAX);
+    let found = arnoldi(map, most, ROUGH, &|values| {
+        let largest = values.first().map_or(0.0, |value| value.norm());
+        values.retain(|value| value.norm() > least.min(share * largest));
+    })?;
+    found.is_settled.then_some(found.dominant.eigenvalues)
+}
+
+/// What block Arnoldi arrived at.
+struct Found {
+    dominant: Dominant,
+    is_settled: bool,
+}
+
+/// Block Arnoldi with full orthogonalization until those eigenvalues are settled that `keep` keeps of all of them, largest
+/// first, or until the space would have to grow beyond `most`. `None` where nothing finite comes out.
+fn arnoldi(
+    map: &impl LinearMap,
+    most: usize,
+    residual: f64,
+    keep: &dyn Fn(&mut Vec<Complex64>),
+) -> Option<Found> {
+    let size = map.size();
+    // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
+    let mut room = most.min(4 * LOOK * BLOCK);
+    let mut basis = DMatrix::zeros(size, room + BLOCK);
+    let mut projected = DMatrix::zeros(room + BLOCK, room);
+    let first = start(size);
+    let scale = first.norm();
+    let (first, _) = orthonormal(first, scale);
+    basis.columns_mut(0, first.ncols()).copy_from(&first);
+    let (mut done, mut width) = (0, first.ncols());
+    let mut look = LOOK;
+    for count in 1.. {
+        if done + width > room {
+            // Few maps need much room, and so much of it takes longer than they do.
+            room = most.min(2 * room);
+            basis = basis.resize_horizontally(room + BLOCK, 0.0);
+            projected = projected.resize(room + BLOCK, room, 0.0);
+        }
+        let mut image = map.apply(&basis.columns(done, width).into_owned())?;
+        let scale = image.norm();
+        let known = basis.columns(0, done + width);
+        // Twice is enough: what the first pass leaves in the space is rounding of the image.
+        for _ in 0..2 {
+            let part = known.tr_mul(&image);
+            image -= known * &part;
+            let mut sum = projected.view_mut((0, done), (done + width, width));
+            sum += part;
+        }
+        let (next, coupling) = orthonormal(image, scale);
+        let end = done + width;
+        projected
+            .view_mut((end, done), (next.ncols(), width))
+            .copy_from(&coupling);
+        basis.columns_mut(end, next.ncols()).copy_from(&next);
+        let is_full = next.ncols() == 0 || end + next.ncols() > most;
+        if is_full || count == look {
+            look += LOOK.max(look / 3);
+            let within = projected.view((0, 0), (end, end)).into_owned();
+            let mut eigenvalues = larger(&within, 0.0)?;
+            keep(&mut eigenvalues);
+            let is_settled = are_settled(&within, &coupling, &eigenvalues, residual);
+            if is_settled || is_full {
+                let dominant = Dominant {
+                    eigenvalues,
+                    basis: Some(basis.columns(0, end).into_owned()),
+                    projected: within,
+                };
+                return Some(Found { dominant, is_settled });
+            }
+        }
+        (done, width) = (end, next.ncols());
+    }
+    None
+}
+
+/// True where ‖K y‖ is small for the last part y of every eigenvector: the residual of M at μ.
+///
+/// Of eigenvalues that are themselves below it nothing more is asked: compact maps have a crowd of them.
+fn are_settled(
+    projected: &DMatrix<f64>,
+    coupling: &DMatrix<f64>,
+    eigenvalues: &[Complex64],
+    residual: f64,
+) -> bool {
+    let coupling = coupling.map(Complex64::from);
+    let width = coupling.ncols();
+    let mut of_interest = eigenvalues
+        .iter()
+        .filter(|value| value.im >= 0.0 && value.norm() > residual);
+    of_interest.all(|&value| {
+        // Each block is coupled to the next by a triangle.
+        Shifted::new(projected, BLOCK, value)
+            .right()
+            .is_some_and(|vector| {
+                let last = vector.rows(vector.len() - width, width);
+                (&coupling * last).norm() < residual * value.norm().max(1.0)
+            })
+    })
+}
+
+/// The eigenvalues of a matrix that are larger than `least`, largest first, of pairs the upper one first.
+fn larger(matrix: &DMatrix<f64>, least: f64) -> Option<Vec<Complex64>> {
+    let mut values = eigenvalues(matrix.clone())?;
+    values.retain(|value| value.norm() > least);
+    values.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
+    Some(values)
+}
+
+/// A block that is the same at every call and has a part along everything.
+fn start(size: usize) -> DMatrix<f64> {
+    // Weyl sequences: multiples of irrational numbers modulo one.
+    let irrational = [2.0_f64.sqrt(), 3.0_f64.sqrt(), 5.0_f64.sqrt()];
+    DMatrix::from_fn(size, BLOCK, |i, j| ((i + 1) as f64 * irrational[j]).fract() - 0.5)
+}
+
+/// Q and R of a block, Q without columns that depend on those before; `scale` is the norm of what the block was made from:
+/// what is below its rounding is zero.
+fn orthonormal(block: DMatrix<f64>, scale: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+    let columns = block.ncols();
+    let mut kept: Vec<DVector<f64>> = Vec::with_capacity(columns);
+    let mut factor = DMatrix::zeros(columns, columns);
+    for j in 0..columns {
+        let mut column = block.column(j).into_owned();
+        for _ in 0..2 {
+            for (i, earlier) in kept.iter().enumerate() {
+                let part = earlier.dot(&column);
+                factor[(i, j)] += part;
+                column.axpy(-part, earlier, 1.0);
+            }
+        }
+        let norm = column.norm();
+        if norm > DEPENDENT * scale {
+            factor[(kept.len(), j)] = norm;
+            kept.push(column / norm);
+        }
+    }
+    let rank = kept.len();
+    let basis = if kept.is_empty() {
+        DMatrix::zeros(block.nrows(), 0)
+    } else {
+        DMatrix::from_columns(&kept)
+    };
+    (basis, factor.rows(0, rank).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Matrix(DMatrix<f64>);
+
+    impl LinearMap for Matrix {
+        fn size(&self) -> usize {
+            self.0.nrows()
+        }
+
+        fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+            Some(&self.0 * columns)
+        }
+    }
+
+    /// A matrix with a pair, a double and a negative eigenvalue outside a cloud of small ones, turned by reflections.
+    fn matrix(size: usize) -> Matrix {
+        let mut matrix = DMatrix::from_fn(size, size, |i, j| {
+            if i == j {
+                0.2 * ((i + 1) as f64 * 0.618).fract()
+            } else {
+                0.0
+            }
+        });
+        for (index, value) in [(0, 0.5), (1, 0.5), (2, 0.9), (3, 0.9), (4, -1.1)] {
+            matrix[(index, index)] = value;
+        }
+        (matrix[(0, 1)], matrix[(1, 0)]) = (0.8, -0.8);
+        for k in 1..4_u32 {
+            let normal =
+                DVector::from_fn(size, |i, _| ((i + 1) as f64 * f64::from(k).sqrt()).sin()).normalize();
+            let reflection = DMatrix::identity(size, size) - &normal * normal.transpose() * 2.0;
+            matrix = &reflection * matrix * &reflection;
+        }
+        Matrix(matrix)
+    }
+
+    #[test]
+    fn few_large_eigenvalues_are_found_with_their_vectors_in_small_and_large_maps() {
+        for size in [40, 300] {
+            let map = matrix(size);
+            let found = Dominant::of(&map, 0.3).unwrap();
+            assert_eq!(found.basis.is_some(), size == 300);
+            let expected = [(-1.1, 0.0), (0.5, 0.8), (0.5, -0.8), (0.9, 0.0), (0.9, 0.0)];
+            assert_eq!(found.eigenvalues.len(), expected.len());
+            for (value, (re, im)) in found.eigenvalues.iter().zip(expected) {
+                // The matrix is normal: eigenvalues are as good as the residual.
+                assert!((value - Complex64::new(re, im)).norm() < 1e-10, "{found:?}");
+                let vector = found.vector(*value).unwrap();
+                let miss = map.0.map(Complex64::from) * &vector - &vector * *value;
+                assert!(miss.norm() < 1e-9 && (vector.norm() - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+    /// A map of rank 4, as that of a structure in free flight, that counts how many vectors it is applied to.
+    struct Thin {
+        within: DMatrix<f64>,
+        directions: DMatrix<f64>,
+        applied: std::cell::Cell<usize>,
+    }
+
+    impl LinearMap for Thin {
+        fn size(&self) -> usize {
+            self.directions.nrows()
+        }
+
+        fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+            self.applied.set(self.applied.get() + columns.ncols());
+            Some(&self.directions * (&self.within * self.directions.tr_mul(columns)))
+        }
+    }
+
+    #[test]
+    fn the_space_of_a_map_of_low_rank_closes_early() {
+        let size = 1000;
+        let (directions, _) = orthonormal(
+            DMatrix::from_fn(size, 4, |i, j| ((i + 1) as f64 * (j as f64 + 2.3).sqrt()).sin()),
+            size as f64,
+        );
+        // A double pair: two equal modes.
+        let (re, im) = (0.6, -0.3);
+        let within = DMatrix::from_row_slice(
+            4,
+            4,
+            &[
+                re, im, 0.0, 0.0, -im, re, 0.0, 0.0, 0.0, 0.0, re, im, 0.0, 0.0, -im, re,
+            ],
+        );
+        let map = Thin {
+            within,
+            directions,
+            applied: std::cell::Cell::new(0),
+        };
+        let found = Dominant::of(&map, 0.3).unwrap();
+        // The first block, and what its images need to fill four dimensions.
+        assert!(map.applied.get() <= 3 * BLOCK, "{}", map.applied.get());
+        assert_eq!(found.eigenvalues.len(), 4);
+        for value in &found.eigenvalues {
+            let error = (value - Complex64::new(re, im.abs().copysign(value.im))).norm();
+            assert!(error < 1e-12, "{found:?}");
+            let vector = found.vector(*value).unwrap();
+            let miss = map.apply(&DMatrix::from_columns(&[
+                vector.map(|v| v.re),
+                vector.map(|v| v.im),
+            ]));
+            let miss = miss.unwrap();
+            let complex =
+                miss.column(0).map(Complex64::from) + miss.column(1).map(|v| Complex64::new(0.0, v));
+            assert!((complex - vector * *value).norm() < 1e-9);
+        }
+    }
+}

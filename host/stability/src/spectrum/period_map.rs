@@ -1,0 +1,193 @@
+//! The collocated map over one tooth period: many multipliers at one speed and depth at once.
+
+use nalgebra::linalg::LU;
+use nalgebra::{DMatrix, Dyn};
+use num_complex::Complex64;
+
+use super::krylov::{self, LinearMap};
+use crate::problem::period::Period;
+use quietcut_numerics::eigenvalues::eigenvalues;
+
+/// Up to this size all eigenvalues of the map are computed from its matrix: it is as fast.
+const WHOLE: usize = 110;
+
+/// The same where Krylov spaces do not settle: a second.
+const UNSETTLED_WHOLE_MAX: usize = 400;
+
+/// Multipliers so large have lost what was before: they are eigenvalues of Φ(w), up to one part in so many.
+const GROWN: f64 = 1e6;
+
+/// How much larger than the largest multiplier a map may be: Krylov spaces with residuals of 1e-7 are to see no more than roundings
+/// of that.
+const NORMAL: f64 = 1e7;
+
+/// The matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at a depth, m.
+///
+/// p are the displacements along the chip normal at the collocation nodes while teeth cut. `None` where a depth is so
+/// large that the collocation equations are singular.
+pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
+    let order = period.order();
+    let size = order + period.ports();
+    let mut map = DMatrix::zeros(size, size);
+    let mut state = DMatrix::zeros(order, size);
+    state.view_mut((0, 0), (order, order)).fill_with_identity();
+    let mut first = order;
+    for element in &period.elements {
+        let ports = element.kernel.nrows();
+        // p − w Q p = E x − w Q p_τ
+        let weighted = &element.kernel * depth_m;
+        let implicit = DMatrix::identity(ports, ports) - &weighted;
+        // Chips of later elements are not in it yet.
+        let known = first + ports;
+        let mut seen = &element.observe * state.columns(0, known);
+        let mut past = seen.columns_mut(first, ports);
+        past -= &weighted;
+        if !implicit.lu().solve_mut(&mut seen) {
+            return None;
+        }
+        map.view_mut((first, 0), (ports, known)).copy_from(&seen);
+        for port in 0..ports {
+            seen[(port, first + port)] -= 1.0;
+        }
+        let mut next = &element.flow * state.columns(0, known);
+        next.gemm(depth_m, &element.drive, &seen, 1.0);
+        state.columns_mut(0, known).copy_from(&next);
+        first = known;
+    }
+    map.rows_mut(0, order).copy_from(&(&period.flight * state));
+    Some(map)
+}
+
+/// All multipliers of the collocated map, largest first; those of the history that have no physical meaning are near
+/// zero.
+pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
+    of_matrix(monodromy(period, depth_m)?)
+}
+
+/// All eigenvalues of the matrix of a map over a period, largest first, of pairs the upper one first.
+pub(crate) fn of_matrix(map: DMatrix<f64>) -> Option<Vec<Complex64>> {
+    let mut multipliers = eigenvalues(map)?;
+    multipliers.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
+    Some(multipliers)
+}
+
+/// The multipliers that seem the largest, to begin Newton with.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Candidates {
+    /// Largest first.
+    pub(crate) multipliers: Vec<Complex64>,
+    /// False where larger ones may have been missed: a Krylov space did not settle, or the map is so far from normal that rounding
+    /// moves its eigenvalues.
+    pub(crate) is_certain: bool,
+}
+
+/// The multipliers within `share` of the largest.
+///
+/// Of large maps by block Arnoldi. `None` where nothing finite comes out.
+pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candidates> {
+    let (order, size) = (period.order(), period.order() + period.ports());
+    let of = |mut multipliers: Vec<Complex64>, norm: f64, is_settled: bool| {
+        let largest = multipliers.first().map_or(0.0, |multiplier| multiplier.norm());
+        multipliers.retain(|multiplier| multiplier.norm() >= share * largest);
+        Candidates {
+            multipliers,
+            is_certain: is_settled && norm <= NORMAL * largest.max(1.0),
+        }
+    };
+    // Φ(w) is what the map makes of a surface at rest: without a tooth before, κ is w.
+    let grown = |transition: DMatrix<f64>| {
+        let norm = transition.amax();
+        let multipliers = of_matrix(transition)?;
+        let is_large = multipliers.first().is_some_and(|first| first.norm() > GROWN);
+        Some(of(multipliers, norm, is_large)).filter(|found| found.is_certain)
+    };
+    if size > WHOLE {
+        let map = Map::new(period, depth_m)?;
+        let identity = DMatrix::identity(size, order);
+        let transition = map.apply(&identity)?.rows(0, order).into_owned();
+        if let Some(found) = grown(transition) {
+            return Some(found);
+        }
+        let found = krylov::largest(&map, share)?;
+        if found.is_settled || size > UNSETTLED_WHOLE_MAX {
+            return Some(of(found.eigenvalues, found.norm, found.is_settled));
+        }
+    }
+    let map = monodromy(period, depth_m)?;
+    if let Some(found) = grown(map.view((0, 0), (order, order)).into_owned()) {
+        return Some(found);
+    }
+    let norm = map.amax();
+    Some(of(of_matrix(map)?, norm, true))
+}
+
+/// All multipliers larger than `least`, or than `share` of the largest where that is less, largest first; with others that are
+/// smaller where the map is small.
+///
+/// Of large maps by block Arnoldi, to begin Newton with. `None` where nothing finite comes out, or where that does not settle and the
+/// map is too large for all eigenvalues.
+pub(crate) fn larger_than(period: &Period, depth_m: f64, least: f64, share: f64) -> Option<Vec<Complex64>> {
+    let size = period.order() + period.ports();
+    if size > WHOLE
+        && let Some(found) = krylov::larger_than(&Map::new(period, depth_m)?, least, share)
+    {
+        return Some(found);
+    }
+    if size > krylov::WHOLE_MAX {
+        return None;
+    }
+    multipliers(period, depth_m)
+}
+
+/// The map (x, p_τ) → (x⁺, p) by what it does, element by element.
+struct Map<'a> {
+    period: &'a Period,
+    depth_m: f64,
+    /// I − w Q of each element.
+    implicit: Vec<LU<f64, Dyn, Dyn>>,
+}
+
+impl<'a> Map<'a> {
+    fn new(period: &'a Period, depth_m: f64) -> Option<Self> {
+        let implicit = period.elements.iter().map(|element| {
+            let ports = element.kernel.nrows();
+            let lu = (DMatrix::identity(ports, ports) - &element.kernel * depth_m).lu();
+            lu.is_invertible().then_some(lu)
+        });
+        Some(Self {
+            implicit: implicit.collect::<Option<_>>()?,
+            period,
+            depth_m,
+        })
+    }
+}
+
+impl LinearMap for Map<'_> {
+    fn size(&self) -> usize {
+        self.period.order() + self.period.ports()
+    }
+
+    fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let order = self.period.order();
+        let mut out = DMatrix::zeros(columns.nrows(), columns.ncols());
+        let mut state = columns.rows(0, order).into_owned();
+        let mut first = order;
+        for (element, implicit) in self.period.elements.iter().zip(&self.implicit) {
+            let ports = element.kernel.nrows();
+            let past = columns.rows(first, ports);
+            let mut seen = &element.observe * &state;
+            seen.gemm(-self.depth_m, &element.kernel, &past, 1.0);
+            if !implicit.solve_mut(&mut seen) {
+                return None;
+            }
+            out.rows_mut(first, ports).copy_from(&seen);
+            seen -= past;
+            let mut next = &element.flow * &state;
+            next.gemm(self.depth_m, &element.drive, &seen, 1.0);
+            state = next;
+            first += ports;
+        }
+        out.rows_mut(0, order).copy_from(&(&self.period.flight * state));
+        out.iter().all(|entry| entry.is_finite()).then_some(out)
+    }
+}

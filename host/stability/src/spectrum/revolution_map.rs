@@ -1,0 +1,140 @@
+//! What one revolution of a tool with variable pitch makes of the state: the map whose eigenvalues are the multipliers.
+
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector, Dyn, LU, Vector3};
+use num_complex::Complex64;
+
+use super::chatter_frequency::loudest_hz;
+use super::krylov::LinearMap;
+use super::map_spectrum::PeriodMap;
+use crate::problem::revolution::Revolution;
+use crate::problem::revolution_mesh::{Series, Source};
+
+/// The map of a revolution at one depth.
+pub(crate) struct RevolutionMap<'a> {
+    revolution: Rc<Revolution<'a>>,
+    depth_m: f64,
+    /// I − w Q of each element.
+    factors: Vec<LU<f64, Dyn, Dyn>>,
+}
+
+/// A revolution of several columns at once.
+struct Trace {
+    /// x at the end, n × columns.
+    state: DMatrix<f64>,
+    /// p of each element, columns × ports.
+    seen: Vec<DMatrix<f64>>,
+    /// p − p_τ of each element, ports × columns.
+    chips: Vec<DMatrix<f64>>,
+}
+
+impl<'a> RevolutionMap<'a> {
+    /// The map at a depth, m; `None` where the collocation equations are singular.
+    pub(crate) fn new(revolution: Rc<Revolution<'a>>, depth_m: f64) -> Option<Self> {
+        let factors = revolution.elements.iter().map(|element| {
+            let size = element.kernel.nrows();
+            let implicit = DMatrix::identity(size, size) - &element.kernel * depth_m;
+            let factor = implicit.lu();
+            factor.is_invertible().then_some(factor)
+        });
+        let factors = factors.collect::<Option<_>>()?;
+        Some(Self {
+            revolution,
+            depth_m,
+            factors,
+        })
+    }
+
+    fn trace(&self, columns: &DMatrix<f64>) -> Option<Trace> {
+        let revolution = self.revolution.as_ref();
+        let order = revolution.pitched.problem.structure.order();
+        let width = columns.ncols();
+        let mut trace = Trace {
+            state: columns.rows(0, order).into_owned(),
+            seen: Vec::with_capacity(revolution.elements.len()),
+            chips: Vec::with_capacity(revolution.elements.len()),
+        };
+        let before = columns.transpose();
+        let stretches = &revolution.mesh.stretches;
+        let parts = stretches.iter().zip(&revolution.elements).zip(&self.factors);
+        for ((stretch, element), factor) in parts {
+            let ports = stretch.pasts.len();
+            let mut past = DMatrix::zeros(width, ports);
+            for (port, of) in stretch.pasts.iter().enumerate() {
+                let mut sum = past.column_mut(port);
+                for (node, weight) in of.weights.iter().enumerate() {
+                    let seen = match of.source {
+                        Source::Earlier(first) => before.column(first + node),
+                        Source::Own(Series { stretch, tooth }) => {
+                            // A delay shorter than a stretch would end in the stretch itself.
+                            let values = trace.seen.get(stretch)?;
+                            values.column(node * stretches[stretch].cutting.len() + tooth)
+                        }
+                    };
+                    sum.axpy(*weight, &seen, 1.0);
+                }
+            }
+            // p − w Q p = E x − w Q p_τ
+            let past = past.transpose();
+            let mut seen = &element.observe * &trace.state;
+            seen.gemm(-self.depth_m, &element.kernel, &past, 1.0);
+            if ports > 0 && !factor.solve_mut(&mut seen) {
+                return None;
+            }
+            let chips = &seen - past;
+            let mut next = &element.flow * &trace.state;
+            next.gemm(self.depth_m, &element.drive, &chips, 1.0);
+            trace.state = next;
+            trace.seen.push(seen.transpose());
+            trace.chips.push(chips);
+        }
+        Some(trace)
+    }
+}
+
+impl LinearMap for RevolutionMap<'_> {
+    fn size(&self) -> usize {
+        self.revolution.mesh.size
+    }
+
+    fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let trace = self.trace(columns)?;
+        let mut image = DMatrix::zeros(self.size(), columns.ncols());
+        image.rows_mut(0, trace.state.nrows()).copy_from(&trace.state);
+        for (series, first) in &self.revolution.mesh.kept {
+            let stretch = &self.revolution.mesh.stretches[series.stretch];
+            let values = &trace.seen[series.stretch];
+            for node in 0..stretch.gauss.nodes.len() {
+                let column = values.column(node * stretch.cutting.len() + series.tooth);
+                image.row_mut(first + node).tr_copy_from(&column);
+            }
+        }
+        image.iter().all(|entry| entry.is_finite()).then_some(image)
+    }
+}
+
+impl PeriodMap for RevolutionMap<'_> {
+    fn chatter_hz(&self, multiplier: Complex64, vector: &DVector<Complex64>) -> Option<f64> {
+        let parts = DMatrix::from_fn(
+            vector.len(),
+            2,
+            |i, j| {
+                if j == 0 { vector[i].re } else { vector[i].im }
+            },
+        );
+        let trace = self.trace(&parts)?;
+        let problem = &self.revolution.pitched.problem;
+        let period_s = self.revolution.mesh.passages.period_s;
+        loudest_hz(problem, self.depth_m, period_s, multiplier, |s| {
+            let mut harmonic = Vector3::<Complex64>::zeros();
+            for (element, chips) in self.revolution.elements.iter().zip(&trace.chips) {
+                for (port, chip) in element.ports.iter().zip(chips.row_iter()) {
+                    let chip = Complex64::new(chip[0], chip[1]) * port.weight_s;
+                    harmonic += port.force.map(Complex64::from) * (chip * (-s * port.time_s).exp());
+                }
+            }
+            Some((problem.structure.transfer(s)? * harmonic).norm())
+        })
+    }
+}

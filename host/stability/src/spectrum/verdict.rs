@@ -1,0 +1,37 @@
+//! What a multiplier and its error say of the cut.
+
+use serde::Serialize;
+
+/// What a multiplier and its error say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// |μ| + error < 1.
+    Stable,
+    /// |μ| − error > 1.
+    Unstable,
+    /// The error bar straddles 1.
+    Undecided,
+}
+
+impl Verdict {
+    /// The verdict on a multiplier of this size.
+    pub fn of(multiplier_abs: f64, error: f64) -> Self {
+        if multiplier_abs + error < 1.0 {
+            Self::Stable
+        } else if multiplier_abs - error > 1.0 {
+            Self::Unstable
+        } else {
+            Self::Undecided
+        }
+    }
+
+    /// The word in answers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stable => "stable",
+            Self::Unstable => "unstable",
+            Self::Undecided => "undecided",
+        }
+    }
+}

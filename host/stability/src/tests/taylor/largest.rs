@@ -1,0 +1,87 @@
+//! The size of the largest multiplier of a period by Taylor series, by Arnoldi's method.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::problem::linear::Problem;
+use crate::spectrum::hessenberg::Shifted;
+use crate::tests::taylor::{Series, TaylorPeriod, are_short, least_counts, refine};
+use quietcut_numerics::eigenvalues::eigenvalues;
+
+/// The most vectors of a Krylov space: where more are needed counting is cheaper.
+const VECTORS_MAX: usize = 120;
+
+/// The residual of an eigenvector, and the change since the look before, with which an eigenvalue is taken, relative to the map.
+const SETTLED: f64 = 1e-10;
+
+/// The absolute value of the largest multiplier, and what the series and rounding leave open of it; `None` where nothing finite comes
+/// out or Arnoldi's method does not settle.
+pub(crate) fn largest_abs(problem: &Problem, rpm: f64, depth_m: f64, series: Series) -> Option<(f64, f64)> {
+    let mut counts = least_counts(problem, rpm, series);
+    for _ in 0..12 {
+        let period = TaylorPeriod::new(problem, rpm, depth_m, series, &counts);
+        let mut tails = vec![0.0; counts.len()];
+        period.apply(&period.start(), &mut tails);
+        let found = are_short(&tails, series.tail).then(|| arnoldi(&period, &mut tails));
+        if let Some(found) = found
+            && are_short(&tails, 100.0 * series.tail)
+        {
+            return found;
+        }
+        refine(&mut counts, &tails, series)?;
+    }
+    None
+}
+
+/// The size of the largest eigenvalue of the map of a period; its change with the last vectors, and what the series leave out of the map.
+fn arnoldi(period: &TaylorPeriod, tails: &mut [f64]) -> Option<(f64, f64)> {
+    let most = VECTORS_MAX.min(period.size);
+    let mut basis: Vec<DVector<f64>> = vec![DVector::from_vec(period.start()).normalize()];
+    let mut hessenberg = DMatrix::zeros(most + 1, most);
+    let (mut look, mut before) = (8, f64::INFINITY);
+    // Squares of motions that grow beyond 1e150 would leave the range of numbers.
+    let mut unit = 1.0;
+    for k in 0..most {
+        let mut image = DVector::from_vec(period.apply(basis[k].as_slice(), tails));
+        if k == 0 {
+            unit = image.amax();
+        }
+        image /= unit;
+        let whole = image.norm();
+        for _ in 0..2 {
+            for (j, known) in basis.iter().enumerate() {
+                let part = known.dot(&image);
+                hessenberg[(j, k)] += part;
+                image.axpy(-part, known, 1.0);
+            }
+        }
+        let left = image.norm();
+        let is_closed = left <= 1e-14 * whole || k + 1 == most;
+        if is_closed || k + 1 == look {
+            look += (look / 3).max(4);
+            let within = hessenberg.view((0, 0), (k + 1, k + 1)).into_owned();
+            let found = eigenvalues(within.clone())?
+                .into_iter()
+                .max_by(|p, q| p.norm_sqr().total_cmp(&q.norm_sqr()))?;
+            let size = found.norm();
+            let shifted = Shifted::new(&within, 1, found);
+            // What the series leave out changes the eigenvalue by its condition times as much.
+            let left_out = period.series.tail * within.norm() * shifted.condition()?;
+            if k + 1 == period.size || left <= 1e-14 * whole {
+                return Some((size * unit, left_out * unit));
+            }
+            // Maps far from normal keep no more than rounding of their norm.
+            let scale = SETTLED * size.max(within.norm());
+            let change = (size - before).abs();
+            if change < scale {
+                let vector = shifted.right()?;
+                if left * vector[k].norm() < scale {
+                    return Some((size * unit, (change + left_out) * unit));
+                }
+            }
+            before = size;
+        }
+        hessenberg[(k + 1, k)] = left;
+        basis.push(image / left);
+    }
+    None
+}
