@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
+use rayon::prelude::*;
 
+use crate::signal::grid::Grid;
 use quietcut_model::structure::FirstOrder;
 
 /// Poles closer than this, relative, are one.
@@ -99,6 +101,14 @@ impl Receptance {
             .sum::<f64>()
             .sqrt()
     }
+}
+
+/// H(iω) at the bins of the finer samples, m/N.
+pub(crate) fn response(receptance: &Receptance, grid: &Grid) -> Vec<Matrix3<Complex64>> {
+    (0..grid.fine_bins())
+        .into_par_iter()
+        .map(|bin| receptance.at(grid.omega(bin)))
+        .collect()
 }
 
 #[cfg(test)]

@@ -7,9 +7,10 @@ use std::fmt;
 use num_complex::Complex64;
 
 use crate::baseline::direction_of;
-use crate::motion::recorded_cut::CutForce;
+use crate::motion::cut_force::CutForce;
+use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::{Domain, Scene};
+use crate::records::study::Scene;
 use quietcut_model::structure::Direction;
 use quietcut_recording::Quantity;
 

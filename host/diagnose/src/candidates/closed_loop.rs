@@ -5,8 +5,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
+use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::{Domain, Scene};
+use crate::records::study::Scene;
 use crate::signal::grid::{Grid, catmull_rom};
 use quietcut_model::structure::FirstOrder;
 use quietcut_recording::Kind;

@@ -15,8 +15,10 @@ use std::f64::consts::TAU;
 use crate::baseline::derivatives;
 use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
 use crate::candidates::closed_loop::{holding_force_n, starts_anywhere};
-use crate::records::record::{Observed, Record};
-use crate::records::study::{Domain, Scene};
+use crate::records::channel::Observed;
+use crate::records::domain::Domain;
+use crate::records::record::Record;
+use crate::records::study::Scene;
 
 pub(crate) struct MissingMode;
 

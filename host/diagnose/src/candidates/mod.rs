@@ -2,6 +2,7 @@
 
 pub(crate) mod cause;
 pub(crate) mod closed_loop;
+pub(crate) mod extension_tables;
 mod linear;
 mod missing_mode;
 mod process;

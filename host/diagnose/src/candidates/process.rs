@@ -16,7 +16,7 @@ mod speed_fluctuation;
 mod wear;
 
 use crate::candidates::cause::{Cause, Place, Regressor};
-use crate::motion::recorded_cut::CutForce;
+use crate::motion::cut_force::CutForce;
 use crate::records::cutting::Cutting;
 use crate::records::record::Record;
 use crate::records::study::Scene;

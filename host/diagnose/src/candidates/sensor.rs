@@ -9,9 +9,11 @@ mod offset;
 use num_complex::Complex64;
 
 use crate::candidates::cause::{Cause, Place, Regressor};
-use crate::records::motion_estimate::main_axis;
-use crate::records::record::{Observed, Record};
-use crate::records::study::{Domain, Scene};
+use crate::records::channel::Observed;
+use crate::records::channel::main_axis;
+use crate::records::domain::Domain;
+use crate::records::record::Record;
+use crate::records::study::Scene;
 use quietcut_recording::Quantity;
 use quietcut_simulate::path::Motion;
 

@@ -3,11 +3,13 @@
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
 use crate::conclusion::parameter_estimates::{by_common_factor, named};
 use crate::conclusion::residual_views::views;
-use crate::fit::library::{Explanation, Library};
+use crate::fit::candidate_model::Explanation;
+use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
 use crate::progress::{Options, Stage};
 use crate::records::checks;
-use crate::records::study::{Domain, Scene};
+use crate::records::domain::Domain;
+use crate::records::study::Scene;
 use crate::selection::select::{APART, Scale, Selection, WITHIN_NOISE, names, select};
 use quietcut_recording::Recording;
 

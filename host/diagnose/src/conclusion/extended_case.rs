@@ -2,34 +2,12 @@
 
 use std::fmt::Write as _;
 
-use toml::{Table, Value};
+use toml::Table;
 
+use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{Diagnosis, Figure, NamedCause, Outcome};
 use crate::conclusion::lobes::Moved;
 use quietcut_model::case::Case;
-
-/// Tables `[extension.NAME]`, in their order, each name once: a cause that acts along several directions has a list of them, and
-/// of each parameter a list that is as long.
-pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = (&'a str, &'a Table)>) -> Vec<(String, Table)> {
-    let mut all: Vec<(String, Table)> = Vec::new();
-    for (name, table) in parts {
-        match all.iter_mut().find(|(known, _)| known == name) {
-            None => all.push((name.to_owned(), table.clone())),
-            Some((_, known)) => {
-                for (key, value) in table {
-                    match known.get_mut(key) {
-                        Some(Value::Array(list)) => list.push(value.clone()),
-                        Some(one) => *one = Value::Array(vec![one.clone(), value.clone()]),
-                        None => {
-                            known.insert(key.clone(), value.clone());
-                        }
-                    }
-                }
-            }
-        }
-    }
-    all
-}
 
 /// What is said of a key behind its value: the intervals of the causes that have it, or have it by number (`ratio_1`, `ratio_2` …).
 fn intervals(causes: &[&NamedCause], key: &str) -> String {

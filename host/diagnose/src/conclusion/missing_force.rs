@@ -6,8 +6,9 @@
 use num_complex::Complex64;
 
 use crate::baseline::Baseline;
-use crate::records::record::{Observed, Record};
-use crate::records::study::Domain;
+use crate::records::channel::Observed;
+use crate::records::domain::Domain;
+use crate::records::record::Record;
 use quietcut_recording::Quantity;
 
 /// Bins over which the power of a residual is averaged.

@@ -5,9 +5,11 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use crate::baseline::direction_of;
 use crate::candidates::cause::{Part, Place};
 use crate::conclusion::answer::{Figure, NINETY_PERCENT, NamedCause};
-use crate::fit::library::{Explanation, Library};
+use crate::fit::candidate_model::Explanation;
+use crate::fit::covariance::covariance;
+use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
-use crate::records::study::{Domain, Scene};
+use crate::records::study::Scene;
 use crate::selection::select::APART;
 
 /// The causes of an explanation.
@@ -165,48 +167,6 @@ fn figure(value: f64, deviation: f64) -> Figure {
             value + NINETY_PERCENT * deviation,
         ],
     }
-}
-
-/// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1, of which
-/// there is so many times the power. What is left of forces is no noise: errors of the motion's derivatives and of the equations,
-/// of which the covariance is taken as they are.
-pub(crate) fn covariance(
-    scene: &Scene<'_>,
-    library: &Library,
-    regression: &mut Regression,
-    explanation: &Explanation,
-    inflation: f64,
-) -> Vec<DMatrix<f64>> {
-    let mut columns = library.columns_of(explanation);
-    let mut places: Vec<Vec<usize>> = Vec::new();
-    let mut from = 0;
-    for place in 0..explanation.choices.len() {
-        let coefficients = library.coefficients(explanation, place);
-        places.push((from..from + coefficients.len()).collect());
-        from += coefficients.len();
-    }
-    for (rows, slopes) in places
-        .iter_mut()
-        .zip(library.slopes_of(scene, regression, explanation))
-    {
-        rows.extend(columns.len()..columns.len() + slopes.len());
-        columns.extend(slopes);
-    }
-    let whole = match regression.fit(Share::Whole, &columns) {
-        Some(fit) if scene.all_in(Domain::Force) => {
-            regression.covariance_by_residual(Share::Whole, &columns, &fit) / inflation
-        }
-        Some(fit) => fit.covariance,
-        None => explanation.fit.covariance.clone(),
-    };
-    places
-        .iter()
-        .map(|rows| {
-            DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
-                whole.get((rows[i], rows[j])).copied().unwrap_or(0.0)
-            })
-        })
-        .collect()
 }
 
 /// The parts of a cause with each principal direction of its covariance at the ends of its 90 % interval; a direction in which no

@@ -5,10 +5,12 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::conclusion::missing_force::MissingForce;
-use crate::fit::library::{Explanation, Library};
+use crate::fit::candidate_model::Explanation;
+use crate::fit::library::Library;
 use crate::motion::recorded_cut::RecordedCut;
+use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::{Domain, Scene};
+use crate::records::study::Scene;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 

@@ -1,17 +1,8 @@
 //! Fits of explanations in closed loop: the extended case moves as it would, and not along the motion that was measured.
 
-use crate::fit::library::{Explanation, Library};
+use crate::fit::candidate_model::Explanation;
+use crate::fit::library::Library;
 use crate::fit::regression::Regression;
-use crate::records::record::Clean;
-
-/// Records with an extended case.
-#[derive(Debug)]
-pub(crate) struct Reading {
-    /// By record and channel: measured less computed.
-    pub residuals: Vec<Vec<Vec<f64>>>,
-    /// What the channels read without their noise.
-    pub predicted: Vec<Clean>,
-}
 
 /// What can fit explanations so.
 pub(crate) trait ClosedFit {

@@ -18,7 +18,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::candidates::closed_loop::ClosedLoop;
-use crate::fit::library::{Explanation, Library};
+use crate::fit::candidate_model::Explanation;
+use crate::fit::library::Library;
 use crate::fit::output_error::{OutputError, projected};
 use crate::fit::segment::{Part, Share};
 use crate::fit::unknowns::{Slot, at_bounds, covariance};

@@ -1,14 +1,11 @@
 //! Which causes explain the residual, and which do so equally well.
 
-use std::sync::Arc;
-
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::candidates;
 use crate::candidates::cause::{Cause, Parameter, Place};
-use crate::fit::closed_fit::Reading;
-use crate::fit::regression::{Fit, Regression, Share};
+use crate::fit::candidate_model::{Choice, Explanation};
+use crate::fit::regression::{Regression, Share};
 use crate::records::record::Record;
 use crate::records::study::Scene;
 
@@ -22,39 +19,6 @@ pub(crate) struct Candidate {
     pub shapes: Vec<(Vec<f64>, Vec<usize>)>,
 }
 
-/// One candidate with one of its shapes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct Choice {
-    /// The candidate.
-    pub candidate: usize,
-    /// Its shape.
-    pub shape: usize,
-}
-
-/// Causes that act together, fitted.
-#[derive(Clone, Debug)]
-pub(crate) struct Explanation {
-    /// What acts.
-    pub choices: Vec<Choice>,
-    /// The fit of all their coefficients, in the order of the choices.
-    pub fit: Fit,
-    /// Parameters that were fitted, those of the shape included.
-    pub freedoms: usize,
-    /// What simulation says, where the records can be simulated: coefficients, shapes and what is left are then its own.
-    pub simulated: Option<Simulated>,
-}
-
-/// Parameters that make a simulation agree with the records.
-#[derive(Clone, Debug)]
-pub(crate) struct Simulated {
-    /// By choice: covariance of coefficients and, behind them, of the shape, for noise of deviation 1.
-    pub covariance: Vec<DMatrix<f64>>,
-    /// By record: states at its start; empty where it starts from rest.
-    pub starts: Vec<Vec<f64>>,
-    /// The records with the extended case, where that is kept.
-    pub reading: Option<Arc<Reading>>,
-}
-
 /// The library on a scene.
 pub(crate) struct Library {
     /// All causes.
@@ -62,9 +26,6 @@ pub(crate) struct Library {
     /// Where they could act.
     pub candidates: Vec<Candidate>,
 }
-
-/// How many of the best pairs are tried with a third cause.
-const PAIRS_KEPT: usize = 24;
 
 impl Library {
     /// All causes on a scene, with their columns added to the regression.
@@ -276,78 +237,6 @@ impl Library {
         };
         let parts = explanation.choices.iter().zip(parameters).flat_map(of);
         Some(parts.map(|part| (part.name, part.extension)).collect())
-    }
-
-    /// The best explanation by each single candidate, best first.
-    pub(crate) fn singles(&self, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
-        let found = self
-            .choices()
-            .par_iter()
-            .filter_map(|choice| self.explain(scene, regression, &[*choice]))
-            .collect();
-        self.best_of_each(found)
-    }
-
-    /// The best explanation by each pair of candidates, best first.
-    pub(crate) fn pairs(&self, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
-        let choices = self.choices();
-        let found = choices
-            .par_iter()
-            .enumerate()
-            .flat_map_iter(|(index, first)| {
-                let rest = &choices[index + 1..];
-                rest.iter()
-                    .filter(|second| self.may_act_together(&[*first], **second))
-                    .filter_map(|second| self.explain(scene, regression, &[*first, *second]))
-                    .collect::<Vec<_>>()
-            })
-            .collect();
-        self.best_of_each(found)
-    }
-
-    /// The best explanation by each triple that contains one of the best pairs, best first.
-    pub(crate) fn triples(
-        &self,
-        scene: &Scene<'_>,
-        regression: &Regression,
-        pairs: &[Explanation],
-    ) -> Vec<Explanation> {
-        let choices = self.choices();
-        let found = pairs
-            .par_iter()
-            .take(PAIRS_KEPT)
-            .flat_map_iter(|pair| {
-                choices
-                    .iter()
-                    .filter(|third| self.may_act_together(&pair.choices, **third))
-                    .filter_map(|third| {
-                        let mut all = pair.choices.clone();
-                        all.push(*third);
-                        all.sort_unstable();
-                        self.explain(scene, regression, &all)
-                    })
-                    .collect::<Vec<_>>()
-            })
-            .collect();
-        self.best_of_each(found)
-    }
-
-    fn best_of_each(&self, mut found: Vec<Explanation>) -> Vec<Explanation> {
-        found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
-        let mut seen: Vec<Vec<usize>> = Vec::new();
-        found.retain(|explanation| {
-            let who: Vec<usize> = explanation
-                .choices
-                .iter()
-                .map(|choice| choice.candidate)
-                .collect();
-            let new = !seen.contains(&who);
-            if new {
-                seen.push(who);
-            }
-            new
-        });
-        found
     }
 
     /// By choice of an explanation: columns of the change of what it adds per unit of each parameter of its shape; none where the

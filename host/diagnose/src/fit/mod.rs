@@ -1,6 +1,8 @@
 //! The parameters of one candidate model: linear regression first, then the prediction-error fit.
 
+pub(crate) mod candidate_model;
 pub(crate) mod closed_fit;
+pub(crate) mod covariance;
 pub(crate) mod force_noise;
 pub(crate) mod library;
 pub(crate) mod normal_equations;

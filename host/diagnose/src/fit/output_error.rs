@@ -10,13 +10,15 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::candidates::closed_loop::{ClosedLoop, starts_anywhere};
+use crate::fit::candidate_model::{Explanation, Simulated};
 use crate::fit::closed_fit::ClosedFit;
-use crate::fit::library::{Explanation, Library, Simulated};
+use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression};
 use crate::fit::segment::{Part, Share, Unknown, split};
 use crate::fit::unknowns::{Found, Point, Problem, Slot, at_bounds, by_choice, energy, predicted, stepped};
-use crate::motion::free_decay::{Decays, dot};
+use crate::motion::free_decay::Decays;
 use crate::records::study::Scene;
+use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
 /// Steps of the search at most.

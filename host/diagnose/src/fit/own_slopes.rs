@@ -9,8 +9,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::closed_fit::Reading;
-use crate::fit::library::{Explanation, Library, Simulated};
+use crate::fit::candidate_model::Reading;
+use crate::fit::candidate_model::{Explanation, Simulated};
+use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
 use crate::fit::relinearization::Relinearization;
 

@@ -1,6 +1,7 @@
 //! Shapes between those of the grid.
 
-use crate::fit::library::{Explanation, Library};
+use crate::fit::candidate_model::Explanation;
+use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
 use crate::records::study::Scene;
 

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use crate::fit::normal_equations::{Products, products};
 pub(crate) use crate::fit::segment::Share;
 use crate::fit::segment::{Part, Unknown, split};
-use crate::motion::free_decay::dot;
 use crate::records::record::TRUSTED_IN_CUTS;
 use crate::records::study::Scene;
+use crate::signal::dot::dot;
 
 /// What is added to the squares of columns, as a share, where all columns of the library are fitted at once.
 const SOFTENED: f64 = 1e-9;

@@ -8,10 +8,12 @@
 
 use std::sync::Arc;
 
-use crate::conclusion::extended_case::joined;
-use crate::conclusion::parameter_estimates::covariance;
-use crate::fit::closed_fit::{ClosedFit, Reading};
-use crate::fit::library::{Choice, Explanation, Library, Simulated};
+use crate::candidates::extension_tables::joined;
+use crate::fit::candidate_model::Reading;
+use crate::fit::candidate_model::{Choice, Explanation, Simulated};
+use crate::fit::closed_fit::ClosedFit;
+use crate::fit::covariance::covariance;
+use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
 use crate::records::record::{Clean, Known, Record};
 use crate::records::study::Scene;

@@ -5,9 +5,10 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::fit::whitening::Whitening;
-use crate::motion::free_decay::dot;
+use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::{Domain, Scene};
+use crate::records::study::Scene;
+use crate::signal::dot::dot;
 use crate::signal::grid::Stretch;
 use quietcut_recording::Kind;
 

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::library::{Choice, Library};
-use crate::motion::free_decay::dot;
+use crate::fit::candidate_model::Choice;
+use crate::fit::library::Library;
 use crate::records::study::Scene;
+use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
 /// Parameters and initial states.

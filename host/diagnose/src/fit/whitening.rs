@@ -4,8 +4,8 @@ use nalgebra::Cholesky;
 use num_complex::Complex64;
 
 use crate::records::amplification::LoopNoise;
+use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Domain;
 
 /// The noise of the channels at each bin: that of the sensors, and what they read of the response to the noise of the force sensors and
 /// to what sampling hides of the forces, both taken as the floor of their spectra. The latter all channels have in common:

@@ -8,8 +8,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
+use crate::motion::cut_force::CutForce;
 use crate::motion::mean_slopes::MeanSlopes;
-use crate::motion::recorded_cut::CutForce;
 use crate::motion::spindle_motion::Turning;
 use quietcut_simulate::path::{Motion, between};
 use quietcut_simulate::{Cutter, Immersion, Tooth};

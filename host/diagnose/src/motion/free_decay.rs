@@ -5,8 +5,10 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 
 use crate::baseline::{Baseline, derivatives};
-use crate::records::record::Record;
+use crate::signal::dot::dot;
+use crate::signal::grid::Grid;
 use quietcut_recording::Quantity;
+use quietcut_simulate::effect::Pickup;
 
 /// The decay of each state of the baseline as each channel reads it, and how much of each the record holds.
 #[derive(Clone, Debug, Default)]
@@ -20,24 +22,27 @@ pub(crate) struct Decays {
 }
 
 impl Decays {
-    pub(crate) fn of(baseline: &Baseline<'_>, record: &Record) -> Self {
+    pub(crate) fn of<'p>(
+        baseline: &Baseline<'_>,
+        grid: &Grid,
+        pickups: impl Iterator<Item = &'p Pickup>,
+        skipped: &[Vec<usize>],
+    ) -> Self {
         let first_order = &baseline.first_order;
         let order = first_order.order();
-        let count = record.grid.count();
-        let step = (&first_order.a / record.grid.rate_hz()).exp();
-        let columns = record
-            .channels
-            .iter()
-            .map(|channel| {
+        let count = grid.count();
+        let step = (&first_order.a / grid.rate_hz()).exp();
+        let columns = pickups
+            .map(|pickup| {
                 let mut row = DMatrix::zeros(1, order);
-                if channel.pickup.quantity == Quantity::Force {
+                if pickup.quantity == Quantity::Force {
                     return vec![vec![0.0; count]; order];
                 }
-                let seen = first_order.seen(&channel.pickup.modes);
-                for (axis, weight) in channel.pickup.weights.iter().enumerate() {
+                let seen = first_order.seen(&pickup.modes);
+                for (axis, weight) in pickup.weights.iter().enumerate() {
                     row += seen.c.row(axis) * *weight;
                 }
-                for _ in 0..derivatives(channel.pickup.quantity) {
+                for _ in 0..derivatives(pickup.quantity) {
                     row = &row * &first_order.a;
                 }
                 let mut columns = vec![Vec::with_capacity(count); order];
@@ -52,7 +57,7 @@ impl Decays {
             .collect();
         Self {
             columns,
-            skipped: record.skipped.clone(),
+            skipped: skipped.to_vec(),
             start: vec![0.0; order],
         }
     }
@@ -134,22 +139,4 @@ impl Decays {
             }
         }
     }
-}
-
-/// Σ a·b, in eight sums side by side: that is what a processor can do at once.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a_chunks
-        .remainder()
-        .iter()
-        .zip(b_chunks.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a_chunks.zip(b_chunks) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }

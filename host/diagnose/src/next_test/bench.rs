@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Matrix3;
 use num_complex::Complex64;
 
-use super::experiment::Reading;
+use super::reading::Reading;
 use crate::baseline::{Baseline, derivatives};
 use crate::conclusion::residual_views::View;
 use crate::signal::noise::rms;

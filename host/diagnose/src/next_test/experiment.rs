@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use super::bench::Bench;
-use super::separation::Difference;
+use super::reading::{Of, Reading, Sensors};
 use crate::conclusion::answer::NextTest;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
@@ -17,32 +17,6 @@ use quietcut_simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
 const TOO_LARGE: f64 = 10.0;
 /// The smallest blow of a hammer, N.
 const LEAST_BLOW_N: f64 = 1.0;
-/// Which sensors are heard.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sensors {
-    /// Those that made the records.
-    Mounted,
-    /// Those, and beside each of them another at the tool.
-    Second,
-    /// Those, and a dynamometer.
-    Force,
-}
-
-/// Which sensor a reading is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Of {
-    Mounted,
-    Second,
-    Force,
-}
-
-/// What one sensor says.
-pub(super) struct Reading {
-    pub(super) name: String,
-    of: Of,
-    pub(super) samples: Vec<f64>,
-}
-
 /// Something to do, without what is measured.
 #[derive(Clone, Debug)]
 pub(super) enum Doing {
@@ -64,41 +38,6 @@ pub(super) struct Experiment {
     rate_hz: f64,
     /// How much more work it is than another.
     pub(super) effort: f64,
-}
-
-impl Sensors {
-    pub(super) fn effort(self) -> f64 {
-        match self {
-            Self::Mounted => 0.0,
-            Self::Second => 1.0,
-            Self::Force => 1.5,
-        }
-    }
-
-    fn described(self) -> Option<&'static str> {
-        match self {
-            Self::Mounted => None,
-            Self::Second => Some("a second sensor at the tool beside each that is mounted"),
-            Self::Force => Some("the cutting force, with a dynamometer"),
-        }
-    }
-}
-
-impl Reading {
-    pub(super) fn is_heard(&self, sensors: Sensors) -> bool {
-        match self.of {
-            Of::Mounted => true,
-            Of::Second => sensors == Sensors::Second,
-            Of::Force => sensors == Sensors::Force,
-        }
-    }
-
-    pub(super) fn described(&self) -> String {
-        match self.of {
-            Of::Second => format!("a second sensor of {}", self.name),
-            Of::Mounted | Of::Force => self.name.clone(),
-        }
-    }
 }
 
 /// Everything that is thought of, with what each costs.
@@ -299,7 +238,7 @@ impl Experiment {
     }
 
     /// As the answer has it.
-    pub(super) fn described(&self, sensors: Sensors, least: &Difference, why: String) -> NextTest {
+    pub(super) fn described(&self, sensors: Sensors, distance: f64, why: String) -> NextTest {
         let plain = NextTest {
             kind: "",
             direction: None,
@@ -310,7 +249,7 @@ impl Experiment {
             feed_per_tooth_mm: None,
             seconds: 0.0,
             measure: sensors.described(),
-            distance: least.squared.sqrt(),
+            distance,
             why,
         };
         match &self.doing {

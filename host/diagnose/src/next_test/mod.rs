@@ -7,6 +7,7 @@
 
 mod bench;
 mod experiment;
+mod reading;
 mod separation;
 #[cfg(test)]
 mod tests;
@@ -14,7 +15,8 @@ mod tests;
 use rayon::prelude::*;
 
 use self::bench::Bench;
-use self::experiment::{Experiment, Sensors, experiments};
+use self::experiment::{Experiment, experiments};
+use self::reading::Sensors;
 use self::separation::{Difference, Rival};
 use crate::conclusion::answer::{Diagnosis, NextTest, label};
 use quietcut_model::case::Case;
@@ -62,7 +64,7 @@ pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagn
     let [one, other] = best.between.map(|index| label(&explanations[index]));
     Some(
         best.experiment
-            .described(best.sensors, &best.least, best.why(&one, &other)),
+            .described(best.sensors, best.least.squared.sqrt(), best.why(&one, &other)),
     )
 }
 

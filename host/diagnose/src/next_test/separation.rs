@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::bench::Bench;
-use super::experiment::{Experiment, Reading, Sensors};
+use super::experiment::Experiment;
+use super::reading::{Reading, Sensors};
+use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{Figure, NINETY_PERCENT, NamedCause};
-use crate::conclusion::extended_case::joined;
 use quietcut_model::case::Case;
 
 /// The least step of a parameter by which readings are differenced, as a share of it: the simulation is exact to 1e-9.

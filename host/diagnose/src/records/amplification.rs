@@ -19,7 +19,8 @@ use num_complex::Complex64;
 
 use crate::motion::mean_slopes::MeanSlopes;
 use crate::motion::recorded_cut::RecordedCut;
-use crate::records::motion_estimate::{main_axis, weighed};
+use crate::records::channel::main_axis;
+use crate::records::motion_estimate::weighed;
 use crate::records::record::Record;
 use quietcut_recording::Quantity;
 

@@ -2,10 +2,9 @@
 
 use crate::baseline::Baseline;
 use crate::error::DiagnoseError;
-use crate::records::record::Observed;
-use crate::records::study::Domain;
+use crate::records::channel::Observed;
 use crate::signal::noise::rms;
-use quietcut_recording::{Kind, Quantity, Recording};
+use quietcut_recording::Recording;
 
 /// Fewest samples.
 const FEWEST: usize = 128;
@@ -13,60 +12,6 @@ const FEWEST: usize = 128;
 const PERIODS: f64 = 3.0;
 /// Share of samples at the very ends of a channel's range, in runs, from which on it is clipped.
 const CLIPPED: f64 = 0.002;
-
-/// In what a recording is compared.
-pub(crate) fn domain(baseline: &Baseline<'_>, recording: &Recording) -> Result<Domain, DiagnoseError> {
-    let has = |quantity: Quantity| {
-        recording
-            .channels
-            .iter()
-            .any(|channel| channel.quantity == quantity)
-    };
-    let motion = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
-    let input = recording.sidecar.input.clone().unwrap_or_default();
-    for name in &input {
-        if recording.channel(name).is_none() {
-            return Err(recording
-                .lacks(format!("{name}, which its sidecar names as its input"))
-                .into());
-        }
-    }
-    if !motion.into_iter().any(has) {
-        return Err(recording
-            .lacks("channel of motion, such as x [m] or ax [m/s^2]")
-            .into());
-    }
-    let kind = recording.sidecar.kind;
-    if kind == Some(Kind::Cutting) {
-        return Ok(Domain::Response);
-    }
-    let driven_by_motion = input
-        .iter()
-        .filter_map(|name| recording.channel(name))
-        .any(|channel| motion.contains(&channel.quantity));
-    if driven_by_motion || (baseline.is_free() && kind != Some(Kind::FreeDecay)) {
-        if !has(Quantity::Force) {
-            return Err(recording
-                .lacks("channel of force, such as fx [N]: driven by motion, that is what the case predicts")
-                .into());
-        }
-        return Ok(Domain::Force);
-    }
-    match kind {
-        Some(Kind::Idle) => Err(DiagnoseError::record(
-            &recording.path,
-            "an idle record has nothing that drives the structure as far as the case knows: shaker, step-sine, sweep, \
-             hammer, free-decay and cutting are diagnosed",
-        )),
-        Some(Kind::FreeDecay) => Ok(Domain::Response),
-        _ if has(Quantity::Force) => Ok(Domain::Response),
-        _ => Err(recording
-            .lacks(
-                "channel of the force that drove it, such as fx [N] (only kind = \"free-decay\" needs none)",
-            )
-            .into()),
-    }
-}
 
 /// Refuses what no fit could use.
 pub(crate) fn record(

@@ -6,7 +6,8 @@ use num_complex::Complex64;
 use crate::baseline::{Baseline, derivatives};
 use crate::error::DiagnoseError;
 use crate::motion::mean_slopes::MeanSlopes;
-use crate::records::record::{Observed, Record};
+use crate::records::channel::{Observed, main_axis};
+use crate::records::record::Record;
 use crate::signal::noise::{rms, white_floor};
 use quietcut_recording::{Kind, Quantity, Recording};
 use quietcut_simulate::path::{Motion, restoring_along};
@@ -243,17 +244,6 @@ fn heard(power: &[f64]) -> Vec<f64> {
             if mean > HEARD { 1.0 - 1.0 / mean } else { 0.0 }
         })
         .collect()
-}
-
-/// The axis that a channel reads most.
-pub(crate) fn main_axis(channel: &Observed) -> Option<usize> {
-    (0..3)
-        .filter(|axis| channel.pickup.weights[*axis] != 0.0)
-        .max_by(|a, b| {
-            channel.pickup.weights[*a]
-                .abs()
-                .total_cmp(&channel.pickup.weights[*b].abs())
-        })
 }
 
 /// Displacement and velocity of the record's free decay at the finer samples, by axis.

@@ -2,19 +2,12 @@
 
 use crate::baseline::Baseline;
 use crate::error::DiagnoseError;
+use crate::records::domain::Domain;
+use crate::records::prepare::prepare;
 use crate::records::record::{Known, Record};
 use quietcut_model::case::Case;
 use quietcut_model::structure::Form;
 use quietcut_recording::Recording;
-
-/// In which quantity a record is compared with the baseline.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Domain {
-    /// The force drives, the motion is predicted: y − H·(F − f_r).
-    Response,
-    /// The motion drives (`input = ["x"]`), or the structure is free to go away: F − (M ẍ + C ẋ + K x + f_r).
-    Force,
-}
 
 /// Baseline and records.
 pub(crate) struct Scene<'a> {
@@ -53,7 +46,7 @@ impl<'a> Scene<'a> {
         let records = recordings
             .iter()
             .enumerate()
-            .map(|(index, recording)| Record::new(&baseline, recording, known(index)))
+            .map(|(index, recording)| prepare(&baseline, recording, known(index)))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self { baseline, records })
     }

@@ -2,8 +2,9 @@
 
 use std::collections::VecDeque;
 
+use crate::fit::candidate_model::Explanation;
 use crate::fit::closed_fit::ClosedFit;
-use crate::fit::library::{Explanation, Library};
+use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
 use crate::selection::rebaselined::extended_around;
 use crate::selection::select::{APART, Scale};

@@ -1,7 +1,8 @@
 //! Which causes may act together.
 
 use crate::candidates::cause::Place;
-use crate::fit::library::{Choice, Explanation, Library};
+use crate::fit::candidate_model::{Choice, Explanation};
+use crate::fit::library::Library;
 
 /// What the force of a cause is a function of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,5 +3,6 @@
 pub(crate) mod closed_selection;
 pub(crate) mod compatibility;
 pub(crate) mod rebaselined;
+pub(crate) mod search;
 pub(crate) mod select;
 pub(crate) mod stepwise;

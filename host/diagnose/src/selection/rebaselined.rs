@@ -7,10 +7,12 @@
 
 use nalgebra::DMatrix;
 
-use crate::conclusion::extended_case::joined;
-use crate::fit::library::{Explanation, Library};
+use crate::candidates::extension_tables::joined;
+use crate::fit::candidate_model::Explanation;
+use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Share};
 use crate::records::study::Scene;
+use crate::selection::search::singles;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
@@ -37,8 +39,7 @@ pub(crate) fn extended_around(
     }
     let mut columns = Regression::new(&around);
     let others = Library::new(&around, &mut columns);
-    let mut found: Vec<Explanation> = others
-        .singles(&around, &columns)
+    let mut found: Vec<Explanation> = singles(&others, &around, &columns)
         .into_iter()
         .filter_map(|single| {
             let choice = single.choices[0];

@@ -1,7 +1,8 @@
 //! Which explanation is selected: causes are added while that gains more than it costs.
 
+use crate::fit::candidate_model::Explanation;
 use crate::fit::closed_fit::ClosedFit;
-use crate::fit::library::{Explanation, Library};
+use crate::fit::library::Library;
 use crate::fit::output_error::OutputError;
 use crate::fit::refine::refine;
 use crate::fit::regression::{Regression, Share};
@@ -9,6 +10,7 @@ use crate::fit::relinearization::Relinearization;
 use crate::progress::Stage;
 use crate::records::record::TRUSTED_IN_CUTS;
 use crate::records::study::Scene;
+use crate::selection::search::{pairs as best_pairs, singles, triples};
 use crate::selection::stepwise::extended;
 use quietcut_recording::Recording;
 
@@ -266,9 +268,9 @@ pub(crate) fn select(
         watch(Stage::Causes(size));
         regression.complete();
         let mut found = match size {
-            1 => library.singles(scene, regression),
-            2 => library.pairs(scene, regression),
-            _ => library.triples(scene, regression, &pairs),
+            1 => singles(library, scene, regression),
+            2 => best_pairs(library, scene, regression),
+            _ => triples(library, scene, regression, &pairs),
         };
         // Simulations of several causes begin at the shapes that were found of each alone.
         if size == 1 || scale.closed.is_none() {

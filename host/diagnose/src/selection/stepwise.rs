@@ -6,7 +6,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::fit::library::{Choice, Explanation, Library};
+use crate::fit::candidate_model::{Choice, Explanation};
+use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Share};
 use crate::records::study::Scene;
 

@@ -7,7 +7,7 @@
 //! 30 (1994).
 
 use super::{Restoring, largest_m, plain};
-use crate::records::study::Domain;
+use crate::records::domain::Domain;
 
 pub(super) const ALIKE: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc > 0.0),

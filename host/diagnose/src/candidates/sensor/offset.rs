@@ -9,11 +9,13 @@
 
 use super::gain::{Gain, factor};
 use super::one_or_all;
-use crate::baseline::receptance::Receptance;
+use crate::baseline::receptance::{Receptance, response};
 use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
-use crate::records::motion_estimate::main_axis;
-use crate::records::record::{Observed, Record, response};
-use crate::records::study::{Domain, Scene};
+use crate::records::channel::Observed;
+use crate::records::channel::main_axis;
+use crate::records::domain::Domain;
+use crate::records::record::Record;
+use crate::records::study::Scene;
 use quietcut_model::structure::Form;
 
 pub(super) struct Offset;

@@ -1,0 +1,62 @@
+//! The readings of the sensors in an experiment.
+
+/// Which sensors are heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sensors {
+    /// Those that made the records.
+    Mounted,
+    /// Those, and beside each of them another at the tool.
+    Second,
+    /// Those, and a dynamometer.
+    Force,
+}
+
+/// Which sensor a reading is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Of {
+    Mounted,
+    Second,
+    Force,
+}
+
+/// What one sensor says.
+pub(super) struct Reading {
+    pub(super) name: String,
+    pub(super) of: Of,
+    pub(super) samples: Vec<f64>,
+}
+
+impl Sensors {
+    pub(super) fn effort(self) -> f64 {
+        match self {
+            Self::Mounted => 0.0,
+            Self::Second => 1.0,
+            Self::Force => 1.5,
+        }
+    }
+
+    pub(super) fn described(self) -> Option<&'static str> {
+        match self {
+            Self::Mounted => None,
+            Self::Second => Some("a second sensor at the tool beside each that is mounted"),
+            Self::Force => Some("the cutting force, with a dynamometer"),
+        }
+    }
+}
+
+impl Reading {
+    pub(super) fn is_heard(&self, sensors: Sensors) -> bool {
+        match self.of {
+            Of::Mounted => true,
+            Of::Second => sensors == Sensors::Second,
+            Of::Force => sensors == Sensors::Force,
+        }
+    }
+
+    pub(super) fn described(&self) -> String {
+        match self.of {
+            Of::Second => format!("a second sensor of {}", self.name),
+            Of::Mounted | Of::Force => self.name.clone(),
+        }
+    }
+}

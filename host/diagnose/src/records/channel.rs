@@ -1,0 +1,56 @@
+//! One channel of a record: its measured and its predicted samples.
+
+use nalgebra::Matrix3;
+use num_complex::Complex64;
+
+use crate::baseline::derivatives;
+use quietcut_simulate::effect::Pickup;
+
+/// A channel that the baseline predicts.
+#[derive(Clone, Debug)]
+pub(crate) struct Observed {
+    /// The quantity, axes, delay and modes that the sensor reads.
+    pub pickup: Pickup,
+    /// Measured samples, SI units.
+    pub measured: Vec<f64>,
+    /// Prediction of the baseline along the measured motion.
+    pub predicted: Vec<f64>,
+    /// Standard deviation of the channel's white noise.
+    pub deviation: f64,
+    /// Averaging time of the sensor, s: one sample for accelerations where the velocity jumps, else zero.
+    pub(super) mean_s: f64,
+    /// Receptance at the sensor, where the baseline has mode shapes there: see [`Record::seen_by`](super::record::Record::seen_by).
+    pub(super) seen: Option<Vec<Matrix3<Complex64>>>,
+}
+
+impl Observed {
+    /// Measured minus predicted samples.
+    pub(crate) fn residual(&self) -> Vec<f64> {
+        self.measured
+            .iter()
+            .zip(&self.predicted)
+            .map(|(a, b)| a - b)
+            .collect()
+    }
+
+    /// Transfer function from displacement to this channel, without its weights: (iω)^q e^(−iωτ) sinc(ωT/2), where q is the number of
+    /// derivatives, τ the delay and T the averaging time.
+    pub(crate) fn factor(&self, omega: f64) -> Complex64 {
+        let half = 0.5 * omega * self.mean_s;
+        let mean = if half == 0.0 { 1.0 } else { half.sin() / half };
+        Complex64::new(0.0, omega).powi(derivatives(self.pickup.quantity))
+            * Complex64::cis(-omega * self.pickup.delay_s)
+            * mean
+    }
+}
+
+/// The axis with the largest weight in a channel.
+pub(crate) fn main_axis(channel: &Observed) -> Option<usize> {
+    (0..3)
+        .filter(|axis| channel.pickup.weights[*axis] != 0.0)
+        .max_by(|a, b| {
+            channel.pickup.weights[*a]
+                .abs()
+                .total_cmp(&channel.pickup.weights[*b].abs())
+        })
+}

@@ -1,0 +1,76 @@
+//! The quantity in which a record is compared with the baseline.
+
+use crate::baseline::Baseline;
+use crate::error::DiagnoseError;
+use quietcut_recording::{Kind, Quantity, Recording};
+
+/// The quantity in which a record is compared with the baseline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Domain {
+    /// The force is the input and the motion is predicted: y − H·(F − f_r).
+    Response,
+    /// The motion is the input (`input = ["x"]`, or a structure without stiffness) and the force is predicted:
+    /// F − (M ẍ + C ẋ + K x + f_r).
+    Force,
+}
+
+impl Domain {
+    /// The domain of a recording, from its kind, its input and its channels.
+    ///
+    /// # Errors
+    /// A missing channel, or a recording without a known excitation.
+    pub(super) fn of(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
+        let has = |quantity: Quantity| {
+            recording
+                .channels
+                .iter()
+                .any(|channel| channel.quantity == quantity)
+        };
+        let motion = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
+        let input = recording.sidecar.input.clone().unwrap_or_default();
+        for name in &input {
+            if recording.channel(name).is_none() {
+                return Err(recording
+                    .lacks(format!("{name}, which its sidecar names as its input"))
+                    .into());
+            }
+        }
+        if !motion.into_iter().any(has) {
+            return Err(recording
+                .lacks("channel of motion, such as x [m] or ax [m/s^2]")
+                .into());
+        }
+        let kind = recording.sidecar.kind;
+        if kind == Some(Kind::Cutting) {
+            return Ok(Self::Response);
+        }
+        let driven_by_motion = input
+            .iter()
+            .filter_map(|name| recording.channel(name))
+            .any(|channel| motion.contains(&channel.quantity));
+        if driven_by_motion || (baseline.is_free() && kind != Some(Kind::FreeDecay)) {
+            if !has(Quantity::Force) {
+                return Err(recording
+                    .lacks(
+                        "channel of force, such as fx [N]: driven by motion, that is what the case predicts",
+                    )
+                    .into());
+            }
+            return Ok(Self::Force);
+        }
+        match kind {
+        Some(Kind::Idle) => Err(DiagnoseError::record(
+            &recording.path,
+            "an idle record has nothing that drives the structure as far as the case knows: shaker, step-sine, sweep, \
+             hammer, free-decay and cutting are diagnosed",
+        )),
+        Some(Kind::FreeDecay) => Ok(Self::Response),
+        _ if has(Quantity::Force) => Ok(Self::Response),
+        _ => Err(recording
+            .lacks(
+                "channel of the force that drove it, such as fx [N] (only kind = \"free-decay\" needs none)",
+            )
+            .into()),
+    }
+    }
+}

@@ -1,0 +1,83 @@
+//! The best candidate models of one, two and three causes along the measured motion.
+
+use rayon::prelude::*;
+
+use crate::fit::candidate_model::Explanation;
+use crate::fit::library::Library;
+use crate::fit::regression::Regression;
+use crate::records::study::Scene;
+
+/// How many of the best pairs are tried with a third cause.
+const PAIRS_KEPT: usize = 24;
+
+/// The best explanation by each single candidate, best first.
+pub(crate) fn singles(library: &Library, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+    let found = library
+        .choices()
+        .par_iter()
+        .filter_map(|choice| library.explain(scene, regression, &[*choice]))
+        .collect();
+    best_of_each(found)
+}
+
+/// The best explanation by each pair of candidates, best first.
+pub(crate) fn pairs(library: &Library, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+    let choices = library.choices();
+    let found = choices
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(index, first)| {
+            let rest = &choices[index + 1..];
+            rest.iter()
+                .filter(|second| library.may_act_together(&[*first], **second))
+                .filter_map(|second| library.explain(scene, regression, &[*first, *second]))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    best_of_each(found)
+}
+
+/// The best explanation by each triple that contains one of the best pairs, best first.
+pub(crate) fn triples(
+    library: &Library,
+    scene: &Scene<'_>,
+    regression: &Regression,
+    pairs: &[Explanation],
+) -> Vec<Explanation> {
+    let choices = library.choices();
+    let found = pairs
+        .par_iter()
+        .take(PAIRS_KEPT)
+        .flat_map_iter(|pair| {
+            choices
+                .iter()
+                .filter(|third| library.may_act_together(&pair.choices, **third))
+                .filter_map(|third| {
+                    let mut all = pair.choices.clone();
+                    all.push(*third);
+                    all.sort_unstable();
+                    library.explain(scene, regression, &all)
+                })
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    best_of_each(found)
+}
+
+fn best_of_each(mut found: Vec<Explanation>) -> Vec<Explanation> {
+    found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
+    let mut seen: Vec<Vec<usize>> = Vec::new();
+    found.retain(|explanation| {
+        let who: Vec<usize> = explanation
+            .choices
+            .iter()
+            .map(|choice| choice.candidate)
+            .collect();
+        let new = !seen.contains(&who);
+        if new {
+            seen.push(who);
+        }
+        new
+    });
+    found
+}
