@@ -37,7 +37,7 @@ pub use conclusion::answer::{self, Diagnosis};
 pub use conclusion::lobes;
 pub use conclusion::missing_force::{AtAmplitude, MissingForce};
 pub use conclusion::recorded_cuts::recorded_cuts;
-pub use conclusion::residual_views::{TurningView, View};
+pub use conclusion::residual_views::{SpindleMotionView, View};
 pub use error::DiagnoseError;
 pub use progress::{Options, Stage};
 
@@ -45,7 +45,7 @@ use conclusion::{conclude, long_records};
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 use records::full_engagement;
-use records::study::Scene;
+use records::study::Study;
 
 /// What the case gets wrong about the recordings, and why.
 ///
@@ -70,13 +70,13 @@ pub fn diagnose_watched(
     watch: &dyn Fn(Stage),
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
-    let (recordings, shortened) = full_engagement::in_full_cut(case, recordings)?;
+    let (recordings, shortened) = full_engagement::in_full_engagement(case, recordings)?;
     let mut diagnosis = match long_records::diagnosed(case, &recordings, options, watch) {
         Some(diagnosis) => diagnosis,
         None => {
             watch(Stage::Records);
-            let scene = Scene::new(case, &recordings)?;
-            conclude::judge(&scene, &recordings, options, watch)
+            let study = Study::new(case, &recordings)?;
+            conclude::judge(&study, &recordings, options, watch)
         }
     };
     diagnosis.next_test = next_test::next_test(case, &recordings, &diagnosis);

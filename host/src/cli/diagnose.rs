@@ -141,7 +141,7 @@ fn text(diagnosis: &Diagnosis) -> String {
         Outcome::Unexplained => "something is wrong that no known cause explains".into(),
     });
     for cause in &diagnosis.causes {
-        let place = match cause.place() {
+        let place = match cause.location() {
             place if place.is_empty() => place,
             place => format!(" ({place})"),
         };
@@ -170,7 +170,7 @@ fn text(diagnosis: &Diagnosis) -> String {
         lines.push(format!(
             "{:.2} % of what the case misses is not explained: {}",
             100.0 * diagnosis.unexplained.fraction,
-            diagnosis.unexplained.place
+            diagnosis.unexplained.location
         ));
     }
     lines.extend(diagnosis.unexplained.guess.clone());

@@ -6,7 +6,7 @@ use super::PictureError;
 use super::lobes_change::{called, picture, section};
 use super::page::page;
 use super::residual_pictures::{file_name, pictures};
-use crate::diagnose::answer::{Figure, NamedCause, Outcome};
+use crate::diagnose::answer::{EstimatedCause, Figure, Outcome};
 use crate::diagnose::{Diagnosis, View};
 
 /// Channels that get pictures: those that miss most.
@@ -46,7 +46,7 @@ pub fn diagnosis_page(
         h2 { "What is left" }
         p {
             (format!("{:.2} % of the energy that the case misses is neither explained nor noise. ", 100.0 * diagnosis.unexplained.fraction))
-            @if diagnosis.unexplained.fraction > 0.0 { (diagnosis.unexplained.place) "." }
+            @if diagnosis.unexplained.fraction > 0.0 { (diagnosis.unexplained.location) "." }
         }
         @if let Some(guess) = &diagnosis.unexplained.guess { p { (guess) "." } }
         h2 { "The residual, channel by channel" }
@@ -136,7 +136,7 @@ fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
     Ok(html! { @for picture in all { (picture) } })
 }
 
-fn cause_table(cause: &NamedCause) -> Markup {
+fn cause_table(cause: &EstimatedCause) -> Markup {
     let place = cause
         .channel
         .clone()

@@ -7,7 +7,7 @@ use super::comparison::{Line, Look, comparison};
 use super::page::figure;
 use super::stroboscope::samples_per_tooth;
 use super::time_signal::thinned;
-use crate::diagnose::{MissingForce, TurningView, View};
+use crate::diagnose::{MissingForce, SpindleMotionView, View};
 
 /// Points of a cloud, at most.
 const POINTS: usize = 3000;
@@ -36,7 +36,7 @@ pub(super) fn pictures(view: &View, fellows: &[&View], with_extension: bool) -> 
         &over_frequency(view)?,
         "Over frequency, as powers of ten of the amplitude per line. What stays at the level of the noise is explained.",
     )];
-    if let Some(turning) = &view.turning {
+    if let Some(turning) = &view.spindle_motion {
         halves.push(figure(
             &over_orders(view, turning)?,
             &format!(
@@ -139,7 +139,7 @@ fn over_frequency(view: &View) -> Result<String, PictureError> {
     comparison(HALF, ["", "frequency [Hz]", &unit], &lines, None)
 }
 
-fn over_orders(view: &View, turning: &TurningView) -> Result<String, PictureError> {
+fn over_orders(view: &View, turning: &SpindleMotionView) -> Result<String, PictureError> {
     let unit = format!("log10 of {} [{}]", view.channel, view.unit);
     let turns_hz = turning.rpm / 60.0;
     let last_hz = (ORDERS_PER_TOOTH * turning.teeth as f64 * turns_hz).min(0.5 * view.rate_hz);

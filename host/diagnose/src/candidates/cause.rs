@@ -10,13 +10,13 @@ use crate::baseline::direction_of;
 use crate::motion::cut_force::CutForce;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_model::structure::Direction;
 use quietcut_recording::Quantity;
 
 /// Where a cause acts.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Place {
+pub(crate) enum Location {
     /// On the whole machine.
     Everywhere,
     /// Along one of the machine's axes (0, 1, 2).
@@ -33,7 +33,7 @@ pub(crate) enum Place {
     ChannelFrom(String, usize),
 }
 
-impl Place {
+impl Location {
     /// The direction, where it is one.
     pub(crate) fn direction(&self) -> Option<Direction> {
         match self {
@@ -67,7 +67,7 @@ impl Place {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Everywhere => f.write_str("everywhere"),
@@ -185,7 +185,7 @@ pub(crate) struct Part {
     /// The name, as in `[extension.NAME]`.
     pub name: &'static str,
     /// Where this part acts.
-    pub place: Place,
+    pub location: Location,
     /// Its parameters.
     pub parameters: Vec<Parameter>,
     /// The extension that makes it part of a case.
@@ -206,38 +206,43 @@ pub(crate) trait Cause: Send + Sync {
     }
 
     /// Where in this scene it could act and be seen; empty where it cannot.
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place>;
+    fn locations(&self, study: &Study<'_>) -> Vec<Location>;
 
     /// Shapes to begin with: a grid over the parameters that do not enter linearly. One empty shape where all do.
-    fn shapes(&self, _scene: &Scene<'_>, _place: &Place) -> Vec<Vec<f64>> {
+    fn nonlinear_grid(&self, _scene: &Study<'_>, _place: &Location) -> Vec<Vec<f64>> {
         vec![Vec::new()]
     }
 
     /// Further shapes that are worth a look for what other causes have left, by record and channel.
-    fn shapes_beside(&self, _scene: &Scene<'_>, _place: &Place, _left: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+    fn nonlinear_grid_beside(
+        &self,
+        _scene: &Study<'_>,
+        _place: &Location,
+        _left: &[Vec<Vec<f64>>],
+    ) -> Vec<Vec<f64>> {
         Vec::new()
     }
 
     /// Bounds of the parameters of a shape: lowest and highest.
-    fn bounds(&self, _scene: &Scene<'_>, _place: &Place) -> Vec<[f64; 2]> {
+    fn bounds(&self, _scene: &Study<'_>, _place: &Location) -> Vec<[f64; 2]> {
         Vec::new()
     }
 
     /// What it adds to a record per unit of each coefficient; `None` where it cannot be computed there.
     fn regressors(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        place: &Place,
-        shape: &[f64],
+        location: &Location,
+        nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>>;
 
     /// Parameters by key of what was fitted; `None` where no such cause is physical (a negative friction).
     fn parameters(
         &self,
-        scene: &Scene<'_>,
-        place: &Place,
-        shape: &[f64],
+        study: &Study<'_>,
+        location: &Location,
+        nonlinear_parameters: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>>;
 
@@ -248,8 +253,8 @@ pub(crate) trait Cause: Send + Sync {
     }
 
     /// The extension that makes the cause part of a case.
-    fn extension(&self, place: &Place, parameters: &[Parameter]) -> toml::Table {
-        let mut table = place.table();
+    fn extension(&self, location: &Location, parameters: &[Parameter]) -> toml::Table {
+        let mut table = location.table();
         for (key, value) in parameters {
             table.insert((*key).into(), (*value).into());
         }
@@ -257,22 +262,22 @@ pub(crate) trait Cause: Send + Sync {
     }
 
     /// What the answer says, name by name: parameters and extension.
-    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
+    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
         vec![Part {
             name: self.name(),
-            place: place.clone(),
+            location: location.clone(),
             parameters: parameters.to_vec(),
-            extension: self.extension(place, parameters),
+            extension: self.extension(location, parameters),
         }]
     }
 
     /// Standard deviations of parameters that are known otherwise than by the fit, by key.
-    fn known_deviations(&self, _scene: &Scene<'_>) -> Vec<Parameter> {
+    fn known_deviations(&self, _scene: &Study<'_>) -> Vec<Parameter> {
         Vec::new()
     }
 
     /// Parameters that are said beside those of the extension, as the same thing in other words.
-    fn also(&self, _scene: &Scene<'_>, _place: &Place, _parameters: &[Parameter]) -> Vec<Parameter> {
+    fn also(&self, _scene: &Study<'_>, _place: &Location, _parameters: &[Parameter]) -> Vec<Parameter> {
         Vec::new()
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::signal::grid::{Grid, catmull_rom};
 use quietcut_model::structure::FirstOrder;
 use quietcut_recording::Kind;
@@ -109,7 +109,7 @@ fn can(record: &Record) -> bool {
 /// The static force that holds the structure of the first `own` states of `first_order` where they have the tool, N along the axes
 /// of the scene: F = H(0)⁻¹ u with H(0) = −C A⁻¹ B; `None` where a force is not held.
 pub(crate) fn holding_force_n(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     first_order: &FirstOrder,
     states: &[f64],
 ) -> Option<Vector3<f64>> {
@@ -118,7 +118,7 @@ pub(crate) fn holding_force_n(
     let c = first_order.c.columns(0, own);
     let compliance = -(c * a.lu().solve(&b)?);
     let moved = c * DVector::from_column_slice(states);
-    let axes = &scene.baseline.axes;
+    let axes = &study.baseline.axes;
     let compliance = DMatrix::from_fn(axes.len(), axes.len(), |i, j| compliance[(axes[i], axes[j])]);
     let force = compliance
         .lu()
@@ -132,13 +132,13 @@ pub(crate) fn holding_force_n(
 
 /// Modes that the extended case has more than the baseline begin where the static force has them that holds the rest where it
 /// begins: what was let go was pulled as a whole. Without such a force they begin at rest.
-fn let_go(scene: &Scene<'_>, dynamics: &Dynamics, states: &mut [f64]) {
-    let (own, all) = (scene.baseline.first_order.order(), dynamics.order());
+fn let_go(study: &Study<'_>, dynamics: &Dynamics, states: &mut [f64]) {
+    let (own, all) = (study.baseline.first_order.order(), dynamics.order());
     if own >= all {
         return;
     }
     let first_order = dynamics.first_order();
-    let Some(force) = holding_force_n(scene, &first_order, &states[..own]) else {
+    let Some(force) = holding_force_n(study, &first_order, &states[..own]) else {
         return;
     };
     let more = all - own;
@@ -158,9 +158,9 @@ fn let_go(scene: &Scene<'_>, dynamics: &Dynamics, states: &mut [f64]) {
 
 impl ClosedLoop {
     /// `None` where some record cannot be simulated.
-    pub(crate) fn new(scene: &Scene<'_>) -> Option<Self> {
-        scene.records.iter().all(can).then(|| Self {
-            drives: scene
+    pub(crate) fn new(study: &Study<'_>) -> Option<Self> {
+        study.records.iter().all(can).then(|| Self {
+            drives: study
                 .records
                 .par_iter()
                 .map(|record| Arc::new(Measured::new(record, &record.force_n)))
@@ -169,8 +169,8 @@ impl ClosedLoop {
     }
 
     /// The same records, driven by other forces: by record, at its samples.
-    pub(crate) fn driven_by(scene: &Scene<'_>, forces_n: &[[Vec<f64>; 3]]) -> Self {
-        let records = scene.records.par_iter().zip(forces_n);
+    pub(crate) fn driven_by(study: &Study<'_>, forces_n: &[[Vec<f64>; 3]]) -> Self {
+        let records = study.records.par_iter().zip(forces_n);
         Self {
             drives: records
                 .map(|(record, force_n)| Arc::new(Measured::new(record, force_n)))
@@ -178,9 +178,9 @@ impl ClosedLoop {
         }
     }
 
-    fn model(&self, scene: &Scene<'_>, record: usize, effects: &Effects) -> Option<Model> {
-        let all = scene.baseline.effects.clone().and(effects);
-        let (dynamics, terms) = all.dynamics(scene.baseline.structure).ok()?;
+    fn model(&self, study: &Study<'_>, record: usize, effects: &Effects) -> Option<Model> {
+        let all = study.baseline.effects.clone().and(effects);
+        let (dynamics, terms) = all.dynamics(study.baseline.structure).ok()?;
         Some(Model {
             dynamics,
             cutting: None,
@@ -190,14 +190,14 @@ impl ClosedLoop {
     }
 
     /// True where a term can hold an axis, as dry friction does.
-    pub(crate) fn holds(&self, scene: &Scene<'_>, effects: &Effects) -> Option<bool> {
-        let model = self.model(scene, 0, effects)?;
+    pub(crate) fn holds(&self, study: &Study<'_>, effects: &Effects) -> Option<bool> {
+        let model = self.model(study, 0, effects)?;
         Some(model.terms.iter().any(|term| term.holds().is_some()))
     }
 
     /// True where the extended case has terms of its own beside the linear structure.
-    pub(crate) fn is_nonlinear(&self, scene: &Scene<'_>, effects: &Effects) -> bool {
-        self.model(scene, 0, effects)
+    pub(crate) fn is_nonlinear(&self, study: &Study<'_>, effects: &Effects) -> bool {
+        self.model(study, 0, effects)
             .is_some_and(|model| !model.terms.is_empty())
     }
 
@@ -206,16 +206,16 @@ impl ClosedLoop {
     /// one meter; `None` for those that follow from others.
     pub(crate) fn begin(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: usize,
         effects: &Effects,
         structure: &[f64],
     ) -> Option<(Vec<f64>, Vec<Option<f64>>)> {
-        let model = self.model(scene, record, effects)?;
+        let model = self.model(study, record, effects)?;
         let order = model.dynamics.order();
         let mut states = structure.to_vec();
         states.resize(order, 0.0);
-        let_go(scene, &model.dynamics, &mut states);
+        let_go(study, &model.dynamics, &mut states);
         let at = At {
             t: 0.0,
             x: model.dynamics.displacement(&states),
@@ -236,14 +236,14 @@ impl ClosedLoop {
     /// the forces of the record; from rest where `start` is empty.
     pub(crate) fn simulate(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         index: usize,
         effects: &Effects,
         start: &[f64],
         length: usize,
     ) -> Option<Vec<Vec<f64>>> {
-        let record = &scene.records[index];
-        let model = self.model(scene, index, effects)?;
+        let record = &study.records[index];
+        let model = self.model(study, index, effects)?;
         let count = record.grid.count();
         let rate_hz = record.grid.rate_hz();
         let mut readings: Vec<Reading> = record
@@ -267,7 +267,7 @@ impl ClosedLoop {
         }
         states.resize(model.order(), 0.0);
         if starts_anywhere(record) {
-            let_go(scene, &model.dynamics, &mut states);
+            let_go(study, &model.dynamics, &mut states);
         }
         // The mean over the last sample ends half a sample later.
         let later = if model.dynamics.velocity_jumps() { 0.5 } else { 0.0 };

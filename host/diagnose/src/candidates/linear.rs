@@ -15,10 +15,10 @@ use rayon::prelude::*;
 
 use crate::baseline::dynamic_stiffness;
 use crate::baseline::receptance::Receptance;
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
@@ -54,14 +54,14 @@ impl Linear {
     }
 
     /// The entry of the matrix on the diagonal, where the structure has one there.
-    fn entry(&self, scene: &Scene<'_>, place: &Place) -> Option<f64> {
-        let Form::Matrices(matrices) = &scene.baseline.structure.form else {
+    fn entry(&self, study: &Study<'_>, location: &Location) -> Option<f64> {
+        let Form::Matrices(matrices) = &study.baseline.structure.form else {
             return None;
         };
-        let directions = &scene.baseline.structure.directions;
+        let directions = &study.baseline.structure.directions;
         let index = directions
             .iter()
-            .position(|direction| Some(*direction) == place.direction())?;
+            .position(|direction| Some(*direction) == location.direction())?;
         let matrix = match self.0 {
             Which::Mass => &matrices.mass,
             Which::Stiffness => &matrices.stiffness,
@@ -70,8 +70,8 @@ impl Linear {
         Some(matrix[(index, index)])
     }
 
-    fn effect(&self, place: &Place, relative: f64) -> Option<Effects> {
-        let mut table = place.table();
+    fn effect(&self, location: &Location, relative: f64) -> Option<Effects> {
+        let mut table = location.table();
         table.insert("relative_change".into(), relative.into());
         Effects::of_extension(self.name(), &table).ok()
     }
@@ -86,43 +86,43 @@ impl Cause for Linear {
         }
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        if scene.baseline.case.extensions.contains_key(self.name()) {
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        if study.baseline.case.extensions.contains_key(self.name()) {
             return Vec::new();
         }
-        let driven = scene.driven_axes();
-        if scene.has_modes() {
+        let driven = study.driven_axes();
+        if study.has_modes() {
             return if driven.is_empty() {
                 Vec::new()
             } else {
-                vec![Place::Everywhere]
+                vec![Location::Everywhere]
             };
         }
-        let mut places: Vec<Place> = driven
+        let mut locations: Vec<Location> = driven
             .iter()
-            .map(|axis| Place::Axis(*axis))
-            .filter(|place| self.entry(scene, place).is_some_and(|entry| entry != 0.0))
+            .map(|axis| Location::Axis(*axis))
+            .filter(|location| self.entry(study, location).is_some_and(|entry| entry != 0.0))
             .collect();
         if driven.len() > 1 {
-            places.push(Place::Everywhere);
+            locations.push(Location::Everywhere);
         }
-        places
+        locations
     }
 
     fn regressors(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        place: &Place,
+        location: &Location,
         _: &[f64],
     ) -> Option<Vec<Regressor>> {
         let [below, above] = [-STEP, STEP].map(|step| {
-            let effect = self.effect(place, step)?;
-            let first_order = scene.baseline.altered(&effect).ok()?;
+            let effect = self.effect(location, step)?;
+            let first_order = study.baseline.altered(&effect).ok()?;
             Some((effect, first_order))
         });
         let ((below_effect, below), (above_effect, above)) = (below?, above?);
-        let baseline = &scene.baseline;
+        let baseline = &study.baseline;
         let grid = &record.grid;
         let folded = of_folded_forces(record);
         let bins = if folded.is_some() {
@@ -166,7 +166,7 @@ impl Cause for Linear {
         };
         let into = match record.domain {
             Domain::Response => {
-                let mut force = effective_force(scene, record);
+                let mut force = effective_force(study, record);
                 for (force, beyond) in force.iter_mut().zip(folded.into_iter().flatten()) {
                     let known = force.len();
                     force.extend(beyond.into_iter().flatten().skip(known));
@@ -209,8 +209,8 @@ impl Cause for Linear {
 
     fn parameters(
         &self,
-        scene: &Scene<'_>,
-        place: &Place,
+        study: &Study<'_>,
+        location: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
@@ -218,17 +218,17 @@ impl Cause for Linear {
         if relative <= -0.95 {
             return None;
         }
-        Some(match self.entry(scene, place) {
+        Some(match self.entry(study, location) {
             Some(entry) => vec![(self.key(), entry * (1.0 + relative))],
             None => vec![("relative_change", relative)],
         })
     }
 
-    fn also(&self, scene: &Scene<'_>, _: &Place, parameters: &[Parameter]) -> Vec<Parameter> {
+    fn also(&self, study: &Study<'_>, _: &Location, parameters: &[Parameter]) -> Vec<Parameter> {
         let [("relative_change", relative)] = parameters else {
             return Vec::new();
         };
-        let Form::Modes(modes) = &scene.baseline.structure.form else {
+        let Form::Modes(modes) = &study.baseline.structure.form else {
             return Vec::new();
         };
         let [mode] = modes.as_slice() else {
@@ -254,8 +254,8 @@ fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
 }
 
 /// F_eff, N, over the axes of the baseline.
-fn effective_force(scene: &Scene<'_>, record: &Record) -> [Vec<Complex64>; 3] {
-    let baseline = &scene.baseline;
+fn effective_force(study: &Study<'_>, record: &Record) -> [Vec<Complex64>; 3] {
+    let baseline = &study.baseline;
     let (axes, grid) = (&baseline.axes, &record.grid);
     let measured: [Option<Vec<Complex64>>; 3] = std::array::from_fn(|axis| {
         (!record.force_n[axis].is_empty()).then(|| grid.spectrum(&record.force_n[axis]))

@@ -13,12 +13,12 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 use crate::baseline::derivatives;
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::candidates::closed_loop::{holding_force_n, starts_anywhere};
 use crate::records::channel::Observed;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 pub(crate) struct MissingMode;
 
@@ -32,42 +32,47 @@ impl Cause for MissingMode {
         "missing-mode"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        if !scene.all_in(Domain::Response) || scene.baseline.case.extensions.contains_key(self.name()) {
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        if !study.all_in(Domain::Response) || study.baseline.case.extensions.contains_key(self.name()) {
             return Vec::new();
         }
-        scene
+        study
             .driven_axes()
             .into_iter()
             .filter(|axis| {
-                scene
+                study
                     .records
                     .iter()
                     .any(|record| !record.force_n[*axis].is_empty() || is_let_go(record, *axis))
             })
-            .map(Place::Axis)
+            .map(Location::Axis)
             .collect()
     }
 
-    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
-        let residual: Vec<Vec<Vec<f64>>> = scene
+    fn nonlinear_grid(&self, study: &Study<'_>, location: &Location) -> Vec<Vec<f64>> {
+        let residual: Vec<Vec<Vec<f64>>> = study
             .records
             .iter()
             .map(|record| record.channels.iter().map(Observed::residual).collect())
             .collect();
-        self.shapes_beside(scene, place, &residual)
+        self.nonlinear_grid_beside(study, location, &residual)
     }
 
     /// The few frequencies at which such a mode would look most like the residual, at three dampings each.
-    fn shapes_beside(&self, scene: &Scene<'_>, place: &Place, left: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
-        let Place::Axis(axis) = place else {
+    fn nonlinear_grid_beside(
+        &self,
+        study: &Study<'_>,
+        location: &Location,
+        left: &[Vec<Vec<f64>>],
+    ) -> Vec<Vec<f64>> {
+        let Location::Axis(axis) = location else {
             return Vec::new();
         };
-        let [[low, high], _] = self.bounds(scene, place)[..] else {
+        let [[low, high], _] = self.bounds(study, location)[..] else {
             return Vec::new();
         };
         let count = 160;
-        let (bins, releases) = (bins(scene, *axis, left), releases(scene, *axis, left));
+        let (bins, releases) = (bins(study, *axis, left), releases(study, *axis, left));
         let likeness: Vec<Vec<(f64, Vec<f64>)>> = DAMPING
             .par_iter()
             .map(|damping| {
@@ -82,31 +87,34 @@ impl Cause for MissingMode {
             .collect();
         let mut peaks: Vec<(f64, Vec<f64>)> = Vec::new();
         for of_damping in likeness {
-            for (index, (value, shape)) in of_damping.iter().enumerate() {
+            for (index, (value, nonlinear_parameters)) in of_damping.iter().enumerate() {
                 let below = |other: Option<&(f64, Vec<f64>)>| other.is_none_or(|other| other.0 <= *value);
                 let before = index.checked_sub(1).and_then(|index| of_damping.get(index));
                 if below(before) && below(of_damping.get(index + 1)) {
-                    peaks.push((*value, shape.clone()));
+                    peaks.push((*value, nonlinear_parameters.clone()));
                 }
             }
         }
         peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
         peaks.truncate(KEPT);
-        peaks.into_iter().map(|(_, shape)| shape).collect()
+        peaks
+            .into_iter()
+            .map(|(_, nonlinear_parameters)| nonlinear_parameters)
+            .collect()
     }
 
-    fn bounds(&self, scene: &Scene<'_>, _: &Place) -> Vec<[f64; 2]> {
-        let rate = scene
+    fn bounds(&self, study: &Study<'_>, _: &Location) -> Vec<[f64; 2]> {
+        let rate = study
             .records
             .iter()
             .map(|record| record.grid.rate_hz())
             .fold(f64::INFINITY, f64::min);
-        let longest = scene
+        let longest = study
             .records
             .iter()
             .map(|record| record.grid.count() as f64 / record.grid.rate_hz())
             .fold(0.0, f64::max);
-        let highest = scene
+        let highest = study
             .records
             .iter()
             .map(|record| record.highest_hz)
@@ -117,16 +125,16 @@ impl Cause for MissingMode {
 
     fn regressors(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        place: &Place,
-        shape: &[f64],
+        location: &Location,
+        nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
-        let (Place::Axis(axis), [frequency, damping]) = (place, shape) else {
+        let (Location::Axis(axis), [frequency, damping]) = (location, nonlinear_parameters) else {
             return None;
         };
         if is_let_go(record, *axis) {
-            let force_n = held_by_n(scene, record)?[*axis];
+            let force_n = held_by_n(study, record)?[*axis];
             let count = record.grid.count();
             let of = |channel| released(record, channel, *axis, force_n, [*frequency, *damping]);
             let observed = record
@@ -160,26 +168,27 @@ impl Cause for MissingMode {
     /// there.
     fn parameters(
         &self,
-        scene: &Scene<'_>,
-        place: &Place,
-        shape: &[f64],
+        study: &Study<'_>,
+        location: &Location,
+        nonlinear_parameters: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let per_mass = *coefficients.first()?;
-        let (Place::Axis(axis), natural) = (place, TAU * shape[0]) else {
+        let (Location::Axis(axis), natural) = (location, TAU * nonlinear_parameters[0]) else {
             return None;
         };
-        let is_known = scene
+        let is_known = study
             .baseline
             .receptance
             .modes_along(*axis)
             .any(|(pole, known_per_mass)| {
-                (pole.norm() - natural).abs() < -pole.re + shape[1] * natural && per_mass < known_per_mass
+                (pole.norm() - natural).abs() < -pole.re + nonlinear_parameters[1] * natural
+                    && per_mass < known_per_mass
             });
         (per_mass > 0.0 && !is_known).then(|| {
             vec![
-                ("frequency_hz", shape[0]),
-                ("damping_ratio", shape[1]),
+                ("frequency_hz", nonlinear_parameters[0]),
+                ("damping_ratio", nonlinear_parameters[1]),
                 ("modal_mass_kg", 1.0 / per_mass),
             ]
         })
@@ -202,8 +211,8 @@ fn is_let_go(record: &Record, axis: usize) -> bool {
 }
 
 /// The static force from which the baseline was let go, N.
-fn held_by_n(scene: &Scene<'_>, record: &Record) -> Option<Vector3<f64>> {
-    holding_force_n(scene, &scene.baseline.first_order, &record.decays.start)
+fn held_by_n(study: &Study<'_>, record: &Record) -> Option<Vector3<f64>> {
+    holding_force_n(study, &study.baseline.first_order, &record.decays.start)
 }
 
 /// What a channel reads of a mode of mass 1 that is let go from under a static force along `axis`, sample after sample.
@@ -229,10 +238,10 @@ fn released<'a>(
 /// A channel that hears the axis in a record of what was let go, with the force that held it.
 type Release<'a> = (&'a Record, &'a Observed, &'a [f64], usize, f64);
 
-fn releases<'a>(scene: &'a Scene<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<Release<'a>> {
+fn releases<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<Release<'a>> {
     let mut all = Vec::new();
-    for (record, left) in scene.records.iter().zip(left) {
-        let Some(force) = held_by_n(scene, record).filter(|_| is_let_go(record, axis)) else {
+    for (record, left) in study.records.iter().zip(left) {
+        let Some(force) = held_by_n(study, record).filter(|_| is_let_go(record, axis)) else {
             continue;
         };
         let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
@@ -247,10 +256,10 @@ fn releases<'a>(scene: &'a Scene<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) ->
 /// units of the noise.
 type Bin = (f64, Complex64, Complex64);
 
-fn bins(scene: &Scene<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
+fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
     let mut all = Vec::new();
     let forced = |(record, _): &(&Record, _)| !record.force_n[axis].is_empty();
-    for (record, left) in scene.records.iter().zip(left).filter(forced) {
+    for (record, left) in study.records.iter().zip(left).filter(forced) {
         let force = record.grid.spectrum(&record.force_n[axis]);
         let hears = |(channel, _): &(&Observed, _)| channel.pickup.weights[axis] != 0.0;
         for (channel, left) in record.channels.iter().zip(left).filter(hears) {

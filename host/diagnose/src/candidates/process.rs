@@ -15,11 +15,11 @@ mod runout;
 mod speed_fluctuation;
 mod wear;
 
-use crate::candidates::cause::{Cause, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Regressor};
 use crate::motion::cut_force::CutForce;
 use crate::records::cutting::Cutting;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_simulate::Cutter;
 
 pub(crate) fn all() -> Vec<Box<dyn Cause>> {
@@ -38,26 +38,26 @@ pub(crate) fn all() -> Vec<Box<dyn Cause>> {
 }
 
 /// The whole cut, where the scene has one that is not known to have the cause already.
-fn everywhere(scene: &Scene<'_>, name: &str) -> Vec<Place> {
-    let known = scene.baseline.case.extensions.contains_key(name);
-    if known || cutter(scene).is_none() {
+fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
+    let known = study.baseline.case.extensions.contains_key(name);
+    if known || cutter(study).is_none() {
         Vec::new()
     } else {
-        vec![Place::Everywhere]
+        vec![Location::Everywhere]
     }
 }
 
 /// The tool of the first cut of a scene.
-fn cutter<'a>(scene: &'a Scene<'_>) -> Option<&'a Cutter> {
-    scene
+fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
+    study
         .records
         .iter()
         .find_map(|record| Some(&record.cut.as_ref()?.cut.cutter))
 }
 
 /// True where the axial direction is part of the cut: it moves, or its force is seen.
-fn has_axial(scene: &Scene<'_>) -> bool {
-    scene.baseline.axes.contains(&2)
+fn has_axial(study: &Study<'_>) -> bool {
+    study.baseline.axes.contains(&2)
 }
 
 /// What a cut adds per unit when its tool changes from `before` to `after`, `over` units apart; nothing in a record without a

@@ -11,9 +11,9 @@ mod quadratic_stiffness;
 mod softening_hardening;
 
 use crate::baseline::terms_of;
-use crate::candidates::cause::{Cause, Parameter, Part, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::restoring_along;
 
@@ -45,7 +45,7 @@ struct Restoring {
     /// Keys of the coefficients.
     linear: &'static [&'static str],
     /// Keys of the shape.
-    shape: &'static [&'static str],
+    nonlinear_parameters: &'static [&'static str],
     /// How many axes it joins.
     axes: usize,
     /// Whether it may also act along all axes at once, by one law.
@@ -53,9 +53,9 @@ struct Restoring {
     /// Whether it may also act along each of them by a law of its own, as in joints of one kind; it has no shape then.
     each: bool,
     /// A grid of shapes for what moves as it does in the scene.
-    shapes: fn(&Scene<'_>, usize) -> Vec<Vec<f64>>,
+    nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
     /// Bounds of the shape.
-    bounds: fn(&Scene<'_>, usize) -> Vec<[f64; 2]>,
+    bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
     /// Whether it acts behind a play, which is a backlash.
     behind_play: bool,
     /// Whether coefficients and shape are physical.
@@ -67,11 +67,11 @@ const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring
     Restoring {
         name,
         linear,
-        shape: &[],
+        nonlinear_parameters: &[],
         axes: 1,
         everywhere: false,
         each: false,
-        shapes: |_, _| vec![Vec::new()],
+        nonlinear_grid: |_, _| vec![Vec::new()],
         bounds: |_, _| Vec::new(),
         behind_play: false,
         physical: |_| true,
@@ -79,8 +79,8 @@ const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring
 }
 
 /// The largest displacement along an axis in any record, m.
-fn largest_m(scene: &Scene<'_>, axis: usize) -> f64 {
-    scene
+fn largest_m(study: &Study<'_>, axis: usize) -> f64 {
+    study
         .records
         .iter()
         .map(|record| record.motion.largest_m(axis))
@@ -88,8 +88,8 @@ fn largest_m(scene: &Scene<'_>, axis: usize) -> f64 {
 }
 
 /// The smallest RMS displacement along an axis of any record, m.
-fn smallest_m(scene: &Scene<'_>, axis: usize) -> f64 {
-    scene
+fn smallest_m(study: &Study<'_>, axis: usize) -> f64 {
+    study
         .records
         .iter()
         .map(|record| record.motion.size_m(axis))
@@ -98,25 +98,25 @@ fn smallest_m(scene: &Scene<'_>, axis: usize) -> f64 {
 }
 
 /// The longest record, s.
-fn longest_s(scene: &Scene<'_>) -> f64 {
-    scene
+fn longest_s(study: &Study<'_>) -> f64 {
+    study
         .records
         .iter()
         .map(|record| record.grid.count() as f64 / record.grid.rate_hz())
         .fold(0.0, f64::max)
 }
 
-fn first_axis(place: &Place) -> usize {
-    match place {
-        Place::Axis(axis) | Place::Axes(axis, _) => *axis,
+fn first_axis(location: &Location) -> usize {
+    match location {
+        Location::Axis(axis) | Location::Axes(axis, _) => *axis,
         _ => 0,
     }
 }
 
 /// The places where a law is to be said: one, unless it is another along each axis.
-fn single_places(place: &Place) -> Vec<Place> {
-    match place {
-        Place::EachOf(axes) => axes.iter().map(|axis| Place::Axis(*axis)).collect(),
+fn single_places(location: &Location) -> Vec<Location> {
+    match location {
+        Location::EachOf(axes) => axes.iter().map(|axis| Location::Axis(*axis)).collect(),
         one => vec![one.clone()],
     }
 }
@@ -130,19 +130,19 @@ fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
 
 impl Restoring {
     /// True where the baseline has an extension of its name: a case holds one.
-    fn in_baseline(&self, scene: &Scene<'_>) -> bool {
+    fn in_baseline(&self, study: &Study<'_>) -> bool {
         self.names()
             .iter()
-            .any(|name| scene.baseline.case.extensions.contains_key(*name))
+            .any(|name| study.baseline.case.extensions.contains_key(*name))
     }
 
-    fn table(&self, place: &Place, shape: &[f64], coefficients: &[f64]) -> toml::Table {
-        let mut table = place.table();
+    fn table(&self, location: &Location, nonlinear_parameters: &[f64], coefficients: &[f64]) -> toml::Table {
+        let mut table = location.table();
         for (key, value) in self
             .linear
             .iter()
             .zip(coefficients)
-            .chain(self.shape.iter().zip(shape))
+            .chain(self.nonlinear_parameters.iter().zip(nonlinear_parameters))
         {
             table.insert((*key).into(), (*value).into());
         }
@@ -150,13 +150,13 @@ impl Restoring {
     }
 
     /// What the answer says of the law along one axis.
-    fn parts_of_one(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
-        let of_play = |(key, _): &&Parameter| self.behind_play && self.shape.contains(key);
+    fn parts_of_one(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
+        let of_play = |(key, _): &&Parameter| self.behind_play && self.nonlinear_parameters.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
         let mut parts = vec![Part {
             name: self.name,
-            place: place.clone(),
-            extension: self.extension(place, &own),
+            location: location.clone(),
+            extension: self.extension(location, &own),
             parameters: own,
         }];
         if self.behind_play {
@@ -173,7 +173,7 @@ impl Restoring {
             );
             parts.push(Part {
                 name: "backlash",
-                place: place.clone(),
+                location: location.clone(),
                 parameters: gap,
                 extension,
             });
@@ -184,18 +184,19 @@ impl Restoring {
     /// What one of its coefficients, 1, adds along the motion of a record; `None` where it cannot act there.
     fn along(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        place: &Place,
-        shape: &[f64],
+        location: &Location,
+        nonlinear_parameters: &[f64],
         index: usize,
     ) -> Option<Regressor> {
         let unit: Vec<f64> = (0..self.linear.len())
             .map(|i| f64::from(u8::from(i == index)))
             .collect();
-        let effects = Effects::of_extension(self.name, &self.table(place, shape, &unit)).ok()?;
+        let effects =
+            Effects::of_extension(self.name, &self.table(location, nonlinear_parameters, &unit)).ok()?;
         let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
-        for term in terms_of(&effects, scene.baseline.structure).ok()? {
+        for term in terms_of(&effects, study.baseline.structure).ok()? {
             for (sum, force) in sum.iter_mut().zip(restoring_along(&*term, &record.motion)) {
                 if sum.is_empty() {
                     *sum = force;
@@ -221,27 +222,27 @@ impl Cause for Restoring {
         }
     }
 
-    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
-        let places = single_places(place);
-        let of_one = (parameters.len() / places.len()).max(1);
-        places
+    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
+        let locations = single_places(location);
+        let of_one = (parameters.len() / locations.len()).max(1);
+        locations
             .iter()
             .zip(parameters.chunks(of_one))
-            .flat_map(|(place, parameters)| self.parts_of_one(place, parameters))
+            .flat_map(|(location, parameters)| self.parts_of_one(location, parameters))
             .collect()
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        if self.in_baseline(scene) {
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        if self.in_baseline(study) {
             return Vec::new();
         }
-        let axes = scene.driven_axes();
+        let axes = study.driven_axes();
         match self.axes {
             1 => {
                 let several = axes.len() > 1;
-                let together = (several && self.everywhere).then_some(Place::Everywhere);
-                let each = (several && self.each).then(|| Place::EachOf(axes.clone()));
-                let single = axes.into_iter().map(Place::Axis);
+                let together = (several && self.everywhere).then_some(Location::Everywhere);
+                let each = (several && self.each).then(|| Location::EachOf(axes.clone()));
+                let single = axes.into_iter().map(Location::Axis);
                 single.chain(together).chain(each).collect()
             }
             _ => axes
@@ -250,44 +251,49 @@ impl Cause for Restoring {
                 .filter(|(a, b)| a != b)
                 // A potential in which both enter alike is one place, not two.
                 .filter(|(a, b)| self.name != "mode-coupling" || self.linear[0] != "kxyy_n_per_m3" || a < b)
-                .map(|(a, b)| Place::Axes(a, b))
+                .map(|(a, b)| Location::Axes(a, b))
                 .collect(),
         }
     }
 
-    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
-        (self.shapes)(scene, first_axis(place))
+    fn nonlinear_grid(&self, study: &Study<'_>, location: &Location) -> Vec<Vec<f64>> {
+        (self.nonlinear_grid)(study, first_axis(location))
     }
 
-    fn bounds(&self, scene: &Scene<'_>, place: &Place) -> Vec<[f64; 2]> {
-        (self.bounds)(scene, first_axis(place))
+    fn bounds(&self, study: &Study<'_>, location: &Location) -> Vec<[f64; 2]> {
+        (self.bounds)(study, first_axis(location))
     }
 
     fn regressors(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        place: &Place,
-        shape: &[f64],
+        location: &Location,
+        nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
-        single_places(place)
+        single_places(location)
             .iter()
-            .flat_map(|place| (0..self.linear.len()).map(move |index| (place, index)))
-            .map(|(place, index)| self.along(scene, record, place, shape, index))
+            .flat_map(|location| (0..self.linear.len()).map(move |index| (location, index)))
+            .map(|(location, index)| self.along(study, record, location, nonlinear_parameters, index))
             .collect()
     }
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
-        shape: &[f64],
+        _: &Study<'_>,
+        _: &Location,
+        nonlinear_parameters: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let mut laws = coefficients.chunks(self.linear.len());
         laws.clone().all(self.physical).then(|| {
             laws.by_ref()
-                .flat_map(|law| self.linear.iter().zip(law).chain(self.shape.iter().zip(shape)))
+                .flat_map(|law| {
+                    self.linear
+                        .iter()
+                        .zip(law)
+                        .chain(self.nonlinear_parameters.iter().zip(nonlinear_parameters))
+                })
                 .map(|(key, value)| (*key, *value))
                 .collect()
         })

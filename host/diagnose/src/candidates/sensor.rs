@@ -8,12 +8,12 @@ mod offset;
 
 use num_complex::Complex64;
 
-use crate::candidates::cause::{Cause, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Regressor};
 use crate::records::channel::Observed;
 use crate::records::channel::main_axis;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_recording::Quantity;
 use quietcut_simulate::path::Motion;
 
@@ -28,12 +28,12 @@ pub(crate) fn all() -> Vec<Box<dyn Cause>> {
 }
 
 /// Names of the channels of motion, where all records are predicted from their force.
-fn channels(scene: &Scene<'_>) -> Vec<String> {
-    if !scene.all_in(Domain::Response) {
+fn channels(study: &Study<'_>) -> Vec<String> {
+    if !study.all_in(Domain::Response) {
         return Vec::new();
     }
     let mut names: Vec<String> = Vec::new();
-    for channel in scene.records.iter().flat_map(|record| &record.channels) {
+    for channel in study.records.iter().flat_map(|record| &record.channels) {
         if channel.pickup.quantity != Quantity::Force && !names.contains(&channel.pickup.name) {
             names.push(channel.pickup.name.clone());
         }
@@ -42,13 +42,13 @@ fn channels(scene: &Scene<'_>) -> Vec<String> {
 }
 
 /// A place for each channel, and where there are several, one for all of them together.
-fn one_or_all(scene: &Scene<'_>, name: &str) -> Vec<Place> {
-    if scene.baseline.case.extensions.contains_key(name) {
+fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
+    if study.baseline.case.extensions.contains_key(name) {
         return Vec::new();
     }
-    let names = channels(scene);
+    let names = channels(study);
     // Without a motion that a force drives, nothing says how large or late it should be but another channel.
-    let free = scene
+    let free = study
         .records
         .iter()
         .all(|record| record.force_n.iter().all(Vec::is_empty));
@@ -56,15 +56,15 @@ fn one_or_all(scene: &Scene<'_>, name: &str) -> Vec<Place> {
     if free && !several {
         return Vec::new();
     }
-    let mut places: Vec<Place> = names.into_iter().map(Place::Channel).collect();
+    let mut locations: Vec<Location> = names.into_iter().map(Location::Channel).collect();
     if several && !free {
-        places.push(Place::Everywhere);
+        locations.push(Location::Everywhere);
     }
-    places
+    locations
 }
 
-fn meant(place: &Place, channel: &Observed) -> bool {
-    match place.channel() {
+fn meant(location: &Location, channel: &Observed) -> bool {
+    match location.channel() {
         Some(name) => channel.pickup.name == name,
         None => channel.pickup.quantity != Quantity::Force,
     }
@@ -118,12 +118,12 @@ fn read(
 /// What the channels that are meant read with the spectrum turned by `change` of ω.
 fn of_meant(
     record: &Record,
-    place: &Place,
+    location: &Location,
     weights: impl Fn(&Observed) -> [f64; 3],
     change: impl Fn(f64) -> Complex64,
 ) -> Vec<Regressor> {
     let of = |channel| {
-        if meant(place, channel) {
+        if meant(location, channel) {
             read(record, channel, weights(channel), &change)
         } else {
             Vec::new()
@@ -168,7 +168,7 @@ fn in_steps(record: &Record, channel: usize, change: impl Fn(f64) -> Complex64) 
 /// of one axis are taken to have an even share in what is known of its motion.
 fn in_cut(
     record: &Record,
-    place: &Place,
+    location: &Location,
     mut regressors: Vec<Regressor>,
     over: f64,
     truth: impl Fn(&mut Motion, usize),
@@ -187,7 +187,7 @@ fn in_cut(
         let (mut all, mut wrong) = (0, 0);
         for channel in readers {
             all += 1;
-            wrong += usize::from(meant(place, channel));
+            wrong += usize::from(meant(location, channel));
         }
         if wrong == 0 || record.motion.x[axis].is_empty() {
             continue;
@@ -203,7 +203,7 @@ fn in_cut(
             }
         }
     }
-    let force = cut.force_along(&cut.cut.turning, &moved);
+    let force = cut.force_along(&cut.cut.spindle_motion, &moved);
     regressor.cut = Some(force.difference(&cut.force, over));
     regressors
 }

@@ -35,7 +35,7 @@ pub struct Figure {
 
 /// A cause with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct NamedCause {
+pub struct EstimatedCause {
     /// Its name, as in `[extension.NAME]`.
     pub name: &'static str,
     /// How sure it is, 0 to 1.
@@ -62,9 +62,9 @@ pub struct NamedCause {
     pub moved: Vec<[toml::Table; 2]>,
 }
 
-impl NamedCause {
+impl EstimatedCause {
     /// Its direction, directions or channel, as far as it has them.
-    pub fn place(&self) -> String {
+    pub fn location(&self) -> String {
         let directions = self.directions.map(|[one, other]| format!("{one} and {other}"));
         let channel = self.channel.clone();
         channel
@@ -75,7 +75,7 @@ impl NamedCause {
 }
 
 /// The causes of one explanation, each with its channel or directions: `mass along x with sensor-gain of ax`.
-pub(crate) fn label(causes: &[NamedCause]) -> String {
+pub(crate) fn label(causes: &[EstimatedCause]) -> String {
     let mut names: Vec<String> = Vec::new();
     for cause in causes {
         let name = match (&cause.channel, cause.direction, cause.directions) {
@@ -139,7 +139,7 @@ pub struct Unexplained {
     pub fraction: f64,
     /// Where it sits.
     #[serde(rename = "where")]
-    pub place: String,
+    pub location: String,
     /// A formula for it, which is a guess.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guess: Option<String>,
@@ -220,7 +220,7 @@ pub struct Diagnosis {
     /// How well the case predicts.
     pub baseline: Quality,
     /// The causes, the surest first; where they are confounded, all of the set.
-    pub causes: Vec<NamedCause>,
+    pub causes: Vec<EstimatedCause>,
     /// Names that mean the same on these records.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equivalent: Vec<Vec<&'static str>>,
@@ -245,7 +245,7 @@ pub struct Diagnosis {
     pub warnings: Vec<String>,
     /// The explanations that are left, each with all its causes, which act together: more than one where the answer is `Confounded`.
     #[serde(skip_serializing_if = "is_single")]
-    pub explanations: Vec<Vec<NamedCause>>,
+    pub explanations: Vec<Vec<EstimatedCause>>,
     /// How many of `causes`, from the first, act together in the extended case.
     #[serde(skip)]
     pub acting: usize,
@@ -255,25 +255,25 @@ pub struct Diagnosis {
 }
 
 /// Nothing that `causes` does not say.
-fn is_single(explanations: &[Vec<NamedCause>]) -> bool {
+fn is_single(explanations: &[Vec<EstimatedCause>]) -> bool {
     explanations.len() < 2
 }
 
 impl Diagnosis {
     /// Adds causes that explain the records together as well as those that act: each name once, or where it is the same names at
     /// `other_places`, each place once.
-    pub(crate) fn add_rival(&mut self, causes: Vec<NamedCause>, other_places: bool) {
+    pub(crate) fn add_rival(&mut self, causes: Vec<EstimatedCause>, other_locations: bool) {
         for cause in &causes {
             let is_known = self.causes.iter().any(|known| {
-                let same_place = known.place() == cause.place();
-                known.name == cause.name && (same_place || !other_places)
+                let same_location = known.location() == cause.location();
+                known.name == cause.name && (same_location || !other_locations)
             });
             if !is_known {
                 self.causes.push(cause.clone());
             }
         }
-        let who = |causes: &[NamedCause]| {
-            let who = causes.iter().map(|cause| (cause.name, cause.place()));
+        let who = |causes: &[EstimatedCause]| {
+            let who = causes.iter().map(|cause| (cause.name, cause.location()));
             let mut who: Vec<_> = who.collect();
             who.sort_unstable();
             who

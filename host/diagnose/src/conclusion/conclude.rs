@@ -9,7 +9,7 @@ use crate::fit::regression::{Regression, Share};
 use crate::progress::{Options, Stage};
 use crate::records::checks;
 use crate::records::domain::Domain;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::selection::select::{APART, Scale, Selection, WITHIN_NOISE, names, select};
 use quietcut_recording::Recording;
 
@@ -30,18 +30,18 @@ const DOUBT: f64 = 0.8;
 const UNLIKE: f64 = 3.0;
 
 pub(crate) fn judge(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     recordings: &[Recording],
     _options: &Options,
     watch: &dyn Fn(Stage),
 ) -> Diagnosis {
     watch(Stage::Library);
-    let mut regression = Regression::new(scene);
-    let mut library = Library::new(scene, &mut regression);
-    if scene.all_in(Domain::Force) && scene.records.len() > 1 {
+    let mut regression = Regression::new(study);
+    let mut library = Library::new(study, &mut regression);
+    if study.all_in(Domain::Force) && study.records.len() > 1 {
         regression.level_records();
     }
-    let scale = Scale::new(scene, recordings, &library, &regression);
+    let scale = Scale::new(study, recordings, &library, &regression);
     let selection = select(&scale, &mut library, &mut regression, watch);
     watch(Stage::Answer);
     answer(&scale, &library, &mut regression, &selection)
@@ -53,14 +53,14 @@ fn answer(
     regression: &mut Regression,
     selection: &Selection,
 ) -> Diagnosis {
-    let scene = scale.scene;
+    let study = scale.study;
     let inflation = scale.inflation(regression, selection.best.as_ref());
     let held_out = regression.residual(Share::HeldOut);
     let count = regression.count(Share::HeldOut) as f64;
     let whole = regression.residual(Share::Whole);
     let missed = Quality {
-        nrmse_heldout: regression.missed(scene, Share::HeldOut),
-        nrmse_whole: regression.missed(scene, Share::Whole),
+        nrmse_heldout: regression.missed(study, Share::HeldOut),
+        nrmse_whole: regression.missed(study, Share::Whole),
     };
     let mut diagnosis = Diagnosis {
         outcome: Outcome::None,
@@ -71,7 +71,7 @@ fn answer(
         gain: None,
         unexplained: Unexplained {
             fraction: 0.0,
-            place: "none above noise".into(),
+            location: "none above noise".into(),
             guess: None,
         },
         lobes: None,
@@ -80,7 +80,7 @@ fn answer(
         warnings: Vec::new(),
         explanations: Vec::new(),
         acting: 0,
-        views: views(scene, library, selection.best.as_ref()),
+        views: views(study, library, selection.best.as_ref()),
     };
     if missed.nrmse_whole > UNLIKE * missed.nrmse_heldout {
         diagnosis.warnings.push(format!(
@@ -91,7 +91,7 @@ fn answer(
     }
     let (of_noise, of_excess) = scale.excess(regression, selection.best.as_ref());
     let allowed = match &selection.best {
-        _ if scene.all_in(Domain::Force) => LEFT_OF_FORCE,
+        _ if study.all_in(Domain::Force) => LEFT_OF_FORCE,
         Some(best) if best.simulated.is_some() => {
             LEFT_OF_RESPONSE * FEWER_LEFT.powi(best.choices.len() as i32 - 1)
         }
@@ -107,15 +107,15 @@ fn answer(
     else {
         if of_noise > WITHIN_NOISE {
             // What was tried and is not believed takes nothing off.
-            diagnosis.views = views(scene, library, None);
-            diagnosis.unexplained.place = crate::conclusion::unexplained::describe(&diagnosis.views);
+            diagnosis.views = views(study, library, None);
+            diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
             diagnosis.outcome = Outcome::Unexplained;
-            diagnosis.unexplained.guess = crate::conclusion::guess::guess(scene, regression);
+            diagnosis.unexplained.guess = crate::conclusion::guess::guess(study, regression);
         }
         return diagnosis;
     };
     if of_noise > WITHIN_NOISE {
-        diagnosis.unexplained.place = crate::conclusion::unexplained::describe(&diagnosis.views);
+        diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
     }
     let left_held_out = scale.left_held_out(library, regression, best);
     diagnosis.outcome = Outcome::Cause;
@@ -133,7 +133,7 @@ fn answer(
         closed.and_then(|closed| closed.spread_by_force_noise(library, explanation))
     };
     let best = &spread(best).unwrap_or_else(|| best.clone());
-    diagnosis.causes = named(scene, library, regression, best, uncertain, confidence);
+    diagnosis.causes = named(study, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
     for cause in diagnosis
         .causes
@@ -152,10 +152,10 @@ fn answer(
     let who = names(library, best);
     for other in &selection.others {
         let other = &spread(other).unwrap_or_else(|| other.clone());
-        let causes = named(scene, library, regression, other, uncertain, confidence);
+        let causes = named(study, library, regression, other, uncertain, confidence);
         diagnosis.add_rival(causes, names(library, other) == who);
     }
-    let by_factor = by_common_factor(scene, library, regression, best, inflation);
+    let by_factor = by_common_factor(study, library, regression, best, inflation);
     diagnosis.add_rival(by_factor, false);
     if diagnosis.causes.len() > diagnosis.acting {
         let shared: Vec<&'static str> = who

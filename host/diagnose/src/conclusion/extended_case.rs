@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use toml::Table;
 
 use crate::candidates::extension_tables::joined;
-use crate::conclusion::answer::{Diagnosis, Figure, NamedCause, Outcome};
+use crate::conclusion::answer::{Diagnosis, EstimatedCause, Figure, Outcome};
 use crate::conclusion::lobes::Moved;
 use quietcut_model::case::Case;
 
 /// What is said of a key behind its value: the intervals of the causes that have it, or have it by number (`ratio_1`, `ratio_2` …).
-fn intervals(causes: &[&NamedCause], key: &str) -> String {
+fn intervals(causes: &[&EstimatedCause], key: &str) -> String {
     let is_of_key = |known: &str| {
         let behind = known
             .strip_prefix(key)
@@ -87,7 +87,7 @@ impl Diagnosis {
         text.push('\n');
         let found = &self.causes[..self.acting];
         for (name, table) in joined(self.found()) {
-            let causes: Vec<&NamedCause> = found.iter().filter(|cause| cause.name == name).collect();
+            let causes: Vec<&EstimatedCause> = found.iter().filter(|cause| cause.name == name).collect();
             // Writing to a string cannot fail.
             let _ = write!(text, "\n[extension.{name}]\n");
             for (key, value) in &table {

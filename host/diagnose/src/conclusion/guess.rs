@@ -11,7 +11,7 @@ use std::fmt::Write;
 use crate::baseline::direction_of;
 use crate::candidates::cause::Regressor;
 use crate::fit::regression::{Regression, Share};
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::{Motion, restoring_along};
 
@@ -61,11 +61,11 @@ enum Term {
 }
 
 /// The formula with what it is worth; `None` where none takes a tenth of what is held out.
-pub(crate) fn guess(scene: &Scene<'_>, regression: &mut Regression) -> Option<String> {
+pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<String> {
     let mut all: Vec<(usize, Term, usize)> = Vec::new();
-    for axis in scene.driven_axes() {
-        for term in terms(scene, axis) {
-            if let Some(column) = column(scene, axis, term) {
+    for axis in study.driven_axes() {
+        for term in terms(study, axis) {
+            if let Some(column) = column(study, axis, term) {
                 all.push((axis, term, regression.add(&column)));
             }
         }
@@ -113,8 +113,8 @@ pub(crate) fn guess(scene: &Scene<'_>, regression: &mut Regression) -> Option<St
     ))
 }
 
-fn terms(scene: &Scene<'_>, axis: usize) -> Vec<Term> {
-    let largest_m = scene
+fn terms(study: &Study<'_>, axis: usize) -> Vec<Term> {
+    let largest_m = study
         .records
         .iter()
         .map(|record| record.motion.largest_m(axis))
@@ -126,14 +126,14 @@ fn terms(scene: &Scene<'_>, axis: usize) -> Vec<Term> {
 }
 
 /// Samples by record and channel per unit of the coefficient; `None` where the term cannot be computed.
-fn column(scene: &Scene<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>>>> {
-    let columns: Vec<Vec<Vec<f64>>> = scene
+fn column(study: &Study<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>>>> {
+    let columns: Vec<Vec<Vec<f64>>> = study
         .records
         .iter()
         .map(|record| {
             let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
             if !record.motion.x[axis].is_empty() {
-                force[axis] = along(scene, &record.motion, axis, term)?;
+                force[axis] = along(study, &record.motion, axis, term)?;
             }
             Some(Regressor::of_force(force).columns(record))
         })
@@ -146,7 +146,7 @@ fn column(scene: &Scene<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>
     is_finite.then_some(columns)
 }
 
-fn along(scene: &Scene<'_>, motion: &Motion, axis: usize, term: Term) -> Option<Vec<f64>> {
+fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: Term) -> Option<Vec<f64>> {
     let of = |f: &dyn Fn(f64, f64) -> f64| {
         let samples = motion.x[axis].iter().zip(&motion.v[axis]);
         samples.map(|(x, v)| f(*x, *v)).collect()
@@ -165,7 +165,7 @@ fn along(scene: &Scene<'_>, motion: &Motion, axis: usize, term: Term) -> Option<
                 format!("hysteresis.direction={direction}"),
             ];
             let effects = Effects::parse(texts.iter().map(String::as_str)).ok()?;
-            let terms = effects.0.first()?.terms(scene.baseline.structure).ok()?;
+            let terms = effects.0.first()?.terms(study.baseline.structure).ok()?;
             // z − x, with x taken off again.
             let difference = restoring_along(&**terms.first()?, motion).into_iter().nth(axis)?;
             difference

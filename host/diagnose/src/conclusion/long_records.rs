@@ -10,7 +10,7 @@ use crate::conclusion::conclude;
 use crate::conclusion::conclude::LEFT_OF_RESPONSE;
 use crate::fit::regression::{Regression, Share};
 use crate::progress::{Options, Stage};
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::selection::select::WITHIN_NOISE;
 use quietcut_model::case::Case;
 use quietcut_recording::{Kind, Recording};
@@ -64,9 +64,9 @@ pub(crate) fn diagnosed(
     watch: &dyn Fn(Stage),
 ) -> Option<Diagnosis> {
     let [beginnings, rest] = beginnings(case, recordings)?;
-    let scene = Scene::new(case, &beginnings).ok()?;
-    let mut diagnosis = conclude::judge(&scene, &beginnings, options, watch);
-    drop(scene);
+    let study = Study::new(case, &beginnings).ok()?;
+    let mut diagnosis = conclude::judge(&study, &beginnings, options, watch);
+    drop(study);
     watch(Stage::Records);
     let believed = Left::of(case, &rest)?;
     let searched_s = beginnings
@@ -114,12 +114,12 @@ struct Left {
 
 impl Left {
     fn of(case: &Case, recordings: &[Recording]) -> Option<Self> {
-        let scene = Scene::new(case, recordings).ok()?;
-        let regression = Regression::new(&scene);
+        let study = Study::new(case, recordings).ok()?;
+        let regression = Regression::new(&study);
         Some(Self {
             energy: regression.residual(Share::Whole),
             count: regression.count(Share::Whole) as f64,
-            missed: regression.missed(&scene, Share::Whole),
+            missed: regression.missed(&study, Share::Whole),
         })
     }
 }

@@ -3,42 +3,43 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use crate::baseline::direction_of;
-use crate::candidates::cause::{Part, Place};
-use crate::conclusion::answer::{Figure, NINETY_PERCENT, NamedCause};
+use crate::candidates::cause::{Location, Part};
+use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use crate::fit::candidate_model::Explanation;
 use crate::fit::covariance::covariance;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::selection::select::APART;
 
 /// The causes of an explanation.
 pub(crate) fn named(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &Library,
     regression: &mut Regression,
     explanation: &Explanation,
     inflation: f64,
     confidence: f64,
-) -> Vec<NamedCause> {
+) -> Vec<EstimatedCause> {
     let covariance = match &explanation.simulated {
         Some(simulated) => simulated.covariance.clone(),
-        None => covariance(scene, library, regression, explanation, inflation),
+        None => covariance(study, library, regression, explanation, inflation),
     };
     let mut all = Vec::new();
-    for (place, covariance) in covariance.iter().enumerate() {
-        let choice = explanation.choices[place];
+    for (position, covariance) in covariance.iter().enumerate() {
+        let choice = explanation.choices[position];
         let candidate = &library.candidates[choice.candidate];
         let cause = library.cause(choice.candidate);
-        let shape = &candidate.shapes[choice.shape].0;
-        let coefficients = library.coefficients(explanation, place);
+        let nonlinear_parameters = &candidate.variants[choice.variant].0;
+        let coefficients = library.coefficients(explanation, position);
         let parts_of = |inner: &[f64]| -> Option<Vec<Part>> {
-            let (coefficients, shape) = inner.split_at(coefficients.len());
-            let parameters = cause.parameters(scene, &candidate.place, shape, coefficients)?;
-            let mut parts = cause.parts(&candidate.place, &parameters);
+            let (coefficients, nonlinear_parameters) = inner.split_at(coefficients.len());
+            let parameters =
+                cause.parameters(study, &candidate.location, nonlinear_parameters, coefficients)?;
+            let mut parts = cause.parts(&candidate.location, &parameters);
             parts[0]
                 .parameters
-                .extend(cause.also(scene, &candidate.place, &parameters));
+                .extend(cause.also(study, &candidate.location, &parameters));
             Some(parts)
         };
         let values = |inner: &[f64]| -> Option<Vec<f64>> {
@@ -50,19 +51,19 @@ pub(crate) fn named(
                     .collect(),
             )
         };
-        let inner: Vec<f64> = coefficients.iter().chain(shape).copied().collect();
+        let inner: Vec<f64> = coefficients.iter().chain(nonlinear_parameters).copied().collect();
         let (Some(parts), Some(center)) = (parts_of(&inner), values(&inner)) else {
             continue;
         };
-        let known = cause.known_deviations(scene);
+        let known = cause.known_deviations(study);
         let mut deviations = deviations(&values, &inner, &center, covariance, inflation).into_iter();
         let moved = moved(&parts_of, &inner, covariance, inflation);
         for (index, part) in parts.into_iter().enumerate() {
             let tables = moved
                 .iter()
                 .map(|ends| ends.each_ref().map(|parts| parts[index].extension.clone()));
-            all.push(NamedCause {
-                choice: place,
+            all.push(EstimatedCause {
+                choice: position,
                 moved: tables.collect(),
                 parameters: part
                     .parameters
@@ -76,7 +77,7 @@ pub(crate) fn named(
                         )
                     })
                     .collect(),
-                ..empty(part.name, &part.place, confidence, part.extension)
+                ..empty(part.name, &part.location, confidence, part.extension)
             });
         }
     }
@@ -85,12 +86,12 @@ pub(crate) fn named(
 
 /// Mass, stiffness and damping by one factor, where that is the same as the gain that was found.
 pub(crate) fn by_common_factor(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &Library,
     regression: &Regression,
     best: &Explanation,
     inflation: f64,
-) -> Vec<NamedCause> {
+) -> Vec<EstimatedCause> {
     let [choice] = best.choices[..] else {
         return Vec::new();
     };
@@ -102,13 +103,13 @@ pub(crate) fn by_common_factor(
         Some(fit) => fit.left,
         None => best.fit.left,
     };
-    let places: Vec<Place> = if scene.has_modes() {
-        vec![Place::Everywhere]
+    let locations: Vec<Location> = if study.has_modes() {
+        vec![Location::Everywhere]
     } else {
-        scene.driven_axes().into_iter().map(Place::Axis).collect()
+        study.driven_axes().into_iter().map(Location::Axis).collect()
     };
-    for place in places {
-        let Some((left, change)) = library.common_factor(regression, &place) else {
+    for location in locations {
+        let Some((left, change)) = library.common_factor(regression, &location) else {
             continue;
         };
         if (left - along) / inflation > APART {
@@ -119,22 +120,22 @@ pub(crate) fn by_common_factor(
         return library
             .candidates
             .iter()
-            .filter(|known| known.place == place)
+            .filter(|known| known.location == location)
             .filter_map(|known| {
                 let cause = &*library.causes[known.cause];
                 if !["mass", "stiffness", "damping"].contains(&cause.name()) {
                     return None;
                 }
-                let of = |change: f64| cause.parameters(scene, &known.place, &[], &[change]);
+                let of = |change: f64| cause.parameters(study, &known.location, &[], &[change]);
                 let parameters = of(change)?;
                 let (key, value) = *parameters.first()?;
                 // Linear in the change.
                 let (_, beyond) = *of(change + 1.0)?.first()?;
                 let scale = beyond - value;
-                let extension = cause.extension(&known.place, &parameters);
-                Some(NamedCause {
+                let extension = cause.extension(&known.location, &parameters);
+                Some(EstimatedCause {
                     parameters: [(key, figure(value, scale * deviation))].into(),
-                    ..empty(cause.name(), &known.place, 0.25, extension)
+                    ..empty(cause.name(), &known.location, 0.25, extension)
                 })
             })
             .collect();
@@ -142,16 +143,16 @@ pub(crate) fn by_common_factor(
     Vec::new()
 }
 
-fn empty(name: &'static str, place: &Place, confidence: f64, extension: toml::Table) -> NamedCause {
-    NamedCause {
+fn empty(name: &'static str, location: &Location, confidence: f64, extension: toml::Table) -> EstimatedCause {
+    EstimatedCause {
         name,
         confidence,
-        direction: place.direction().map(|direction| direction.name()),
-        directions: match place {
-            Place::Axes(a, b) => Some([direction_of(*a).name(), direction_of(*b).name()]),
+        direction: location.direction().map(|direction| direction.name()),
+        directions: match location {
+            Location::Axes(a, b) => Some([direction_of(*a).name(), direction_of(*b).name()]),
             _ => None,
         },
-        channel: place.channel().map(String::from),
+        channel: location.channel().map(String::from),
         parameters: std::collections::BTreeMap::new(),
         extension,
         choice: 0,

@@ -10,7 +10,7 @@ use crate::fit::library::Library;
 use crate::motion::recorded_cut::RecordedCut;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
@@ -38,12 +38,12 @@ pub struct View {
     /// The force that the residual tells of; `None` where there is no motion that it could act on.
     pub missing: Option<MissingForce>,
     /// What a cut has besides; `None` for other tests.
-    pub turning: Option<TurningView>,
+    pub spindle_motion: Option<SpindleMotionView>,
 }
 
 /// How the spindle turns under a channel of a cut.
 #[derive(Clone, Debug)]
-pub struct TurningView {
+pub struct SpindleMotionView {
     /// Mean speed, rev/min.
     pub rpm: f64,
     /// Number of teeth.
@@ -81,20 +81,20 @@ impl View {
 }
 
 /// Views of every channel, with the explanation taken off where there is one.
-pub(crate) fn views(scene: &Scene<'_>, library: &Library, best: Option<&Explanation>) -> Vec<View> {
+pub(crate) fn views(study: &Study<'_>, library: &Library, best: Option<&Explanation>) -> Vec<View> {
     let mut all = Vec::new();
-    for record in &scene.records {
-        let left_by_best = best.map(|best| left_by(scene, library, record, best));
+    for record in &study.records {
+        let left_by_best = best.map(|best| left_by(study, library, record, best));
         for (index, channel) in record.channels.iter().enumerate() {
             let residual = channel.residual();
             let left = left_by_best
                 .as_ref()
                 .map_or_else(Vec::new, |left| left[index].clone());
-            let turning = record.cut.as_ref().map(|cutting| {
+            let spindle_motion = record.cut.as_ref().map(|cutting| {
                 let passes = passes(record, &cutting.cut);
                 let at = |samples: &[f64]| strobe(&passes, samples);
-                TurningView {
-                    rpm: cutting.cut.turning.rpm(),
+                SpindleMotionView {
+                    rpm: cutting.cut.spindle_motion.rpm(),
                     teeth: cutting.cut.cutter.teeth.len(),
                     measured: at(&channel.measured),
                     residual: at(&residual),
@@ -108,8 +108,8 @@ pub(crate) fn views(scene: &Scene<'_>, library: &Library, best: Option<&Explanat
                 highest_hz: record.band_hz,
                 deviation: channel.deviation,
                 measured: channel.measured.clone(),
-                missing: MissingForce::of(&scene.baseline, record, channel, &residual),
-                turning,
+                missing: MissingForce::of(&study.baseline, record, channel, &residual),
+                spindle_motion,
                 residual,
                 left,
             });
@@ -119,8 +119,8 @@ pub(crate) fn views(scene: &Scene<'_>, library: &Library, best: Option<&Explanat
 }
 
 /// What an explanation leaves of each channel, once the free decay that it leaves has been taken out.
-fn left_by(scene: &Scene<'_>, library: &Library, record: &Record, best: &Explanation) -> Vec<Vec<f64>> {
-    let explained = library.explained(scene, record, best);
+fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Explanation) -> Vec<Vec<f64>> {
+    let explained = library.explained(study, record, best);
     let left: Vec<Vec<f64>> = record
         .channels
         .iter()
@@ -146,7 +146,7 @@ fn left_by(scene: &Scene<'_>, library: &Library, record: &Record, best: &Explana
 fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
     let rate_hz = record.grid.rate_hz();
-    let turned = |sample: usize| cut.turning.angle_rad(sample as f64 / rate_hz) / pitch;
+    let turned = |sample: usize| cut.spindle_motion.angle_rad(sample as f64 / rate_hz) / pitch;
     let first = turned(0).ceil();
     let mut next = first;
     let mut found = Vec::new();

@@ -41,8 +41,8 @@ fn of_channel(view: &View) -> String {
     );
     if let Some((hz, share)) = peak(view, left) {
         said += &format!("; most at {hz:.3} Hz");
-        if let Some(turning) = &view.turning {
-            said += &format!(", spindle order {:.2}", 60.0 * hz / turning.rpm);
+        if let Some(spindle_motion) = &view.spindle_motion {
+            said += &format!(", spindle order {:.2}", 60.0 * hz / spindle_motion.rpm);
         }
         said += &format!(" ({:.0} % of the energy within a few lines)", 100.0 * share);
     }

@@ -13,7 +13,7 @@ pub(crate) struct Choice {
     /// The candidate.
     pub candidate: usize,
     /// Its shape.
-    pub shape: usize,
+    pub variant: usize,
 }
 
 /// Causes that act together, fitted.
@@ -24,7 +24,7 @@ pub(crate) struct Explanation {
     /// The fit of all their coefficients, in the order of the choices.
     pub fit: Fit,
     /// Parameters that were fitted, those of the shape included.
-    pub freedoms: usize,
+    pub parameter_count: usize,
     /// What simulation says, where the records can be simulated: coefficients, shapes and what is left are then its own.
     pub simulated: Option<Simulated>,
 }

@@ -6,13 +6,13 @@ use crate::fit::candidate_model::Explanation;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
 use crate::records::domain::Domain;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 /// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1, of which
 /// there is so many times the power. What is left of forces is no noise: errors of the motion's derivatives and of the equations,
 /// of which the covariance is taken as they are.
 pub(crate) fn covariance(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &Library,
     regression: &mut Regression,
     explanation: &Explanation,
@@ -28,13 +28,13 @@ pub(crate) fn covariance(
     }
     for (rows, slopes) in places
         .iter_mut()
-        .zip(library.slopes_of(scene, regression, explanation))
+        .zip(library.slopes_of(study, regression, explanation))
     {
         rows.extend(columns.len()..columns.len() + slopes.len());
         columns.extend(slopes);
     }
     let whole = match regression.fit(Share::Whole, &columns) {
-        Some(fit) if scene.all_in(Domain::Force) => {
+        Some(fit) if study.all_in(Domain::Force) => {
             regression.covariance_by_residual(Share::Whole, &columns, &fit) / inflation
         }
         Some(fit) => fit.covariance,

@@ -42,7 +42,7 @@ impl OutputError<'_> {
     pub(crate) fn spread(&self, library: &Library, explanation: &Explanation) -> Option<Explanation> {
         let simulated = explanation.simulated.as_ref()?;
         let mut deviations = self
-            .scene
+            .study
             .records
             .iter()
             .flat_map(|record| record.force_deviation_n);
@@ -51,8 +51,8 @@ impl OutputError<'_> {
         }
         let (mut problem, mut point) = self.problem(library, explanation)?;
         point.starts.clone_from(&simulated.starts);
-        let effects = problem.effects(self.scene, &point)?;
-        if !self.closed.is_nonlinear(self.scene, &effects) {
+        let effects = problem.effects(self.study, &point)?;
+        if !self.closed.is_nonlinear(self.study, &effects) {
             return None;
         }
         for (slot, step) in &mut problem.slots {
@@ -72,7 +72,7 @@ impl OutputError<'_> {
         // δ² − δ'² of one draw.
         let more_of = |draw: usize| {
             let noise = self.drawn(draw as u64);
-            let closed = ClosedLoop::driven_by(self.scene, &self.with(&noise));
+            let closed = ClosedLoop::driven_by(self.study, &self.with(&noise));
             let mut shaken = self.residuals_by(&closed, &problem, &whole, &point)?;
             for (shaken, left) in shaken.iter_mut().zip(&left) {
                 shaken
@@ -87,7 +87,7 @@ impl OutputError<'_> {
         let draws = |range: Range<usize>| -> Vec<Option<DVector<f64>>> {
             range.into_par_iter().map(more_of).collect()
         };
-        let samples: usize = self.scene.records.iter().map(|record| record.grid.count()).sum();
+        let samples: usize = self.study.records.iter().map(|record| record.grid.count()).sum();
         let most = (SIMULATED / samples.max(1)).clamp(DRAWS[0], DRAWS[1]);
         let first = FIRST.max(most / 2);
         let mut drawn = draws(0..first);
@@ -129,7 +129,7 @@ impl OutputError<'_> {
     fn drawn(&self, draw: u64) -> Vec<Forces> {
         let mut random = ChaCha8Rng::seed_from_u64(draw);
         random.set_stream(STREAM);
-        let records = self.scene.records.iter();
+        let records = self.study.records.iter();
         records
             .map(|record| {
                 std::array::from_fn(|axis| {
@@ -148,7 +148,7 @@ impl OutputError<'_> {
 
     /// The measured forces with `noise`.
     fn with(&self, noise: &[Forces]) -> Vec<Forces> {
-        let records = self.scene.records.iter().zip(noise);
+        let records = self.study.records.iter().zip(noise);
         records
             .map(|(record, noise)| {
                 std::array::from_fn(|axis| {
@@ -161,7 +161,7 @@ impl OutputError<'_> {
 
     /// What is left by record where the baseline answers to `noise`, in units of the noise.
     fn by_baseline(&self, noise: &[Forces], parts: &[&Part]) -> Vec<Vec<f64>> {
-        let records = self.scene.records.iter().zip(noise).enumerate();
+        let records = self.study.records.iter().zip(noise).enumerate();
         records
             .map(|(index, (record, noise))| {
                 let spectra: [Option<Vec<Complex64>>; 3] = std::array::from_fn(|axis| {

@@ -3,20 +3,20 @@
 use rayon::prelude::*;
 
 use crate::candidates;
-use crate::candidates::cause::{Cause, Parameter, Place};
+use crate::candidates::cause::{Cause, Location, Parameter};
 use crate::fit::candidate_model::{Choice, Explanation};
 use crate::fit::regression::{Regression, Share};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 /// A cause at a place, with the columns of each of its shapes.
 pub(crate) struct Candidate {
     /// Its cause, a place in the library.
     pub cause: usize,
     /// Where.
-    pub place: Place,
+    pub location: Location,
     /// Shapes and the columns that they have.
-    pub shapes: Vec<(Vec<f64>, Vec<usize>)>,
+    pub variants: Vec<(Vec<f64>, Vec<usize>)>,
 }
 
 /// The library on a scene.
@@ -29,71 +29,85 @@ pub(crate) struct Library {
 
 impl Library {
     /// All causes on a scene, with their columns added to the regression.
-    pub(crate) fn new(scene: &Scene<'_>, regression: &mut Regression) -> Self {
+    pub(crate) fn new(study: &Study<'_>, regression: &mut Regression) -> Self {
         let causes = candidates::all();
-        let placed: Vec<(usize, Place, Vec<f64>)> = causes
+        let placed: Vec<(usize, Location, Vec<f64>)> = causes
             .iter()
             .enumerate()
             .flat_map(|(index, cause)| {
-                let places = cause.places(scene);
-                places.into_iter().flat_map(move |place| {
-                    let shapes = cause.shapes(scene, &place);
-                    shapes.into_iter().map(move |shape| (index, place.clone(), shape))
+                let locations = cause.locations(study);
+                locations.into_iter().flat_map(move |location| {
+                    let variants = cause.nonlinear_grid(study, &location);
+                    variants
+                        .into_iter()
+                        .map(move |nonlinear_parameters| (index, location.clone(), nonlinear_parameters))
                 })
             })
             .collect();
         // Along each of several axes it adds what it adds along one after the other.
         let (each, placed): (Vec<_>, Vec<_>) = placed
             .into_iter()
-            .partition(|(_, place, _)| matches!(place, Place::EachOf(_)));
+            .partition(|(_, location, _)| matches!(location, Location::EachOf(_)));
         let computed: Vec<_> = placed
             .into_par_iter()
-            .filter_map(|(cause, place, shape)| {
-                let columns = columns(scene, &*causes[cause], &place, &shape)?;
-                Some((cause, place, shape, columns))
+            .filter_map(|(cause, location, nonlinear_parameters)| {
+                let columns = columns(study, &*causes[cause], &location, &nonlinear_parameters)?;
+                Some((cause, location, nonlinear_parameters, columns))
             })
             .collect();
         let mut library = Self {
             causes,
             candidates: Vec::new(),
         };
-        for (cause, place, shape, columns) in computed {
+        for (cause, location, nonlinear_parameters, columns) in computed {
             let numbers = columns.iter().map(|column| regression.add(column)).collect();
-            library.put(cause, place, shape, numbers);
+            library.put(cause, location, nonlinear_parameters, numbers);
         }
-        for (cause, place, shape) in each {
-            if let Some(numbers) = library.columns_along_each(cause, &place, &shape) {
-                library.put(cause, place, shape, numbers);
+        for (cause, location, nonlinear_parameters) in each {
+            if let Some(numbers) = library.columns_along_each(cause, &location, &nonlinear_parameters) {
+                library.put(cause, location, nonlinear_parameters, numbers);
             }
         }
         regression.complete();
         library
     }
 
-    fn find(&self, cause: usize, place: &Place) -> Option<usize> {
+    fn find(&self, cause: usize, location: &Location) -> Option<usize> {
         self.candidates
             .iter()
-            .position(|candidate| candidate.cause == cause && candidate.place == *place)
+            .position(|candidate| candidate.cause == cause && candidate.location == *location)
     }
 
-    fn put(&mut self, cause: usize, place: Place, shape: Vec<f64>, columns: Vec<usize>) {
-        match self.find(cause, &place) {
-            Some(known) => self.candidates[known].shapes.push((shape, columns)),
+    fn put(&mut self, cause: usize, location: Location, nonlinear_parameters: Vec<f64>, columns: Vec<usize>) {
+        match self.find(cause, &location) {
+            Some(known) => self.candidates[known]
+                .variants
+                .push((nonlinear_parameters, columns)),
             None => self.candidates.push(Candidate {
                 cause,
-                place,
-                shapes: vec![(shape, columns)],
+                location,
+                variants: vec![(nonlinear_parameters, columns)],
             }),
         }
     }
 
     /// The columns of a cause along each of several axes: those along one after the other; `None` where one of them is not known.
-    fn columns_along_each(&self, cause: usize, place: &Place, shape: &[f64]) -> Option<Vec<usize>> {
-        let Place::EachOf(axes) = place else { return None };
+    fn columns_along_each(
+        &self,
+        cause: usize,
+        location: &Location,
+        nonlinear_parameters: &[f64],
+    ) -> Option<Vec<usize>> {
+        let Location::EachOf(axes) = location else {
+            return None;
+        };
         let mut columns = Vec::new();
         for axis in axes {
-            let known = &self.candidates[self.find(cause, &Place::Axis(*axis))?];
-            let (_, own) = known.shapes.iter().find(|(known, _)| known == shape)?;
+            let known = &self.candidates[self.find(cause, &Location::Axis(*axis))?];
+            let (_, own) = known
+                .variants
+                .iter()
+                .find(|(known, _)| known == nonlinear_parameters)?;
             columns.extend_from_slice(own);
         }
         Some(columns)
@@ -110,20 +124,20 @@ impl Library {
             .iter()
             .enumerate()
             .flat_map(|(candidate, known)| {
-                (0..known.shapes.len()).map(move |shape| Choice { candidate, shape })
+                (0..known.variants.len()).map(move |variant| Choice { candidate, variant })
             })
             .collect()
     }
 
     /// The columns of a choice.
     pub(crate) fn columns(&self, choice: Choice) -> &[usize] {
-        &self.candidates[choice.candidate].shapes[choice.shape].1
+        &self.candidates[choice.candidate].variants[choice.variant].1
     }
 
     /// The fit of some choices; `None` where they cannot be told from each other, or are not physical.
     pub(crate) fn explain(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         regression: &Regression,
         choices: &[Choice],
     ) -> Option<Explanation> {
@@ -134,22 +148,22 @@ impl Library {
             .collect();
         let fit = regression.fit(Share::Whole, &columns)?;
         let explanation = Explanation {
-            freedoms: choices.iter().map(|choice| self.freedoms(*choice)).sum(),
+            parameter_count: choices.iter().map(|choice| self.parameter_count(*choice)).sum(),
             choices: choices.to_vec(),
             fit,
             simulated: None,
         };
-        self.parameters(scene, &explanation).map(|_| explanation)
+        self.parameters(study, &explanation).map(|_| explanation)
     }
 
     /// Parameters of a choice that are fitted; what settles by itself is none.
-    pub(crate) fn freedoms(&self, choice: Choice) -> usize {
-        let (shape, columns) = &self.candidates[choice.candidate].shapes[choice.shape];
+    pub(crate) fn parameter_count(&self, choice: Choice) -> usize {
+        let (nonlinear_parameters, columns) = &self.candidates[choice.candidate].variants[choice.variant];
         let settles = self
             .cause(choice.candidate)
-            .settled(shape, &vec![1.0; columns.len()])
+            .settled(nonlinear_parameters, &vec![1.0; columns.len()])
             .is_some();
-        columns.len() + if settles { 0 } else { shape.len() }
+        columns.len() + if settles { 0 } else { nonlinear_parameters.len() }
     }
 
     /// All columns of an explanation, choice after choice.
@@ -163,27 +177,28 @@ impl Library {
     }
 
     /// The coefficients of one of the choices.
-    pub(crate) fn coefficients(&self, explanation: &Explanation, place: usize) -> Vec<f64> {
-        let from: usize = explanation.choices[..place]
+    pub(crate) fn coefficients(&self, explanation: &Explanation, position: usize) -> Vec<f64> {
+        let from: usize = explanation.choices[..position]
             .iter()
             .map(|choice| self.columns(*choice).len())
             .sum();
-        explanation.fit.coefficients[from..from + self.columns(explanation.choices[place]).len()].to_vec()
+        explanation.fit.coefficients[from..from + self.columns(explanation.choices[position]).len()].to_vec()
     }
 
     /// What an explanation adds to the residual of each channel of a record.
     pub(crate) fn explained(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
         explanation: &Explanation,
     ) -> Vec<Vec<f64>> {
         let mut sum = vec![vec![0.0; record.grid.count()]; record.channels.len()];
-        for (place, choice) in explanation.choices.iter().enumerate() {
+        for (position, choice) in explanation.choices.iter().enumerate() {
             let known = &self.candidates[choice.candidate];
             let cause = self.cause(choice.candidate);
-            let coefficients = self.coefficients(explanation, place);
-            let regressors = cause.regressors(scene, record, &known.place, &known.shapes[choice.shape].0);
+            let coefficients = self.coefficients(explanation, position);
+            let regressors =
+                cause.regressors(study, record, &known.location, &known.variants[choice.variant].0);
             for (regressor, coefficient) in regressors.iter().flatten().zip(coefficients) {
                 for (sum, column) in sum.iter_mut().zip(regressor.columns(record)) {
                     sum.iter_mut()
@@ -207,7 +222,7 @@ impl Library {
     /// The parameters of every cause of an explanation.
     pub(crate) fn parameters(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         explanation: &Explanation,
     ) -> Option<Vec<Vec<Parameter>>> {
         let mut from = 0;
@@ -216,10 +231,15 @@ impl Library {
             .iter()
             .map(|choice| {
                 let candidate = &self.candidates[choice.candidate];
-                let (shape, columns) = &candidate.shapes[choice.shape];
+                let (nonlinear_parameters, columns) = &candidate.variants[choice.variant];
                 let coefficients = &explanation.fit.coefficients[from..from + columns.len()];
                 from += columns.len();
-                self.causes[candidate.cause].parameters(scene, &candidate.place, shape, coefficients)
+                self.causes[candidate.cause].parameters(
+                    study,
+                    &candidate.location,
+                    nonlinear_parameters,
+                    coefficients,
+                )
             })
             .collect()
     }
@@ -227,13 +247,13 @@ impl Library {
     /// The extensions that make an explanation part of a case.
     pub(crate) fn extensions(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         explanation: &Explanation,
     ) -> Option<Vec<(&'static str, toml::Table)>> {
-        let parameters = self.parameters(scene, explanation)?;
+        let parameters = self.parameters(study, explanation)?;
         let of = |(choice, parameters): (&Choice, Vec<Parameter>)| {
-            let place = &self.candidates[choice.candidate].place;
-            self.cause(choice.candidate).parts(place, &parameters)
+            let location = &self.candidates[choice.candidate].location;
+            self.cause(choice.candidate).parts(location, &parameters)
         };
         let parts = explanation.choices.iter().zip(parameters).flat_map(of);
         Some(parts.map(|part| (part.name, part.extension)).collect())
@@ -243,20 +263,22 @@ impl Library {
     /// shape is no freedom of the fit.
     pub(crate) fn slopes_of(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         regression: &mut Regression,
         explanation: &Explanation,
     ) -> Vec<Vec<usize>> {
         (0..explanation.choices.len())
-            .map(|place| {
-                let choice = explanation.choices[place];
-                let coefficients = self.coefficients(explanation, place);
-                let shape = &self.candidates[choice.candidate].shapes[choice.shape].0;
+            .map(|position| {
+                let choice = explanation.choices[position];
+                let coefficients = self.coefficients(explanation, position);
+                let nonlinear_parameters = &self.candidates[choice.candidate].variants[choice.variant].0;
                 let cause = self.cause(choice.candidate);
-                if shape.is_empty() || cause.settled(shape, &coefficients).is_some() {
+                if nonlinear_parameters.is_empty()
+                    || cause.settled(nonlinear_parameters, &coefficients).is_some()
+                {
                     return Vec::new();
                 }
-                self.slopes(scene, regression, choice, &coefficients)
+                self.slopes(study, regression, choice, &coefficients)
                     .unwrap_or_default()
             })
             .collect()
@@ -265,27 +287,32 @@ impl Library {
     /// Columns of the change of what a choice with these coefficients adds, per unit of each parameter of its shape.
     pub(crate) fn slopes(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         regression: &mut Regression,
         choice: Choice,
         coefficients: &[f64],
     ) -> Option<Vec<usize>> {
         let known = &self.candidates[choice.candidate];
         let cause = &*self.causes[known.cause];
-        let shape = &known.shapes[choice.shape].0;
-        let bounds = cause.bounds(scene, &known.place);
-        (0..shape.len())
+        let nonlinear_parameters = &known.variants[choice.variant].0;
+        let bounds = cause.bounds(study, &known.location);
+        (0..nonlinear_parameters.len())
             .map(|parameter| {
                 let [low, high] = bounds[parameter];
-                let step = 0.01 * if low > 0.0 { shape[parameter] } else { high - low };
+                let step = 0.01
+                    * if low > 0.0 {
+                        nonlinear_parameters[parameter]
+                    } else {
+                        high - low
+                    };
                 let at = |value: f64| {
-                    let mut moved = shape.clone();
+                    let mut moved = nonlinear_parameters.clone();
                     moved[parameter] = value.clamp(low, high);
                     let width = moved[parameter];
-                    columns(scene, cause, &known.place, &moved).map(|columns| (columns, width))
+                    columns(study, cause, &known.location, &moved).map(|columns| (columns, width))
                 };
-                let (above, to) = at(shape[parameter] + step)?;
-                let (below, from) = at(shape[parameter] - step)?;
+                let (above, to) = at(nonlinear_parameters[parameter] + step)?;
+                let (below, from) = at(nonlinear_parameters[parameter] - step)?;
                 let mut slope = above[0].clone();
                 for (record, slope) in slope.iter_mut().enumerate() {
                     for (channel, slope) in slope.iter_mut().enumerate() {
@@ -308,14 +335,14 @@ impl Library {
     }
 
     /// What is left if one factor on mass, stiffness and damping at `place` stands for everything, and that factor less one.
-    pub(crate) fn common_factor(&self, regression: &Regression, place: &Place) -> Option<(f64, f64)> {
+    pub(crate) fn common_factor(&self, regression: &Regression, location: &Location) -> Option<(f64, f64)> {
         let columns: Vec<usize> = ["mass", "stiffness", "damping"]
             .iter()
             .map(|name| {
                 self.candidates
                     .iter()
-                    .position(|known| self.causes[known.cause].name() == *name && known.place == *place)
-                    .map(|index| self.candidates[index].shapes[0].1[0])
+                    .position(|known| self.causes[known.cause].name() == *name && known.location == *location)
+                    .map(|index| self.candidates[index].variants[0].1[0])
             })
             .collect::<Option<_>>()?;
         let at = |factor: f64| regression.left(Share::Whole, &columns, &vec![factor; columns.len()]);
@@ -330,56 +357,69 @@ impl Library {
     }
 
     /// Adds the shapes that are worth a look for what an explanation leaves.
-    pub(crate) fn add_shapes_beside(
+    pub(crate) fn add_variants_beside(
         &mut self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         regression: &mut Regression,
         left: &[Vec<Vec<f64>>],
     ) {
         for candidate in 0..self.candidates.len() {
-            let place = &self.candidates[candidate].place;
-            for shape in self.cause(candidate).shapes_beside(scene, place, left) {
-                self.add_shape(scene, regression, candidate, shape);
+            let location = &self.candidates[candidate].location;
+            for nonlinear_parameters in self.cause(candidate).nonlinear_grid_beside(study, location, left) {
+                self.add_variant(study, regression, candidate, nonlinear_parameters);
             }
         }
     }
 
     /// Adds a shape to a candidate; `None` where it has no columns.
-    pub(crate) fn add_shape(
+    pub(crate) fn add_variant(
         &mut self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         regression: &mut Regression,
         candidate: usize,
-        shape: Vec<f64>,
+        nonlinear_parameters: Vec<f64>,
     ) -> Option<Choice> {
         let known = &self.candidates[candidate];
-        if let Some(index) = known.shapes.iter().position(|(known, _)| *known == shape) {
+        if let Some(index) = known
+            .variants
+            .iter()
+            .position(|(known, _)| *known == nonlinear_parameters)
+        {
             return Some(Choice {
                 candidate,
-                shape: index,
+                variant: index,
             });
         }
-        let columns = columns(scene, &*self.causes[known.cause], &known.place, &shape)?;
+        let columns = columns(
+            study,
+            &*self.causes[known.cause],
+            &known.location,
+            &nonlinear_parameters,
+        )?;
         let numbers = columns.iter().map(|column| regression.add(column)).collect();
-        let shapes = &mut self.candidates[candidate].shapes;
-        shapes.push((shape, numbers));
+        let variants = &mut self.candidates[candidate].variants;
+        variants.push((nonlinear_parameters, numbers));
         Some(Choice {
             candidate,
-            shape: shapes.len() - 1,
+            variant: variants.len() - 1,
         })
     }
 }
 
 /// Samples by coefficient, record and channel.
 fn columns(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     cause: &dyn Cause,
-    place: &Place,
-    shape: &[f64],
+    location: &Location,
+    nonlinear_parameters: &[f64],
 ) -> Option<Vec<Vec<Vec<Vec<f64>>>>> {
     let mut by_coefficient: Vec<Vec<Vec<Vec<f64>>>> = Vec::new();
-    for record in &scene.records {
-        for (index, regressor) in cause.regressors(scene, record, place, shape)?.iter().enumerate() {
+    for record in &study.records {
+        for (index, regressor) in cause
+            .regressors(study, record, location, nonlinear_parameters)?
+            .iter()
+            .enumerate()
+        {
             if by_coefficient.len() <= index {
                 by_coefficient.push(Vec::new());
             }

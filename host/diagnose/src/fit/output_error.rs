@@ -17,7 +17,7 @@ use crate::fit::regression::{Fit, Regression};
 use crate::fit::segment::{Part, Share, Unknown, split};
 use crate::fit::unknowns::{Found, Point, Problem, Slot, at_bounds, by_choice, energy, predicted, stepped};
 use crate::motion::free_decay::Decays;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
@@ -41,7 +41,7 @@ const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
 /// Simulations compared with records.
 pub(crate) struct OutputError<'a> {
-    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) study: &'a Study<'a>,
     pub(crate) closed: ClosedLoop,
     /// Parts of each share, in the order of the records.
     parts: Vec<Part>,
@@ -64,8 +64,8 @@ pub(crate) fn projected(columns: &[Column], size: usize, residuals: &[Vec<f64>])
 
 impl<'a> OutputError<'a> {
     /// `None` where some record cannot be simulated.
-    pub(crate) fn new(scene: &'a Scene<'a>) -> Option<Self> {
-        let closed = ClosedLoop::new(scene)?;
+    pub(crate) fn new(study: &'a Study<'a>) -> Option<Self> {
+        let closed = ClosedLoop::new(study)?;
         // What is let go has its own start among the parameters.
         let unknown = |record: &crate::records::record::Record| {
             if starts_anywhere(record) {
@@ -75,20 +75,20 @@ impl<'a> OutputError<'a> {
             }
         };
         let horizon = |share: f64| {
-            (0..scene.records.len())
+            (0..study.records.len())
                 .map(|index| {
-                    let record = &scene.records[index];
+                    let record = &study.records[index];
                     let count = (share * record.grid.count() as f64) as usize;
-                    Part::new(scene, index, 0..count.max(16), Share::Whole, unknown(record))
+                    Part::new(study, index, 0..count.max(16), Share::Whole, unknown(record))
                 })
                 .collect()
         };
         Some(Self {
-            scene,
+            study,
             closed,
-            parts: split(scene, unknown),
+            parts: split(study, unknown),
             horizons: HORIZONS.map(horizon).into(),
-            is_let_go: scene.records.iter().all(starts_anywhere),
+            is_let_go: study.records.iter().all(starts_anywhere),
         })
     }
 
@@ -109,8 +109,8 @@ impl<'a> OutputError<'a> {
         let Some(length) = mine.iter().map(|part| part.range.end).max() else {
             return Some(Vec::new());
         };
-        let mut samples = closed.simulate(self.scene, record, effects, start, length)?;
-        for (channel, samples) in self.scene.records[record].channels.iter().zip(&mut samples) {
+        let mut samples = closed.simulate(self.study, record, effects, start, length)?;
+        for (channel, samples) in self.study.records[record].channels.iter().zip(&mut samples) {
             for (simulated, measured) in samples.iter_mut().zip(&channel.measured) {
                 *simulated = measured - *simulated;
             }
@@ -135,8 +135,8 @@ impl<'a> OutputError<'a> {
         parts: &[&Part],
         point: &Point,
     ) -> Option<Vec<Vec<f64>>> {
-        let effects = problem.effects(self.scene, point)?;
-        (0..self.scene.records.len())
+        let effects = problem.effects(self.study, point)?;
+        (0..self.study.records.len())
             .into_par_iter()
             .map(|record| self.residual(closed, record, parts, &effects, &point.starts[record]))
             .collect()
@@ -158,7 +158,7 @@ impl<'a> OutputError<'a> {
                 [*step, -step].into_iter().find_map(|step| {
                     let mut moved = point.clone();
                     *slot.of(&mut moved) += step;
-                    let effects = problem.effects(self.scene, &moved)?;
+                    let effects = problem.effects(self.study, &moved)?;
                     Some((effects, moved, step))
                 })
             })
@@ -300,15 +300,18 @@ impl<'a> OutputError<'a> {
     ) -> Option<Explanation> {
         let mut next = explanation.clone();
         let mut coefficients = Vec::new();
-        for (place, inner) in found.point.inner.iter().enumerate() {
-            let choice = next.choices[place];
-            let count = library.candidates[choice.candidate].shapes[choice.shape].1.len();
+        for (position, inner) in found.point.inner.iter().enumerate() {
+            let choice = next.choices[position];
+            let count = library.candidates[choice.candidate].variants[choice.variant]
+                .1
+                .len();
             coefficients.extend_from_slice(&inner[..count]);
-            let shape = library
+            let nonlinear_parameters = library
                 .cause(choice.candidate)
                 .settled(&inner[count..], &inner[..count])
                 .unwrap_or_else(|| inner[count..].to_vec());
-            next.choices[place] = library.add_shape(self.scene, regression, choice.candidate, shape)?;
+            next.choices[position] =
+                library.add_variant(self.study, regression, choice.candidate, nonlinear_parameters)?;
         }
         next.fit.coefficients = coefficients;
         next.fit.left = found.left;
@@ -328,32 +331,36 @@ impl<'a> OutputError<'a> {
     ) -> Option<(Problem<'b>, Point)> {
         let mut slots = Vec::new();
         let mut inner = Vec::new();
-        for (place, choice) in explanation.choices.iter().enumerate() {
+        for (position, choice) in explanation.choices.iter().enumerate() {
             let known = &library.candidates[choice.candidate];
             let cause = library.cause(choice.candidate);
-            let coefficients = library.coefficients(explanation, place);
-            let shape = &known.shapes[choice.shape].0;
+            let coefficients = library.coefficients(explanation, position);
+            let nonlinear_parameters = &known.variants[choice.variant].0;
             for (index, coefficient) in coefficients.iter().enumerate() {
                 let slot = Slot::Inner {
-                    choice: place,
+                    choice: position,
                     index,
                     bounds: [f64::NEG_INFINITY, f64::INFINITY],
                 };
                 slots.push((slot, 1e-3 * coefficient.abs().max(f64::MIN_POSITIVE)));
             }
-            if cause.settled(shape, &coefficients).is_none() {
-                let bounds = cause.bounds(self.scene, &known.place);
+            if cause.settled(nonlinear_parameters, &coefficients).is_none() {
+                let bounds = cause.bounds(self.study, &known.location);
                 for (index, [low, high]) in bounds.into_iter().enumerate() {
                     let slot = Slot::Inner {
-                        choice: place,
+                        choice: position,
                         index: coefficients.len() + index,
                         bounds: [low, high],
                     };
-                    let size = if low > 0.0 { shape[index] } else { high - low };
+                    let size = if low > 0.0 {
+                        nonlinear_parameters[index]
+                    } else {
+                        high - low
+                    };
                     slots.push((slot, 1e-3 * size));
                 }
             }
-            inner.push(coefficients.iter().chain(shape).copied().collect());
+            inner.push(coefficients.iter().chain(nonlinear_parameters).copied().collect());
         }
         let mut problem = Problem {
             library,
@@ -363,18 +370,18 @@ impl<'a> OutputError<'a> {
         };
         let mut point = Point {
             inner,
-            starts: vec![Vec::new(); self.scene.records.len()],
+            starts: vec![Vec::new(); self.study.records.len()],
         };
-        let effects = problem.effects(self.scene, &point)?;
-        if self.closed.holds(self.scene, &effects)? {
+        let effects = problem.effects(self.study, &point)?;
+        if self.closed.holds(self.study, &effects)? {
             problem.least_step = LEAST_STEP_OF_FRICTION;
         }
         for (record, start) in point.starts.iter_mut().enumerate() {
-            if !starts_anywhere(&self.scene.records[record]) {
+            if !starts_anywhere(&self.study.records[record]) {
                 continue;
             }
             let state = self.state_at_start(library, explanation, record);
-            let (states, sizes) = self.closed.begin(self.scene, record, &effects, &state)?;
+            let (states, sizes) = self.closed.begin(self.study, record, &effects, &state)?;
             let amplitude = states
                 .iter()
                 .zip(&sizes)
@@ -393,8 +400,8 @@ impl<'a> OutputError<'a> {
 
     /// The state of the baseline at the start of a record, once what the explanation adds is taken off.
     fn state_at_start(&self, library: &Library, explanation: &Explanation, index: usize) -> Vec<f64> {
-        let record = &self.scene.records[index];
-        let explained = library.explained(self.scene, record, explanation);
+        let record = &self.study.records[index];
+        let explained = library.explained(self.study, record, explanation);
         let mut decays: Decays = record.decays.clone();
         let sizes: Vec<f64> = record.channels.iter().map(|channel| channel.deviation).collect();
         let left: Vec<Vec<f64>> = record
@@ -457,7 +464,7 @@ impl ClosedFit for OutputError<'_> {
                 covariance: DMatrix::zeros(0, 0),
                 left: 0.0,
             },
-            freedoms: 0,
+            parameter_count: 0,
             simulated: None,
         };
         let (mut problem, point) = self.problem(library, &nothing)?;
@@ -469,15 +476,15 @@ impl ClosedFit for OutputError<'_> {
     fn left_of(&self, library: &Library, explanation: &Explanation) -> Option<Vec<Vec<Vec<f64>>>> {
         let simulated = explanation.simulated.as_ref()?;
         let (problem, point) = self.problem(library, explanation)?;
-        let effects = problem.effects(self.scene, &point)?;
-        self.scene
+        let effects = problem.effects(self.study, &point)?;
+        self.study
             .records
             .par_iter()
             .enumerate()
             .map(|(index, record)| {
                 let count = record.grid.count();
                 let start = &simulated.starts[index];
-                let samples = self.closed.simulate(self.scene, index, &effects, start, count)?;
+                let samples = self.closed.simulate(self.study, index, &effects, start, count)?;
                 let left = record.channels.iter().zip(samples).map(|(channel, samples)| {
                     channel
                         .measured

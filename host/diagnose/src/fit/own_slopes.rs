@@ -43,7 +43,7 @@ impl Relinearization<'_> {
         regression: &mut Regression,
         explanation: &Explanation,
     ) -> Option<Explanation> {
-        let shapes = library.slopes_of(self.scene, regression, explanation);
+        let shapes = library.slopes_of(self.study, regression, explanation);
         let mut at = explanation.clone();
         let mut known = explanation.simulated.as_ref()?.reading.clone()?;
         let mut now = self.again(library, &at, &known)?;
@@ -75,7 +75,7 @@ impl Relinearization<'_> {
 
     /// The recordings with the extended case along the motion that was predicted before.
     fn again(&self, library: &Library, at: &Explanation, known: &Reading) -> Option<Arc<Reading>> {
-        let extensions = library.extensions(self.scene, at)?;
+        let extensions = library.extensions(self.study, at)?;
         self.read(&extensions, Some(&known.predicted)).map(Arc::new)
     }
 
@@ -157,8 +157,8 @@ fn by_choice(
 ) -> Vec<DMatrix<f64>> {
     let (mut coefficient, mut shape) = (0, at.fit.coefficients.len());
     (0..at.choices.len())
-        .map(|place| {
-            let (own, of_shape) = (library.coefficients(at, place).len(), shapes[place].len());
+        .map(|position| {
+            let (own, of_shape) = (library.coefficients(at, position).len(), shapes[position].len());
             let rows: Vec<usize> = (coefficient..coefficient + own)
                 .chain(shape..shape + of_shape)
                 .collect();

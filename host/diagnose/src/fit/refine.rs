@@ -3,14 +3,14 @@
 use crate::fit::candidate_model::Explanation;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 /// Explanations whose shapes are refined.
 const REFINED: usize = 3;
 
 /// Refines the shapes of the best few explanations.
 pub(crate) fn refine(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
     found: &mut [Explanation],
@@ -25,8 +25,8 @@ pub(crate) fn refine(
         .collect();
     for index in worth {
         let mut explanation = found[index].clone();
-        for place in 0..explanation.choices.len() {
-            explanation = one(scene, library, regression, explanation, place);
+        for position in 0..explanation.choices.len() {
+            explanation = one(study, library, regression, explanation, position);
         }
         found[index] = explanation;
     }
@@ -34,25 +34,25 @@ pub(crate) fn refine(
 }
 
 fn one(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
     explanation: Explanation,
-    place: usize,
+    position: usize,
 ) -> Explanation {
-    let choice = explanation.choices[place];
-    let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
-    if shape.is_empty() {
+    let choice = explanation.choices[position];
+    let nonlinear_parameters = &library.candidates[choice.candidate].variants[choice.variant].0;
+    if nonlinear_parameters.is_empty() {
         return explanation;
     }
     let settles = library
         .cause(choice.candidate)
-        .settled(shape, &[1.0; 8])
+        .settled(nonlinear_parameters, &[1.0; 8])
         .is_some();
     if settles {
-        settle(scene, library, regression, explanation, place)
+        settle(study, library, regression, explanation, position)
     } else {
-        search(scene, library, regression, explanation, place)
+        search(study, library, regression, explanation, position)
     }
 }
 
@@ -61,38 +61,44 @@ const SETTLINGS: usize = 12;
 
 /// Goes to the shape that the coefficients ask for until it stays, by half where all of the way leaves more.
 fn settle(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
     mut explanation: Explanation,
-    place: usize,
+    position: usize,
 ) -> Explanation {
     for _ in 0..SETTLINGS {
-        let choice = explanation.choices[place];
-        let shape = library.candidates[choice.candidate].shapes[choice.shape]
+        let choice = explanation.choices[position];
+        let nonlinear_parameters = library.candidates[choice.candidate].variants[choice.variant]
             .0
             .clone();
-        let coefficients = library.coefficients(&explanation, place);
-        let Some(asked) = library.cause(choice.candidate).settled(&shape, &coefficients) else {
+        let coefficients = library.coefficients(&explanation, position);
+        let Some(asked) = library
+            .cause(choice.candidate)
+            .settled(&nonlinear_parameters, &coefficients)
+        else {
             break;
         };
         if asked
             .iter()
-            .zip(&shape)
+            .zip(&nonlinear_parameters)
             .all(|(a, b)| (a - b).abs() <= 1e-4 * b.abs())
         {
             break;
         }
         let better = [1.0, 0.5].into_iter().find_map(|share| {
-            let next = shape
+            let next = nonlinear_parameters
                 .iter()
                 .zip(&asked)
-                .map(|(shape, asked)| shape + share * (asked - shape));
-            with_shape(scene, library, regression, &explanation, place, next.collect())
+                .map(|(nonlinear_parameters, asked)| {
+                    nonlinear_parameters + share * (asked - nonlinear_parameters)
+                });
+            with_nonlinear_parameters(study, library, regression, &explanation, position, next.collect())
                 .filter(|better| better.fit.left < explanation.fit.left)
         });
         // What leaves less where it contradicts itself is no explanation.
-        let better = better.or_else(|| with_shape(scene, library, regression, &explanation, place, asked));
+        let better = better
+            .or_else(|| with_nonlinear_parameters(study, library, regression, &explanation, position, asked));
         let Some(better) = better else {
             break;
         };
@@ -106,36 +112,38 @@ const SLOPES_FOLLOWED: usize = 3;
 
 /// Steps along each parameter, shorter where they do not help; then where the slopes point.
 fn search(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
     mut explanation: Explanation,
-    place: usize,
+    position: usize,
 ) -> Explanation {
-    let candidate = explanation.choices[place].candidate;
+    let candidate = explanation.choices[position].candidate;
     let bounds = library
         .cause(candidate)
-        .bounds(scene, &library.candidates[candidate].place);
+        .bounds(study, &library.candidates[candidate].location);
     let mut steps = vec![0.25; bounds.len()];
     for _ in 0..4 {
         for parameter in 0..bounds.len() {
             let [low, high] = bounds[parameter];
-            let shape = library.candidates[candidate].shapes[explanation.choices[place].shape]
+            let nonlinear_parameters = library.candidates[candidate].variants
+                [explanation.choices[position].variant]
                 .0
                 .clone();
             let mut improved = false;
             for sign in [1.0, -1.0] {
-                let mut moved = shape.clone();
+                let mut moved = nonlinear_parameters.clone();
                 let step = sign * steps[parameter];
                 // Sizes are moved by factors, what may be zero by shares of its range.
                 moved[parameter] = if low > 0.0 {
-                    shape[parameter] * (1.0 + step)
+                    nonlinear_parameters[parameter] * (1.0 + step)
                 } else {
-                    shape[parameter] + step * (high - low)
+                    nonlinear_parameters[parameter] + step * (high - low)
                 }
                 .clamp(low, high);
-                if let Some(better) = with_shape(scene, library, regression, &explanation, place, moved)
-                    .filter(|tried| tried.fit.left < explanation.fit.left)
+                if let Some(better) =
+                    with_nonlinear_parameters(study, library, regression, &explanation, position, moved)
+                        .filter(|tried| tried.fit.left < explanation.fit.left)
                 {
                     explanation = better;
                     improved = true;
@@ -148,7 +156,7 @@ fn search(
         }
     }
     for _ in 0..SLOPES_FOLLOWED {
-        let Some(better) = along_slopes(scene, library, regression, &explanation, place, &bounds) else {
+        let Some(better) = along_slopes(study, library, regression, &explanation, position, &bounds) else {
             break;
         };
         explanation = better;
@@ -158,22 +166,22 @@ fn search(
 
 /// One Gauss–Newton step in the shape; `None` where it does not help.
 fn along_slopes(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
     explanation: &Explanation,
-    place: usize,
+    position: usize,
     bounds: &[[f64; 2]],
 ) -> Option<Explanation> {
-    let choice = explanation.choices[place];
-    let coefficients = library.coefficients(explanation, place);
-    let slopes = library.slopes(scene, regression, choice, &coefficients)?;
+    let choice = explanation.choices[position];
+    let coefficients = library.coefficients(explanation, position);
+    let slopes = library.slopes(study, regression, choice, &coefficients)?;
     let mut columns = library.columns_of(explanation);
     let own = columns.len();
     columns.extend(&slopes);
     let fit = regression.fit(Share::Whole, &columns)?;
-    let shape = &library.candidates[choice.candidate].shapes[choice.shape].0;
-    let moved: Vec<f64> = shape
+    let nonlinear_parameters = &library.candidates[choice.candidate].variants[choice.variant].0;
+    let moved: Vec<f64> = nonlinear_parameters
         .iter()
         .zip(&fit.coefficients[own..])
         .zip(bounds)
@@ -182,21 +190,21 @@ fn along_slopes(
             (value + step.clamp(-most, most)).clamp(*low, *high)
         })
         .collect();
-    with_shape(scene, library, regression, explanation, place, moved)
+    with_nonlinear_parameters(study, library, regression, explanation, position, moved)
         .filter(|tried| tried.fit.left < explanation.fit.left - 0.01)
 }
 
-fn with_shape(
-    scene: &Scene<'_>,
+fn with_nonlinear_parameters(
+    study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
     explanation: &Explanation,
-    place: usize,
-    shape: Vec<f64>,
+    position: usize,
+    nonlinear_parameters: Vec<f64>,
 ) -> Option<Explanation> {
-    let candidate = explanation.choices[place].candidate;
-    let choice = library.add_shape(scene, regression, candidate, shape)?;
+    let candidate = explanation.choices[position].candidate;
+    let choice = library.add_variant(study, regression, candidate, nonlinear_parameters)?;
     let mut choices = explanation.choices.clone();
-    choices[place] = choice;
-    library.explain(scene, regression, &choices)
+    choices[position] = choice;
+    library.explain(study, regression, &choices)
 }

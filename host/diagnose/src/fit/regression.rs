@@ -10,7 +10,7 @@ use crate::fit::normal_equations::{Products, products};
 pub(crate) use crate::fit::segment::Share;
 use crate::fit::segment::{Part, Unknown, split};
 use crate::records::record::TRUSTED_IN_CUTS;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::signal::dot::dot;
 
 /// What is added to the squares of columns, as a share, where all columns of the library are fitted at once.
@@ -58,12 +58,12 @@ pub(crate) struct Regression {
 
 impl Regression {
     /// The residuals of a scene.
-    pub(crate) fn new(scene: &Scene<'_>) -> Self {
-        let parts = split(scene, |_| Unknown::StartAndOffsets);
+    pub(crate) fn new(study: &Study<'_>) -> Self {
+        let parts = split(study, |_| Unknown::StartAndOffsets);
         let residuals: Vec<Vec<f64>> = parts
             .iter()
             .map(|part| {
-                let channels = &scene.records[part.record].channels;
+                let channels = &study.records[part.record].channels;
                 let residual: Vec<Vec<f64>> = channels.iter().map(|channel| channel.residual()).collect();
                 part.whiten(&residual)
             })
@@ -74,7 +74,7 @@ impl Regression {
             residuals,
             products: std::array::from_fn(|_| Products::default()),
             complete: 0,
-            ridge: if scene.records.iter().any(|record| record.cut.is_some()) {
+            ridge: if study.records.iter().any(|record| record.cut.is_some()) {
                 TRUSTED_IN_CUTS * TRUSTED_IN_CUTS
             } else {
                 ROUNDING
@@ -165,9 +165,9 @@ impl Regression {
     }
 
     /// Σ y² of what was measured in the whole records, in units of the noise.
-    pub(crate) fn signal(&self, scene: &Scene<'_>) -> f64 {
+    pub(crate) fn signal(&self, study: &Study<'_>) -> f64 {
         let of_part = |part: &Part| {
-            let channels = scene.records[part.record].channels.iter();
+            let channels = study.records[part.record].channels.iter();
             let measured: Vec<Vec<f64>> = channels.map(|channel| channel.measured.clone()).collect();
             let whitened = part.whiten(&measured);
             dot(&whitened, &whitened)
@@ -245,10 +245,10 @@ impl Regression {
     }
 
     /// Root mean square of the residual over that of what was measured, on a share; channels count alike.
-    pub(crate) fn missed(&self, scene: &Scene<'_>, share: Share) -> f64 {
+    pub(crate) fn missed(&self, study: &Study<'_>, share: Share) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
         for part in self.parts.iter().filter(|part| part.share == share) {
-            for channel in &scene.records[part.record].channels {
+            for channel in &study.records[part.record].channels {
                 let energy =
                     |samples: &[f64]| dot(&samples[part.range.clone()], &samples[part.range.clone()]);
                 let whole = dot(&channel.measured, &channel.measured) * part.range.len() as f64

@@ -16,7 +16,7 @@ use crate::fit::covariance::covariance;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
 use crate::records::record::{Clean, Known, Record};
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_recording::Recording;
 
 /// Readings with an extended case at most.
@@ -33,15 +33,15 @@ type Residuals = Vec<Vec<Vec<f64>>>;
 
 /// The recordings, to be read again with extended cases.
 pub(crate) struct Relinearization<'a> {
-    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) study: &'a Study<'a>,
     recordings: &'a [Recording],
 }
 
 impl<'a> Relinearization<'a> {
     /// `None` where no record is a cut.
-    pub(crate) fn new(scene: &'a Scene<'a>, recordings: &'a [Recording]) -> Option<Self> {
-        let is_cut = scene.records.iter().any(|record| record.cut.is_some());
-        is_cut.then_some(Self { scene, recordings })
+    pub(crate) fn new(study: &'a Study<'a>, recordings: &'a [Recording]) -> Option<Self> {
+        let is_cut = study.records.iter().any(|record| record.cut.is_some());
+        is_cut.then_some(Self { study, recordings })
     }
 
     /// Reads the recordings with `extensions` more in the case, along the motion that was `predicted` before if there is one.
@@ -50,19 +50,19 @@ impl<'a> Relinearization<'a> {
         extensions: &[(&'static str, toml::Table)],
         predicted: Option<&[Clean]>,
     ) -> Option<Reading> {
-        let mut case = self.scene.baseline.case.clone();
+        let mut case = self.study.baseline.case.clone();
         let tables = extensions.iter().map(|(name, table)| (*name, table));
         case.extensions.extend(joined(tables));
         // As the case alone has it: an explanation is not compared with another along another motion.
         let known = |index: usize| {
-            let amplifies = self.scene.records[index].amplifies;
+            let amplifies = self.study.records[index].amplifies;
             let predicted = predicted.filter(|_| !amplifies);
             Known {
                 clean: predicted.map(|predicted| predicted[index].clone()),
                 amplifies: Some(amplifies),
             }
         };
-        let read = Scene::with(&case, self.recordings, known).ok()?;
+        let read = Study::with(&case, self.recordings, known).ok()?;
         let residuals: Residuals = read
             .records
             .iter()
@@ -101,27 +101,27 @@ impl<'a> Relinearization<'a> {
         for (coefficient, change) in next.fit.coefficients.iter_mut().zip(of_coefficients) {
             *coefficient += change;
         }
-        for (place, slopes) in slopes.iter().enumerate() {
-            let Choice { candidate, shape } = next.choices[place];
-            let coefficients = library.coefficients(&next, place);
-            let shape = &library.candidates[candidate].shapes[shape].0;
+        for (position, slopes) in slopes.iter().enumerate() {
+            let Choice { candidate, variant } = next.choices[position];
+            let coefficients = library.coefficients(&next, position);
+            let nonlinear_parameters = &library.candidates[candidate].variants[variant].0;
             let cause = library.cause(candidate);
-            let moved = match cause.settled(shape, &coefficients) {
+            let moved = match cause.settled(nonlinear_parameters, &coefficients) {
                 Some(settled) => settled,
                 None if slopes.is_empty() => continue,
                 None => {
-                    let bounds = cause.bounds(self.scene, &library.candidates[candidate].place);
+                    let bounds = cause.bounds(self.study, &library.candidates[candidate].location);
                     let (own, rest) = of_shapes.split_at(slopes.len());
                     of_shapes = rest;
-                    let moved = shape.iter().zip(own).zip(bounds);
+                    let moved = nonlinear_parameters.iter().zip(own).zip(bounds);
                     moved
                         .map(|((value, change), [low, high])| (value + change).clamp(low, high))
                         .collect()
                 }
             };
-            next.choices[place] = library.add_shape(self.scene, regression, candidate, moved)?;
+            next.choices[position] = library.add_variant(self.study, regression, candidate, moved)?;
         }
-        library.parameters(self.scene, &next).map(|_| next)
+        library.parameters(self.study, &next).map(|_| next)
     }
 }
 
@@ -133,7 +133,7 @@ impl ClosedFit for Relinearization<'_> {
         explanation: &Explanation,
         (rival, _): (f64, f64),
     ) -> Option<Explanation> {
-        let slopes = library.slopes_of(self.scene, regression, explanation);
+        let slopes = library.slopes_of(self.study, regression, explanation);
         let mut columns = library.columns_of(explanation);
         columns.extend(slopes.iter().flatten());
         let mut at = explanation.clone();
@@ -141,7 +141,7 @@ impl ClosedFit for Relinearization<'_> {
         let mut best: Option<(Explanation, Arc<Reading>)> = None;
         for round in 0..ROUNDS {
             let Some(reading) = self.read(
-                &library.extensions(self.scene, &at)?,
+                &library.extensions(self.study, &at)?,
                 predicted.as_ref().map(|reading| &reading.predicted[..]),
             ) else {
                 break;
@@ -168,7 +168,7 @@ impl ClosedFit for Relinearization<'_> {
         }
         let (mut found, reading) = best?;
         found.simulated = Some(Simulated {
-            covariance: covariance(self.scene, library, regression, &found, 1.0),
+            covariance: covariance(self.study, library, regression, &found, 1.0),
             starts: Vec::new(),
             reading: Some(reading),
         });
@@ -189,7 +189,7 @@ impl ClosedFit for Relinearization<'_> {
     }
 
     fn left_by_baseline(&self, _: &Library, regression: &Regression) -> Option<f64> {
-        let known: Vec<Clean> = self.scene.records.iter().map(Record::predicted).collect();
+        let known: Vec<Clean> = self.study.records.iter().map(Record::predicted).collect();
         let reading = self.read(&[], Some(&known))?;
         Some(regression.refit(Share::Whole, &[], &reading.residuals)?.before)
     }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use crate::fit::whitening::Whitening;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::signal::dot::dot;
 use crate::signal::grid::Stretch;
 use quietcut_recording::Kind;
@@ -52,10 +52,10 @@ pub(crate) enum Share {
 /// Each record as a whole, and in four blocks of a third, a sixth, a third and a sixth of which the short ones are held out:
 /// they hold other times, and of a sweep other frequencies, than what is fitted. Of several free decays the last is held out
 /// whole: the end of a decay tells nothing.
-pub(crate) fn split(scene: &Scene<'_>, unknown: impl Fn(&Record) -> Unknown) -> Vec<Part> {
-    let several = scene.records.len() > 1;
-    let last = scene.records.len().saturating_sub(1);
-    scene
+pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Unknown) -> Vec<Part> {
+    let several = study.records.len() > 1;
+    let last = study.records.len().saturating_sub(1);
+    study
         .records
         .iter()
         .enumerate()
@@ -81,7 +81,7 @@ pub(crate) fn split(scene: &Scene<'_>, unknown: impl Fn(&Record) -> Unknown) -> 
             let unknown = unknown(record);
             ranges
                 .into_iter()
-                .map(move |(range, share)| Part::new(scene, index, range, share, unknown))
+                .map(move |(range, share)| Part::new(study, index, range, share, unknown))
         })
         .collect()
 }
@@ -89,13 +89,13 @@ pub(crate) fn split(scene: &Scene<'_>, unknown: impl Fn(&Record) -> Unknown) -> 
 impl Part {
     /// A part of the record at `index`.
     pub(crate) fn new(
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         index: usize,
         range: Range<usize>,
         share: Share,
         unknown: Unknown,
     ) -> Self {
-        let record = &scene.records[index];
+        let record = &study.records[index];
         let mut part = Self {
             record: index,
             bins: bins_of(record, range.len()),

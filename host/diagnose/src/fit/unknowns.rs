@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fit::candidate_model::Choice;
 use crate::fit::library::Library;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
@@ -73,17 +73,17 @@ impl Problem<'_> {
     }
 
     /// The effects at a point; `None` where it is not physical.
-    pub(crate) fn effects(&self, scene: &Scene<'_>, point: &Point) -> Option<Effects> {
+    pub(crate) fn effects(&self, study: &Study<'_>, point: &Point) -> Option<Effects> {
         let Self { library, choices, .. } = self;
         let mut tables = Vec::new();
         for (choice, inner) in choices.iter().zip(&point.inner) {
             let known = &library.candidates[choice.candidate];
-            let (shape, columns) = &known.shapes[choice.shape];
+            let (nonlinear_parameters, columns) = &known.variants[choice.variant];
             let (coefficients, moved) = inner.split_at(columns.len());
-            debug_assert_eq!(moved.len(), shape.len());
+            debug_assert_eq!(moved.len(), nonlinear_parameters.len());
             let cause = library.cause(choice.candidate);
-            let parameters = cause.parameters(scene, &known.place, moved, coefficients)?;
-            let parts = cause.parts(&known.place, &parameters);
+            let parameters = cause.parameters(study, &known.location, moved, coefficients)?;
+            let parts = cause.parts(&known.location, &parameters);
             tables.extend(parts.into_iter().map(|part| (part.name, part.extension)));
         }
         Effects::of_extensions(tables.iter().map(|(name, table)| (*name, table))).ok()

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::motion::cut_force::CutForce;
 use crate::motion::mean_slopes::MeanSlopes;
-use crate::motion::spindle_motion::Turning;
+use crate::motion::spindle_motion::SpindleMotion;
 use quietcut_simulate::path::{Motion, between};
 use quietcut_simulate::{Cutter, Immersion, Tooth};
 
@@ -79,7 +79,7 @@ impl Chips {
     /// The chips along `motion`, and where `at_samples` says so those at the samples of the record as far as it says so.
     pub(crate) fn new(
         cutter: &Cutter,
-        turning: &Turning,
+        spindle_motion: &SpindleMotion,
         motion: &Motion,
         sampling: Sampling,
         at_samples: impl Fn(usize) -> bool + Sync,
@@ -92,7 +92,7 @@ impl Chips {
         } = sampling;
         let along = Along {
             cutter,
-            turning,
+            spindle_motion,
             motion,
             passes: passes(cutter.teeth.len(), true).max(several.unwrap_or(0)),
             step_s: 1.0 / (rate_hz * finer as f64),
@@ -111,8 +111,8 @@ impl Chips {
     }
 
     /// The force of a tool that turns so along the motion of these chips.
-    pub(crate) fn force(&self, cutter: &Cutter, turning: &Turning, motion: &Motion) -> CutForce {
-        let of = |series, width_s| self.of_series_n(series, width_s, cutter, turning, motion);
+    pub(crate) fn force(&self, cutter: &Cutter, spindle_motion: &SpindleMotion, motion: &Motion) -> CutForce {
+        let of = |series, width_s| self.of_series_n(series, width_s, cutter, spindle_motion, motion);
         CutForce {
             mean_n: of(&self.over_samples, motion.step_s),
             sampled_n: of(&self.at_samples, 0.0),
@@ -125,7 +125,7 @@ impl Chips {
         series: &Series,
         width_s: f64,
         cutter: &Cutter,
-        turning: &Turning,
+        spindle_motion: &SpindleMotion,
         motion: &Motion,
     ) -> [Vec<f64>; 3] {
         let (radial_m, passes) = self.standing_out(cutter);
@@ -142,14 +142,14 @@ impl Chips {
             let depth_m = cutter.depth_at_m(cutter.depth_m, chip.z_m);
             let mut force = cutter.force.force_n(chip.place, thickness_m, depth_m);
             if let (Some(_), Some(radius_m)) = (cutter.force.process_damping, cutter.radius_m) {
-                let speed_m_per_s = radius_m * turning.speed_rad_per_s(chip.t);
+                let speed_m_per_s = radius_m * spindle_motion.speed_rad_per_s(chip.t);
                 let damping = cutter.force.damping_ns_per_m(chip.place, depth_m, speed_m_per_s);
                 let v = at(&motion.v, chip.t / motion.step_s);
                 for (force, damping) in force.iter_mut().zip(damping) {
                     *force -= damping[0] * v[0] + damping[1] * v[1] + damping[2] * v[2];
                 }
             }
-            let factor = in_contact * chip.share * cutter.force.wear(turning.since_s(chip.t));
+            let factor = in_contact * chip.share * cutter.force.wear(spindle_motion.since_s(chip.t));
             for (sum, force) in sum.iter_mut().zip(force) {
                 sum[chip.sample] += factor * force;
             }
@@ -158,7 +158,7 @@ impl Chips {
     }
 
     /// How the force of a tool that turns so answers to a small motion beside the one of these chips.
-    pub(crate) fn mean_slopes(&self, cutter: &Cutter, turning: &Turning) -> MeanSlopes {
+    pub(crate) fn mean_slopes(&self, cutter: &Cutter, spindle_motion: &SpindleMotion) -> MeanSlopes {
         let (radial_m, passes) = self.standing_out(cutter);
         let series = &self.over_samples;
         let mut means = MeanSlopes::default();
@@ -168,7 +168,8 @@ impl Chips {
                 continue;
             }
             let depth_m = cutter.depth_at_m(cutter.depth_m, chip.z_m);
-            let share = chip.share * cutter.force.wear(turning.since_s(chip.t)) / series.samples as f64;
+            let share =
+                chip.share * cutter.force.wear(spindle_motion.since_s(chip.t)) / series.samples as f64;
             let at = |thickness_m: f64| Vector3::from(cutter.force.force_n(chip.place, thickness_m, depth_m));
             let step_m = STEP * thickness_m;
             let force_n = at(thickness_m);
@@ -184,12 +185,12 @@ impl Chips {
                 back_rad += cutter.teeth[tooth].pitch_rad;
                 tooth = cutter.teeth[tooth].ahead;
             }
-            means.add(back_rad / TAU * turning.turn_s(), share * slope);
+            means.add(back_rad / TAU * spindle_motion.turn_s(), share * slope);
             for (axis, square) in means.squares.iter_mut().enumerate() {
                 let column = slope.column(axis);
                 *square += share
                     * chip.share
-                    * cutter.force.wear(turning.since_s(chip.t))
+                    * cutter.force.wear(spindle_motion.since_s(chip.t))
                     * column
                     * column.transpose();
             }
@@ -198,7 +199,7 @@ impl Chips {
                 means.direct_n_per_m.set_column(2, &by_depth);
             }
             if let (Some(_), Some(radius_m)) = (cutter.force.process_damping, cutter.radius_m) {
-                let speed_m_per_s = radius_m * turning.speed_rad_per_s(chip.t);
+                let speed_m_per_s = radius_m * spindle_motion.speed_rad_per_s(chip.t);
                 let damping = cutter.force.damping_ns_per_m(chip.place, depth_m, speed_m_per_s);
                 means.damping_ns_per_m += share * Matrix3::from_fn(|i, j| damping[i][j]);
             }
@@ -291,7 +292,7 @@ fn series(samples: usize, of: impl Fn(usize, &mut Series) + Sync) -> Series {
 /// A cut along a motion.
 struct Along<'a> {
     cutter: &'a Cutter,
-    turning: &'a Turning,
+    spindle_motion: &'a SpindleMotion,
     motion: &'a Motion,
     passes: usize,
     step_s: f64,
@@ -301,11 +302,11 @@ struct Along<'a> {
 impl Along<'_> {
     /// Every tooth in the arc within a finer sample, only as long as it is there.
     fn over(&self, sample: usize, into: &mut Series) {
-        let (cutter, turning) = (self.cutter, self.turning);
+        let (cutter, spindle_motion) = (self.cutter, self.spindle_motion);
         let t = sample as f64 * self.step_s;
-        let speed = turning.speed_rad_per_s(t);
+        let speed = spindle_motion.speed_rad_per_s(t);
         let half = 0.5 * self.step_s * speed;
-        let angle = turning.angle_rad(t);
+        let angle = spindle_motion.angle_rad(t);
         let arc = cutter.exit_rad - cutter.start_rad;
         for (number, tooth) in cutter.teeth.iter().enumerate() {
             // From the start of the arc, so that the pass that begins within the sample is not cut in two.
@@ -322,7 +323,7 @@ impl Along<'_> {
     /// Every tooth in the arc at an instant.
     fn at_instant(&self, sample: usize, t: f64, into: &mut Series) {
         let cutter = self.cutter;
-        let angle = self.turning.angle_rad(t);
+        let angle = self.spindle_motion.angle_rad(t);
         for (number, tooth) in cutter.teeth.iter().enumerate() {
             let from_start = (angle + tooth.angle_rad - cutter.start_rad).rem_euclid(TAU);
             if from_start < cutter.exit_rad - cutter.start_rad {
@@ -332,9 +333,9 @@ impl Along<'_> {
     }
 
     fn put(&self, sample: usize, number: usize, share: f64, t: f64, into: &mut Series) {
-        let (cutter, turning) = (self.cutter, self.turning);
+        let (cutter, spindle_motion) = (self.cutter, self.spindle_motion);
         let tooth = &cutter.teeth[number];
-        let place = cutter.immersion(turning.angle_rad(t) + tooth.angle_rad);
+        let place = cutter.immersion(spindle_motion.angle_rad(t) + tooth.angle_rad);
         let x = at(&self.motion.x, t / self.step_s);
         let even = |tooth: &Tooth| Tooth {
             radial_m: 0.0,
@@ -345,10 +346,11 @@ impl Along<'_> {
         for _ in 0..self.passes {
             back_rad += ahead.pitch_rad;
             ahead = &cutter.teeth[ahead.ahead];
-            let delay_s = turning.delay_s(t, back_rad);
+            let delay_s = spindle_motion.delay_s(t, back_rad);
             let was = at(&self.motion.x, self.recorded(t - delay_s) / self.step_s);
             // The feed axis moves on steadily.
-            let feed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * delay_s / turning.turn_s();
+            let feed_m =
+                cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * delay_s / spindle_motion.turn_s();
             let left_m = cutter.reach_m(&even(ahead), place, was) - cutter.recession_m(place, feed_m);
             into.thickness_m.push(reach_m - left_m);
         }
@@ -367,7 +369,7 @@ impl Along<'_> {
         if t >= 0.0 {
             return t;
         }
-        let turn_s = self.turning.turn_s();
+        let turn_s = self.spindle_motion.turn_s();
         let later = t + (-t / turn_s).ceil() * turn_s;
         if later < self.end_s { later } else { 0.0 }
     }

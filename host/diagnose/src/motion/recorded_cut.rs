@@ -7,7 +7,7 @@
 
 use crate::error::DiagnoseError;
 use crate::motion::chips::{Chips, Sampling};
-use crate::motion::spindle_motion::Turning;
+use crate::motion::spindle_motion::SpindleMotion;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_recording::Recording;
@@ -29,7 +29,7 @@ pub(crate) struct RecordedCut {
     /// The tool in its cut, as the case has it.
     pub cutter: Cutter,
     /// How the spindle turns.
-    pub turning: Turning,
+    pub spindle_motion: SpindleMotion,
     /// Samples per second.
     rate_hz: f64,
     /// Samples of the record.
@@ -77,21 +77,21 @@ impl RecordedCut {
         let cutter = Cutter::new(tool, material, &cut, 1e-3 * depth_mm)
             .and_then(|cutter| effects.cutter(cutter))
             .map_err(wrong)?;
-        let turning = Turning::new(recording, effects.spindle(Spindle::new(1.0)).fluctuation())?;
+        let spindle_motion = SpindleMotion::new(recording, effects.spindle(Spindle::new(1.0)).fluctuation())?;
         if let Some(rpm) = said.spindle_rpm
-            && (turning.rpm() / rpm - 1.0).abs() > 0.05
+            && (spindle_motion.rpm() / rpm - 1.0).abs() > 0.05
         {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
                     "tacho says {:.1} rev/min, the .toml beside it {rpm}: is pulses_per_rev of the tachometer right?",
-                    turning.rpm()
+                    spindle_motion.rpm()
                 ),
             ));
         }
         Ok(Self {
             cutter,
-            turning,
+            spindle_motion,
             rate_hz: recording.sample_rate_hz,
             count: recording.len(),
             passes: None,
@@ -99,7 +99,13 @@ impl RecordedCut {
     }
 
     /// Its chips along `motion`, whose samples are `finer` times as dense as those of the record, for a spindle that turns so.
-    pub(crate) fn chips(&self, turning: &Turning, motion: &Motion, finer: usize, with_force: bool) -> Chips {
+    pub(crate) fn chips(
+        &self,
+        spindle_motion: &SpindleMotion,
+        motion: &Motion,
+        finer: usize,
+        with_force: bool,
+    ) -> Chips {
         let sampling = Sampling {
             rate_hz: self.rate_hz,
             count: self.count,
@@ -107,7 +113,7 @@ impl RecordedCut {
             passes: self.passes,
         };
         // Where no force is measured none is compared at samples.
-        Chips::new(&self.cutter, turning, motion, sampling, |sample| {
+        Chips::new(&self.cutter, spindle_motion, motion, sampling, |sample| {
             with_force && !self.is_beside(sample as f64 / self.rate_hz)
         })
     }
@@ -128,14 +134,14 @@ impl RecordedCut {
     pub(crate) fn first_turn(&self) -> usize {
         let passes = self.passes.unwrap_or(1).max(self.cutter.teeth.len());
         let turns = passes as f64 / self.cutter.teeth.len() as f64;
-        ((turns * self.turning.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
+        ((turns * self.spindle_motion.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
     }
 
     /// True where a tooth enters or leaves within `BESIDE` of a sample of `t`.
     pub(crate) fn is_beside(&self, t: f64) -> bool {
-        let near_rad = BESIDE / self.rate_hz * self.turning.speed_rad_per_s(t);
+        let near_rad = BESIDE / self.rate_hz * self.spindle_motion.speed_rad_per_s(t);
         self.cutter.teeth.iter().any(|tooth| {
-            let phi = self.turning.angle_rad(t) + tooth.angle_rad;
+            let phi = self.spindle_motion.angle_rad(t) + tooth.angle_rad;
             [self.cutter.start_rad, self.cutter.exit_rad]
                 .into_iter()
                 .any(|edge| {

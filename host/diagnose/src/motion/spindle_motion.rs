@@ -13,7 +13,7 @@ const FEWEST_EDGES: usize = 4;
 
 /// The spindle angle along a record: that of a spindle, and an angle at the start.
 #[derive(Clone, Debug)]
-pub(crate) struct Turning {
+pub(crate) struct SpindleMotion {
     spindle: Spindle,
     rpm: f64,
     /// The angle at the beginning of the whole recording, from which a fluctuation counts as well.
@@ -25,7 +25,7 @@ pub(crate) struct Turning {
     edges_s: Vec<f64>,
 }
 
-impl Turning {
+impl SpindleMotion {
     /// From the tachometer of a recording: the steady turning (with the fluctuation that the case has) whose whole turns are
     /// nearest to the edges.
     ///
@@ -79,8 +79,8 @@ impl Turning {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
             // Edge k at 2πk: the angle of the spindle there, less what fluctuates, is a line.
-            let swing = |t: f64| self.swing_s(t);
-            let times: Vec<f64> = self.edges_s.iter().map(|t| t + swing(*t)).collect();
+            let modulation_s = |t: f64| self.modulation_s(t);
+            let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
             let mean_t = times.iter().sum::<f64>() / count;
             let mean_k = 0.5 * (count - 1.0);
             let (mut tt, mut tk) = (0.0, 0.0);
@@ -99,7 +99,7 @@ impl Turning {
         self
     }
 
-    fn swing_s(&self, t: f64) -> f64 {
+    fn modulation_s(&self, t: f64) -> f64 {
         let steady = Spindle::new(60.0);
         self.fluctuation.map_or(0.0, |fluctuation| {
             steady.fluctuating(fluctuation).angle_rad(t) / TAU - t
@@ -189,7 +189,7 @@ const BEYOND_CHANCE: f64 = 20.0;
 
 /// A swing of the speed, as tachometers tell it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Swing {
+pub(crate) struct SpeedModulation {
     /// The swing.
     pub fluctuation: Fluctuation,
     /// Standard deviations of δ, f_m in Hz and ψ in rad: from what is left of the times of the edges.
@@ -200,17 +200,20 @@ pub(crate) struct Swing {
 ///
 /// Edge k comes at t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + a constant: linear in all but the frequency,
 /// with T₀ and the constant those of each record.
-pub(crate) fn swing(turnings: &[&Turning]) -> Option<Swing> {
-    let longest_s = turnings
+pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<SpeedModulation> {
+    let longest_s = spindle_motions
         .iter()
-        .filter_map(|turning| Some(turning.edges_s.last()? - turning.edges_s.first()?))
+        .filter_map(|spindle_motion| Some(spindle_motion.edges_s.last()? - spindle_motion.edges_s.first()?))
         .fold(0.0, f64::max);
-    let turns_per_s = turnings
+    let turns_per_s = spindle_motions
         .iter()
-        .map(|turning| 1.0 / turning.turn_s())
+        .map(|spindle_motion| 1.0 / spindle_motion.turn_s())
         .fold(f64::INFINITY, f64::min);
-    let edges: usize = turnings.iter().map(|turning| turning.edges_s.len()).sum();
-    let free = edges.checked_sub(2 * turnings.len() + 4)? as f64;
+    let edges: usize = spindle_motions
+        .iter()
+        .map(|spindle_motion| spindle_motion.edges_s.len())
+        .sum();
+    let free = edges.checked_sub(2 * spindle_motions.len() + 4)? as f64;
     if longest_s <= 0.0 {
         return None;
     }
@@ -219,42 +222,47 @@ pub(crate) fn swing(turnings: &[&Turning]) -> Option<Swing> {
     let count = ((high_hz - low_hz) / step_hz).max(0.0) as usize;
     let (_, best_hz) = (0..=count)
         .map(|index| low_hz + step_hz * index as f64)
-        .map(|hertz| (nearest(turnings, hertz).left, hertz))
+        .map(|hertz| (nearest(spindle_motions, hertz).left, hertz))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     // Golden section about the best of the grid.
     let (mut from, mut to) = (best_hz - step_hz, best_hz + step_hz);
     for _ in 0..40 {
         let third = 0.381_966 * (to - from);
-        if nearest(turnings, from + third).left < nearest(turnings, to - third).left {
+        if nearest(spindle_motions, from + third).left < nearest(spindle_motions, to - third).left {
             to -= third;
         } else {
             from += third;
         }
     }
     let frequency_hz = 0.5 * (from + to);
-    let found = nearest(turnings, frequency_hz);
+    let found = nearest(spindle_motions, frequency_hz);
     let gained = (found.without - found.left) / 3.0;
     let delta = found.along.hypot(found.across);
     let is_found = gained > BEYOND_CHANCE * found.left / free && delta < 0.9;
-    is_found.then(|| Swing {
+    is_found.then(|| SpeedModulation {
         fluctuation: Fluctuation {
             delta,
             frequency_hz,
             phase_rad: found.across.atan2(found.along),
         },
-        deviation: deviation(turnings, frequency_hz, &found, found.left / free),
+        deviation: deviation(spindle_motions, frequency_hz, &found, found.left / free),
     })
 }
 
 /// Standard deviations of δ, f_m and ψ for edges whose times have the given variance, s².
-fn deviation(turnings: &[&Turning], frequency_hz: f64, found: &Nearest, variance: f64) -> [f64; 3] {
+fn deviation(
+    spindle_motions: &[&SpindleMotion],
+    frequency_hz: f64,
+    found: &Nearest,
+    variance: f64,
+) -> [f64; 3] {
     let step_hz = 1e-4 * frequency_hz;
     let times = |along: f64, across: f64, frequency_hz: f64| -> Vec<f64> {
         let omega = TAU * frequency_hz;
         let of = |t: f64| along * (1.0 - (omega * t).cos()) / omega + across * (omega * t).sin() / omega;
-        turnings
+        spindle_motions
             .iter()
-            .flat_map(|turning| without_line(&turning.edges_s, of))
+            .flat_map(|spindle_motion| without_line(&spindle_motion.edges_s, of))
             .collect()
     };
     let (along, across) = (found.along, found.across);
@@ -291,15 +299,15 @@ struct Nearest {
     without: f64,
 }
 
-fn nearest(turnings: &[&Turning], frequency_hz: f64) -> Nearest {
+fn nearest(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> Nearest {
     let omega = TAU * frequency_hz;
     // Products of (1 − cos)/ω, sin/ω and t, each without its line over the edges of its record.
     let mut products = [[0.0; 3]; 3];
-    for turning in turnings {
+    for spindle_motion in spindle_motions {
         let columns = [
-            without_line(&turning.edges_s, |t| (1.0 - (omega * t).cos()) / omega),
-            without_line(&turning.edges_s, |t| (omega * t).sin() / omega),
-            without_line(&turning.edges_s, |t| t),
+            without_line(&spindle_motion.edges_s, |t| (1.0 - (omega * t).cos()) / omega),
+            without_line(&spindle_motion.edges_s, |t| (omega * t).sin() / omega),
+            without_line(&spindle_motion.edges_s, |t| t),
         ];
         for (row, a) in products.iter_mut().zip(&columns) {
             for (product, b) in row.iter_mut().zip(&columns) {
@@ -347,8 +355,8 @@ fn without_line(edges_s: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn turning(edges_s: Vec<f64>) -> Turning {
-        Turning {
+    fn spindle_motion(edges_s: Vec<f64>) -> SpindleMotion {
+        SpindleMotion {
             spindle: Spindle::new(1.0),
             rpm: 1.0,
             start_rad: 0.0,
@@ -377,13 +385,13 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         let swings = [
-            turning(edges(900.0, 0.4, Some(truth))),
-            turning(edges(1233.0, 2.0, Some(truth))),
+            spindle_motion(edges(900.0, 0.4, Some(truth))),
+            spindle_motion(edges(1233.0, 2.0, Some(truth))),
         ];
-        let Swing {
+        let SpeedModulation {
             fluctuation: found,
             deviation,
-        } = swing(&swings.each_ref()).unwrap();
+        } = speed_modulation(&swings.each_ref()).unwrap();
         // Two microseconds against a swing of δ/ω = 1.1 ms over 24 edges.
         assert!((found.delta / truth.delta - 1.0).abs() < 3e-3, "{found:?}");
         assert!(
@@ -408,8 +416,8 @@ mod tests {
             let apart = known.angle_rad(t) - (spindle.angle_rad(t) - 0.4);
             assert!(apart.abs() < 1e-3, "{t}: {apart}");
         }
-        let steady = turning(edges(900.0, 0.4, None));
-        assert!(swing(&[&steady]).is_none());
+        let steady = spindle_motion(edges(900.0, 0.4, None));
+        assert!(speed_modulation(&[&steady]).is_none());
         assert!((steady.rpm() - 900.0).abs() < 0.01);
     }
 }

@@ -6,7 +6,7 @@ use super::bench::Bench;
 use super::experiment::Experiment;
 use super::reading::{Reading, Sensors};
 use crate::candidates::extension_tables::joined;
-use crate::conclusion::answer::{Figure, NINETY_PERCENT, NamedCause};
+use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use quietcut_model::case::Case;
 
 /// The least step of a parameter by which readings are differenced, as a share of it: the simulation is exact to 1e-9.
@@ -14,7 +14,7 @@ const LEAST_STEP: f64 = 1e-4;
 
 /// An explanation: the causes that act together.
 pub(super) struct Rival<'a> {
-    pub(super) causes: &'a [NamedCause],
+    pub(super) causes: &'a [EstimatedCause],
 }
 
 /// What an explanation says of an experiment.
@@ -53,7 +53,7 @@ impl Rival<'_> {
 
     /// Parameters that are not exactly known: cause, key, step, and the step in standard deviations.
     fn steps(&self) -> Vec<(usize, &'static str, f64, f64)> {
-        let of = |(index, cause): (usize, &NamedCause)| {
+        let of = |(index, cause): (usize, &EstimatedCause)| {
             let figures: Vec<(&'static str, Figure)> = cause
                 .parameters
                 .iter()

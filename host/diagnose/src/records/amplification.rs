@@ -54,7 +54,10 @@ pub(crate) fn amplifies(record: &Record, cut: &RecordedCut, slopes: &MeanSlopes)
 
 fn is_new_each_turn(record: &Record, cut: &RecordedCut) -> bool {
     let part_of = |sample: usize| {
-        let turned = cut.turning.angle_rad(sample as f64 / record.grid.rate_hz()) / std::f64::consts::TAU;
+        let turned = cut
+            .spindle_motion
+            .angle_rad(sample as f64 / record.grid.rate_hz())
+            / std::f64::consts::TAU;
         ((turned.rem_euclid(1.0) * PARTS as f64) as usize).min(PARTS - 1)
     };
     let share = |samples: &[f64]| {

@@ -6,7 +6,7 @@ use crate::motion::chips::Chips;
 use crate::motion::cut_force::CutForce;
 use crate::motion::mean_slopes::MeanSlopes;
 use crate::motion::recorded_cut::RecordedCut;
-use crate::motion::spindle_motion::Turning;
+use crate::motion::spindle_motion::SpindleMotion;
 use crate::records::channel::Observed;
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Cutter;
@@ -39,9 +39,9 @@ impl Cutting {
         with_force: bool,
     ) -> Result<Self, DiagnoseError> {
         let cut = RecordedCut::new(baseline.case, &baseline.effects, recording)?;
-        let chips = cut.chips(&cut.turning, motion, finer, with_force);
+        let chips = cut.chips(&cut.spindle_motion, motion, finer, with_force);
         Ok(Self {
-            force: chips.force(&cut.cutter, &cut.turning, motion),
+            force: chips.force(&cut.cutter, &cut.spindle_motion, motion),
             chips,
             finer,
             with_force,
@@ -61,26 +61,26 @@ impl Cutting {
 
     /// How its force answers to a small motion beside the one that its chips are of.
     pub(crate) fn mean_slopes(&self) -> MeanSlopes {
-        self.chips.mean_slopes(&self.cut.cutter, &self.cut.turning)
+        self.chips.mean_slopes(&self.cut.cutter, &self.cut.spindle_motion)
     }
 
     /// Goes along another motion.
     pub(super) fn follow(&mut self, motion: &Motion) {
         self.chips = self
             .cut
-            .chips(&self.cut.turning, motion, self.finer, self.with_force);
+            .chips(&self.cut.spindle_motion, motion, self.finer, self.with_force);
         self.force = self.force_of(&self.cut.cutter, motion);
     }
 
     /// The force of another tool along the motion that the chips are of.
     pub(crate) fn force_of(&self, cutter: &Cutter, motion: &Motion) -> CutForce {
-        self.chips.force(cutter, &self.cut.turning, motion)
+        self.chips.force(cutter, &self.cut.spindle_motion, motion)
     }
 
     /// The force of the believed tool where it turns or moves otherwise.
-    pub(crate) fn force_along(&self, turning: &Turning, motion: &Motion) -> CutForce {
+    pub(crate) fn force_along(&self, spindle_motion: &SpindleMotion, motion: &Motion) -> CutForce {
         self.cut
-            .chips(turning, motion, self.finer, self.with_force)
-            .force(&self.cut.cutter, turning, motion)
+            .chips(spindle_motion, motion, self.finer, self.with_force)
+            .force(&self.cut.cutter, spindle_motion, motion)
     }
 }

@@ -15,7 +15,7 @@ use num_complex::Complex64;
 use crate::baseline::{Baseline, derivatives};
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::cut_of;
-use crate::motion::spindle_motion::Turning;
+use crate::motion::spindle_motion::SpindleMotion;
 use crate::signal::noise::{floor_between_lines, median, rms};
 use quietcut_model::case::Case;
 use quietcut_recording::{Kind, Quantity, Recording};
@@ -51,7 +51,7 @@ const ANGLES: usize = 512;
 ///
 /// # Errors
 /// A recording whose full cut is too short to be diagnosed.
-pub(crate) fn in_full_cut<'a>(
+pub(crate) fn in_full_engagement<'a>(
     case: &Case,
     recordings: &'a [Recording],
 ) -> Result<(Cow<'a, [Recording]>, Vec<String>), DiagnoseError> {
@@ -66,7 +66,7 @@ pub(crate) fn in_full_cut<'a>(
             continue;
         };
         let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
-        let turns = (to_s - from_s) / Turning::new(recording, None)?.turn_s();
+        let turns = (to_s - from_s) / SpindleMotion::new(recording, None)?.turn_s();
         if turns < FEWEST_IN_CUT {
             return Err(DiagnoseError::record(
                 &recording.path,
@@ -94,7 +94,7 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
     if !is_of_a_cut(recording) {
         return None;
     }
-    let turn_s = Turning::new(recording, None).ok()?.turn_s();
+    let turn_s = SpindleMotion::new(recording, None).ok()?.turn_s();
     let cutter = cutter(baseline, recording)?;
     let levels = Levels::of(
         baseline,
@@ -193,9 +193,13 @@ fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
         .map(|tooth| angle_rad + tooth.angle_rad)
         .filter(|phi_rad| (phi_rad - cutter.start_rad).rem_euclid(TAU) < arc)
         .map(|phi_rad| {
-            let place = cutter.immersion(phi_rad);
-            let thickness_m = cutter.recession_m(place, cutter.feed_per_tooth_m);
-            Vector3::from(cutter.force.force_n(place, thickness_m.max(0.0), cutter.depth_m))
+            let immersion = cutter.immersion(phi_rad);
+            let thickness_m = cutter.recession_m(immersion, cutter.feed_per_tooth_m);
+            Vector3::from(
+                cutter
+                    .force
+                    .force_n(immersion, thickness_m.max(0.0), cutter.depth_m),
+            )
         })
         .sum()
 }

@@ -10,14 +10,14 @@ use quietcut_model::structure::Form;
 use quietcut_recording::Recording;
 
 /// Baseline and records.
-pub(crate) struct Scene<'a> {
+pub(crate) struct Study<'a> {
     /// What is believed.
     pub baseline: Baseline<'a>,
     /// What was measured.
     pub records: Vec<Record>,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> Study<'a> {
     /// Reads the records against the baseline.
     ///
     /// # Errors

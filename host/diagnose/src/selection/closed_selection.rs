@@ -6,7 +6,7 @@ use crate::fit::candidate_model::Explanation;
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Share};
-use crate::selection::rebaselined::extended_around;
+use crate::selection::rebaselined::extended_rebaselined;
 use crate::selection::select::{APART, Scale};
 use crate::selection::stepwise::{distinct, extended, nested, without};
 
@@ -47,8 +47,9 @@ impl Scale<'_> {
         );
         let mut tried = VecDeque::from(tried);
         let mut spare = tried.split_off((extended + most).min(tried.len())).into_iter();
-        let (mut rival, mut freedoms) =
-            rival.map_or((f64::INFINITY, 0), |rival| (rival.fit.left, rival.freedoms));
+        let (mut rival, mut parameter_count) = rival.map_or((f64::INFINITY, 0), |rival| {
+            (rival.fit.left, rival.parameter_count)
+        });
         // The same causes along more axes are simulated only where more axes gain something.
         let mut leading: Option<Explanation> = None;
         let mut simulated = Vec::new();
@@ -60,7 +61,7 @@ impl Scale<'_> {
         while let Some(explanation) = tried.pop_front() {
             // Where one explains nearly all, what is far from that along the measured motion need not be simulated.
             // But a simpler one may be the truth that the other holds as a part.
-            let far_off = if explanation.freedoms < freedoms {
+            let far_off = if explanation.parameter_count < parameter_count {
                 SIMPLER * FAR_OFF
             } else {
                 FAR_OFF
@@ -70,7 +71,7 @@ impl Scale<'_> {
             }
             if leading.as_ref().is_some_and(|leading| {
                 library.are_same_causes(leading, &explanation)
-                    && leading.freedoms < explanation.freedoms
+                    && leading.parameter_count < explanation.parameter_count
                     && self.gain(regression, leading, 1.0) > self.gain(regression, &explanation, 1.0)
             }) {
                 continue;
@@ -84,7 +85,7 @@ impl Scale<'_> {
                 continue;
             };
             if fitted.fit.left < rival {
-                (rival, freedoms) = (fitted.fit.left, fitted.freedoms);
+                (rival, parameter_count) = (fitted.fit.left, fitted.parameter_count);
                 leading = Some(explanation);
             }
             simulated.push(fitted);
@@ -108,13 +109,13 @@ impl Scale<'_> {
         let bases = || fewer.iter().filter(|base| base.simulated.is_some());
         // Cuts, whose libraries are costly, go without.
         if let Some(base) = bases().next().filter(|_| self.coherent == 0.0) {
-            let around = extended_around(self.scene, self.recordings, library, regression, base);
+            let around = extended_rebaselined(self.study, self.recordings, library, regression, base);
             tried.extend(around.into_iter().take(AROUND));
         }
         for (base, most) in bases().zip(EXTENDED) {
             if let Some(left) = closed.left_of(library, base) {
                 tried.extend(
-                    extended(self.scene, library, regression, base, &left)
+                    extended(self.study, library, regression, base, &left)
                         .into_iter()
                         .take(most),
                 );
@@ -138,19 +139,19 @@ impl Scale<'_> {
             .map(|explanation| self.gain(regression, explanation, inflation))
             .collect();
         let mut gained = 0.0;
-        for place in 0..found.len().min(POLISHED) {
+        for position in 0..found.len().min(POLISHED) {
             // What was behind by more than twice what the best gained will not come up to it, unless it is simpler: of that the other
             // may have mended what the slopes of the baseline got wrong.
-            let is_simpler = found[place].freedoms < found[0].freedoms
-                && found[place].fit.left < NEARLY * found[0].fit.left;
-            if place > 0 && !is_simpler && before[0] - before[place] > APART + 2.0 * gained {
+            let is_simpler = found[position].parameter_count < found[0].parameter_count
+                && found[position].fit.left < NEARLY * found[0].fit.left;
+            if position > 0 && !is_simpler && before[0] - before[position] > APART + 2.0 * gained {
                 continue;
             }
-            if let Some(polished) = closed.polished(library, regression, &found[place]) {
-                if place == 0 {
+            if let Some(polished) = closed.polished(library, regression, &found[position]) {
+                if position == 0 {
                     gained = (self.gain(regression, &polished, inflation) - before[0]).max(0.0);
                 }
-                found[place] = polished;
+                found[position] = polished;
             }
         }
         self.sort(regression, found, inflation);
@@ -172,8 +173,9 @@ impl Scale<'_> {
             let reached = self.gain(regression, &kept, inflation);
             let places = 0..kept.choices.len();
             let fewer = places.clone().filter(|_| kept.choices.len() > 1);
-            let mut simpler: Vec<Explanation> = fewer.map(|place| without(library, &kept, place)).collect();
-            simpler.extend(places.flat_map(|place| nested(self.scene, library, &kept, place)));
+            let mut simpler: Vec<Explanation> =
+                fewer.map(|position| without(library, &kept, position)).collect();
+            simpler.extend(places.flat_map(|position| nested(self.study, library, &kept, position)));
             let needless = simpler.into_iter().find_map(|fewer| {
                 let fewer = closed.fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))?;
                 let enough = |regression: &Regression, fewer: &Explanation| {

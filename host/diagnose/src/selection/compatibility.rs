@@ -1,6 +1,6 @@
 //! Which causes may act together.
 
-use crate::candidates::cause::Place;
+use crate::candidates::cause::Location;
 use crate::fit::candidate_model::{Choice, Explanation};
 use crate::fit::library::Library;
 
@@ -45,12 +45,12 @@ impl Library {
     }
 
     /// True of explanations by the same causes at the same places.
-    pub(crate) fn are_at_same_places(&self, one: &Explanation, other: &Explanation) -> bool {
+    pub(crate) fn are_at_same_locations(&self, one: &Explanation, other: &Explanation) -> bool {
         let is_in = |choice: &Choice, of: &Explanation| {
             let known = &self.candidates[choice.candidate];
             of.choices.iter().any(|other| {
                 let other = &self.candidates[other.candidate];
-                other.cause == known.cause && other.place == known.place
+                other.cause == known.cause && other.location == known.location
             })
         };
         one.choices.len() == other.choices.len() && one.choices.iter().all(|choice| is_in(choice, other))
@@ -60,27 +60,28 @@ impl Library {
     /// channel: between the two nothing would be determined.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
         let name = |choice: Choice| self.cause(choice.candidate).name();
-        let place = |choice: Choice| &self.candidates[choice.candidate].place;
+        let location = |choice: Choice| &self.candidates[choice.candidate].location;
         let cubic = ["cubic-stiffness", "softening-hardening"];
         let reading = ["sensor-gain", "sensor-offset-from-tool-tip"];
-        let is_by_mode = |choice: Choice| self.candidates[choice.candidate].shapes[choice.shape].1.len() > 1;
+        let is_by_mode =
+            |choice: Choice| self.candidates[choice.candidate].variants[choice.variant].1.len() > 1;
         let are_both = |names: [&str; 2]| names.contains(&name(one)) && names.contains(&name(other));
-        are_both(cubic) && meet(place(one), place(other))
-            || are_both(reading) && place(one) == place(other) && (is_by_mode(one) || is_by_mode(other))
+        are_both(cubic) && meet(location(one), location(other))
+            || are_both(reading) && location(one) == location(other) && (is_by_mode(one) || is_by_mode(other))
     }
 
     /// True of terms of one law along one axis.
     fn are_alike(&self, one: Choice, other: Choice) -> bool {
         match (self.law(one), self.law(other)) {
-            (Some((law, place)), Some((other_law, other_place))) => {
-                law == other_law && meet(place, other_place)
+            (Some((law, location)), Some((other_law, other_location))) => {
+                law == other_law && meet(location, other_location)
             }
             _ => false,
         }
     }
 
     /// Of what a choice is a law, and where.
-    fn law(&self, choice: Choice) -> Option<(Law, &Place)> {
+    fn law(&self, choice: Choice) -> Option<(Law, &Location)> {
         let law = match self.cause(choice.candidate).name() {
             "stiffness"
             | "drift"
@@ -91,17 +92,17 @@ impl Library {
             "damping" | "cubic-damping" | "coulomb-friction" | "hysteresis" => Law::OfVelocity,
             _ => return None,
         };
-        Some((law, &self.candidates[choice.candidate].place))
+        Some((law, &self.candidates[choice.candidate].location))
     }
 }
 
 /// True of places that are the same, or have an axis in common.
-fn meet(one: &Place, other: &Place) -> bool {
+fn meet(one: &Location, other: &Location) -> bool {
     match (one, other) {
-        (Place::EachOf(axes), Place::Axis(axis)) | (Place::Axis(axis), Place::EachOf(axes)) => {
+        (Location::EachOf(axes), Location::Axis(axis)) | (Location::Axis(axis), Location::EachOf(axes)) => {
             axes.contains(axis)
         }
-        (Place::EachOf(axes), Place::EachOf(others)) => axes.iter().any(|axis| others.contains(axis)),
+        (Location::EachOf(axes), Location::EachOf(others)) => axes.iter().any(|axis| others.contains(axis)),
         _ => one == other,
     }
 }

@@ -11,30 +11,30 @@ use crate::candidates::extension_tables::joined;
 use crate::fit::candidate_model::Explanation;
 use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Share};
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::selection::search::singles;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
 /// The best explanations of `base` and one cause more around the case that `base` makes, best first; none where `base` leaves the
 /// linear structure as it is, since there nothing would be new.
-pub(crate) fn extended_around(
-    scene: &Scene<'_>,
+pub(crate) fn extended_rebaselined(
+    study: &Study<'_>,
     recordings: &[Recording],
     library: &mut Library,
     regression: &mut Regression,
     base: &Explanation,
 ) -> Vec<Explanation> {
-    let Some(extensions) = library.extensions(scene, base) else {
+    let Some(extensions) = library.extensions(study, base) else {
         return Vec::new();
     };
-    let mut case: Case = scene.baseline.case.clone();
+    let mut case: Case = study.baseline.case.clone();
     case.extensions
         .extend(joined(extensions.iter().map(|(name, table)| (*name, table))));
-    let Ok(around) = Scene::new(&case, recordings) else {
+    let Ok(around) = Study::new(&case, recordings) else {
         return Vec::new();
     };
-    if around.baseline.first_order.a == scene.baseline.first_order.a {
+    if around.baseline.first_order.a == study.baseline.first_order.a {
         return Vec::new();
     }
     let mut columns = Regression::new(&around);
@@ -47,9 +47,9 @@ pub(crate) fn extended_around(
             let candidate = library
                 .candidates
                 .iter()
-                .position(|other| other.cause == known.cause && other.place == known.place)?;
-            let shape = known.shapes[choice.shape].0.clone();
-            let choice = library.add_shape(scene, regression, candidate, shape)?;
+                .position(|other| other.cause == known.cause && other.location == known.location)?;
+            let nonlinear_parameters = known.variants[choice.variant].0.clone();
+            let choice = library.add_variant(study, regression, candidate, nonlinear_parameters)?;
             if !library.may_act_together(&base.choices, choice) {
                 return None;
             }
@@ -63,18 +63,18 @@ pub(crate) fn extended_around(
                     coefficients,
                     left: single.fit.left,
                 },
-                freedoms: base.freedoms + library.freedoms(choice),
+                parameter_count: base.parameter_count + library.parameter_count(choice),
                 simulated: None,
             };
             library
-                .parameters(scene, &explanation)
+                .parameters(study, &explanation)
                 .is_some()
                 .then_some(explanation)
         })
         .collect();
     regression.complete();
     let price = (columns.count(Share::Whole).max(2) as f64).ln();
-    let cost = |explanation: &Explanation| explanation.fit.left + explanation.freedoms as f64 * price;
+    let cost = |explanation: &Explanation| explanation.fit.left + explanation.parameter_count as f64 * price;
     found.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     found
 }

@@ -5,23 +5,23 @@ use rayon::prelude::*;
 use crate::fit::candidate_model::Explanation;
 use crate::fit::library::Library;
 use crate::fit::regression::Regression;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 /// How many of the best pairs are tried with a third cause.
 const PAIRS_KEPT: usize = 24;
 
 /// The best explanation by each single candidate, best first.
-pub(crate) fn singles(library: &Library, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<Explanation> {
     let found = library
         .choices()
         .par_iter()
-        .filter_map(|choice| library.explain(scene, regression, &[*choice]))
+        .filter_map(|choice| library.explain(study, regression, &[*choice]))
         .collect();
     best_of_each(found)
 }
 
 /// The best explanation by each pair of candidates, best first.
-pub(crate) fn pairs(library: &Library, scene: &Scene<'_>, regression: &Regression) -> Vec<Explanation> {
+pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<Explanation> {
     let choices = library.choices();
     let found = choices
         .par_iter()
@@ -30,7 +30,7 @@ pub(crate) fn pairs(library: &Library, scene: &Scene<'_>, regression: &Regressio
             let rest = &choices[index + 1..];
             rest.iter()
                 .filter(|second| library.may_act_together(&[*first], **second))
-                .filter_map(|second| library.explain(scene, regression, &[*first, *second]))
+                .filter_map(|second| library.explain(study, regression, &[*first, *second]))
                 .collect::<Vec<_>>()
         })
         .collect();
@@ -40,7 +40,7 @@ pub(crate) fn pairs(library: &Library, scene: &Scene<'_>, regression: &Regressio
 /// The best explanation by each triple that contains one of the best pairs, best first.
 pub(crate) fn triples(
     library: &Library,
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     regression: &Regression,
     pairs: &[Explanation],
 ) -> Vec<Explanation> {
@@ -56,7 +56,7 @@ pub(crate) fn triples(
                     let mut all = pair.choices.clone();
                     all.push(*third);
                     all.sort_unstable();
-                    library.explain(scene, regression, &all)
+                    library.explain(study, regression, &all)
                 })
                 .collect::<Vec<_>>()
         })

@@ -9,7 +9,7 @@ use crate::fit::regression::{Regression, Share};
 use crate::fit::relinearization::Relinearization;
 use crate::progress::Stage;
 use crate::records::record::TRUSTED_IN_CUTS;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::selection::search::{pairs as best_pairs, singles, triples};
 use crate::selection::stepwise::extended;
 use quietcut_recording::Recording;
@@ -50,7 +50,7 @@ pub(crate) struct Selection {
 
 /// What explanations are weighed by.
 pub(crate) struct Scale<'a> {
-    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) study: &'a Study<'a>,
     pub(crate) recordings: &'a [Recording],
     /// Fits in closed loop, where there are such.
     pub(crate) closed: Option<Box<dyn ClosedFit + 'a>>,
@@ -64,26 +64,26 @@ pub(crate) struct Scale<'a> {
 
 impl<'a> Scale<'a> {
     pub(crate) fn new(
-        scene: &'a Scene<'a>,
+        study: &'a Study<'a>,
         recordings: &'a [Recording],
         library: &Library,
         regression: &Regression,
     ) -> Self {
-        let closed: Option<Box<dyn ClosedFit + 'a>> = match OutputError::new(scene) {
+        let closed: Option<Box<dyn ClosedFit + 'a>> = match OutputError::new(study) {
             Some(output_error) => Some(Box::new(output_error)),
-            None => Relinearization::new(scene, recordings).map(|closed| Box::new(closed) as Box<_>),
+            None => Relinearization::new(study, recordings).map(|closed| Box::new(closed) as Box<_>),
         };
         // Simulations are free to begin elsewhere, and do not carry the noise of the measured motion: like is compared with like.
         let by_baseline = closed
             .as_ref()
             .and_then(|closed| closed.left_by_baseline(library, regression));
-        let is_cut = scene.records.iter().any(|record| record.cut.is_some());
+        let is_cut = study.records.iter().any(|record| record.cut.is_some());
         Self {
-            scene,
+            study,
             recordings,
             closed,
             coherent: if is_cut {
-                TRUSTED_IN_CUTS * TRUSTED_IN_CUTS * regression.signal(scene)
+                TRUSTED_IN_CUTS * TRUSTED_IN_CUTS * regression.signal(study)
             } else {
                 0.0
             },
@@ -98,7 +98,7 @@ impl<'a> Scale<'a> {
             Some(best) if best.simulated.is_some() => {
                 let free = regression
                     .count(Share::Whole)
-                    .saturating_sub(best.freedoms)
+                    .saturating_sub(best.parameter_count)
                     .max(1) as f64;
                 (best.fit.left / free).max(0.5)
             }
@@ -125,7 +125,7 @@ impl<'a> Scale<'a> {
             Some(_) => self.reference,
             None => regression.residual(Share::Whole),
         };
-        (reference - explanation.fit.left) / inflation - explanation.freedoms as f64 * count.ln()
+        (reference - explanation.fit.left) / inflation - explanation.parameter_count as f64 * count.ln()
     }
 
     pub(crate) fn sort(&self, regression: &Regression, found: &mut [Explanation], inflation: f64) {
@@ -181,8 +181,8 @@ impl<'a> Scale<'a> {
         };
         let inflation = self.inflation(regression, Some(base));
         let price = (regression.count(Share::Whole).max(2) as f64).ln();
-        let cost = |of: &Explanation| of.fit.left / inflation + of.freedoms as f64 * price;
-        extended(self.scene, library, regression, base, &left)
+        let cost = |of: &Explanation| of.fit.left / inflation + of.parameter_count as f64 * price;
+        extended(self.study, library, regression, base, &left)
             .first()
             .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
     }
@@ -194,7 +194,7 @@ impl<'a> Scale<'a> {
         fewer: Option<&Explanation>,
         more: &Explanation,
     ) -> bool {
-        if fewer.is_some_and(|fewer| more.freedoms < fewer.freedoms) {
+        if fewer.is_some_and(|fewer| more.parameter_count < fewer.parameter_count) {
             return true;
         }
         let noise = regression.count(Share::Whole) as f64;
@@ -243,7 +243,7 @@ pub(crate) fn select(
         ahead: f64::INFINITY,
         gained: 0.0,
     };
-    let scene = scale.scene;
+    let study = scale.study;
     let mut pairs = Vec::new();
     let mut fewer: Vec<Explanation> = Vec::new();
     for (index, most) in SIMULATED.into_iter().enumerate() {
@@ -259,8 +259,8 @@ pub(crate) fn select(
         if enough {
             let Some(best) = &selection.best else { break };
             let asked = scale.asks_for_more(library, regression, best, &fewer);
-            imitated =
-                (!asked && size == 2 && best.freedoms > size && scale.closed.is_some()).then(|| best.clone());
+            imitated = (!asked && size == 2 && best.parameter_count > size && scale.closed.is_some())
+                .then(|| best.clone());
             if !asked && imitated.is_none() {
                 break;
             }
@@ -268,20 +268,20 @@ pub(crate) fn select(
         watch(Stage::Causes(size));
         regression.complete();
         let mut found = match size {
-            1 => singles(library, scene, regression),
-            2 => best_pairs(library, scene, regression),
-            _ => triples(library, scene, regression, &pairs),
+            1 => singles(library, study, regression),
+            2 => best_pairs(library, study, regression),
+            _ => triples(library, study, regression, &pairs),
         };
         // Simulations of several causes begin at the shapes that were found of each alone.
         if size == 1 || scale.closed.is_none() {
-            refine(scene, library, regression, &mut found);
+            refine(study, library, regression, &mut found);
         }
         scale.sort(regression, &mut found, scale.inflation);
         if size == 2 {
             pairs.clone_from(&found);
         }
         if let Some(imitated) = &imitated {
-            found.retain(|explanation| explanation.freedoms < imitated.freedoms);
+            found.retain(|explanation| explanation.parameter_count < imitated.parameter_count);
         }
         let extended = if imitated.is_some() { &[] } else { &fewer[..] };
         let mut found = scale.simulated(library, regression, found, extended, most, imitated.as_ref());
@@ -346,9 +346,9 @@ pub(crate) fn select(
 /// many.
 fn is_rival(library: &Library, best: &Explanation, other: &Explanation) -> bool {
     if names(library, other) != names(library, best) {
-        return other.freedoms <= best.freedoms;
+        return other.parameter_count <= best.parameter_count;
     }
-    other.freedoms == best.freedoms && !library.are_at_same_places(best, other)
+    other.parameter_count == best.parameter_count && !library.are_at_same_locations(best, other)
 }
 
 fn tell(
@@ -364,11 +364,11 @@ fn tell(
             .iter()
             .map(|choice| {
                 let known = &library.candidates[choice.candidate];
-                let shape = &known.shapes[choice.shape].0;
+                let nonlinear_parameters = &known.variants[choice.variant].0;
                 format!(
-                    "{} {} {shape:?}",
+                    "{} {} {nonlinear_parameters:?}",
                     library.cause(choice.candidate).name(),
-                    known.place
+                    known.location
                 )
             })
             .collect();
@@ -394,7 +394,7 @@ fn simplest(
     let apart = APART.max(NUMERICS * regression.residual(Share::Whole) / inflation);
     let as_good = |other: &&Explanation| {
         other.simulated.is_none()
-            && other.freedoms < best.freedoms
+            && other.parameter_count < best.parameter_count
             && scale.excess(regression, Some(other)).1 < SAMPLING
             && scale.gain(regression, other, inflation) > scale.gain(regression, best, inflation) - apart
     };

@@ -9,30 +9,31 @@ use nalgebra::DMatrix;
 use crate::fit::candidate_model::{Choice, Explanation};
 use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Share};
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 /// The best explanations of `base` and one cause more, best first; `left` is what is left of it, by record and channel.
 pub(crate) fn extended(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
     base: &Explanation,
     left: &[Vec<Vec<f64>>],
 ) -> Vec<Explanation> {
     let target = regression.add(left);
-    library.add_shapes_beside(scene, regression, left);
+    library.add_variants_beside(study, regression, left);
     regression.complete();
     let library = &*library;
     let mut found: Vec<Explanation> = library
         .choices()
         .into_iter()
         .filter(|choice| library.may_act_together(&base.choices, *choice))
-        .filter_map(|choice| with(scene, library, regression, base, choice, target))
+        .filter_map(|choice| with(study, library, regression, base, choice, target))
         .collect();
     let price = (regression.count(Share::Whole).max(2) as f64).ln();
     let inflation = (base.fit.left / regression.count(Share::Whole).max(1) as f64).max(1.0);
-    let cost =
-        |explanation: &Explanation| explanation.fit.left / inflation + explanation.freedoms as f64 * price;
+    let cost = |explanation: &Explanation| {
+        explanation.fit.left / inflation + explanation.parameter_count as f64 * price
+    };
     found.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     let mut seen: Vec<usize> = Vec::new();
     found.retain(|explanation| {
@@ -45,7 +46,7 @@ pub(crate) fn extended(
 }
 
 fn with(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &Library,
     regression: &Regression,
     base: &Explanation,
@@ -74,11 +75,11 @@ fn with(
                 coefficients,
                 left: (base.fit.left - taken).max(0.0),
             },
-            freedoms: base.freedoms + library.freedoms(choice),
+            parameter_count: base.parameter_count + library.parameter_count(choice),
             simulated: None,
         };
         library
-            .parameters(scene, &explanation)
+            .parameters(study, &explanation)
             .is_some()
             .then_some(explanation)
     };
@@ -86,15 +87,15 @@ fn with(
 }
 
 /// The explanation without one of its causes.
-pub(crate) fn without(library: &Library, explanation: &Explanation, place: usize) -> Explanation {
+pub(crate) fn without(library: &Library, explanation: &Explanation, position: usize) -> Explanation {
     let mut coefficients = Vec::new();
-    for other in (0..explanation.choices.len()).filter(|other| *other != place) {
+    for other in (0..explanation.choices.len()).filter(|other| *other != position) {
         coefficients.extend(library.coefficients(explanation, other));
     }
     let mut choices = explanation.choices.clone();
-    let gone = choices.remove(place);
+    let gone = choices.remove(position);
     Explanation {
-        freedoms: explanation.freedoms - library.freedoms(gone),
+        parameter_count: explanation.parameter_count - library.parameter_count(gone),
         choices,
         fit: Fit {
             covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
@@ -108,24 +109,26 @@ pub(crate) fn without(library: &Library, explanation: &Explanation, place: usize
 /// The explanation with a simpler cause in the place of one of its own: at the same place, with some of its parameters and no others
 /// (a cubic spring for one that softens and hardens), at the values that they have.
 pub(crate) fn nested(
-    scene: &Scene<'_>,
+    study: &Study<'_>,
     library: &Library,
     explanation: &Explanation,
-    place: usize,
+    position: usize,
 ) -> Vec<Explanation> {
-    let Some(parameters) = library.parameters(scene, explanation) else {
+    let Some(parameters) = library.parameters(study, explanation) else {
         return Vec::new();
     };
-    let whole = explanation.choices[place];
-    let values = &parameters[place];
-    let acts_at = &library.candidates[whole.candidate].place;
-    let before = explanation.choices[..place].iter();
+    let whole = explanation.choices[position];
+    let values = &parameters[position];
+    let acts_at = &library.candidates[whole.candidate].location;
+    let before = explanation.choices[..position].iter();
     let from: usize = before.map(|choice| library.columns(*choice).len()).sum();
     let to = from + library.columns(whole).len();
     let simpler = |choice: Choice| {
         let known = &library.candidates[choice.candidate];
-        let (shape, columns) = &known.shapes[choice.shape];
-        if known.place != *acts_at || !shape.is_empty() || library.freedoms(choice) >= library.freedoms(whole)
+        let (nonlinear_parameters, columns) = &known.variants[choice.variant];
+        if known.location != *acts_at
+            || !nonlinear_parameters.is_empty()
+            || library.parameter_count(choice) >= library.parameter_count(whole)
         {
             return None;
         }
@@ -136,16 +139,19 @@ pub(crate) fn nested(
             .take(columns.len())
             .map(|(_, value)| *value)
             .collect();
-        let said = cause.parameters(scene, acts_at, shape, &own)?;
+        let said = cause.parameters(study, acts_at, nonlinear_parameters, &own)?;
         if said.is_empty() || !said.iter().all(|parameter| values.contains(parameter)) {
             return None;
         }
         let mut coefficients = explanation.fit.coefficients.clone();
         coefficients.splice(from..to, own);
         let mut choices = explanation.choices.clone();
-        choices[place] = choice;
+        choices[position] = choice;
         Some(Explanation {
-            freedoms: choices.iter().map(|choice| library.freedoms(*choice)).sum(),
+            parameter_count: choices
+                .iter()
+                .map(|choice| library.parameter_count(*choice))
+                .sum(),
             choices,
             fit: Fit {
                 covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),

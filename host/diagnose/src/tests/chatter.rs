@@ -1,7 +1,7 @@
 //! Virtual cuts near a lobe and in grown chatter, diagnosed with the plain case.
 
 use crate::conclusion::answer::Outcome;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::tests::virtual_records::{case, record};
 use crate::{Diagnosis, Options, diagnose};
 use quietcut_model::case::Case;
@@ -43,8 +43,8 @@ fn a_right_case_is_right_near_the_lobe_and_in_chatter() {
     ] {
         let recording = slot(depth_mm, &[], measured, 5);
         let case = believed();
-        let scene = Scene::new(&case, std::slice::from_ref(&recording)).unwrap();
-        assert!(scene.records[0].amplifies, "{depth_mm} mm");
+        let study = Study::new(&case, std::slice::from_ref(&recording)).unwrap();
+        assert!(study.records[0].amplifies, "{depth_mm} mm");
         let diagnosis = asked(recording);
         assert_eq!(diagnosis.outcome, Outcome::None, "{depth_mm} mm, {measured:?}");
     }
@@ -54,8 +54,8 @@ fn a_right_case_is_right_near_the_lobe_and_in_chatter() {
 fn a_shallow_cut_does_not_amplify() {
     let case = believed();
     let recording = slot(0.2 * LIMIT_MM, &[], &[Quantity::Displacement], 5);
-    let scene = Scene::new(&case, &[recording]).unwrap();
-    assert!(!scene.records[0].amplifies);
+    let study = Study::new(&case, &[recording]).unwrap();
+    assert!(!study.records[0].amplifies);
 }
 
 #[test]

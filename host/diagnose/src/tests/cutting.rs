@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Matrix3;
 
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use crate::tests::virtual_records::record;
 use crate::{Diagnosis, Options, diagnose};
 use quietcut_model::case::Case;
@@ -196,13 +196,13 @@ fn what_moves_a_resonance_is_found_beside_another_cause_and_no_third_is() {
 fn mean_slopes_of_a_cut_are_those_that_averaged_lobes_have() {
     let believed = case("0.15", "");
     let recordings = records(&[], false, 7);
-    let scene = Scene::new(&believed, &recordings).unwrap();
+    let study = Study::new(&believed, &recordings).unwrap();
     let (tool, cut) = (believed.tool().unwrap(), believed.cut().unwrap());
     let force = ToothForce::new(tool, believed.material().unwrap());
     // The deeper of the two: cut in feed direction x, 60 turns less what is lost at the ends.
     let averaged = force.averaged(&Engagement::new(tool, cut), 1e-3 * cut.feed_per_tooth_mm);
     let expected = averaged.directional * 0.8e-3;
-    let slopes = scene.records[0].cut.as_ref().unwrap().mean_slopes();
+    let slopes = study.records[0].cut.as_ref().unwrap().mean_slopes();
     let sum: Matrix3<f64> = slopes.by_delay.iter().map(|(_, slope)| slope).sum();
     // Where teeth leave the chip comes to nothing, and noise decides about contact.
     assert!(

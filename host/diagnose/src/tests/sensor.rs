@@ -167,7 +167,8 @@ fn of_two_sensors_that_disagree_nobody_knows_which_is_wrong() {
     assert_eq!(answer.outcome, Outcome::Confounded, "{:?}", answer.causes);
     assert_eq!(answer.equivalent, [["sensor-gain"]]);
     let gain_of = |channel: &str| {
-        let of = |cause: &&crate::conclusion::answer::NamedCause| cause.channel.as_deref() == Some(channel);
+        let of =
+            |cause: &&crate::conclusion::answer::EstimatedCause| cause.channel.as_deref() == Some(channel);
         answer.causes.iter().find(of).unwrap().parameters["gain"].value
     };
     assert!((gain_of("x") - 1.2).abs() < 0.01, "{}", gain_of("x"));

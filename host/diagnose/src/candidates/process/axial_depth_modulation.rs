@@ -4,9 +4,9 @@
 //! Fit: no parameter; the coefficient of the change must come out near 1. Source: thesis, eq. 3.5.
 
 use super::{changed, everywhere, has_axial};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 pub(super) struct OfDepth;
 
@@ -18,15 +18,15 @@ impl Cause for OfDepth {
         "axial-depth-modulation"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        if has_axial(scene) {
-            everywhere(scene, self.name())
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        if has_axial(study) {
+            everywhere(study, self.name())
         } else {
             Vec::new()
         }
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
         Some(vec![changed(
             record,
             |cutter| cutter.axial_depth_modulation = true,
@@ -36,15 +36,15 @@ impl Cause for OfDepth {
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        _: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         ((coefficients.first()? - 1.0).abs() < ROUNDING).then(Vec::new)
     }
 
-    fn extension(&self, _: &Place, _: &[Parameter]) -> toml::Table {
+    fn extension(&self, _: &Location, _: &[Parameter]) -> toml::Table {
         toml::Table::from_iter([("on".to_owned(), toml::Value::Boolean(true))])
     }
 }

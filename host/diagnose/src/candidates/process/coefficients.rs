@@ -1,9 +1,9 @@
 //! A set of coefficients of the material that differs from that of the case: F is linear in each.
 
 use super::{changed, cutter, everywhere, has_axial};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_model::milling::Material;
 use quietcut_simulate::Cutter;
 
@@ -24,14 +24,20 @@ impl Cause for Coefficients {
         self.name
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        everywhere(scene, self.name)
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        everywhere(study, self.name)
     }
 
-    fn regressors(&self, scene: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
-        let step = (self.step)(cutter(scene)?);
+    fn regressors(
+        &self,
+        study: &Study<'_>,
+        record: &Record,
+        _: &Location,
+        _: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let step = (self.step)(cutter(study)?);
         // The axial coefficient acts where there is an axial direction.
-        let count = if has_axial(scene) { 3 } else { 2 };
+        let count = if has_axial(study) { 3 } else { 2 };
         let with_more = |index: usize| {
             changed(
                 record,
@@ -48,12 +54,12 @@ impl Cause for Coefficients {
 
     fn parameters(
         &self,
-        scene: &Scene<'_>,
-        _: &Place,
+        study: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        let mut material = cutter(scene)?.force.material();
+        let mut material = cutter(study)?.force.material();
         let believed = (self.of)(&mut material).map(|value| *value);
         let found: Vec<Parameter> = self
             .keys

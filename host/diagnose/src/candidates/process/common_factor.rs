@@ -3,9 +3,9 @@
 //! In the steady state of a stable linear cut without measured force one gain on all channels is exactly the same.
 
 use super::{changed, cutter, everywhere};
-use crate::candidates::cause::{Cause, Parameter, Part, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_model::milling::Material;
 
 /// Coefficients of the cut, and those of an edge that has a force.
@@ -59,20 +59,20 @@ impl Cause for CommonFactor {
         }
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        let has_edge = cutter(scene).is_some_and(|cutter| values(&cutter.force.material())[3..] != [0.0; 3]);
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        let has_edge = cutter(study).is_some_and(|cutter| values(&cutter.force.material())[3..] != [0.0; 3]);
         let known = self
             .names()
             .iter()
-            .any(|name| scene.baseline.case.extensions.contains_key(*name));
+            .any(|name| study.baseline.case.extensions.contains_key(*name));
         if has_edge == self.with_edge && !known {
-            everywhere(scene, self.name())
+            everywhere(study, self.name())
         } else {
             Vec::new()
         }
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
         Some(vec![changed(
             record,
             |cutter| {
@@ -85,26 +85,26 @@ impl Cause for CommonFactor {
 
     fn parameters(
         &self,
-        scene: &Scene<'_>,
-        _: &Place,
+        study: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let factor = 1.0 + coefficients.first()?;
-        let found = values(&scaled(cutter(scene)?.force.material(), factor));
+        let found = values(&scaled(cutter(study)?.force.material(), factor));
         let keys = CUTTING.into_iter().chain(EDGE).zip(found);
         (factor > 0.0).then(|| keys.take(if self.with_edge { 6 } else { 3 }).collect())
     }
 
-    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
+    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
         self.names()
             .into_iter()
             .zip(parameters.chunks(3))
             .map(|(name, parameters)| Part {
                 name,
-                place: place.clone(),
+                location: location.clone(),
                 parameters: parameters.to_vec(),
-                extension: self.extension(place, parameters),
+                extension: self.extension(location, parameters),
             })
             .collect()
     }

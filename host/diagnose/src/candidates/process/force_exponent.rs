@@ -7,9 +7,9 @@
 //! their regressors are exact at the shape (p, q) that they are made for.
 
 use super::{added, changed, cutter, everywhere, step};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_simulate::ChipLaw;
 
 pub(super) struct ForceExponent;
@@ -18,8 +18,8 @@ pub(super) struct ForceExponent;
 const LEAST: f64 = 1e-3;
 
 /// h*, m: half the feed of the first cut.
-fn reference_m(scene: &Scene<'_>) -> f64 {
-    cutter(scene).map_or(1e-4, |cutter| 0.5 * cutter.feed_per_tooth_m)
+fn reference_m(study: &Study<'_>) -> f64 {
+    cutter(study).map_or(1e-4, |cutter| 0.5 * cutter.feed_per_tooth_m)
 }
 
 impl Cause for ForceExponent {
@@ -27,24 +27,26 @@ impl Cause for ForceExponent {
         "force-exponent"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        everywhere(scene, self.name())
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        everywhere(study, self.name())
     }
 
-    fn shapes(&self, _: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
+    fn nonlinear_grid(&self, _: &Study<'_>, _: &Location) -> Vec<Vec<f64>> {
         [0.6, 0.8, 1.0, 1.2].map(|exponent| vec![exponent, 0.0]).to_vec()
     }
 
     fn regressors(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        _: &Place,
-        shape: &[f64],
+        _: &Location,
+        nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
-        let &[exponent, q] = shape else { return None };
+        let &[exponent, q] = nonlinear_parameters else {
+            return None;
+        };
         let less = step(exponent - 1.0, LEAST);
-        let h = reference_m(scene);
+        let h = reference_m(study);
         let law = move |q: f64| ChipLaw {
             exponent: 1.0 + less,
             reference_m: h * (-q / less).exp(),
@@ -68,13 +70,13 @@ impl Cause for ForceExponent {
 
     fn parameters(
         &self,
-        scene: &Scene<'_>,
-        _: &Place,
+        study: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
         let &[less, q] = coefficients else { return None };
-        let reference_mm = 1e3 * reference_m(scene) * (-q / less).exp();
+        let reference_mm = 1e3 * reference_m(study) * (-q / less).exp();
         // Beyond these no chip law was ever measured.
         let physical = less > -0.8 && less < 1.0 && reference_mm.is_finite() && reference_mm > 0.0;
         physical.then(|| vec![("exponent", 1.0 + less), ("reference_chip_mm", reference_mm)])

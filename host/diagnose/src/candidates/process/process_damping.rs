@@ -5,9 +5,9 @@
 //! Fit: linear in C, along the measured velocity. Source: Altintas, Eynian and Onozuka, CIRP Annals 57 (2008).
 
 use super::{changed, cutter, everywhere};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_simulate::ProcessDamping;
 
 pub(super) struct OfFlank;
@@ -17,16 +17,16 @@ impl Cause for OfFlank {
         "process-damping"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
         // Without the diameter the cutting speed is not known.
-        if cutter(scene).is_some_and(|cutter| cutter.radius_m.is_some()) {
-            everywhere(scene, self.name())
+        if cutter(study).is_some_and(|cutter| cutter.radius_m.is_some()) {
+            everywhere(study, self.name())
         } else {
             Vec::new()
         }
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
         let unit = ProcessDamping {
             n_per_m: 1.0,
             friction: 0.0,
@@ -40,8 +40,8 @@ impl Cause for OfFlank {
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        _: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {

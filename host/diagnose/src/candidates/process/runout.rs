@@ -7,9 +7,9 @@
 use std::f64::consts::TAU;
 
 use super::{added, changed, cutter, everywhere, step};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_model::milling::Runout;
 use quietcut_simulate::Cutter;
 
@@ -20,8 +20,8 @@ const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
 /// A shape below this, in µm, is the slope there.
 const LEAST_UM: f64 = 0.01;
 
-fn teeth(scene: &Scene<'_>) -> usize {
-    cutter(scene).map_or(0, |cutter| cutter.teeth.len())
+fn teeth(study: &Study<'_>) -> usize {
+    cutter(study).map_or(0, |cutter| cutter.teeth.len())
 }
 
 fn offset(along_um: f64, across_um: f64) -> impl Fn(&mut Cutter) {
@@ -38,25 +38,25 @@ impl Cause for OfTool {
         "runout"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        let runs_true = scene
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        let runs_true = study
             .baseline
             .case
             .tool
             .as_ref()
             .is_some_and(|tool| tool.runout.is_none());
         // The only tooth of a tool follows itself.
-        if runs_true && teeth(scene) > 1 {
-            everywhere(scene, self.name())
+        if runs_true && teeth(study) > 1 {
+            everywhere(study, self.name())
         } else {
             Vec::new()
         }
     }
 
     /// The slope at none, and about offsets with which some teeth leave the surface.
-    fn shapes(&self, scene: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
-        let feed_um = cutter(scene).map_or(0.0, |cutter| 1e6 * cutter.feed_per_tooth_m);
-        let directions = if teeth(scene) > 2 { 6 } else { 2 };
+    fn nonlinear_grid(&self, study: &Study<'_>, _: &Location) -> Vec<Vec<f64>> {
+        let feed_um = cutter(study).map_or(0.0, |cutter| 1e6 * cutter.feed_per_tooth_m);
+        let directions = if teeth(study) > 2 { 6 } else { 2 };
         let about = SHARES_OF_FEED.into_iter().flat_map(|share| {
             (0..directions).map(move |direction| {
                 let angle = TAU * f64::from(direction) / f64::from(directions);
@@ -68,16 +68,18 @@ impl Cause for OfTool {
 
     fn regressors(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        _: &Place,
-        shape: &[f64],
+        _: &Location,
+        nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
-        let &[along, across] = shape else { return None };
+        let &[along, across] = nonlinear_parameters else {
+            return None;
+        };
         let (along_step, across_step) = (step(along, LEAST_UM), step(across, LEAST_UM));
         let mut regressors = vec![changed(record, offset(along_step, 0.0), along_step)];
         // Two teeth stand on one line: what is across it moves neither.
-        if teeth(scene) > 2 {
+        if teeth(study) > 2 {
             regressors.push(added(
                 record,
                 offset(along, 0.0),
@@ -97,8 +99,8 @@ impl Cause for OfTool {
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        _: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {

@@ -8,10 +8,10 @@
 //! large the swing is, the tachometer knows better.
 
 use super::everywhere;
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
-use crate::motion::spindle_motion::{Swing, Turning, swing};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
+use crate::motion::spindle_motion::{SpeedModulation, SpindleMotion, speed_modulation};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_simulate::Fluctuation;
 
 pub(super) struct OfSpindle;
@@ -20,13 +20,13 @@ pub(super) struct OfSpindle;
 const ROUNDING: f64 = 0.5;
 
 /// The swing that the tachometers of all cuts tell.
-fn of_tachometer(scene: &Scene<'_>) -> Option<Swing> {
-    let turnings: Vec<&Turning> = scene
+fn of_tachometer(study: &Study<'_>) -> Option<SpeedModulation> {
+    let spindle_motions: Vec<&SpindleMotion> = study
         .records
         .iter()
-        .filter_map(|record| Some(&record.cut.as_ref()?.cut.turning))
+        .filter_map(|record| Some(&record.cut.as_ref()?.cut.spindle_motion))
         .collect();
-    swing(&turnings)
+    speed_modulation(&spindle_motions)
 }
 
 impl Cause for OfSpindle {
@@ -34,12 +34,12 @@ impl Cause for OfSpindle {
         "speed-fluctuation"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        everywhere(scene, self.name())
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        everywhere(study, self.name())
     }
 
-    fn shapes(&self, scene: &Scene<'_>, _: &Place) -> Vec<Vec<f64>> {
-        let shape = |found: Swing| {
+    fn nonlinear_grid(&self, study: &Study<'_>, _: &Location) -> Vec<Vec<f64>> {
+        let nonlinear_parameters = |found: SpeedModulation| {
             let Fluctuation {
                 delta,
                 frequency_hz,
@@ -47,11 +47,20 @@ impl Cause for OfSpindle {
             } = found.fluctuation;
             vec![frequency_hz, delta, phase_rad]
         };
-        of_tachometer(scene).map(shape).into_iter().collect()
+        of_tachometer(study)
+            .map(nonlinear_parameters)
+            .into_iter()
+            .collect()
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, shape: &[f64]) -> Option<Vec<Regressor>> {
-        let &[frequency_hz, delta, phase_rad] = shape else {
+    fn regressors(
+        &self,
+        _: &Study<'_>,
+        record: &Record,
+        _: &Location,
+        nonlinear_parameters: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let &[frequency_hz, delta, phase_rad] = nonlinear_parameters else {
             return None;
         };
         let fluctuation = Fluctuation {
@@ -62,24 +71,24 @@ impl Cause for OfSpindle {
         let Some(cut) = &record.cut else {
             return Some(vec![Regressor::default()]);
         };
-        let turning = cut.cut.turning.with(fluctuation);
-        let force = cut.force_along(&turning, &record.motion);
+        let spindle_motion = cut.cut.spindle_motion.with(fluctuation);
+        let force = cut.force_along(&spindle_motion, &record.motion);
         Some(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
     }
 
     /// The shape is the tachometer's, not one that the fit chose.
-    fn settled(&self, shape: &[f64], _: &[f64]) -> Option<Vec<f64>> {
-        Some(shape.to_vec())
+    fn settled(&self, nonlinear_parameters: &[f64], _: &[f64]) -> Option<Vec<f64>> {
+        Some(nonlinear_parameters.to_vec())
     }
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
-        shape: &[f64],
+        _: &Study<'_>,
+        _: &Location,
+        nonlinear_parameters: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        let &[frequency_hz, delta, phase_rad] = shape else {
+        let &[frequency_hz, delta, phase_rad] = nonlinear_parameters else {
             return None;
         };
         let share = *coefficients.first()?;
@@ -92,11 +101,11 @@ impl Cause for OfSpindle {
         })
     }
 
-    fn known_deviations(&self, scene: &Scene<'_>) -> Vec<Parameter> {
-        let Some(Swing {
+    fn known_deviations(&self, study: &Study<'_>) -> Vec<Parameter> {
+        let Some(SpeedModulation {
             deviation: [delta, frequency_hz, phase_rad],
             ..
-        }) = of_tachometer(scene)
+        }) = of_tachometer(study)
         else {
             return Vec::new();
         };

@@ -4,9 +4,9 @@
 //! Fit: linear in r. Source: Altintas, Manufacturing Automation (2012), ch. 2 (forces over flank wear).
 
 use super::{changed, everywhere};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 pub(super) struct OfEdge;
 
@@ -15,11 +15,11 @@ impl Cause for OfEdge {
         "wear"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        everywhere(scene, self.name())
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        everywhere(study, self.name())
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, _: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+    fn regressors(&self, _: &Study<'_>, record: &Record, _: &Location, _: &[f64]) -> Option<Vec<Regressor>> {
         Some(vec![changed(
             record,
             |cutter| cutter.force.wear_per_s += 1.0,
@@ -29,8 +29,8 @@ impl Cause for OfEdge {
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        _: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {

@@ -7,16 +7,16 @@
 use super::{Restoring, largest_m, logarithmic, plain, smallest_m};
 
 pub(super) const CAUSE: Restoring = Restoring {
-    shape: &["gap_mm"],
-    shapes: |scene, axis| {
-        let last = 1.9 * largest_m(scene, axis);
-        let first = (0.3 * smallest_m(scene, axis)).min(0.1 * last);
+    nonlinear_parameters: &["gap_mm"],
+    nonlinear_grid: |study, axis| {
+        let last = 1.9 * largest_m(study, axis);
+        let first = (0.3 * smallest_m(study, axis)).min(0.1 * last);
         logarithmic(1e3 * first, 1e3 * last, 12)
             .into_iter()
             .map(|gap| vec![gap])
             .collect()
     },
-    bounds: |scene, axis| vec![[1.0 * smallest_m(scene, axis), 2e3 * largest_m(scene, axis)]],
+    bounds: |study, axis| vec![[1.0 * smallest_m(study, axis), 2e3 * largest_m(study, axis)]],
     physical: |share| share[0] > 0.0 && share[0] <= 1.02,
     ..plain("backlash", &["stiffness_fraction"])
 };

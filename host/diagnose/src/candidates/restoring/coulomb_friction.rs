@@ -21,14 +21,14 @@ pub(super) const EACH_WAY: Restoring = Restoring {
 
 /// Friction that takes hold only once a play has been crossed: no force after a reversal, then friction.
 pub(super) const BEHIND_PLAY: Restoring = Restoring {
-    shape: &["play_mm"],
-    shapes: |scene, axis| {
-        let most = 2e3 * largest_m(scene, axis);
+    nonlinear_parameters: &["play_mm"],
+    nonlinear_grid: |study, axis| {
+        let most = 2e3 * largest_m(study, axis);
         [0.02, 0.04, 0.08, 0.16, 0.32, 0.5, 0.7]
             .map(|share| vec![share * most])
             .to_vec()
     },
-    bounds: |scene, axis| vec![[largest_m(scene, axis), 1.9e3 * largest_m(scene, axis)]],
+    bounds: |study, axis| vec![[largest_m(study, axis), 1.9e3 * largest_m(study, axis)]],
     physical: |fc| fc.iter().all(|fc| *fc >= 0.0) && fc.iter().any(|fc| *fc > 0.0),
     behind_play: true,
     ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
@@ -37,19 +37,19 @@ pub(super) const BEHIND_PLAY: Restoring = Restoring {
 /// The same where the joint that has the play closes softly. Where a structure moves freely a loop of Bouc and Wen takes its place:
 /// it is sought where the motion is imposed, and the force of every instant is seen.
 pub(super) const BEHIND_CLEARANCE: Restoring = Restoring {
-    shape: &["play_mm", "contact_mm"],
-    shapes: |scene, axis| {
-        if !scene.all_in(Domain::Force) {
+    nonlinear_parameters: &["play_mm", "contact_mm"],
+    nonlinear_grid: |study, axis| {
+        if !study.all_in(Domain::Force) {
             return Vec::new();
         }
-        let most = 2e3 * largest_m(scene, axis);
+        let most = 2e3 * largest_m(study, axis);
         [0.02, 0.04, 0.08, 0.16, 0.32]
             .into_iter()
             .flat_map(|play| [0.02, 0.06].map(|contact| vec![play * most, contact * most]))
             .collect()
     },
-    bounds: |scene, axis| {
-        let largest_m = largest_m(scene, axis);
+    bounds: |study, axis| {
+        let largest_m = largest_m(study, axis);
         vec![[largest_m, 1.9e3 * largest_m], [largest_m, 1e3 * largest_m]]
     },
     ..BEHIND_PLAY

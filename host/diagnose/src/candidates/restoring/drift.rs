@@ -12,9 +12,9 @@ pub(super) const RATE: Restoring = Restoring {
 };
 
 pub(super) const SETTLING: Restoring = Restoring {
-    shape: &["time_constant_s"],
-    shapes: |scene, _| {
-        let length = longest_s(scene);
+    nonlinear_parameters: &["time_constant_s"],
+    nonlinear_grid: |study, _| {
+        let length = longest_s(study);
         logarithmic(0.05 * length, length, 5)
             .into_iter()
             .map(|t| vec![t])
@@ -23,6 +23,6 @@ pub(super) const SETTLING: Restoring = Restoring {
     everywhere: true,
     // A stiffness that more than doubles, or vanishes, is another machine.
     physical: |change| change.iter().all(|change| change.abs() <= 1.0),
-    bounds: |scene, _| vec![[0.05 * longest_s(scene), 2.0 * longest_s(scene)]],
+    bounds: |study, _| vec![[0.05 * longest_s(study), 2.0 * longest_s(study)]],
     ..plain("drift", &["relative_change"])
 };

@@ -7,18 +7,18 @@
 use super::{Restoring, largest_m, logarithmic, plain, smallest_m};
 
 pub(super) const CAUSE: Restoring = Restoring {
-    shape: &["yield_m", "exponent", "gamma"],
-    shapes: |scene, axis| {
-        let last = 2.0 * largest_m(scene, axis);
-        let first = (0.2 * smallest_m(scene, axis)).min(0.1 * last);
+    nonlinear_parameters: &["yield_m", "exponent", "gamma"],
+    nonlinear_grid: |study, axis| {
+        let last = 2.0 * largest_m(study, axis);
+        let first = (0.2 * smallest_m(study, axis)).min(0.1 * last);
         logarithmic(first, last, 7)
             .into_iter()
             .flat_map(|yield_m| [1.0, 2.0].map(|exponent| vec![yield_m, exponent, 0.5]))
             .collect()
     },
-    bounds: |scene, axis| {
+    bounds: |study, axis| {
         vec![
-            [0.02 * smallest_m(scene, axis), 8.0 * largest_m(scene, axis)],
+            [0.02 * smallest_m(study, axis), 8.0 * largest_m(study, axis)],
             [1.0, 6.0],
             [0.0, 1.0],
         ]

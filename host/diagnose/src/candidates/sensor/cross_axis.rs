@@ -7,9 +7,9 @@
 use num_complex::Complex64;
 
 use super::{channels, in_cut, of_meant};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 pub(super) struct CrossAxis;
 
@@ -21,33 +21,39 @@ impl Cause for CrossAxis {
         "cross-axis"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        if scene.baseline.case.extensions.contains_key(self.name()) {
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        if study.baseline.case.extensions.contains_key(self.name()) {
             return Vec::new();
         }
-        let axes = scene.driven_axes();
-        let mut places = Vec::new();
-        for name in channels(scene) {
-            let Some(pickup) = scene.baseline.pickup(&name) else {
+        let axes = study.driven_axes();
+        let mut locations = Vec::new();
+        for name in channels(study) {
+            let Some(pickup) = study.baseline.pickup(&name) else {
                 continue;
             };
             for &axis in axes.iter().filter(|axis| pickup.weights[**axis] == 0.0) {
-                places.push(Place::ChannelFrom(name.clone(), axis));
+                locations.push(Location::ChannelFrom(name.clone(), axis));
             }
         }
-        places
+        locations
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, place: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
-        let Place::ChannelFrom(_, axis) = place else {
+    fn regressors(
+        &self,
+        _: &Study<'_>,
+        record: &Record,
+        location: &Location,
+        _: &[f64],
+    ) -> Option<Vec<Regressor>> {
+        let Location::ChannelFrom(_, axis) = location else {
             return None;
         };
         let mut weights = [0.0; 3];
         weights[*axis] = 1.0;
-        let read = of_meant(record, place, |_| weights, |_| Complex64::ONE);
+        let read = of_meant(record, location, |_| weights, |_| Complex64::ONE);
         let other = record.motion.clone();
         // x = y − p·(the other direction).
-        Some(in_cut(record, place, read, SMALL_FRACTION, |motion, to| {
+        Some(in_cut(record, location, read, SMALL_FRACTION, |motion, to| {
             for (to, from) in [
                 (&mut motion.x[to], &other.x[*axis]),
                 (&mut motion.v[to], &other.v[*axis]),
@@ -61,8 +67,8 @@ impl Cause for CrossAxis {
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        _: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {

@@ -7,9 +7,9 @@
 use num_complex::Complex64;
 
 use super::{in_cut, in_steps, meant, of_meant, one_or_all};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 pub(super) struct Delay;
 
@@ -24,19 +24,19 @@ impl Cause for Delay {
         "sensor-delay"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        one_or_all(scene, self.name())
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        one_or_all(study, self.name())
     }
 
-    fn shapes(&self, scene: &Scene<'_>, place: &Place) -> Vec<Vec<f64>> {
-        let [[_, longest]] = self.bounds(scene, place)[..] else {
+    fn nonlinear_grid(&self, study: &Study<'_>, location: &Location) -> Vec<Vec<f64>> {
+        let [[_, longest]] = self.bounds(study, location)[..] else {
             return Vec::new();
         };
         [0.01, 0.3, 1.0].map(|share| vec![share * longest]).to_vec()
     }
 
-    fn bounds(&self, scene: &Scene<'_>, _: &Place) -> Vec<[f64; 2]> {
-        let highest = scene
+    fn bounds(&self, study: &Study<'_>, _: &Location) -> Vec<[f64; 2]> {
+        let highest = study
             .records
             .iter()
             .map(|record| record.highest_hz)
@@ -46,17 +46,17 @@ impl Cause for Delay {
 
     fn regressors(
         &self,
-        _: &Scene<'_>,
+        _: &Study<'_>,
         record: &Record,
-        place: &Place,
-        shape: &[f64],
+        location: &Location,
+        nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
-        let delay = *shape.first()?;
+        let delay = *nonlinear_parameters.first()?;
         // Per second of delay, so that the coefficient is the delay.
         let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
         let read = if record.cut.is_some() {
             let of = |channel: usize| {
-                if meant(place, &record.channels[channel]) {
+                if meant(location, &record.channels[channel]) {
                     in_steps(record, channel, change)
                 } else {
                     Some(Vec::new())
@@ -66,10 +66,10 @@ impl Cause for Delay {
                 (0..record.channels.len()).map(of).collect::<Option<_>>()?,
             )]
         } else {
-            of_meant(record, place, |channel| channel.pickup.weights, change)
+            of_meant(record, location, |channel| channel.pickup.weights, change)
         };
         // x(t) = y(t + τ).
-        Some(in_cut(record, place, read, delay, |motion, axis| {
+        Some(in_cut(record, location, read, delay, |motion, axis| {
             motion.advance(axis, delay);
         }))
     }
@@ -85,12 +85,12 @@ impl Cause for Delay {
     /// None where the regressor was made for a delay of another size: that is no delay.
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
-        shape: &[f64],
+        _: &Study<'_>,
+        _: &Location,
+        nonlinear_parameters: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        let (delay, made_for) = (*coefficients.first()?, *shape.first()?);
+        let (delay, made_for) = (*coefficients.first()?, *nonlinear_parameters.first()?);
         (delay > made_for / ANOTHER && delay < made_for * ANOTHER).then(|| vec![("delay_s", delay)])
     }
 }

@@ -6,9 +6,9 @@
 //! Fit: linear in g − 1. Source: the calibration factor of ISO 16063; Altintas, Manufacturing Automation (2012), ch. 2, for what a
 //! dynamometer tells of a cut.
 
-use crate::candidates::cause::{Cause, Parameter, Part, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_recording::Quantity;
 
 pub(super) struct ForceGain;
@@ -17,10 +17,10 @@ pub(super) struct ForceGain;
 const LEAST: f64 = 0.02;
 
 /// The channels that a place means.
-fn names(place: &Place) -> &[String] {
-    match place {
-        Place::Channel(name) => std::slice::from_ref(name),
-        Place::Channels(names) => names,
+fn names(location: &Location) -> &[String] {
+    match location {
+        Location::Channel(name) => std::slice::from_ref(name),
+        Location::Channels(names) => names,
         _ => &[],
     }
 }
@@ -30,25 +30,31 @@ impl Cause for ForceGain {
         "sensor-gain"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        let all_cuts = scene.records.iter().all(|record| record.cut.is_some());
-        if !all_cuts || scene.baseline.case.extensions.contains_key(self.name()) {
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        let all_cuts = study.records.iter().all(|record| record.cut.is_some());
+        if !all_cuts || study.baseline.case.extensions.contains_key(self.name()) {
             return Vec::new();
         }
         let mut names: Vec<String> = Vec::new();
-        for channel in scene.records.iter().flat_map(|record| &record.channels) {
+        for channel in study.records.iter().flat_map(|record| &record.channels) {
             if channel.pickup.quantity == Quantity::Force && !names.contains(&channel.pickup.name) {
                 names.push(channel.pickup.name.clone());
             }
         }
-        let together = (names.len() > 1).then(|| Place::Channels(names.clone()));
-        names.into_iter().map(Place::Channel).chain(together).collect()
+        let together = (names.len() > 1).then(|| Location::Channels(names.clone()));
+        names.into_iter().map(Location::Channel).chain(together).collect()
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, place: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+    fn regressors(
+        &self,
+        _: &Study<'_>,
+        record: &Record,
+        location: &Location,
+        _: &[f64],
+    ) -> Option<Vec<Regressor>> {
         let of = |index: usize| {
             let channel = &record.channels[index];
-            if !names(place).contains(&channel.pickup.name) {
+            if !names(location).contains(&channel.pickup.name) {
                 return Vec::new();
             }
             let mut force = channel.predicted.clone();
@@ -64,8 +70,8 @@ impl Cause for ForceGain {
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        _: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
@@ -73,15 +79,15 @@ impl Cause for ForceGain {
         (gain > LEAST).then(|| vec![("gain", gain)])
     }
 
-    fn parts(&self, place: &Place, parameters: &[Parameter]) -> Vec<Part> {
-        names(place)
+    fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
+        names(location)
             .iter()
             .map(|name| {
-                let place = Place::Channel(name.clone());
+                let location = Location::Channel(name.clone());
                 Part {
                     name: self.name(),
-                    extension: self.extension(&place, parameters),
-                    place,
+                    extension: self.extension(&location, parameters),
+                    location,
                     parameters: parameters.to_vec(),
                 }
             })

@@ -8,9 +8,9 @@
 use num_complex::Complex64;
 
 use super::{in_cut, of_meant, one_or_all};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 
 pub(super) struct Gain;
 
@@ -31,19 +31,25 @@ impl Cause for Gain {
         "sensor-gain"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        one_or_all(scene, self.name())
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        one_or_all(study, self.name())
     }
 
-    fn regressors(&self, _: &Scene<'_>, record: &Record, place: &Place, _: &[f64]) -> Option<Vec<Regressor>> {
+    fn regressors(
+        &self,
+        _: &Study<'_>,
+        record: &Record,
+        location: &Location,
+        _: &[f64],
+    ) -> Option<Vec<Regressor>> {
         let read = of_meant(
             record,
-            place,
+            location,
             |channel| channel.pickup.weights,
             |_| Complex64::ONE,
         );
         // x = (1 − share)·y.
-        Some(in_cut(record, place, read, SMALL_SHARE, |motion, axis| {
+        Some(in_cut(record, location, read, SMALL_SHARE, |motion, axis| {
             let signals = motion.x[axis].iter_mut().chain(&mut motion.v[axis]);
             signals.for_each(|value| *value *= 1.0 - SMALL_SHARE);
         }))
@@ -51,8 +57,8 @@ impl Cause for Gain {
 
     fn parameters(
         &self,
-        _: &Scene<'_>,
-        _: &Place,
+        _: &Study<'_>,
+        _: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {

@@ -10,12 +10,12 @@
 use super::gain::{Gain, factor};
 use super::one_or_all;
 use crate::baseline::receptance::{Receptance, response};
-use crate::candidates::cause::{Cause, Parameter, Place, Regressor};
+use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::channel::Observed;
 use crate::records::channel::main_axis;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
-use crate::records::study::Scene;
+use crate::records::study::Study;
 use quietcut_model::structure::Form;
 
 pub(super) struct Offset;
@@ -29,18 +29,18 @@ const RATIOS: [&str; 9] = [
 const SEEN: f64 = 1e-6;
 
 /// The modes that each have their ratio in a channel, as places in the case, of so many; `None` where there is one ratio for all.
-fn modes(scene: &Scene<'_>, place: &Place) -> Option<(Vec<usize>, usize)> {
-    let name = place.channel()?;
-    let Form::Modes(modes) = &scene.baseline.structure.form else {
+fn modes(study: &Study<'_>, location: &Location) -> Option<(Vec<usize>, usize)> {
+    let name = location.channel()?;
+    let Form::Modes(modes) = &study.baseline.structure.form else {
         return None;
     };
     let is_driven = |record: &Record| record.domain == Domain::Response && record.cut.is_none();
-    if modes.len() > RATIOS.len() || !scene.records.iter().all(is_driven) {
+    if modes.len() > RATIOS.len() || !study.records.iter().all(is_driven) {
         return None;
     }
-    let mut channels = scene.records.iter().flat_map(|record| &record.channels);
+    let mut channels = study.records.iter().flat_map(|record| &record.channels);
     let axis = main_axis(channels.find(|channel| channel.pickup.name == name)?)?;
-    let directions = &scene.baseline.structure.directions;
+    let directions = &study.baseline.structure.directions;
     let along = directions
         .iter()
         .position(|direction| direction.axis() == Some(axis))?;
@@ -56,18 +56,18 @@ fn modes(scene: &Scene<'_>, place: &Place) -> Option<(Vec<usize>, usize)> {
 }
 
 /// What a channel reads of one mode under the forces of the record, with its share of the free decay.
-fn read_of(scene: &Scene<'_>, record: &Record, index: usize, mode: usize) -> Vec<f64> {
+fn read_of(study: &Study<'_>, record: &Record, index: usize, mode: usize) -> Vec<f64> {
     let channel: &Observed = &record.channels[index];
-    let first_order = &scene.baseline.first_order;
+    let first_order = &study.baseline.first_order;
     let mut alone = vec![0.0; first_order.order() / 2];
     alone[mode] = 1.0;
     let transfer = response(&Receptance::new(&first_order.seen(&alone)), &record.grid);
-    let responses = record.responses_by(channel, &transfer, &scene.baseline.axes);
+    let responses = record.responses_by(channel, &transfer, &study.baseline.axes);
     let mut force = std::array::from_fn(|axis| {
         let force = &record.force_n[axis];
         (!force.is_empty()).then(|| record.grid.spectrum(force))
     });
-    record.add_terms(&scene.baseline, &mut force);
+    record.add_terms(&study.baseline, &mut force);
     let mut read = record.read_by(&force, &responses, index);
     for state in [2 * mode, 2 * mode + 1] {
         let start = record.decays.start[state];
@@ -83,27 +83,27 @@ impl Cause for Offset {
         "sensor-offset-from-tool-tip"
     }
 
-    fn places(&self, scene: &Scene<'_>) -> Vec<Place> {
-        one_or_all(scene, self.name())
+    fn locations(&self, study: &Study<'_>) -> Vec<Location> {
+        one_or_all(study, self.name())
             .into_iter()
-            .filter(|place| scene.sits_elsewhere(place.channel()))
+            .filter(|location| study.sits_elsewhere(location.channel()))
             .collect()
     }
 
     fn regressors(
         &self,
-        scene: &Scene<'_>,
+        study: &Study<'_>,
         record: &Record,
-        place: &Place,
-        shape: &[f64],
+        location: &Location,
+        nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
-        let Some((modes, _)) = modes(scene, place) else {
-            return Gain.regressors(scene, record, place, shape);
+        let Some((modes, _)) = modes(study, location) else {
+            return Gain.regressors(study, record, location, nonlinear_parameters);
         };
         let of_mode = |mode: &usize| {
             let read = |(index, channel): (usize, &Observed)| {
-                if place.channel() == Some(&channel.pickup.name) {
-                    read_of(scene, record, index, *mode)
+                if location.channel() == Some(&channel.pickup.name) {
+                    read_of(study, record, index, *mode)
                 } else {
                     Vec::new()
                 }
@@ -115,12 +115,12 @@ impl Cause for Offset {
 
     fn parameters(
         &self,
-        scene: &Scene<'_>,
-        place: &Place,
+        study: &Study<'_>,
+        location: &Location,
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        let Some((modes, count)) = modes(scene, place) else {
+        let Some((modes, count)) = modes(study, location) else {
             return Some(vec![("ratio", factor(coefficients)?)]);
         };
         let ratio = |mode: usize| {
@@ -130,8 +130,8 @@ impl Cause for Offset {
         Some((0..count).map(|mode| (RATIOS[mode], ratio(mode))).collect())
     }
 
-    fn extension(&self, place: &Place, parameters: &[Parameter]) -> toml::Table {
-        let mut table = place.table();
+    fn extension(&self, location: &Location, parameters: &[Parameter]) -> toml::Table {
+        let mut table = location.table();
         let ratio = match parameters {
             [(_, ratio)] => (*ratio).into(),
             _ => parameters
