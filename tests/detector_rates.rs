@@ -8,6 +8,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use quietcut_testkit::results::Campaign;
 use quietcut_tests::acceptance::LIMITS;
 use quietcut_tests::campaign::{Line, Rates, run};
 
@@ -53,5 +54,17 @@ fn table() {
     lines.extend([2, 3, 9].map(|index| Line::noisy(index, 2.0)));
     let wanted = std::env::var("QUIETCUT_LINES").unwrap_or_default();
     lines.retain(|line| line.name.contains(&wanted));
-    print(&run(lines, seeds));
+    let rates = run(lines, seeds);
+    print(&rates);
+    let figures: Vec<_> = rates
+        .iter()
+        .map(|line| (line.name().to_owned(), line.findings()))
+        .collect();
+    Campaign {
+        name: "detector-rates",
+        title: "Detector",
+        command: "QUIETCUT_SEEDS=20 cargo test --release -p quietcut-tests --test detector_rates -- --ignored --nocapture",
+        seeds: &format!("{seeds} per line"),
+    }
+    .record(&figures);
 }

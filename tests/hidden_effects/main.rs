@@ -35,6 +35,7 @@ mod signal;
 use campaign::{Report, Share};
 use puzzle::{Family, Puzzle};
 use quietcut::diagnose::{Options, diagnose};
+use quietcut_testkit::results::Campaign;
 use serde_json::Value;
 
 /// What the tool answers; an error is an outcome of its own. Case and recordings are kept where `QUIETCUT_KEEP` names a folder.
@@ -162,6 +163,7 @@ fn campaign() {
         reports.push(report);
     }
     let mut failed = Vec::new();
+    let mut figures = Vec::new();
     for Wanted {
         what,
         share,
@@ -170,6 +172,9 @@ fn campaign() {
     } in requirements(&reports)
     {
         let holds = (least..=most).contains(&share.value());
+        if share.all > 0 {
+            figures.push((what.to_string(), share.to_string()));
+        }
         match (share.all, holds) {
             (0, _) => println!("not judged: {what}"),
             (_, true) => println!("holds: {what}: {share}"),
@@ -179,5 +184,20 @@ fn campaign() {
             failed.push(what);
         }
     }
+    let suffix = if text.is_empty() {
+        String::new()
+    } else {
+        format!("-{text}")
+    };
+    Campaign {
+        name: &format!("hidden-effects{suffix}"),
+        title: &format!("Hidden effects {text}"),
+        command: &format!(
+            "QUIETCUT_SEEDS={seeds} QUIETCUT_FAMILY={text} cargo test --release -p quietcut-tests --test hidden_effects -- \
+             --ignored --nocapture campaign"
+        ),
+        seeds: &format!("{seeds} per family, from {first}"),
+    }
+    .record(&figures);
     assert!(failed.is_empty(), "{failed:?}");
 }

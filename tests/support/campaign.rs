@@ -217,24 +217,34 @@ impl Rates {
     }
 }
 
-impl fmt::Display for Rates {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Rates {
+    /// What is cut.
+    pub fn name(&self) -> &str {
+        &self.line.name
+    }
+
+    /// Rates in words: of false alarms below the limit, of verdicts in time and of the right kind above it.
+    pub fn findings(&self) -> String {
         let cuts = self.cuts();
-        write!(f, "{:<58}", self.line.name)?;
         if self.line.right.is_none() {
-            return write!(f, "false alarms {}/{cuts}", self.wrong());
+            return format!("false alarms {}/{cuts}", self.wrong());
         }
         let mut ratios: Vec<f64> = self.alarms().map(|alarm| alarm.0).collect();
         ratios.sort_by(f64::total_cmp);
         let median = ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN);
         let worst = ratios.last().copied().unwrap_or(f64::NAN);
-        write!(
-            f,
+        format!(
             "in time {}/{cuts}, wrong kind {}; ratio {median:.2}, worst {worst:.2}; frequency within {:.2} Hz",
             self.in_time(5.0),
             self.wrong(),
             self.frequency_error_hz()
         )
+    }
+}
+
+impl fmt::Display for Rates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:<58}{}", self.name(), self.findings())
     }
 }
 

@@ -3,6 +3,8 @@
 //! A dev-dependency only. It knows the layers up to `quietcut-model`; that crate and those below it cannot use it.
 #![allow(clippy::expect_used, clippy::panic)]
 
+pub mod results;
+
 use std::path::PathBuf;
 
 use quietcut_model::case::Case;
