@@ -9,6 +9,7 @@ pub mod chain_bits;
 pub mod command;
 pub mod cut;
 pub mod device_log;
+pub mod documents;
 pub mod emulator;
 pub mod firmware_image;
 pub mod pty;

@@ -1,0 +1,128 @@
+//! Parts of pages that are made from the code and from the results of campaigns.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::fs;
+
+use quietcut_tests::documents::{assert_generated, files, root, text};
+use serde_json::Value;
+
+/// The first sentence at the head of a source file.
+fn first_sentence(source: &str) -> String {
+    let head: Vec<_> = source
+        .lines()
+        .map_while(|line| line.strip_prefix("//!"))
+        .map(str::trim)
+        .take_while(|line| !line.is_empty())
+        .collect();
+    let head = head.join(" ");
+    // A sentence begins with a capital letter; "eq. 3.7" is none.
+    let end = head
+        .match_indices(". ")
+        .find(|(at, _)| head[at + 2..].starts_with(char::is_uppercase))
+        .map_or(head.len(), |(at, _)| at);
+    head[..end].trim_end_matches(['.', ':']).to_owned()
+}
+
+#[test]
+fn the_page_of_tests_lists_every_test() {
+    let mut list = String::from("| test | |\n|---|---|\n");
+    let manifest = text("tests/Cargo.toml");
+    for path in manifest.lines().filter_map(|line| line.strip_prefix("path = \"")) {
+        let path = path.trim_end_matches('"');
+        if path.starts_with("support") {
+            continue;
+        }
+        let sentence = first_sentence(&text(&format!("tests/{path}")));
+        assert!(!sentence.is_empty(), "{path} does not say what it tests");
+        writeln!(list, "| `tests/{path}` | {sentence} |").expect("a string grows");
+    }
+    assert_generated("tests/README.md", Some("tests"), &list);
+}
+
+/// A constant of a file `criteria.rs` whose comment has the word "unfounded" stands on the page.
+#[test]
+fn the_page_of_limitations_lists_every_unfounded_number() {
+    let mut list = String::new();
+    for path in files(&root(), &|path| path.ends_with("criteria.rs")) {
+        let source = fs::read_to_string(&path).expect("a source file");
+        let file = path
+            .strip_prefix(root())
+            .expect("below the root")
+            .display()
+            .to_string();
+        let mut comment = String::new();
+        for line in source.lines().map(str::trim) {
+            if let Some(rest) = line.strip_prefix("///").or_else(|| line.strip_prefix("//")) {
+                comment += rest;
+                comment.push(' ');
+                continue;
+            }
+            let item = line
+                .trim_start_matches("pub")
+                .trim_start_matches("(crate)")
+                .trim_start();
+            let item = item.trim_start_matches("const ");
+            if comment.to_lowercase().contains("unfounded") && item.contains([':', '(']) {
+                let name = item.split([':', '(']).next().unwrap_or(item);
+                let comment = comment.split_whitespace().collect::<Vec<_>>().join(" ");
+                writeln!(list, "- `{name}` in `{file}`: {comment}").expect("a string grows");
+            }
+            if !line.starts_with("#[") {
+                comment.clear();
+            }
+        }
+    }
+    if list.is_empty() {
+        list = "No number is marked so at present.\n".into();
+    }
+    assert_generated("host/LIMITATIONS.md", Some("unfounded"), &list);
+}
+
+#[test]
+fn the_page_of_validation_has_every_result() {
+    let mut page = String::new();
+    for path in files(&root().join("tests/results"), &|path| {
+        path.extension().is_some_and(|ending| ending == "json")
+    }) {
+        let result: Value = serde_json::from_str(&fs::read_to_string(&path).expect("a result"))
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let Some(figures) = result["figures"].as_array() else {
+            continue;
+        };
+        let of = |key: &str| result[key].as_str().unwrap_or("not recorded").trim().to_owned();
+        let (title, command) = (of("title"), of("command"));
+        write!(
+            page,
+            "### {title}\n\n```sh campaign\n{command}\n```\n\nCommit {}, compiler {}, seeds: {}.\n\n| | |\n|---|---|\n",
+            of("commit"),
+            of("compiler"),
+            of("seeds")
+        )
+        .expect("a string grows");
+        for figure in figures {
+            let word = |key: &str| figure[key].as_str().unwrap_or_default();
+            writeln!(page, "| {} | {} |", word("figure"), word("value")).expect("a string grows");
+        }
+        page.push('\n');
+    }
+    assert_generated("host/VALIDATION.md", Some("results"), &page);
+}
+
+/// The pins in `firmware/README.md` are those at the head of the board's source.
+#[test]
+fn the_wiring_table_is_that_of_the_board() {
+    let rows = |text: &str| -> BTreeSet<(String, String)> {
+        text.lines()
+            .filter_map(|line| line.trim_start_matches("//!").trim().strip_prefix("| "))
+            .filter_map(|row| {
+                let mut cells = row.split(" | ");
+                Some((cells.next()?.to_owned(), cells.next()?.to_owned()))
+            })
+            .filter(|(pin, _)| pin.starts_with('P') || *pin == "SWD")
+            .collect()
+    };
+    let board = rows(&text("firmware/src/bin/nucleo_g474re/main.rs"));
+    assert!(board.len() >= 8, "{board:?}");
+    assert_eq!(rows(&text("firmware/README.md")), board);
+}

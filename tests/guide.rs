@@ -1,0 +1,65 @@
+//! The guide from tap test to stable cut, as a reader follows it.
+#![allow(clippy::expect_used, clippy::panic)]
+
+use std::fs;
+
+use quietcut_tests::documents::{root, run};
+
+#[test]
+fn the_guide_leads_to_a_stable_cut() {
+    let (folder, printed) = run("host/GUIDE.md");
+    let said = |part: &str| {
+        let (_, stdout) = printed
+            .iter()
+            .find(|(command, _)| command.contains(part))
+            .unwrap_or_else(|| panic!("no command with {part}"));
+        stdout.as_str()
+    };
+    assert!(said("--method modes").contains("mode at 16.9"));
+    let points = said("--at 1045,2");
+    assert!(points.contains("1045 rev/min, 2 mm: unstable"), "{points}");
+    assert!(points.contains("1380 rev/min, 2 mm: stable"), "{points}");
+    let chatter = said("replay cut.csv");
+    assert!(
+        chatter.contains("CHATTER at 17.4 Hz") && chatter.contains("go to 138"),
+        "{chatter}"
+    );
+    let advised = said("replay advised.csv");
+    assert!(!advised.contains("CHATTER"), "{advised}");
+    let diagnosis = said("diagnose tests/cases/kuka-kr90-acetal.toml");
+    assert!(
+        diagnosis.contains("runout_um = 1.5") || diagnosis.contains("runout_um = 1.4"),
+        "{diagnosis}"
+    );
+    assert!(said("diagnose tests/cases/kuka-kr90-full.toml").contains("cubic-stiffness"));
+
+    let drawn = fs::read_to_string(folder.path().join("host/pictures/lobes.svg")).expect("a picture");
+    let kept = fs::read_to_string(root().join("host/pictures/lobes.svg")).expect("the picture of the README");
+    assert_same_picture(&drawn, &kept);
+}
+
+/// The same words in the same order; numbers may differ by one hundredth of a point.
+fn assert_same_picture(drawn: &str, kept: &str) {
+    let words = |text: &str| -> Vec<String> {
+        text.split(|c: char| c.is_whitespace() || ['"', ',', '<', '>', '/'].contains(&c))
+            .filter(|word| !word.is_empty())
+            .map(str::to_owned)
+            .collect()
+    };
+    let (drawn, kept) = (words(drawn), words(kept));
+    assert_eq!(
+        drawn.len(),
+        kept.len(),
+        "host/pictures/lobes.svg is not what its command draws"
+    );
+    for (drawn, kept) in drawn.iter().zip(&kept) {
+        let same = match (drawn.parse::<f64>(), kept.parse::<f64>()) {
+            (Ok(drawn), Ok(kept)) => (drawn - kept).abs() <= 0.01,
+            _ => drawn == kept,
+        };
+        assert!(
+            same,
+            "host/pictures/lobes.svg: {kept} where its command draws {drawn}"
+        );
+    }
+}
