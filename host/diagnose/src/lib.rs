@@ -37,7 +37,7 @@ pub use conclusion::answer::{self, Diagnosis};
 pub use conclusion::lobes;
 pub use conclusion::missing_force::{AtAmplitude, MissingForce};
 pub use conclusion::recorded_cuts::recorded_cuts;
-pub use conclusion::residual_views::{SpindleMotionView, View};
+pub use conclusion::residual_views::{ResidualView, SpindleMotionView};
 pub use error::DiagnoseError;
 pub use progress::{Options, Stage};
 
@@ -71,12 +71,12 @@ pub fn diagnose_watched(
 ) -> Result<Diagnosis, DiagnoseError> {
     watch(Stage::Records);
     let (recordings, shortened) = full_engagement::in_full_engagement(case, recordings)?;
-    let mut diagnosis = match long_records::diagnosed(case, &recordings, options, watch) {
+    let mut diagnosis = match long_records::concluded(case, &recordings, options, watch) {
         Some(diagnosis) => diagnosis,
         None => {
             watch(Stage::Records);
             let study = Study::new(case, &recordings)?;
-            conclude::judge(&study, &recordings, options, watch)
+            conclude::conclude(&study, &recordings, options, watch)
         }
     };
     diagnosis.next_test = next_test::next_test(case, &recordings, &diagnosis);

@@ -7,7 +7,7 @@ use super::lobes_change::{called, picture, section};
 use super::page::page;
 use super::residual_pictures::{file_name, pictures};
 use crate::diagnose::answer::{EstimatedCause, Figure, Outcome};
-use crate::diagnose::{Diagnosis, View};
+use crate::diagnose::{Diagnosis, ResidualView};
 
 /// Channels that get pictures: those that miss most.
 const PICTURED: usize = 3;
@@ -121,8 +121,8 @@ fn seen(diagnosis: &Diagnosis) -> Markup {
 
 /// Pictures of the channels that miss most.
 fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
-    let mut views: Vec<&View> = diagnosis.views.iter().collect();
-    let loudness = |view: &View| view.sizes()[1] / view.deviation.max(f64::MIN_POSITIVE);
+    let mut views: Vec<&ResidualView> = diagnosis.views.iter().collect();
+    let loudness = |view: &ResidualView| view.sizes()[1] / view.deviation.max(f64::MIN_POSITIVE);
     views.sort_by(|a, b| loudness(b).total_cmp(&loudness(a)));
     let mut all = Vec::new();
     for view in views.into_iter().take(PICTURED) {
@@ -130,7 +130,7 @@ fn all_pictures(diagnosis: &Diagnosis) -> Result<Markup, PictureError> {
             .views
             .iter()
             .filter(|other| other.channel == view.channel);
-        let fellows: Vec<&View> = same_channel.collect();
+        let fellows: Vec<&ResidualView> = same_channel.collect();
         all.push(pictures(view, &fellows, !view.left.is_empty())?);
     }
     Ok(html! { @for picture in all { (picture) } })

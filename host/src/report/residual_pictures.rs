@@ -7,7 +7,7 @@ use super::comparison::{Line, Look, comparison};
 use super::page::figure;
 use super::stroboscope::samples_per_tooth;
 use super::time_signal::thinned;
-use crate::diagnose::{MissingForce, SpindleMotionView, View};
+use crate::diagnose::{MissingForce, ResidualView, SpindleMotionView};
 
 /// Points of a cloud, at most.
 const POINTS: usize = 3000;
@@ -25,7 +25,11 @@ const PASSES: usize = 400;
 ///
 /// # Errors
 /// A picture that cannot be drawn.
-pub(super) fn pictures(view: &View, fellows: &[&View], with_extension: bool) -> Result<Markup, PictureError> {
+pub(super) fn pictures(
+    view: &ResidualView,
+    fellows: &[&ResidualView],
+    with_extension: bool,
+) -> Result<Markup, PictureError> {
     let what = format!("{} of {}", view.channel, file_name(&view.record));
     let time = if with_extension {
         "over time: what was measured, what the case misses, and what the extended case misses."
@@ -77,7 +81,7 @@ pub(super) fn file_name(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or(path)
 }
 
-fn signals(view: &View) -> Vec<(&'static str, Look, &[f64])> {
+fn signals(view: &ResidualView) -> Vec<(&'static str, Look, &[f64])> {
     let mut signals = vec![
         ("measured", Look::Measured, view.measured.as_slice()),
         ("missed by the case", Look::Missed, view.residual.as_slice()),
@@ -88,7 +92,7 @@ fn signals(view: &View) -> Vec<(&'static str, Look, &[f64])> {
     signals
 }
 
-fn over_time(view: &View, what: &str) -> Result<String, PictureError> {
+fn over_time(view: &ResidualView, what: &str) -> Result<String, PictureError> {
     let t_s: Vec<f64> = (0..view.measured.len())
         .map(|n| n as f64 / view.rate_hz)
         .collect();
@@ -105,7 +109,7 @@ fn over_time(view: &View, what: &str) -> Result<String, PictureError> {
 }
 
 /// Spectra with `scale` frequency units to a hertz, up to `last_hz`.
-fn spectra(view: &View, points: usize, last_hz: f64, scale: f64) -> Vec<Line> {
+fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<Line> {
     let mut lines: Vec<Line> = signals(view)
         .into_iter()
         .map(|(name, look, samples)| Line {
@@ -133,13 +137,13 @@ fn spectra(view: &View, points: usize, last_hz: f64, scale: f64) -> Vec<Line> {
     lines
 }
 
-fn over_frequency(view: &View) -> Result<String, PictureError> {
+fn over_frequency(view: &ResidualView) -> Result<String, PictureError> {
     let unit = format!("log10 of {} [{}]", view.channel, view.unit);
     let lines = spectra(view, 500, view.highest_hz, 1.0);
     comparison(HALF, ["", "frequency [Hz]", &unit], &lines, None)
 }
 
-fn over_orders(view: &View, turning: &SpindleMotionView) -> Result<String, PictureError> {
+fn over_orders(view: &ResidualView, turning: &SpindleMotionView) -> Result<String, PictureError> {
     let unit = format!("log10 of {} [{}]", view.channel, view.unit);
     let turns_hz = turning.rpm / 60.0;
     let last_hz = (ORDERS_PER_TOOTH * turning.teeth as f64 * turns_hz).min(0.5 * view.rate_hz);
@@ -149,7 +153,7 @@ fn over_orders(view: &View, turning: &SpindleMotionView) -> Result<String, Pictu
     comparison(HALF, ["", "spindle order", &unit], &lines, None)
 }
 
-fn strobed(samples: &[(u32, f64)], what: &str, view: &View) -> Result<String, PictureError> {
+fn strobed(samples: &[(u32, f64)], what: &str, view: &ResidualView) -> Result<String, PictureError> {
     let shown = &samples[samples.len().saturating_sub(PASSES)..];
     let quantity = format!("{what}: {} [{}]", view.channel, view.unit);
     samples_per_tooth("", &quantity, shown, None)

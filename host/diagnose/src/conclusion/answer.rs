@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::conclusion::lobes::{Chart, Lobes};
-use crate::conclusion::residual_views::View;
+use crate::conclusion::residual_views::ResidualView;
 
 /// A normal deviate is within this many deviations with 90 %.
 pub(crate) const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
@@ -251,7 +251,7 @@ pub struct Diagnosis {
     pub acting: usize,
     /// The residuals, channel by channel.
     #[serde(skip)]
-    pub views: Vec<View>,
+    pub views: Vec<ResidualView>,
 }
 
 /// Nothing that `causes` does not say.

@@ -1,16 +1,16 @@
 //! From evidence to an answer.
 
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
-use crate::conclusion::parameter_estimates::{by_common_factor, named};
-use crate::conclusion::residual_views::views;
-use crate::fit::candidate_model::Explanation;
+use crate::conclusion::parameter_estimates::{by_common_factor, parameter_estimates};
+use crate::conclusion::residual_views::residual_views;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::progress::{Options, Stage};
 use crate::records::checks;
 use crate::records::domain::Domain;
 use crate::records::study::Study;
-use crate::selection::select::{APART, Scale, Selection, WITHIN_NOISE, names, select};
+use crate::selection::select::{APART, Selection, SelectionCriteria, WITHIN_NOISE, names, select};
 use quietcut_recording::Recording;
 
 /// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
@@ -29,7 +29,7 @@ const DOUBT: f64 = 0.8;
 /// What is held out is not like the whole records where they miss so many times as much.
 const UNLIKE: f64 = 3.0;
 
-pub(crate) fn judge(
+pub(crate) fn conclude(
     study: &Study<'_>,
     recordings: &[Recording],
     _options: &Options,
@@ -41,26 +41,26 @@ pub(crate) fn judge(
     if study.all_in(Domain::Force) && study.records.len() > 1 {
         regression.level_records();
     }
-    let scale = Scale::new(study, recordings, &library, &regression);
-    let selection = select(&scale, &mut library, &mut regression, watch);
+    let criteria = SelectionCriteria::new(study, recordings, &library, &regression);
+    let selection = select(&criteria, &mut library, &mut regression, watch);
     watch(Stage::Answer);
-    answer(&scale, &library, &mut regression, &selection)
+    answer(&criteria, &library, &mut regression, &selection)
 }
 
 fn answer(
-    scale: &Scale<'_>,
+    criteria: &SelectionCriteria<'_>,
     library: &Library,
     regression: &mut Regression,
     selection: &Selection,
 ) -> Diagnosis {
-    let study = scale.study;
-    let inflation = scale.inflation(regression, selection.best.as_ref());
-    let held_out = regression.residual(Share::HeldOut);
-    let count = regression.count(Share::HeldOut) as f64;
-    let whole = regression.residual(Share::Whole);
+    let study = criteria.study;
+    let inflation = criteria.inflation(regression, selection.best.as_ref());
+    let held_out = regression.residual(Subset::HeldOut);
+    let count = regression.count(Subset::HeldOut) as f64;
+    let whole = regression.residual(Subset::Whole);
     let missed = Quality {
-        nrmse_heldout: regression.missed(study, Share::HeldOut),
-        nrmse_whole: regression.missed(study, Share::Whole),
+        nrmse_heldout: regression.missed(study, Subset::HeldOut),
+        nrmse_whole: regression.missed(study, Subset::Whole),
     };
     let mut diagnosis = Diagnosis {
         outcome: Outcome::None,
@@ -80,7 +80,7 @@ fn answer(
         warnings: Vec::new(),
         explanations: Vec::new(),
         acting: 0,
-        views: views(study, library, selection.best.as_ref()),
+        views: residual_views(study, library, selection.best.as_ref()),
     };
     if missed.nrmse_whole > UNLIKE * missed.nrmse_heldout {
         diagnosis.warnings.push(format!(
@@ -89,7 +89,7 @@ fn answer(
             100.0 * missed.nrmse_whole
         ));
     }
-    let (of_noise, of_excess) = scale.excess(regression, selection.best.as_ref());
+    let (of_noise, of_excess) = criteria.excess(regression, selection.best.as_ref());
     let allowed = match &selection.best {
         _ if study.all_in(Domain::Force) => LEFT_OF_FORCE,
         Some(best) if best.simulated.is_some() => {
@@ -107,7 +107,7 @@ fn answer(
     else {
         if of_noise > WITHIN_NOISE {
             // What was tried and is not believed takes nothing off.
-            diagnosis.views = views(study, library, None);
+            diagnosis.views = residual_views(study, library, None);
             diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
             diagnosis.outcome = Outcome::Unexplained;
             diagnosis.unexplained.guess = crate::conclusion::guess::guess(study, regression);
@@ -117,9 +117,9 @@ fn answer(
     if of_noise > WITHIN_NOISE {
         diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
     }
-    let left_held_out = scale.left_held_out(library, regression, best);
+    let left_held_out = criteria.left_held_out(library, regression, best);
     diagnosis.outcome = Outcome::Cause;
-    let chance = 5.0 * (2.0 / regression.count(Share::Whole).max(1) as f64).sqrt() + REJECTED;
+    let chance = 5.0 * (2.0 / regression.count(Subset::Whole).max(1) as f64).sqrt() + REJECTED;
     let doubt = if best.simulated.is_some() && of_noise > chance {
         DOUBT
     } else {
@@ -127,13 +127,13 @@ fn answer(
     };
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
     // Errors of the computation go along with the signal: where they are like a cause, they are not averaged away.
-    let uncertain = inflation + scale.coherent;
-    let spread = |explanation: &Explanation| {
-        let closed = scale.closed.as_ref();
-        closed.and_then(|closed| closed.spread_by_force_noise(library, explanation))
+    let uncertain = inflation + criteria.coherent;
+    let spread = |model: &CandidateModel| {
+        let closed = criteria.closed.as_ref();
+        closed.and_then(|closed| closed.spread_by_force_noise(library, model))
     };
     let best = &spread(best).unwrap_or_else(|| best.clone());
-    diagnosis.causes = named(study, library, regression, best, uncertain, confidence);
+    diagnosis.causes = parameter_estimates(study, library, regression, best, uncertain, confidence);
     diagnosis.acting = diagnosis.causes.len();
     for cause in diagnosis
         .causes
@@ -152,7 +152,7 @@ fn answer(
     let who = names(library, best);
     for other in &selection.others {
         let other = &spread(other).unwrap_or_else(|| other.clone());
-        let causes = named(study, library, regression, other, uncertain, confidence);
+        let causes = parameter_estimates(study, library, regression, other, uncertain, confidence);
         diagnosis.add_rival(causes, names(library, other) == who);
     }
     let by_factor = by_common_factor(study, library, regression, best, inflation);

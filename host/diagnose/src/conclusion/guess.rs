@@ -10,7 +10,7 @@ use std::fmt::Write;
 
 use crate::baseline::direction_of;
 use crate::candidates::cause::Regressor;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::{Motion, restoring_along};
@@ -71,17 +71,17 @@ pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<St
         }
     }
     regression.complete();
-    let count = regression.count(Share::Fitted) as f64;
+    let count = regression.count(Subset::Fitted) as f64;
     let price =
         |left: f64, terms: usize| count * left.max(f64::MIN_POSITIVE).ln() + terms as f64 * count.ln();
     let mut chosen: Vec<usize> = Vec::new();
-    let mut best = price(regression.residual(Share::Fitted), 0);
+    let mut best = price(regression.residual(Subset::Fitted), 0);
     while chosen.len() < MOST {
         let next = (0..all.len())
             .filter(|index| !chosen.contains(index))
             .filter_map(|index| {
                 let columns: Vec<usize> = chosen.iter().chain([&index]).map(|&i| all[i].2).collect();
-                Some((index, regression.fit(Share::Fitted, &columns)?.left))
+                Some((index, regression.fit(Subset::Fitted, &columns)?.left))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((index, left)) = next else { break };
@@ -93,9 +93,9 @@ pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<St
         chosen.push(index);
     }
     let columns: Vec<usize> = chosen.iter().map(|&index| all[index].2).collect();
-    let coefficients = regression.fit(Share::Fitted, &columns)?.coefficients;
-    let left = regression.left(Share::HeldOut, &columns, coefficients.as_slice());
-    let taken = 1.0 - left / regression.residual(Share::HeldOut).max(f64::MIN_POSITIVE);
+    let coefficients = regression.fit(Subset::Fitted, &columns)?.coefficients;
+    let left = regression.left(Subset::HeldOut, &columns, coefficients.as_slice());
+    let taken = 1.0 - left / regression.residual(Subset::HeldOut).max(f64::MIN_POSITIVE);
     if chosen.is_empty() || taken < WORTH {
         return None;
     }

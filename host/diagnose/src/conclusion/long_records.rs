@@ -8,7 +8,7 @@ use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
 use crate::conclusion::conclude;
 use crate::conclusion::conclude::LEFT_OF_RESPONSE;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::progress::{Options, Stage};
 use crate::records::study::Study;
 use crate::selection::select::WITHIN_NOISE;
@@ -57,7 +57,7 @@ fn turns_s(recording: &Recording) -> Option<f64> {
 }
 
 /// What the beginnings of the records tell, where that holds for all of them; `None` where it does not, or where they are short.
-pub(crate) fn diagnosed(
+pub(crate) fn concluded(
     case: &Case,
     recordings: &[Recording],
     options: &Options,
@@ -65,10 +65,10 @@ pub(crate) fn diagnosed(
 ) -> Option<Diagnosis> {
     let [beginnings, rest] = beginnings(case, recordings)?;
     let study = Study::new(case, &beginnings).ok()?;
-    let mut diagnosis = conclude::judge(&study, &beginnings, options, watch);
+    let mut diagnosis = conclude::conclude(&study, &beginnings, options, watch);
     drop(study);
     watch(Stage::Records);
-    let believed = Left::of(case, &rest)?;
+    let believed = Residual::of(case, &rest)?;
     let searched_s = beginnings
         .iter()
         .map(|record| record.len() as f64 / record.sample_rate_hz);
@@ -82,7 +82,7 @@ pub(crate) fn diagnosed(
         Outcome::None => case.clone(),
         _ => diagnosis.extended(case)?,
     };
-    let explained = Left::of(&extended, &rest)?;
+    let explained = Residual::of(&extended, &rest)?;
     let beyond = explained.energy - explained.count;
     if beyond > WITHIN_NOISE * explained.count
         && beyond > LEFT_OF_RESPONSE * (believed.energy - believed.count)
@@ -103,7 +103,7 @@ pub(crate) fn diagnosed(
 }
 
 /// What a case leaves of records.
-struct Left {
+struct Residual {
     /// In units of the noise.
     energy: f64,
     /// Numbers that were compared.
@@ -112,14 +112,14 @@ struct Left {
     missed: f64,
 }
 
-impl Left {
+impl Residual {
     fn of(case: &Case, recordings: &[Recording]) -> Option<Self> {
         let study = Study::new(case, recordings).ok()?;
         let regression = Regression::new(&study);
         Some(Self {
-            energy: regression.residual(Share::Whole),
-            count: regression.count(Share::Whole) as f64,
-            missed: regression.missed(&study, Share::Whole),
+            energy: regression.residual(Subset::Whole),
+            count: regression.count(Subset::Whole) as f64,
+            missed: regression.missed(&study, Subset::Whole),
         })
     }
 }

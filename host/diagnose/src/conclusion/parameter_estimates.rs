@@ -5,33 +5,33 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use crate::baseline::direction_of;
 use crate::candidates::cause::{Location, Part};
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::covariance::covariance;
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 use crate::selection::select::APART;
 
 /// The causes of an explanation.
-pub(crate) fn named(
+pub(crate) fn parameter_estimates(
     study: &Study<'_>,
     library: &Library,
     regression: &mut Regression,
-    explanation: &Explanation,
+    model: &CandidateModel,
     inflation: f64,
     confidence: f64,
 ) -> Vec<EstimatedCause> {
-    let covariance = match &explanation.simulated {
+    let covariance = match &model.simulated {
         Some(simulated) => simulated.covariance.clone(),
-        None => covariance(study, library, regression, explanation, inflation),
+        None => covariance(study, library, regression, model, inflation),
     };
     let mut all = Vec::new();
     for (position, covariance) in covariance.iter().enumerate() {
-        let choice = explanation.choices[position];
+        let choice = model.choices[position];
         let candidate = &library.candidates[choice.candidate];
         let cause = library.cause(choice.candidate);
         let nonlinear_parameters = &candidate.variants[choice.variant].0;
-        let coefficients = library.coefficients(explanation, position);
+        let coefficients = library.coefficients(model, position);
         let parts_of = |inner: &[f64]| -> Option<Vec<Part>> {
             let (coefficients, nonlinear_parameters) = inner.split_at(coefficients.len());
             let parameters =
@@ -89,7 +89,7 @@ pub(crate) fn by_common_factor(
     study: &Study<'_>,
     library: &Library,
     regression: &Regression,
-    best: &Explanation,
+    best: &CandidateModel,
     inflation: f64,
 ) -> Vec<EstimatedCause> {
     let [choice] = best.choices[..] else {
@@ -99,7 +99,7 @@ pub(crate) fn by_common_factor(
         return Vec::new();
     }
     // Along the measured motion, as the common factor is.
-    let along = match regression.fit(Share::Whole, &library.columns_of(best)) {
+    let along = match regression.fit(Subset::Whole, &library.columns_of(best)) {
         Some(fit) => fit.left,
         None => best.fit.left,
     };

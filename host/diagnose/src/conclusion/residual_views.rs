@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::conclusion::missing_force::MissingForce;
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::motion::recorded_cut::RecordedCut;
 use crate::records::domain::Domain;
@@ -16,7 +16,7 @@ use crate::signal::noise::rms;
 
 /// One channel of one record: what was measured, what the case misses of it, and what the extended case misses.
 #[derive(Clone, Debug)]
-pub struct View {
+pub struct ResidualView {
     /// The record.
     pub record: String,
     /// The channel.
@@ -54,7 +54,7 @@ pub struct SpindleMotionView {
     pub residual: Vec<(u32, f64)>,
 }
 
-impl View {
+impl ResidualView {
     /// Amplitudes of a signal of this channel over frequency, averaged to at most `points` points: (Hz, RMS per line).
     pub fn spectrum(&self, samples: &[f64], points: usize) -> Vec<(f64, f64)> {
         if samples.is_empty() {
@@ -81,7 +81,11 @@ impl View {
 }
 
 /// Views of every channel, with the explanation taken off where there is one.
-pub(crate) fn views(study: &Study<'_>, library: &Library, best: Option<&Explanation>) -> Vec<View> {
+pub(crate) fn residual_views(
+    study: &Study<'_>,
+    library: &Library,
+    best: Option<&CandidateModel>,
+) -> Vec<ResidualView> {
     let mut all = Vec::new();
     for record in &study.records {
         let left_by_best = best.map(|best| left_by(study, library, record, best));
@@ -100,7 +104,7 @@ pub(crate) fn views(study: &Study<'_>, library: &Library, best: Option<&Explanat
                     residual: at(&residual),
                 }
             });
-            all.push(View {
+            all.push(ResidualView {
                 record: record.path.display().to_string(),
                 channel: channel.pickup.name.clone(),
                 unit: channel.pickup.quantity.unit(),
@@ -119,7 +123,7 @@ pub(crate) fn views(study: &Study<'_>, library: &Library, best: Option<&Explanat
 }
 
 /// What an explanation leaves of each channel, once the free decay that it leaves has been taken out.
-fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Explanation) -> Vec<Vec<f64>> {
+fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &CandidateModel) -> Vec<Vec<f64>> {
     let explained = library.explained(study, record, best);
     let left: Vec<Vec<f64>> = record
         .channels

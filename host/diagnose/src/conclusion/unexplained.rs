@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::conclusion::residual_views::View;
+use crate::conclusion::residual_views::ResidualView;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
@@ -13,15 +13,15 @@ const NEAR: usize = 8;
 
 /// Frequency (and spindle order), time and amplitude at which most of what is left sits: of what was found, or of the case where
 /// nothing was, in the channel where it is largest beside its noise.
-pub(crate) fn describe(views: &[View]) -> String {
+pub(crate) fn describe(views: &[ResidualView]) -> String {
     let worst = views.iter().max_by(|a, b| {
-        let beside_noise = |view: &View| rms(left(view)) / view.deviation.max(f64::MIN_POSITIVE);
+        let beside_noise = |view: &ResidualView| rms(left(view)) / view.deviation.max(f64::MIN_POSITIVE);
         beside_noise(a).total_cmp(&beside_noise(b))
     });
     worst.map_or_else(String::new, of_channel)
 }
 
-fn left(view: &View) -> &[f64] {
+fn left(view: &ResidualView) -> &[f64] {
     if view.left.is_empty() {
         &view.residual
     } else {
@@ -29,7 +29,7 @@ fn left(view: &View) -> &[f64] {
     }
 }
 
-fn of_channel(view: &View) -> String {
+fn of_channel(view: &ResidualView) -> String {
     let left = left(view);
     let size = rms(left);
     let mut said = format!(
@@ -59,7 +59,7 @@ fn of_channel(view: &View) -> String {
 }
 
 /// The frequency with the most energy, and the share of all that is near it.
-fn peak(view: &View, samples: &[f64]) -> Option<(f64, f64)> {
+fn peak(view: &ResidualView, samples: &[f64]) -> Option<(f64, f64)> {
     if samples.is_empty() {
         return None;
     }

@@ -18,7 +18,7 @@ pub(crate) struct Choice {
 
 /// Causes that act together, fitted.
 #[derive(Clone, Debug)]
-pub(crate) struct Explanation {
+pub(crate) struct CandidateModel {
     /// What acts.
     pub choices: Vec<Choice>,
     /// The fit of all their coefficients, in the order of the choices.

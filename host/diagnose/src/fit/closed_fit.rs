@@ -1,6 +1,6 @@
 //! Fits of explanations in closed loop: the extended case moves as it would, and not along the motion that was measured.
 
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::regression::Regression;
 
@@ -13,9 +13,9 @@ pub(crate) trait ClosedFit {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        explanation: &Explanation,
+        explanation: &CandidateModel,
         limits: (f64, f64),
-    ) -> Option<Explanation>;
+    ) -> Option<CandidateModel>;
 
     /// True where what cannot be fitted so is no explanation: the extended case cannot even be read along its own motion.
     fn is_needed(&self) -> bool {
@@ -28,14 +28,18 @@ pub(crate) trait ClosedFit {
         &self,
         _library: &mut Library,
         _regression: &mut Regression,
-        _explanation: &Explanation,
-    ) -> Option<Explanation> {
+        _explanation: &CandidateModel,
+    ) -> Option<CandidateModel> {
         None
     }
 
     /// The same explanation with the covariance that its parameters have where noise of the forces drives a machine that is not
     /// linear; `None` where that changes nothing.
-    fn spread_by_force_noise(&self, _library: &Library, _explanation: &Explanation) -> Option<Explanation> {
+    fn spread_by_force_noise(
+        &self,
+        _library: &Library,
+        _explanation: &CandidateModel,
+    ) -> Option<CandidateModel> {
         None
     }
 
@@ -43,13 +47,13 @@ pub(crate) trait ClosedFit {
     fn left_by_baseline(&self, library: &Library, regression: &Regression) -> Option<f64>;
 
     /// Measured less computed, by record and channel, of an explanation that was fitted so.
-    fn left_of(&self, library: &Library, explanation: &Explanation) -> Option<Vec<Vec<Vec<f64>>>>;
+    fn left_of(&self, library: &Library, explanation: &CandidateModel) -> Option<Vec<Vec<Vec<f64>>>>;
 
     /// What is left of the held-out parts if the parameters come from the fitted ones alone.
     fn left_held_out(
         &self,
         library: &Library,
         regression: &Regression,
-        explanation: &Explanation,
+        explanation: &CandidateModel,
     ) -> Option<f64>;
 }

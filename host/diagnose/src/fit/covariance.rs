@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::records::domain::Domain;
 use crate::records::study::Study;
 
@@ -15,30 +15,27 @@ pub(crate) fn covariance(
     study: &Study<'_>,
     library: &Library,
     regression: &mut Regression,
-    explanation: &Explanation,
+    model: &CandidateModel,
     inflation: f64,
 ) -> Vec<DMatrix<f64>> {
-    let mut columns = library.columns_of(explanation);
+    let mut columns = library.columns_of(model);
     let mut places: Vec<Vec<usize>> = Vec::new();
     let mut from = 0;
-    for place in 0..explanation.choices.len() {
-        let coefficients = library.coefficients(explanation, place);
+    for place in 0..model.choices.len() {
+        let coefficients = library.coefficients(model, place);
         places.push((from..from + coefficients.len()).collect());
         from += coefficients.len();
     }
-    for (rows, slopes) in places
-        .iter_mut()
-        .zip(library.slopes_of(study, regression, explanation))
-    {
+    for (rows, slopes) in places.iter_mut().zip(library.slopes_of(study, regression, model)) {
         rows.extend(columns.len()..columns.len() + slopes.len());
         columns.extend(slopes);
     }
-    let whole = match regression.fit(Share::Whole, &columns) {
+    let whole = match regression.fit(Subset::Whole, &columns) {
         Some(fit) if study.all_in(Domain::Force) => {
-            regression.covariance_by_residual(Share::Whole, &columns, &fit) / inflation
+            regression.covariance_by_residual(Subset::Whole, &columns, &fit) / inflation
         }
         Some(fit) => fit.covariance,
-        None => explanation.fit.covariance.clone(),
+        None => model.fit.covariance.clone(),
     };
     places
         .iter()

@@ -18,11 +18,11 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::candidates::closed_loop::ClosedLoop;
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::output_error::{OutputError, projected};
-use crate::fit::segment::{Part, Share};
-use crate::fit::unknowns::{Slot, at_bounds, covariance};
+use crate::fit::segment::{Segment, Subset};
+use crate::fit::unknowns::{FreeParameter, at_bounds, covariance};
 
 /// How often noise is drawn: by 16 a deviation is known to a fifth, by 4 to a third. Of long records as often as so many samples are
 /// simulated.
@@ -39,8 +39,8 @@ type Forces = [Vec<f64>; 3];
 
 impl OutputError<'_> {
     /// See the head of the file; `None` where no force has noise, or nothing but the linear structure answers to it.
-    pub(crate) fn spread(&self, library: &Library, explanation: &Explanation) -> Option<Explanation> {
-        let simulated = explanation.simulated.as_ref()?;
+    pub(crate) fn spread(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
+        let simulated = model.simulated.as_ref()?;
         let mut deviations = self
             .study
             .records
@@ -49,20 +49,20 @@ impl OutputError<'_> {
         if deviations.all(|deviation| deviation == 0.0) {
             return None;
         }
-        let (mut problem, mut point) = self.problem(library, explanation)?;
+        let (mut problem, mut point) = self.problem(library, model)?;
         point.starts.clone_from(&simulated.starts);
         let effects = problem.effects(self.study, &point)?;
         if !self.closed.is_nonlinear(self.study, &effects) {
             return None;
         }
         for (slot, step) in &mut problem.slots {
-            if let Slot::Inner { choice, index, .. } = *slot {
+            if let FreeParameter::Inner { choice, index, .. } = *slot {
                 let known = simulated.covariance[choice][(index, index)].sqrt();
                 let least = problem.least_step * point.inner[choice][index].abs();
                 *step = known.clamp(1e-3 * *step, *step).max(least);
             }
         }
-        let whole = self.of_share(Share::Whole);
+        let whole = self.of_subset(Subset::Whole);
         let left = self.residuals(&problem, &whole, &point)?;
         let columns = self.columns(&problem, &whole, &point, &left)?;
         let (mut normal, mut gradient) = self.normal(&mut problem, &columns, &point, &left);
@@ -94,7 +94,7 @@ impl OutputError<'_> {
         let is_worth = |more: &DVector<f64>| {
             let inner = problem.slots.iter().enumerate();
             inner
-                .filter(|(_, (slot, _))| matches!(slot, Slot::Inner { .. }))
+                .filter(|(_, (slot, _))| matches!(slot, FreeParameter::Inner { .. }))
                 .any(|(slot, _)| more[slot] > WORTH * covariance[(slot, slot)])
         };
         if !is_worth(&mean(&drawn)?) {
@@ -104,10 +104,10 @@ impl OutputError<'_> {
         // What a few draws tell of a variance makes of a normal distribution one of Student's, with the variance ν/(ν − 2).
         let degrees = drawn.iter().flatten().count().max(3) as f64;
         let more = mean(&drawn)? * (degrees / (degrees - 2.0));
-        let mut spread = explanation.clone();
+        let mut spread = model.clone();
         let by_choice = &mut spread.simulated.as_mut()?.covariance;
         for (index, (slot, _)) in problem.slots.iter().enumerate() {
-            let Slot::Inner {
+            let FreeParameter::Inner {
                 choice, index: inner, ..
             } = *slot
             else {
@@ -160,7 +160,7 @@ impl OutputError<'_> {
     }
 
     /// What is left by record where the baseline answers to `noise`, in units of the noise.
-    fn by_baseline(&self, noise: &[Forces], parts: &[&Part]) -> Vec<Vec<f64>> {
+    fn by_baseline(&self, noise: &[Forces], segments: &[&Segment]) -> Vec<Vec<f64>> {
         let records = self.study.records.iter().zip(noise).enumerate();
         records
             .map(|(index, (record, noise))| {
@@ -170,8 +170,8 @@ impl OutputError<'_> {
                 let read: Vec<Vec<f64>> = (0..record.channels.len())
                     .map(|channel| record.read_response(&spectra, channel))
                     .collect();
-                let mine = parts.iter().filter(|part| part.record == index);
-                mine.flat_map(|part| part.whiten(&read)).collect()
+                let mine = segments.iter().filter(|segment| segment.record == index);
+                mine.flat_map(|segment| segment.whiten(&read)).collect()
             })
             .collect()
     }

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use crate::candidates;
 use crate::candidates::cause::{Cause, Location, Parameter};
-use crate::fit::candidate_model::{Choice, Explanation};
-use crate::fit::regression::{Regression, Share};
+use crate::fit::candidate_model::{CandidateModel, Choice};
+use crate::fit::regression::{Regression, Subset};
 use crate::records::record::Record;
 use crate::records::study::Study;
 
@@ -140,20 +140,20 @@ impl Library {
         study: &Study<'_>,
         regression: &Regression,
         choices: &[Choice],
-    ) -> Option<Explanation> {
+    ) -> Option<CandidateModel> {
         let columns: Vec<usize> = choices
             .iter()
             .flat_map(|choice| self.columns(*choice))
             .copied()
             .collect();
-        let fit = regression.fit(Share::Whole, &columns)?;
-        let explanation = Explanation {
+        let fit = regression.fit(Subset::Whole, &columns)?;
+        let model = CandidateModel {
             parameter_count: choices.iter().map(|choice| self.parameter_count(*choice)).sum(),
             choices: choices.to_vec(),
             fit,
             simulated: None,
         };
-        self.parameters(study, &explanation).map(|_| explanation)
+        self.parameters(study, &model).map(|_| model)
     }
 
     /// Parameters of a choice that are fitted; what settles by itself is none.
@@ -167,8 +167,8 @@ impl Library {
     }
 
     /// All columns of an explanation, choice after choice.
-    pub(crate) fn columns_of(&self, explanation: &Explanation) -> Vec<usize> {
-        explanation
+    pub(crate) fn columns_of(&self, model: &CandidateModel) -> Vec<usize> {
+        model
             .choices
             .iter()
             .flat_map(|choice| self.columns(*choice))
@@ -177,12 +177,12 @@ impl Library {
     }
 
     /// The coefficients of one of the choices.
-    pub(crate) fn coefficients(&self, explanation: &Explanation, position: usize) -> Vec<f64> {
-        let from: usize = explanation.choices[..position]
+    pub(crate) fn coefficients(&self, model: &CandidateModel, position: usize) -> Vec<f64> {
+        let from: usize = model.choices[..position]
             .iter()
             .map(|choice| self.columns(*choice).len())
             .sum();
-        explanation.fit.coefficients[from..from + self.columns(explanation.choices[position]).len()].to_vec()
+        model.fit.coefficients[from..from + self.columns(model.choices[position]).len()].to_vec()
     }
 
     /// What an explanation adds to the residual of each channel of a record.
@@ -190,13 +190,13 @@ impl Library {
         &self,
         study: &Study<'_>,
         record: &Record,
-        explanation: &Explanation,
+        model: &CandidateModel,
     ) -> Vec<Vec<f64>> {
         let mut sum = vec![vec![0.0; record.grid.count()]; record.channels.len()];
-        for (position, choice) in explanation.choices.iter().enumerate() {
+        for (position, choice) in model.choices.iter().enumerate() {
             let known = &self.candidates[choice.candidate];
             let cause = self.cause(choice.candidate);
-            let coefficients = self.coefficients(explanation, position);
+            let coefficients = self.coefficients(model, position);
             let regressors =
                 cause.regressors(study, record, &known.location, &known.variants[choice.variant].0);
             for (regressor, coefficient) in regressors.iter().flatten().zip(coefficients) {
@@ -211,11 +211,11 @@ impl Library {
     }
 
     /// What is left of the held-out parts if the coefficients come from the fitted ones alone.
-    pub(crate) fn left_held_out(&self, regression: &Regression, explanation: &Explanation) -> f64 {
-        let columns = self.columns_of(explanation);
-        match regression.fit(Share::Fitted, &columns) {
-            Some(fit) => regression.left(Share::HeldOut, &columns, &fit.coefficients),
-            None => regression.residual(Share::HeldOut),
+    pub(crate) fn left_held_out(&self, regression: &Regression, model: &CandidateModel) -> f64 {
+        let columns = self.columns_of(model);
+        match regression.fit(Subset::Fitted, &columns) {
+            Some(fit) => regression.left(Subset::HeldOut, &columns, &fit.coefficients),
+            None => regression.residual(Subset::HeldOut),
         }
     }
 
@@ -223,16 +223,16 @@ impl Library {
     pub(crate) fn parameters(
         &self,
         study: &Study<'_>,
-        explanation: &Explanation,
+        model: &CandidateModel,
     ) -> Option<Vec<Vec<Parameter>>> {
         let mut from = 0;
-        explanation
+        model
             .choices
             .iter()
             .map(|choice| {
                 let candidate = &self.candidates[choice.candidate];
                 let (nonlinear_parameters, columns) = &candidate.variants[choice.variant];
-                let coefficients = &explanation.fit.coefficients[from..from + columns.len()];
+                let coefficients = &model.fit.coefficients[from..from + columns.len()];
                 from += columns.len();
                 self.causes[candidate.cause].parameters(
                     study,
@@ -248,14 +248,14 @@ impl Library {
     pub(crate) fn extensions(
         &self,
         study: &Study<'_>,
-        explanation: &Explanation,
+        model: &CandidateModel,
     ) -> Option<Vec<(&'static str, toml::Table)>> {
-        let parameters = self.parameters(study, explanation)?;
+        let parameters = self.parameters(study, model)?;
         let of = |(choice, parameters): (&Choice, Vec<Parameter>)| {
             let location = &self.candidates[choice.candidate].location;
             self.cause(choice.candidate).parts(location, &parameters)
         };
-        let parts = explanation.choices.iter().zip(parameters).flat_map(of);
+        let parts = model.choices.iter().zip(parameters).flat_map(of);
         Some(parts.map(|part| (part.name, part.extension)).collect())
     }
 
@@ -265,12 +265,12 @@ impl Library {
         &self,
         study: &Study<'_>,
         regression: &mut Regression,
-        explanation: &Explanation,
+        model: &CandidateModel,
     ) -> Vec<Vec<usize>> {
-        (0..explanation.choices.len())
+        (0..model.choices.len())
             .map(|position| {
-                let choice = explanation.choices[position];
-                let coefficients = self.coefficients(explanation, position);
+                let choice = model.choices[position];
+                let coefficients = self.coefficients(model, position);
                 let nonlinear_parameters = &self.candidates[choice.candidate].variants[choice.variant].0;
                 let cause = self.cause(choice.candidate);
                 if nonlinear_parameters.is_empty()
@@ -345,7 +345,7 @@ impl Library {
                     .map(|index| self.candidates[index].variants[0].1[0])
             })
             .collect::<Option<_>>()?;
-        let at = |factor: f64| regression.left(Share::Whole, &columns, &vec![factor; columns.len()]);
+        let at = |factor: f64| regression.left(Subset::Whole, &columns, &vec![factor; columns.len()]);
         // A parabola in the factor.
         let (below, middle, above) = (at(-1.0), at(0.0), at(1.0));
         let curvature = below + above - 2.0 * middle;

@@ -10,9 +10,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fit::candidate_model::Reading;
-use crate::fit::candidate_model::{Explanation, Simulated};
+use crate::fit::candidate_model::{CandidateModel, Simulated};
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::fit::relinearization::Relinearization;
 
 /// Steps at most.
@@ -41,8 +41,8 @@ impl Relinearization<'_> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        explanation: &Explanation,
-    ) -> Option<Explanation> {
+        explanation: &CandidateModel,
+    ) -> Option<CandidateModel> {
         let shapes = library.slopes_of(self.study, regression, explanation);
         let mut at = explanation.clone();
         let mut known = explanation.simulated.as_ref()?.reading.clone()?;
@@ -74,7 +74,7 @@ impl Relinearization<'_> {
     }
 
     /// The recordings with the extended case along the motion that was predicted before.
-    fn again(&self, library: &Library, at: &Explanation, known: &Reading) -> Option<Arc<Reading>> {
+    fn again(&self, library: &Library, at: &CandidateModel, known: &Reading) -> Option<Arc<Reading>> {
         let extensions = library.extensions(self.study, at)?;
         self.read(&extensions, Some(&known.predicted)).map(Arc::new)
     }
@@ -84,7 +84,7 @@ impl Relinearization<'_> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        at: &Explanation,
+        at: &CandidateModel,
         shapes: &[Vec<usize>],
         (known, now): (&Reading, &Reading),
     ) -> Option<Slopes> {
@@ -94,7 +94,7 @@ impl Relinearization<'_> {
         let moved = (MOVED * left.norm()).max(LEAST_MOVED);
         let mut jacobian = DMatrix::zeros(left.len(), of_baseline.len());
         for parameter in 0..of_baseline.len() {
-            let step = moved / regression.length(Share::Whole, of_baseline[parameter]);
+            let step = moved / regression.length(Subset::Whole, of_baseline[parameter]);
             // Where a step leaves what is physical, the other way is taken.
             let (beside, step) = [step, -step].into_iter().find_map(|step| {
                 let mut change = vec![0.0; of_baseline.len()];
@@ -140,7 +140,7 @@ fn solved(jacobian: &DMatrix<f64>, left: &DVector<f64>) -> Option<Slopes> {
 }
 
 fn whitened(regression: &Regression, residuals: &[Vec<Vec<f64>>]) -> DVector<f64> {
-    let parts = regression.whitened(Share::Whole, residuals);
+    let parts = regression.whitened(Subset::Whole, residuals);
     DVector::from_vec(parts.into_iter().flat_map(|(_, part)| part).collect())
 }
 
@@ -151,7 +151,7 @@ fn left_of(regression: &Regression, reading: &Reading) -> f64 {
 /// By choice: coefficients and behind them the shape, out of the covariance of all coefficients and behind them all shapes.
 fn by_choice(
     library: &Library,
-    at: &Explanation,
+    at: &CandidateModel,
     shapes: &[Vec<usize>],
     all: &DMatrix<f64>,
 ) -> Vec<DMatrix<f64>> {

@@ -1,8 +1,8 @@
 //! Shapes between those of the grid.
 
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 
 /// Explanations whose shapes are refined.
@@ -13,22 +13,22 @@ pub(crate) fn refine(
     study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    found: &mut [Explanation],
+    found: &mut [CandidateModel],
 ) {
     let Some(best) = found.first().map(|best| best.fit.left) else {
         return;
     };
-    let whole = regression.residual(Share::Whole);
+    let whole = regression.residual(Subset::Whole);
     let worth: Vec<usize> = (0..found.len())
         .filter(|index| whole - found[*index].fit.left > 0.5 * (whole - best))
         .take(REFINED)
         .collect();
     for index in worth {
-        let mut explanation = found[index].clone();
-        for position in 0..explanation.choices.len() {
-            explanation = one(study, library, regression, explanation, position);
+        let mut model = found[index].clone();
+        for position in 0..model.choices.len() {
+            model = one(study, library, regression, model, position);
         }
-        found[index] = explanation;
+        found[index] = model;
     }
     found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
 }
@@ -37,22 +37,22 @@ fn one(
     study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    explanation: Explanation,
+    model: CandidateModel,
     position: usize,
-) -> Explanation {
-    let choice = explanation.choices[position];
+) -> CandidateModel {
+    let choice = model.choices[position];
     let nonlinear_parameters = &library.candidates[choice.candidate].variants[choice.variant].0;
     if nonlinear_parameters.is_empty() {
-        return explanation;
+        return model;
     }
     let settles = library
         .cause(choice.candidate)
         .settled(nonlinear_parameters, &[1.0; 8])
         .is_some();
     if settles {
-        settle(study, library, regression, explanation, position)
+        settle(study, library, regression, model, position)
     } else {
-        search(study, library, regression, explanation, position)
+        search(study, library, regression, model, position)
     }
 }
 
@@ -64,15 +64,15 @@ fn settle(
     study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    mut explanation: Explanation,
+    mut model: CandidateModel,
     position: usize,
-) -> Explanation {
+) -> CandidateModel {
     for _ in 0..SETTLINGS {
-        let choice = explanation.choices[position];
+        let choice = model.choices[position];
         let nonlinear_parameters = library.candidates[choice.candidate].variants[choice.variant]
             .0
             .clone();
-        let coefficients = library.coefficients(&explanation, position);
+        let coefficients = library.coefficients(&model, position);
         let Some(asked) = library
             .cause(choice.candidate)
             .settled(&nonlinear_parameters, &coefficients)
@@ -93,18 +93,18 @@ fn settle(
                 .map(|(nonlinear_parameters, asked)| {
                     nonlinear_parameters + share * (asked - nonlinear_parameters)
                 });
-            with_nonlinear_parameters(study, library, regression, &explanation, position, next.collect())
-                .filter(|better| better.fit.left < explanation.fit.left)
+            with_nonlinear_parameters(study, library, regression, &model, position, next.collect())
+                .filter(|better| better.fit.left < model.fit.left)
         });
         // What leaves less where it contradicts itself is no explanation.
-        let better = better
-            .or_else(|| with_nonlinear_parameters(study, library, regression, &explanation, position, asked));
+        let better =
+            better.or_else(|| with_nonlinear_parameters(study, library, regression, &model, position, asked));
         let Some(better) = better else {
             break;
         };
-        explanation = better;
+        model = better;
     }
-    explanation
+    model
 }
 
 /// Most steps along the slopes.
@@ -115,10 +115,10 @@ fn search(
     study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    mut explanation: Explanation,
+    mut model: CandidateModel,
     position: usize,
-) -> Explanation {
-    let candidate = explanation.choices[position].candidate;
+) -> CandidateModel {
+    let candidate = model.choices[position].candidate;
     let bounds = library
         .cause(candidate)
         .bounds(study, &library.candidates[candidate].location);
@@ -127,7 +127,7 @@ fn search(
         for parameter in 0..bounds.len() {
             let [low, high] = bounds[parameter];
             let nonlinear_parameters = library.candidates[candidate].variants
-                [explanation.choices[position].variant]
+                [model.choices[position].variant]
                 .0
                 .clone();
             let mut improved = false;
@@ -142,10 +142,10 @@ fn search(
                 }
                 .clamp(low, high);
                 if let Some(better) =
-                    with_nonlinear_parameters(study, library, regression, &explanation, position, moved)
-                        .filter(|tried| tried.fit.left < explanation.fit.left)
+                    with_nonlinear_parameters(study, library, regression, &model, position, moved)
+                        .filter(|tried| tried.fit.left < model.fit.left)
                 {
-                    explanation = better;
+                    model = better;
                     improved = true;
                     break;
                 }
@@ -156,12 +156,12 @@ fn search(
         }
     }
     for _ in 0..SLOPES_FOLLOWED {
-        let Some(better) = along_slopes(study, library, regression, &explanation, position, &bounds) else {
+        let Some(better) = along_slopes(study, library, regression, &model, position, &bounds) else {
             break;
         };
-        explanation = better;
+        model = better;
     }
-    explanation
+    model
 }
 
 /// One Gauss–Newton step in the shape; `None` where it does not help.
@@ -169,17 +169,17 @@ fn along_slopes(
     study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    explanation: &Explanation,
+    model: &CandidateModel,
     position: usize,
     bounds: &[[f64; 2]],
-) -> Option<Explanation> {
-    let choice = explanation.choices[position];
-    let coefficients = library.coefficients(explanation, position);
+) -> Option<CandidateModel> {
+    let choice = model.choices[position];
+    let coefficients = library.coefficients(model, position);
     let slopes = library.slopes(study, regression, choice, &coefficients)?;
-    let mut columns = library.columns_of(explanation);
+    let mut columns = library.columns_of(model);
     let own = columns.len();
     columns.extend(&slopes);
-    let fit = regression.fit(Share::Whole, &columns)?;
+    let fit = regression.fit(Subset::Whole, &columns)?;
     let nonlinear_parameters = &library.candidates[choice.candidate].variants[choice.variant].0;
     let moved: Vec<f64> = nonlinear_parameters
         .iter()
@@ -190,21 +190,21 @@ fn along_slopes(
             (value + step.clamp(-most, most)).clamp(*low, *high)
         })
         .collect();
-    with_nonlinear_parameters(study, library, regression, explanation, position, moved)
-        .filter(|tried| tried.fit.left < explanation.fit.left - 0.01)
+    with_nonlinear_parameters(study, library, regression, model, position, moved)
+        .filter(|tried| tried.fit.left < model.fit.left - 0.01)
 }
 
 fn with_nonlinear_parameters(
     study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    explanation: &Explanation,
+    model: &CandidateModel,
     position: usize,
     nonlinear_parameters: Vec<f64>,
-) -> Option<Explanation> {
-    let candidate = explanation.choices[position].candidate;
+) -> Option<CandidateModel> {
+    let candidate = model.choices[position].candidate;
     let choice = library.add_variant(study, regression, candidate, nonlinear_parameters)?;
-    let mut choices = explanation.choices.clone();
+    let mut choices = model.choices.clone();
     choices[position] = choice;
     library.explain(study, regression, &choices)
 }

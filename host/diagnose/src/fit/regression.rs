@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::fit::normal_equations::{Products, products};
-pub(crate) use crate::fit::segment::Share;
-use crate::fit::segment::{Part, Unknown, split};
+pub(crate) use crate::fit::segment::Subset;
+use crate::fit::segment::{Nuisance, Segment, split};
 use crate::records::record::TRUSTED_IN_CUTS;
 use crate::records::study::Study;
 use crate::signal::dot::dot;
@@ -44,7 +44,7 @@ pub(crate) struct Refit {
 
 /// All columns of a scene.
 pub(crate) struct Regression {
-    parts: Vec<Part>,
+    segments: Vec<Segment>,
     /// By column, by part.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
@@ -59,17 +59,17 @@ pub(crate) struct Regression {
 impl Regression {
     /// The residuals of a scene.
     pub(crate) fn new(study: &Study<'_>) -> Self {
-        let parts = split(study, |_| Unknown::StartAndOffsets);
-        let residuals: Vec<Vec<f64>> = parts
+        let segments = split(study, |_| Nuisance::StartAndOffsets);
+        let residuals: Vec<Vec<f64>> = segments
             .iter()
-            .map(|part| {
-                let channels = &study.records[part.record].channels;
+            .map(|segment| {
+                let channels = &study.records[segment.record].channels;
                 let residual: Vec<Vec<f64>> = channels.iter().map(|channel| channel.residual()).collect();
-                part.whiten(&residual)
+                segment.whiten(&residual)
             })
             .collect();
         let mut regression = Self {
-            parts,
+            segments,
             columns: Vec::new(),
             residuals,
             products: std::array::from_fn(|_| Products::default()),
@@ -88,10 +88,10 @@ impl Regression {
     fn sum(&mut self) {
         self.products = std::array::from_fn(|_| Products::default());
         self.complete = 0;
-        for (part, residual) in self.parts.iter().zip(&self.residuals) {
-            let products = &mut self.products[part.share as usize];
+        for (segment, residual) in self.segments.iter().zip(&self.residuals) {
+            let products = &mut self.products[segment.subset as usize];
             products.residual += dot(residual, residual);
-            products.count += residual.len() - part.taken();
+            products.count += residual.len() - segment.taken();
         }
         for column in 0..self.columns.len() {
             self.sum_column(column);
@@ -101,8 +101,8 @@ impl Regression {
     fn sum_column(&mut self, column: usize) {
         let mut sums = [[0.0; 2]; 3];
         let values = self.columns[column].iter().zip(&self.residuals);
-        for (part, (values, residual)) in self.parts.iter().zip(values) {
-            let [square, with_residual] = &mut sums[part.share as usize];
+        for (segment, (values, residual)) in self.segments.iter().zip(values) {
+            let [square, with_residual] = &mut sums[segment.subset as usize];
             *square += dot(values, values);
             *with_residual += dot(values, residual);
         }
@@ -117,32 +117,37 @@ impl Regression {
     /// squares in units of the noise would listen to the record that is described worst (weights by estimated variances, as in
     /// feasible generalized least squares).
     pub(crate) fn level_records(&mut self) {
-        let records = self.parts.iter().map(|part| part.record + 1).max().unwrap_or(0);
+        let records = self
+            .segments
+            .iter()
+            .map(|segment| segment.record + 1)
+            .max()
+            .unwrap_or(0);
         let mut left = vec![1.0; records];
-        for (index, part) in self.parts.iter().enumerate() {
-            if part.share == Share::Whole {
+        for (index, segment) in self.segments.iter().enumerate() {
+            if segment.subset == Subset::Whole {
                 let free = self.residuals[index]
                     .len()
                     .saturating_sub(self.columns.len())
                     .max(1);
-                left[part.record] = self.left_of_part(index) / free as f64;
+                left[segment.record] = self.left_of_segment(index) / free as f64;
             }
         }
         let least = left.iter().copied().fold(f64::INFINITY, f64::min).max(1.0);
-        for (index, part) in self.parts.iter_mut().enumerate() {
-            part.weight = (least / left[part.record].max(least)).sqrt();
+        for (index, segment) in self.segments.iter_mut().enumerate() {
+            segment.weight = (least / left[segment.record].max(least)).sqrt();
             let values = self.columns.iter_mut().flat_map(|column| &mut column[index]);
             for value in values.chain(&mut self.residuals[index]) {
-                *value *= part.weight;
+                *value *= segment.weight;
             }
         }
         self.sum();
     }
 
     /// What all columns leave of one part.
-    fn left_of_part(&self, part: usize) -> f64 {
-        let residual = &self.residuals[part];
-        let mut columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[part][..]).collect();
+    fn left_of_segment(&self, segment: usize) -> f64 {
+        let residual = &self.residuals[segment];
+        let mut columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[segment][..]).collect();
         columns.retain(|column| column.iter().any(|value| *value != 0.0));
         let size = columns.len();
         columns.push(residual);
@@ -166,23 +171,26 @@ impl Regression {
 
     /// Σ y² of what was measured in the whole records, in units of the noise.
     pub(crate) fn signal(&self, study: &Study<'_>) -> f64 {
-        let of_part = |part: &Part| {
-            let channels = study.records[part.record].channels.iter();
+        let of_segment = |segment: &Segment| {
+            let channels = study.records[segment.record].channels.iter();
             let measured: Vec<Vec<f64>> = channels.map(|channel| channel.measured.clone()).collect();
-            let whitened = part.whiten(&measured);
+            let whitened = segment.whiten(&measured);
             dot(&whitened, &whitened)
         };
-        let whole = self.parts.iter().filter(|part| part.share == Share::Whole);
-        whole.map(of_part).sum()
+        let whole = self
+            .segments
+            .iter()
+            .filter(|segment| segment.subset == Subset::Whole);
+        whole.map(of_segment).sum()
     }
 
     /// Adds a regressor, given as samples by record and channel; its number. Its products with others are computed as they are
     /// asked for, until [`Self::complete`].
     pub(crate) fn add(&mut self, samples: &[Vec<Vec<f64>>]) -> usize {
         let column: Vec<Vec<f64>> = self
-            .parts
+            .segments
             .par_iter()
-            .map(|part| part.whiten(&samples[part.record]))
+            .map(|segment| segment.whiten(&samples[segment.record]))
             .collect();
         self.columns.push(column);
         self.sum_column(self.columns.len() - 1);
@@ -195,16 +203,16 @@ impl Regression {
         if first == size {
             return;
         }
-        let of_parts: Vec<DMatrix<f64>> = (0..self.parts.len())
+        let of_segments: Vec<DMatrix<f64>> = (0..self.segments.len())
             .into_par_iter()
-            .map(|part| {
-                let columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[part][..]).collect();
+            .map(|segment| {
+                let columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[segment][..]).collect();
                 products(&columns, first)
             })
             .collect();
         let mut sums = [(); 3].map(|()| DMatrix::zeros(size - first, size));
-        for (part, rows) in self.parts.iter().zip(of_parts) {
-            sums[part.share as usize] += rows;
+        for (segment, rows) in self.segments.iter().zip(of_segments) {
+            sums[segment.subset as usize] += rows;
         }
         for (products, rows) in self.products.iter_mut().zip(&sums) {
             products.complete(rows);
@@ -213,45 +221,45 @@ impl Regression {
     }
 
     /// Length of a column over a share, per unit of its coefficient.
-    pub(crate) fn length(&self, share: Share, column: usize) -> f64 {
-        self.products(share).square(column).sqrt()
+    pub(crate) fn length(&self, subset: Subset, column: usize) -> f64 {
+        self.products(subset).square(column).sqrt()
     }
 
     /// Product of two columns over a share.
-    fn product(&self, share: Share, i: usize, j: usize) -> f64 {
-        self.products(share).known(i, j).unwrap_or_else(|| {
+    fn product(&self, subset: Subset, i: usize, j: usize) -> f64 {
+        self.products(subset).known(i, j).unwrap_or_else(|| {
             let mine = self
-                .parts
+                .segments
                 .iter()
                 .enumerate()
-                .filter(|(_, part)| part.share == share);
+                .filter(|(_, segment)| segment.subset == subset);
             mine.map(|(index, _)| dot(&self.columns[i][index], &self.columns[j][index]))
                 .sum()
         })
     }
 
-    fn products(&self, share: Share) -> &Products {
-        &self.products[share as usize]
+    fn products(&self, subset: Subset) -> &Products {
+        &self.products[subset as usize]
     }
 
     /// Σ residual² in units of the noise.
-    pub(crate) fn residual(&self, share: Share) -> f64 {
-        self.products(share).residual
+    pub(crate) fn residual(&self, subset: Subset) -> f64 {
+        self.products(subset).residual
     }
 
     /// Numbers that are compared.
-    pub(crate) fn count(&self, share: Share) -> usize {
-        self.products(share).count
+    pub(crate) fn count(&self, subset: Subset) -> usize {
+        self.products(subset).count
     }
 
     /// Root mean square of the residual over that of what was measured, on a share; channels count alike.
-    pub(crate) fn missed(&self, study: &Study<'_>, share: Share) -> f64 {
+    pub(crate) fn missed(&self, study: &Study<'_>, subset: Subset) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
-        for part in self.parts.iter().filter(|part| part.share == share) {
-            for channel in &study.records[part.record].channels {
+        for segment in self.segments.iter().filter(|segment| segment.subset == subset) {
+            for channel in &study.records[segment.record].channels {
                 let energy =
-                    |samples: &[f64]| dot(&samples[part.range.clone()], &samples[part.range.clone()]);
-                let whole = dot(&channel.measured, &channel.measured) * part.range.len() as f64
+                    |samples: &[f64]| dot(&samples[segment.range.clone()], &samples[segment.range.clone()]);
+                let whole = dot(&channel.measured, &channel.measured) * segment.range.len() as f64
                     / channel.measured.len() as f64;
                 sum += energy(&channel.residual()) / whole.max(f64::MIN_POSITIVE);
                 count += 1.0;
@@ -266,22 +274,22 @@ impl Regression {
     }
 
     /// The fit of some columns to a share; `None` where they are one and the same, or nothing.
-    pub(crate) fn fit(&self, share: Share, columns: &[usize]) -> Option<Fit> {
-        self.solve(share, columns, self.ridge)
+    pub(crate) fn fit(&self, subset: Subset, columns: &[usize]) -> Option<Fit> {
+        self.solve(subset, columns, self.ridge)
     }
 
     /// Coefficients of `columns` that fit the column `target`, and how much of its energy they take.
     pub(crate) fn fit_column(
         &self,
-        share: Share,
+        subset: Subset,
         columns: &[usize],
         target: usize,
     ) -> Option<(Vec<f64>, f64)> {
         let right: Vec<f64> = columns
             .iter()
-            .map(|column| self.product(share, *column, target))
+            .map(|column| self.product(subset, *column, target))
             .collect();
-        let (solution, _) = self.normal(share, columns, self.ridge, &right)?;
+        let (solution, _) = self.normal(subset, columns, self.ridge, &right)?;
         let taken = solution.iter().zip(&right).map(|(x, right)| x * right).sum();
         Some((solution, taken))
     }
@@ -290,18 +298,18 @@ impl Regression {
     /// columns are one and the same, or nothing.
     pub(crate) fn refit(
         &self,
-        share: Share,
+        subset: Subset,
         columns: &[usize],
         residuals: &[Vec<Vec<f64>>],
     ) -> Option<Refit> {
-        let mine = self.whitened(share, residuals);
+        let mine = self.whitened(subset, residuals);
         let with = |column: usize| -> f64 {
             mine.iter()
-                .map(|(part, residual)| dot(&self.columns[column][*part], residual))
+                .map(|(segment, residual)| dot(&self.columns[column][*segment], residual))
                 .sum()
         };
         let right: Vec<f64> = columns.iter().map(|column| with(*column)).collect();
-        let (change, _) = self.normal(share, columns, self.ridge, &right)?;
+        let (change, _) = self.normal(subset, columns, self.ridge, &right)?;
         Some(Refit {
             before: mine.iter().map(|(_, residual)| dot(residual, residual)).sum(),
             taken: change
@@ -316,15 +324,15 @@ impl Regression {
     /// What is left of `residuals`, given by record and channel, with given coefficients of `columns`.
     pub(crate) fn left_with(
         &self,
-        share: Share,
+        subset: Subset,
         columns: &[usize],
         residuals: &[Vec<Vec<f64>>],
         coefficients: &[f64],
     ) -> f64 {
         let mut sum = 0.0;
-        for (part, mut residual) in self.whitened(share, residuals) {
+        for (segment, mut residual) in self.whitened(subset, residuals) {
             for (column, coefficient) in columns.iter().zip(coefficients) {
-                for (residual, value) in residual.iter_mut().zip(&self.columns[*column][part]) {
+                for (residual, value) in residual.iter_mut().zip(&self.columns[*column][segment]) {
                     *residual -= coefficient * value;
                 }
             }
@@ -336,17 +344,22 @@ impl Regression {
     /// The covariance of a fit to a share whose residual is no noise of deviation 1 but an error of the equations, which has a
     /// spectrum of its own: (XᵀX)⁻¹ Xᵀ diag(r²/(1 − h)²) X (XᵀX)⁻¹ with h = diag(X (XᵀX)⁻¹ Xᵀ), one number of the spectrum
     /// independent of the next (HC3 of MacKinnon and White, 1985).
-    pub(crate) fn covariance_by_residual(&self, share: Share, columns: &[usize], fit: &Fit) -> DMatrix<f64> {
+    pub(crate) fn covariance_by_residual(
+        &self,
+        subset: Subset,
+        columns: &[usize],
+        fit: &Fit,
+    ) -> DMatrix<f64> {
         let mut middle = DMatrix::zeros(columns.len(), columns.len());
         let mine = self
-            .parts
+            .segments
             .iter()
             .enumerate()
-            .filter(|(_, part)| part.share == share);
-        for (part, _) in mine {
-            let residual = &self.residuals[part];
+            .filter(|(_, segment)| segment.subset == subset);
+        for (segment, _) in mine {
+            let residual = &self.residuals[segment];
             let mut x = DMatrix::from_fn(residual.len(), columns.len(), |row, column| {
-                self.columns[columns[column]][part][row]
+                self.columns[columns[column]][segment][row]
             });
             let left =
                 DVector::from_column_slice(residual) - &x * DVector::from_column_slice(&fit.coefficients);
@@ -359,34 +372,34 @@ impl Regression {
         &fit.covariance * middle * &fit.covariance
     }
 
-    pub(crate) fn whitened(&self, share: Share, residuals: &[Vec<Vec<f64>>]) -> Vec<(usize, Vec<f64>)> {
-        self.parts
+    pub(crate) fn whitened(&self, subset: Subset, residuals: &[Vec<Vec<f64>>]) -> Vec<(usize, Vec<f64>)> {
+        self.segments
             .par_iter()
             .enumerate()
-            .filter(|(_, part)| part.share == share)
-            .map(|(index, part)| (index, part.whiten(&residuals[part.record])))
+            .filter(|(_, segment)| segment.subset == subset)
+            .map(|(index, segment)| (index, segment.whiten(&residuals[segment.record])))
             .collect()
     }
 
     /// What is left if all columns may explain, numerically dependent ones softened.
     pub(crate) fn left_by_all(&self) -> f64 {
-        let whole = self.products(Share::Whole);
+        let whole = self.products(Subset::Whole);
         let all: Vec<usize> = (0..self.columns.len())
             .filter(|column| whole.square(*column) > 0.0)
             .collect();
-        self.solve(Share::Whole, &all, SOFTENED)
+        self.solve(Subset::Whole, &all, SOFTENED)
             .map_or(whole.residual, |fit| fit.left)
     }
 
-    fn solve(&self, share: Share, columns: &[usize], ridge: f64) -> Option<Fit> {
-        let products = self.products(share);
+    fn solve(&self, subset: Subset, columns: &[usize], ridge: f64) -> Option<Fit> {
+        let products = self.products(subset);
         let right: Vec<f64> = columns
             .iter()
             .map(|column| products.with_residual[*column])
             .collect();
-        let (coefficients, covariance) = self.normal(share, columns, ridge, &right)?;
+        let (coefficients, covariance) = self.normal(subset, columns, ridge, &right)?;
         Some(Fit {
-            left: self.left(share, columns, &coefficients),
+            left: self.left(subset, columns, &coefficients),
             coefficients,
             covariance,
         })
@@ -395,12 +408,12 @@ impl Regression {
     /// Solution and inverse of the normal equations, `right` in the order of the columns; `None` where columns are one and the same, or nothing.
     fn normal(
         &self,
-        share: Share,
+        subset: Subset,
         columns: &[usize],
         ridge: f64,
         right: &[f64],
     ) -> Option<(Vec<f64>, DMatrix<f64>)> {
-        let products = self.products(share);
+        let products = self.products(subset);
         let size = columns.len();
         let scale: Vec<f64> = columns
             .iter()
@@ -410,7 +423,7 @@ impl Regression {
             return None;
         }
         let mut gram = DMatrix::from_fn(size, size, |i, j| {
-            self.product(share, columns[i], columns[j]) / (scale[i] * scale[j])
+            self.product(subset, columns[i], columns[j]) / (scale[i] * scale[j])
         });
         for i in 0..size {
             gram[(i, i)] += ridge;
@@ -428,13 +441,13 @@ impl Regression {
     }
 
     /// What is left of a share with given coefficients.
-    pub(crate) fn left(&self, share: Share, columns: &[usize], coefficients: &[f64]) -> f64 {
-        let products = self.products(share);
+    pub(crate) fn left(&self, subset: Subset, columns: &[usize], coefficients: &[f64]) -> f64 {
+        let products = self.products(subset);
         let mut left = products.residual;
         for (column, coefficient) in columns.iter().zip(coefficients) {
             left -= 2.0 * coefficient * products.with_residual[*column];
             for (other, factor) in columns.iter().zip(coefficients) {
-                left += coefficient * factor * self.product(share, *column, *other);
+                left += coefficient * factor * self.product(subset, *column, *other);
             }
         }
         left.max(0.0)

@@ -10,11 +10,11 @@ use std::sync::Arc;
 
 use crate::candidates::extension_tables::joined;
 use crate::fit::candidate_model::Reading;
-use crate::fit::candidate_model::{Choice, Explanation, Simulated};
+use crate::fit::candidate_model::{CandidateModel, Choice, Simulated};
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::covariance::covariance;
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::records::record::{Clean, Known, Record};
 use crate::records::study::Study;
 use quietcut_recording::Recording;
@@ -92,10 +92,10 @@ impl<'a> Relinearization<'a> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        explanation: &Explanation,
+        explanation: &CandidateModel,
         slopes: &[Vec<usize>],
         change: &[f64],
-    ) -> Option<Explanation> {
+    ) -> Option<CandidateModel> {
         let mut next = explanation.clone();
         let (of_coefficients, mut of_shapes) = change.split_at(explanation.fit.coefficients.len());
         for (coefficient, change) in next.fit.coefficients.iter_mut().zip(of_coefficients) {
@@ -130,15 +130,15 @@ impl ClosedFit for Relinearization<'_> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        explanation: &Explanation,
+        explanation: &CandidateModel,
         (rival, _): (f64, f64),
-    ) -> Option<Explanation> {
+    ) -> Option<CandidateModel> {
         let slopes = library.slopes_of(self.study, regression, explanation);
         let mut columns = library.columns_of(explanation);
         columns.extend(slopes.iter().flatten());
         let mut at = explanation.clone();
         let mut predicted: Option<Arc<Reading>> = None;
-        let mut best: Option<(Explanation, Arc<Reading>)> = None;
+        let mut best: Option<(CandidateModel, Arc<Reading>)> = None;
         for round in 0..ROUNDS {
             let Some(reading) = self.read(
                 &library.extensions(self.study, &at)?,
@@ -146,7 +146,7 @@ impl ClosedFit for Relinearization<'_> {
             ) else {
                 break;
             };
-            let refit = regression.refit(Share::Whole, &columns, &reading.residuals)?;
+            let refit = regression.refit(Subset::Whole, &columns, &reading.residuals)?;
             at.fit.left = refit.before;
             // The first one follows the measured motion still: it is compared with none.
             let is_better = round <= 1 || best.as_ref().is_none_or(|(best, _)| at.fit.left < best.fit.left);
@@ -183,18 +183,18 @@ impl ClosedFit for Relinearization<'_> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        explanation: &Explanation,
-    ) -> Option<Explanation> {
+        explanation: &CandidateModel,
+    ) -> Option<CandidateModel> {
         self.by_own_slopes(library, regression, explanation)
     }
 
     fn left_by_baseline(&self, _: &Library, regression: &Regression) -> Option<f64> {
         let known: Vec<Clean> = self.study.records.iter().map(Record::predicted).collect();
         let reading = self.read(&[], Some(&known))?;
-        Some(regression.refit(Share::Whole, &[], &reading.residuals)?.before)
+        Some(regression.refit(Subset::Whole, &[], &reading.residuals)?.before)
     }
 
-    fn left_of(&self, _: &Library, explanation: &Explanation) -> Option<Residuals> {
+    fn left_of(&self, _: &Library, explanation: &CandidateModel) -> Option<Residuals> {
         let reading = explanation.simulated.as_ref()?.reading.as_ref()?;
         Some(reading.residuals.clone())
     }
@@ -203,11 +203,11 @@ impl ClosedFit for Relinearization<'_> {
         &self,
         library: &Library,
         regression: &Regression,
-        explanation: &Explanation,
+        explanation: &CandidateModel,
     ) -> Option<f64> {
         let left = &explanation.simulated.as_ref()?.reading.as_ref()?.residuals;
         let columns = library.columns_of(explanation);
-        let change = regression.refit(Share::Fitted, &columns, left)?.change;
-        Some(regression.left_with(Share::HeldOut, &columns, left, &change))
+        let change = regression.refit(Subset::Fitted, &columns, left)?.change;
+        Some(regression.left_with(Subset::HeldOut, &columns, left, &change))
     }
 }

@@ -1,8 +1,9 @@
 //! Searches that begin again: from beside where one ended, and from other sizes.
 
-use crate::fit::output_error::{LEAST_STEP, OutputError, ROUNDS, SETTLED};
-use crate::fit::segment::Part;
-use crate::fit::unknowns::{Found, Point, Problem, Slot, energy};
+use crate::fit::output_error::{LEAST_STEP, OutputError};
+use crate::fit::search::{ROUNDS, SETTLED};
+use crate::fit::segment::Segment;
+use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResult, energy};
 
 /// χ² per number from which on a search is looked at again.
 const STUCK: f64 = 1.1;
@@ -22,39 +23,47 @@ impl OutputError<'_> {
     /// another explanation has reached the χ² of `rival`.
     pub(crate) fn looked_at_again(
         &self,
-        problem: &mut Problem<'_>,
-        parts: &[&Part],
-        start: &Point,
-        mut found: Found,
+        problem: &mut FitProblem<'_>,
+        segments: &[&Segment],
+        start: &ParameterPoint,
+        mut found: SearchResult,
         (rival, count): (f64, usize),
-    ) -> Found {
+    ) -> SearchResult {
         let stuck = STUCK * count as f64;
         let is_simple = problem.choices.len() == 1 && problem.inner().count() <= FEW;
         if self.is_let_go && found.left > stuck && is_simple {
-            found = self.elsewhere(problem, parts, start, found, rival);
+            found = self.elsewhere(problem, segments, start, found, rival);
         }
         if problem.least_step > LEAST_STEP && found.left > stuck && found.left < STUCK * rival {
-            found = self.beside(problem, parts, found, rival);
+            found = self.beside(problem, segments, found, rival);
         }
         found
     }
 
     /// The search once more from the best of what lies near where it ended: whether friction lets go at all is a cliff.
-    fn beside(&self, problem: &mut Problem<'_>, parts: &[&Part], ended: Found, rival: f64) -> Found {
-        let mut best: Option<(f64, Point)> = None;
+    fn beside(
+        &self,
+        problem: &mut FitProblem<'_>,
+        segments: &[&Segment],
+        ended: SearchResult,
+        rival: f64,
+    ) -> SearchResult {
+        let mut best: Option<(f64, ParameterPoint)> = None;
         for slot in problem.inner() {
             for share in BESIDE.into_iter().flat_map(|share| [share, -share]) {
                 let mut moved = ended.point.clone();
                 *slot.of(&mut moved) *= 1.0 + share;
                 let least = best.as_ref().map_or(ended.left, |best| best.0);
-                if let Some(left) = self.residuals(problem, parts, &moved).map(|left| energy(&left))
+                if let Some(left) = self
+                    .residuals(problem, segments, &moved)
+                    .map(|left| energy(&left))
                     && left < least - SETTLED
                 {
                     best = Some((left, moved));
                 }
             }
         }
-        let again = best.and_then(|(_, point)| self.search(problem, parts, point, ROUNDS, rival));
+        let again = best.and_then(|(_, point)| self.search(problem, segments, point, ROUNDS, rival));
         again.filter(|again| again.left < ended.left).unwrap_or(ended)
     }
 
@@ -62,12 +71,12 @@ impl OutputError<'_> {
     /// between two sizes there are hills.
     fn elsewhere(
         &self,
-        problem: &mut Problem<'_>,
-        parts: &[&Part],
-        start: &Point,
-        ended: Found,
+        problem: &mut FitProblem<'_>,
+        segments: &[&Segment],
+        start: &ParameterPoint,
+        ended: SearchResult,
         rival: f64,
-    ) -> Found {
+    ) -> SearchResult {
         let mut best = ended;
         let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
         for _ in problem.inner() {
@@ -76,15 +85,15 @@ impl OutputError<'_> {
                 .flat_map(|known| SIZES.map(|size| [known.clone(), vec![size]].concat()))
                 .collect();
         }
-        let first: Vec<&Part> = self.horizons[0].iter().collect();
-        let mut tried: Vec<(f64, Point)> = grid
+        let first: Vec<&Segment> = self.horizons[0].iter().collect();
+        let mut tried: Vec<(f64, ParameterPoint)> = grid
             .into_iter()
             .filter_map(|sizes| {
                 let mut point = start.clone();
                 for (slot, size) in problem.inner().zip(sizes) {
                     let value = slot.of(&mut point);
                     *value *= size;
-                    if let Slot::Inner {
+                    if let FreeParameter::Inner {
                         bounds: [low, high], ..
                     } = slot
                     {
@@ -99,7 +108,7 @@ impl OutputError<'_> {
         for (_, point) in tried.into_iter().take(FOLLOWED) {
             let point = self.near_to_far(problem, point);
             let rival = rival.min(best.left);
-            if let Some(found) = self.search(problem, parts, point, ROUNDS, rival)
+            if let Some(found) = self.search(problem, segments, point, ROUNDS, rival)
                 && found.left < best.left
             {
                 best = found;

@@ -9,19 +9,19 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use crate::signal::dot::dot;
-use crate::signal::grid::Stretch;
+use crate::signal::grid::SegmentTransform;
 use quietcut_recording::Kind;
 
 /// A part of a record.
-pub(crate) struct Part {
+pub(crate) struct Segment {
     /// Its record, by its place in the scene.
     pub(crate) record: usize,
     pub(crate) range: Range<usize>,
-    pub(crate) share: Share,
+    pub(crate) subset: Subset,
     /// One over how many times the noise of its record is taken for what it is.
     pub(crate) weight: f64,
     bins: usize,
-    stretch: Stretch,
+    transform: SegmentTransform,
     whitening: Whitening,
     /// By channel: samples, counted from the start of the part, that are not compared.
     skipped: Vec<Vec<usize>>,
@@ -31,7 +31,7 @@ pub(crate) struct Part {
 
 /// What a part may owe to what nobody knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Unknown {
+pub(crate) enum Nuisance {
     /// The state at its start, as free decays of the baseline, and the offsets of sensors.
     StartAndOffsets,
     /// Offsets of sensors alone.
@@ -40,7 +40,7 @@ pub(crate) enum Unknown {
 
 /// Which parts count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Share {
+pub(crate) enum Subset {
     /// Those that are fitted.
     Fitted,
     /// Those that are held out.
@@ -52,7 +52,7 @@ pub(crate) enum Share {
 /// Each record as a whole, and in four blocks of a third, a sixth, a third and a sixth of which the short ones are held out:
 /// they hold other times, and of a sweep other frequencies, than what is fitted. Of several free decays the last is held out
 /// whole: the end of a decay tells nothing.
-pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Unknown) -> Vec<Part> {
+pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) -> Vec<Segment> {
     let several = study.records.len() > 1;
     let last = study.records.len().saturating_sub(1);
     study
@@ -62,41 +62,41 @@ pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Unknown) -> 
         .flat_map(|(index, record)| {
             let Range { start: from, end } = record.compared.clone();
             let count = end - from;
-            let mut ranges = vec![(from..end, Share::Whole)];
+            let mut ranges = vec![(from..end, Subset::Whole)];
             if several && record.kind == Some(Kind::FreeDecay) {
-                let share = if index == last {
-                    Share::HeldOut
+                let subset = if index == last {
+                    Subset::HeldOut
                 } else {
-                    Share::Fitted
+                    Subset::Fitted
                 };
-                ranges.push((from..end, share));
+                ranges.push((from..end, subset));
             } else {
                 ranges.extend([
-                    (from..from + count / 3, Share::Fitted),
-                    (from + count / 3..from + count / 2, Share::HeldOut),
-                    (from + count / 2..from + 5 * count / 6, Share::Fitted),
-                    (from + 5 * count / 6..end, Share::HeldOut),
+                    (from..from + count / 3, Subset::Fitted),
+                    (from + count / 3..from + count / 2, Subset::HeldOut),
+                    (from + count / 2..from + 5 * count / 6, Subset::Fitted),
+                    (from + 5 * count / 6..end, Subset::HeldOut),
                 ]);
             }
             let unknown = unknown(record);
             ranges
                 .into_iter()
-                .map(move |(range, share)| Part::new(study, index, range, share, unknown))
+                .map(move |(range, subset)| Segment::new(study, index, range, subset, unknown))
         })
         .collect()
 }
 
-impl Part {
+impl Segment {
     /// A part of the record at `index`.
     pub(crate) fn new(
         study: &Study<'_>,
         index: usize,
         range: Range<usize>,
-        share: Share,
-        unknown: Unknown,
+        subset: Subset,
+        unknown: Nuisance,
     ) -> Self {
         let record = &study.records[index];
-        let mut part = Self {
+        let mut segment = Self {
             record: index,
             bins: bins_of(record, range.len()),
             skipped: record
@@ -109,16 +109,16 @@ impl Part {
                         .collect()
                 })
                 .collect(),
-            stretch: Stretch::new(range.len()),
+            transform: SegmentTransform::new(range.len()),
             range,
-            share,
+            subset,
             weight: 1.0,
             whitening: Whitening::default(),
             nuisance: Vec::new(),
         };
-        part.whitening = Whitening::of(record, part.range.len(), part.bins);
-        part.nuisance = nuisance(record, &part, unknown);
-        part
+        segment.whitening = Whitening::of(record, segment.range.len(), segment.bins);
+        segment.nuisance = nuisance(record, &segment, unknown);
+        segment
     }
 
     /// Transformed, cut to the band, in units of the noise, and without what nuisances explain; `samples` are those of the
@@ -148,21 +148,21 @@ fn bins_of(record: &Record, length: usize) -> usize {
     ((share * length as f64) as usize + 1).min(length / 2 + 1)
 }
 
-fn raw(part: &Part, samples: &[Vec<f64>]) -> Vec<f64> {
-    let mut column = Vec::with_capacity(2 * part.bins * samples.len());
-    for (samples, skipped) in samples.iter().zip(&part.skipped) {
-        let mut samples = Cow::Borrowed(&samples[part.range.clone()]);
+fn raw(segment: &Segment, samples: &[Vec<f64>]) -> Vec<f64> {
+    let mut column = Vec::with_capacity(2 * segment.bins * samples.len());
+    for (samples, skipped) in samples.iter().zip(&segment.skipped) {
+        let mut samples = Cow::Borrowed(&samples[segment.range.clone()]);
         for &sample in skipped {
             samples.to_mut()[sample] = 0.0;
         }
-        part.stretch.parts(&samples, part.bins, &mut column);
+        segment.transform.bins(&samples, segment.bins, &mut column);
     }
-    part.whitening.apply(&mut column);
+    segment.whitening.apply(&mut column);
     column
 }
 
 /// An orthonormal basis of decays and offsets in a part; where forces are compared there is neither.
-fn nuisance(record: &Record, part: &Part, unknown: Unknown) -> Vec<Vec<f64>> {
+fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f64>> {
     if record.domain == Domain::Force {
         return Vec::new();
     }
@@ -170,8 +170,8 @@ fn nuisance(record: &Record, part: &Part, unknown: Unknown) -> Vec<Vec<f64>> {
     let channels = record.channels.len();
     let mut raws = Vec::new();
     let states = match unknown {
-        Unknown::StartAndOffsets => record.decays.count(),
-        Unknown::Offsets => 0,
+        Nuisance::StartAndOffsets => record.decays.count(),
+        Nuisance::Offsets => 0,
     };
     for state in 0..states {
         // The decay of a part begins with the part.
@@ -179,17 +179,17 @@ fn nuisance(record: &Record, part: &Part, unknown: Unknown) -> Vec<Vec<f64>> {
             .map(|channel| {
                 let column = record.decays.column(channel, state);
                 let mut samples = vec![0.0; count];
-                samples[part.range.clone()].copy_from_slice(&column[..part.range.len()]);
+                samples[segment.range.clone()].copy_from_slice(&column[..segment.range.len()]);
                 samples
             })
             .collect();
-        raws.push(raw(part, &shifted));
+        raws.push(raw(segment, &shifted));
     }
     for constant in 0..channels {
         let samples: Vec<Vec<f64>> = (0..channels)
             .map(|channel| vec![f64::from(u8::from(channel == constant)); count])
             .collect();
-        raws.push(raw(part, &samples));
+        raws.push(raw(segment, &samples));
     }
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut column in raws {

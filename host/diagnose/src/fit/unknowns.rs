@@ -10,7 +10,7 @@ use quietcut_simulate::Effects;
 
 /// Parameters and initial states.
 #[derive(Clone, Debug)]
-pub(crate) struct Point {
+pub(crate) struct ParameterPoint {
     /// By choice: coefficients and, behind them, the shape.
     pub(crate) inner: Vec<Vec<f64>>,
     /// By record: states at its start; empty where it starts from rest.
@@ -19,7 +19,7 @@ pub(crate) struct Point {
 
 /// One number of a point that may move.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Slot {
+pub(crate) enum FreeParameter {
     Inner {
         choice: usize,
         index: usize,
@@ -32,24 +32,24 @@ pub(crate) enum Slot {
 }
 
 /// What is fitted: causes, and which numbers may move, each with the step of its difference.
-pub(crate) struct Problem<'a> {
+pub(crate) struct FitProblem<'a> {
     pub(crate) library: &'a Library,
     pub(crate) choices: &'a [Choice],
-    pub(crate) slots: Vec<(Slot, f64)>,
+    pub(crate) slots: Vec<(FreeParameter, f64)>,
     /// Least step of a difference, as a share of its parameter.
     pub(crate) least_step: f64,
 }
 
 /// Where a search ended.
-pub(crate) struct Found {
-    pub(crate) point: Point,
+pub(crate) struct SearchResult {
+    pub(crate) point: ParameterPoint,
     pub(crate) left: f64,
     /// Jᵀ J of the slots.
     pub(crate) normal: DMatrix<f64>,
 }
 
-impl Slot {
-    pub(crate) fn of(self, point: &mut Point) -> &mut f64 {
+impl FreeParameter {
+    pub(crate) fn of(self, point: &mut ParameterPoint) -> &mut f64 {
         match self {
             Self::Inner { choice, index, .. } => &mut point.inner[choice][index],
             Self::Start { record, index } => &mut point.starts[record][index],
@@ -65,15 +65,15 @@ impl Slot {
     }
 }
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// What may move besides the states at the start.
-    pub(crate) fn inner(&self) -> impl Iterator<Item = Slot> {
+    pub(crate) fn inner(&self) -> impl Iterator<Item = FreeParameter> {
         let slots = self.slots.iter().map(|(slot, _)| *slot);
-        slots.filter(|slot| matches!(slot, Slot::Inner { .. }))
+        slots.filter(|slot| matches!(slot, FreeParameter::Inner { .. }))
     }
 
     /// The effects at a point; `None` where it is not physical.
-    pub(crate) fn effects(&self, study: &Study<'_>, point: &Point) -> Option<Effects> {
+    pub(crate) fn effects(&self, study: &Study<'_>, point: &ParameterPoint) -> Option<Effects> {
         let Self { library, choices, .. } = self;
         let mut tables = Vec::new();
         for (choice, inner) in choices.iter().zip(&point.inner) {
@@ -97,19 +97,19 @@ pub(crate) fn energy(residuals: &[Vec<f64>]) -> f64 {
 
 /// (Jᵀ J + trust·diag) step = Jᵀ r, taken within the bounds; `None` where that has no solution.
 pub(crate) fn stepped(
-    problem: &Problem<'_>,
-    point: &Point,
+    problem: &FitProblem<'_>,
+    point: &ParameterPoint,
     normal: &DMatrix<f64>,
     gradient: &DVector<f64>,
     trust: f64,
-) -> Option<Point> {
+) -> Option<ParameterPoint> {
     let step = scaled(normal, 1e-12 + trust)?.solve(&gradient.component_mul(&roots(normal)));
     let step = step.component_mul(&roots(normal));
     let mut next = point.clone();
     for ((slot, _), step) in problem.slots.iter().zip(step.iter()) {
         let value = slot.of(&mut next);
         *value += step;
-        if let Slot::Inner {
+        if let FreeParameter::Inner {
             bounds: [low, high], ..
         } = slot
         {
@@ -127,13 +127,13 @@ pub(crate) fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
 
 /// What stands at a bound and is pushed beyond it stays there.
 pub(crate) fn at_bounds(
-    problem: &Problem<'_>,
-    point: &Point,
+    problem: &FitProblem<'_>,
+    point: &ParameterPoint,
     normal: &mut DMatrix<f64>,
     gradient: &mut DVector<f64>,
 ) {
     for (index, (slot, _)) in problem.slots.iter().enumerate() {
-        let Slot::Inner {
+        let FreeParameter::Inner {
             bounds: [low, high], ..
         } = slot
         else {
@@ -181,7 +181,7 @@ pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// Covariance for noise of deviation 1 of the numbers of each choice, initial states being unknown; zero for what did not move.
-pub(crate) fn by_choice(slots: &[Slot], found: &Found) -> Vec<DMatrix<f64>> {
+pub(crate) fn by_choice(slots: &[FreeParameter], found: &SearchResult) -> Vec<DMatrix<f64>> {
     let mut all: Vec<DMatrix<f64>> = found
         .point
         .inner
@@ -194,8 +194,8 @@ pub(crate) fn by_choice(slots: &[Slot], found: &Found) -> Vec<DMatrix<f64>> {
     for (i, first) in slots.iter().enumerate() {
         for (j, second) in slots.iter().enumerate() {
             if let (
-                Slot::Inner { choice, index, .. },
-                Slot::Inner {
+                FreeParameter::Inner { choice, index, .. },
+                FreeParameter::Inner {
                     choice: other,
                     index: second,
                     ..

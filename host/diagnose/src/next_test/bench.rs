@@ -7,7 +7,7 @@ use num_complex::Complex64;
 
 use super::reading::Reading;
 use crate::baseline::{Baseline, derivatives};
-use crate::conclusion::residual_views::View;
+use crate::conclusion::residual_views::ResidualView;
 use crate::signal::noise::rms;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
@@ -64,7 +64,7 @@ pub(super) struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     /// `None` where the machine cannot be simulated, or does not vibrate.
-    pub(super) fn new(case: &'a Case, recordings: &[Recording], views: &[View]) -> Option<Self> {
+    pub(super) fn new(case: &'a Case, recordings: &[Recording], views: &[ResidualView]) -> Option<Self> {
         let baseline = Baseline::new(case).ok()?;
         let modes_hz = [baseline.lowest_hz()?, highest_hz(&baseline)?];
         let [lowest_hz, highest_hz] = modes_hz;
@@ -163,7 +163,7 @@ fn peak(channel: &Channel) -> f64 {
 }
 
 /// The channels of motion, each name once.
-fn heard(baseline: &Baseline<'_>, recordings: &[Recording], views: &[View]) -> Vec<Heard> {
+fn heard(baseline: &Baseline<'_>, recordings: &[Recording], views: &[ResidualView]) -> Vec<Heard> {
     let mut all: Vec<Heard> = Vec::new();
     for channel in channels_of(recordings.iter()) {
         let is_known = all.iter().any(|heard| heard.name == channel.name);
@@ -193,7 +193,7 @@ fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
 }
 
 /// The noise of a channel, the mean over the records; 0 where it is not known.
-fn deviation(views: &[View], name: &str) -> f64 {
+fn deviation(views: &[ResidualView], name: &str) -> f64 {
     let known: Vec<f64> = views
         .iter()
         .filter(|view| view.channel == name)

@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::selection::rebaselined::extended_rebaselined;
-use crate::selection::select::{APART, Scale};
+use crate::selection::select::{APART, SelectionCriteria};
 use crate::selection::stepwise::{distinct, extended, nested, without};
 
 /// χ² per number below which an explanation explains nearly all, and over that of another below which it is nearly as good; and how
@@ -23,18 +23,18 @@ const EXTENDED: [usize; 2] = [6, 3];
 /// And because of what looks best around the machine as the best of those with one cause less has it.
 const AROUND: usize = 4;
 
-impl Scale<'_> {
+impl SelectionCriteria<'_> {
     /// The first of `found` as simulation has them, where it can; else all as they are. `fewer` are the best with one cause
     /// less; what stays behind `rival` is given up.
     pub(crate) fn simulated(
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        found: Vec<Explanation>,
-        fewer: &[Explanation],
+        found: Vec<CandidateModel>,
+        fewer: &[CandidateModel],
         most: usize,
-        rival: Option<&Explanation>,
-    ) -> Vec<Explanation> {
+        rival: Option<&CandidateModel>,
+    ) -> Vec<CandidateModel> {
         let Some(closed) = &self.closed else {
             return found;
         };
@@ -51,9 +51,9 @@ impl Scale<'_> {
             (rival.fit.left, rival.parameter_count)
         });
         // The same causes along more axes are simulated only where more axes gain something.
-        let mut leading: Option<Explanation> = None;
+        let mut leading: Option<CandidateModel> = None;
         let mut simulated = Vec::new();
-        let noise = regression.count(Share::Whole) as f64;
+        let noise = regression.count(Subset::Whole) as f64;
         let best_left = tried
             .iter()
             .map(|explanation| explanation.fit.left)
@@ -103,8 +103,8 @@ impl Scale<'_> {
         closed: &dyn ClosedFit,
         library: &mut Library,
         regression: &mut Regression,
-        fewer: &[Explanation],
-    ) -> (Vec<Explanation>, usize) {
+        fewer: &[CandidateModel],
+    ) -> (Vec<CandidateModel>, usize) {
         let mut tried = Vec::new();
         let bases = || fewer.iter().filter(|base| base.simulated.is_some());
         // Cuts, whose libraries are costly, go without.
@@ -130,7 +130,7 @@ impl Scale<'_> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        found: &mut [Explanation],
+        found: &mut [CandidateModel],
         inflation: f64,
     ) {
         let Some(closed) = &self.closed else { return };
@@ -162,8 +162,8 @@ impl Scale<'_> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        best: Explanation,
-    ) -> Explanation {
+        best: CandidateModel,
+    ) -> CandidateModel {
         let Some(closed) = self.closed.as_ref().filter(|_| best.simulated.is_some()) else {
             return best;
         };
@@ -173,12 +173,12 @@ impl Scale<'_> {
             let reached = self.gain(regression, &kept, inflation);
             let places = 0..kept.choices.len();
             let fewer = places.clone().filter(|_| kept.choices.len() > 1);
-            let mut simpler: Vec<Explanation> =
+            let mut simpler: Vec<CandidateModel> =
                 fewer.map(|position| without(library, &kept, position)).collect();
             simpler.extend(places.flat_map(|position| nested(self.study, library, &kept, position)));
             let needless = simpler.into_iter().find_map(|fewer| {
                 let fewer = closed.fit(library, regression, &fewer, (kept.fit.left, f64::INFINITY))?;
-                let enough = |regression: &Regression, fewer: &Explanation| {
+                let enough = |regression: &Regression, fewer: &CandidateModel| {
                     self.gain(regression, fewer, inflation) > reached - self.least_gain(regression, true)
                 };
                 if enough(regression, &fewer) {

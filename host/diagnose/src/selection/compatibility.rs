@@ -1,7 +1,7 @@
 //! Which causes may act together.
 
 use crate::candidates::cause::Location;
-use crate::fit::candidate_model::{Choice, Explanation};
+use crate::fit::candidate_model::{CandidateModel, Choice};
 use crate::fit::library::Library;
 
 /// What the force of a cause is a function of.
@@ -31,8 +31,8 @@ impl Library {
     }
 
     /// True of explanations by the same causes, wherever these act.
-    pub(crate) fn are_same_causes(&self, one: &Explanation, other: &Explanation) -> bool {
-        let causes = |of: &Explanation| {
+    pub(crate) fn are_same_causes(&self, one: &CandidateModel, other: &CandidateModel) -> bool {
+        let causes = |of: &CandidateModel| {
             let mut causes: Vec<usize> = of
                 .choices
                 .iter()
@@ -45,8 +45,8 @@ impl Library {
     }
 
     /// True of explanations by the same causes at the same places.
-    pub(crate) fn are_at_same_locations(&self, one: &Explanation, other: &Explanation) -> bool {
-        let is_in = |choice: &Choice, of: &Explanation| {
+    pub(crate) fn are_at_same_locations(&self, one: &CandidateModel, other: &CandidateModel) -> bool {
+        let is_in = |choice: &Choice, of: &CandidateModel| {
             let known = &self.candidates[choice.candidate];
             of.choices.iter().any(|other| {
                 let other = &self.candidates[other.candidate];

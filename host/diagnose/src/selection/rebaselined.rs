@@ -8,9 +8,9 @@
 use nalgebra::DMatrix;
 
 use crate::candidates::extension_tables::joined;
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
-use crate::fit::regression::{Fit, Regression, Share};
+use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::study::Study;
 use crate::selection::search::singles;
 use quietcut_model::case::Case;
@@ -23,8 +23,8 @@ pub(crate) fn extended_rebaselined(
     recordings: &[Recording],
     library: &mut Library,
     regression: &mut Regression,
-    base: &Explanation,
-) -> Vec<Explanation> {
+    base: &CandidateModel,
+) -> Vec<CandidateModel> {
     let Some(extensions) = library.extensions(study, base) else {
         return Vec::new();
     };
@@ -39,7 +39,7 @@ pub(crate) fn extended_rebaselined(
     }
     let mut columns = Regression::new(&around);
     let others = Library::new(&around, &mut columns);
-    let mut found: Vec<Explanation> = singles(&others, &around, &columns)
+    let mut found: Vec<CandidateModel> = singles(&others, &around, &columns)
         .into_iter()
         .filter_map(|single| {
             let choice = single.choices[0];
@@ -56,7 +56,7 @@ pub(crate) fn extended_rebaselined(
             let mut choices = base.choices.clone();
             choices.push(choice);
             let coefficients = [&base.fit.coefficients[..], &single.fit.coefficients].concat();
-            let explanation = Explanation {
+            let model = CandidateModel {
                 choices,
                 fit: Fit {
                     covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
@@ -66,15 +66,12 @@ pub(crate) fn extended_rebaselined(
                 parameter_count: base.parameter_count + library.parameter_count(choice),
                 simulated: None,
             };
-            library
-                .parameters(study, &explanation)
-                .is_some()
-                .then_some(explanation)
+            library.parameters(study, &model).is_some().then_some(model)
         })
         .collect();
     regression.complete();
-    let price = (columns.count(Share::Whole).max(2) as f64).ln();
-    let cost = |explanation: &Explanation| explanation.fit.left + explanation.parameter_count as f64 * price;
+    let price = (columns.count(Subset::Whole).max(2) as f64).ln();
+    let cost = |model: &CandidateModel| model.fit.left + model.parameter_count as f64 * price;
     found.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     found
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::regression::Regression;
 use crate::records::study::Study;
@@ -11,7 +11,7 @@ use crate::records::study::Study;
 const PAIRS_KEPT: usize = 24;
 
 /// The best explanation by each single candidate, best first.
-pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<Explanation> {
+pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let found = library
         .choices()
         .par_iter()
@@ -21,7 +21,7 @@ pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regress
 }
 
 /// The best explanation by each pair of candidates, best first.
-pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<Explanation> {
+pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let choices = library.choices();
     let found = choices
         .par_iter()
@@ -42,8 +42,8 @@ pub(crate) fn triples(
     library: &Library,
     study: &Study<'_>,
     regression: &Regression,
-    pairs: &[Explanation],
-) -> Vec<Explanation> {
+    pairs: &[CandidateModel],
+) -> Vec<CandidateModel> {
     let choices = library.choices();
     let found = pairs
         .par_iter()
@@ -64,15 +64,11 @@ pub(crate) fn triples(
     best_of_each(found)
 }
 
-fn best_of_each(mut found: Vec<Explanation>) -> Vec<Explanation> {
+fn best_of_each(mut found: Vec<CandidateModel>) -> Vec<CandidateModel> {
     found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
     let mut seen: Vec<Vec<usize>> = Vec::new();
-    found.retain(|explanation| {
-        let who: Vec<usize> = explanation
-            .choices
-            .iter()
-            .map(|choice| choice.candidate)
-            .collect();
+    found.retain(|model| {
+        let who: Vec<usize> = model.choices.iter().map(|choice| choice.candidate).collect();
         let new = !seen.contains(&who);
         if new {
             seen.push(who);

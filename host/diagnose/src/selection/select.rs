@@ -1,11 +1,11 @@
 //! Which explanation is selected: causes are added while that gains more than it costs.
 
-use crate::fit::candidate_model::Explanation;
+use crate::fit::candidate_model::CandidateModel;
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
 use crate::fit::output_error::OutputError;
 use crate::fit::refine::refine;
-use crate::fit::regression::{Regression, Share};
+use crate::fit::regression::{Regression, Subset};
 use crate::fit::relinearization::Relinearization;
 use crate::progress::Stage;
 use crate::records::record::TRUSTED_IN_CUTS;
@@ -40,8 +40,8 @@ const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 
 /// What was selected: the best explanation, and those that are as good with as many causes.
 pub(crate) struct Selection {
-    pub(crate) best: Option<Explanation>,
-    pub(crate) others: Vec<Explanation>,
+    pub(crate) best: Option<CandidateModel>,
+    pub(crate) others: Vec<CandidateModel>,
     /// By how much the best is ahead of the next that is another.
     pub(crate) ahead: f64,
     /// By how much it is ahead of what fewer causes reach.
@@ -49,7 +49,7 @@ pub(crate) struct Selection {
 }
 
 /// What explanations are weighed by.
-pub(crate) struct Scale<'a> {
+pub(crate) struct SelectionCriteria<'a> {
     pub(crate) study: &'a Study<'a>,
     pub(crate) recordings: &'a [Recording],
     /// Fits in closed loop, where there are such.
@@ -62,7 +62,7 @@ pub(crate) struct Scale<'a> {
     pub(crate) coherent: f64,
 }
 
-impl<'a> Scale<'a> {
+impl<'a> SelectionCriteria<'a> {
     pub(crate) fn new(
         study: &'a Study<'a>,
         recordings: &'a [Recording],
@@ -88,16 +88,16 @@ impl<'a> Scale<'a> {
                 0.0
             },
             inflation: inflation(regression),
-            reference: by_baseline.unwrap_or_else(|| regression.residual(Share::Whole)),
+            reference: by_baseline.unwrap_or_else(|| regression.residual(Subset::Whole)),
         }
     }
 
     /// How much the noise is above what it is taken for, by what `best` leaves of it.
-    pub(crate) fn inflation(&self, regression: &Regression, best: Option<&Explanation>) -> f64 {
+    pub(crate) fn inflation(&self, regression: &Regression, best: Option<&CandidateModel>) -> f64 {
         match best {
             Some(best) if best.simulated.is_some() => {
                 let free = regression
-                    .count(Share::Whole)
+                    .count(Subset::Whole)
                     .saturating_sub(best.parameter_count)
                     .max(1) as f64;
                 (best.fit.left / free).max(0.5)
@@ -108,7 +108,7 @@ impl<'a> Scale<'a> {
 
     /// What a cause must gain to be believed beside what errors of the computation may give it.
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
-        let noise = regression.count(Share::Whole) as f64;
+        let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
             SHARE_BESIDE_ENOUGH
         } else {
@@ -118,17 +118,17 @@ impl<'a> Scale<'a> {
     }
 
     /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
-    pub(crate) fn gain(&self, regression: &Regression, explanation: &Explanation, inflation: f64) -> f64 {
-        let count = regression.count(Share::Whole).max(2) as f64;
+    pub(crate) fn gain(&self, regression: &Regression, model: &CandidateModel, inflation: f64) -> f64 {
+        let count = regression.count(Subset::Whole).max(2) as f64;
         // Like is compared with like.
-        let reference = match explanation.simulated {
+        let reference = match model.simulated {
             Some(_) => self.reference,
-            None => regression.residual(Share::Whole),
+            None => regression.residual(Subset::Whole),
         };
-        (reference - explanation.fit.left) / inflation - explanation.parameter_count as f64 * count.ln()
+        (reference - model.fit.left) / inflation - model.parameter_count as f64 * count.ln()
     }
 
-    pub(crate) fn sort(&self, regression: &Regression, found: &mut [Explanation], inflation: f64) {
+    pub(crate) fn sort(&self, regression: &Regression, found: &mut [CandidateModel], inflation: f64) {
         found.sort_by(|a, b| {
             self.gain(regression, b, inflation)
                 .total_cmp(&self.gain(regression, a, inflation))
@@ -136,19 +136,19 @@ impl<'a> Scale<'a> {
     }
 
     /// What is left beyond the noise, as a share of the noise and as a share of what was there beyond the noise.
-    pub(crate) fn excess(&self, regression: &Regression, best: Option<&Explanation>) -> (f64, f64) {
-        let noise = regression.count(Share::Whole) as f64;
+    pub(crate) fn excess(&self, regression: &Regression, best: Option<&CandidateModel>) -> (f64, f64) {
+        let noise = regression.count(Subset::Whole) as f64;
         let left = best.map_or(self.reference, |best| best.fit.left);
-        let reference = self.reference.max(regression.residual(Share::Whole));
+        let reference = self.reference.max(regression.residual(Subset::Whole));
         let beyond = (left - noise - PLAIN * self.coherent).max(0.0);
         let there = (reference - noise).max(1e-9 * noise);
         (beyond / noise, beyond / there)
     }
 
     /// True where what is left is noise, or so little of what there was that sampling alone may leave it.
-    fn is_enough(&self, regression: &Regression, best: Option<&Explanation>) -> bool {
+    fn is_enough(&self, regression: &Regression, best: Option<&CandidateModel>) -> bool {
         let (of_noise, of_excess) = self.excess(regression, best);
-        let count = regression.count(Share::Whole) as f64;
+        let count = regression.count(Subset::Whole) as f64;
         let simulated = best.is_some_and(|best| best.simulated.is_some());
         let (inflation, sampling) = if simulated {
             (1.0, SAMPLING_SIMULATED)
@@ -164,8 +164,8 @@ impl<'a> Scale<'a> {
         &self,
         library: &mut Library,
         regression: &mut Regression,
-        best: &Explanation,
-        found: &[Explanation],
+        best: &CandidateModel,
+        found: &[CandidateModel],
     ) -> bool {
         let base = if best.simulated.is_some() {
             Some(best)
@@ -180,8 +180,8 @@ impl<'a> Scale<'a> {
             return false;
         };
         let inflation = self.inflation(regression, Some(base));
-        let price = (regression.count(Share::Whole).max(2) as f64).ln();
-        let cost = |of: &Explanation| of.fit.left / inflation + of.parameter_count as f64 * price;
+        let price = (regression.count(Subset::Whole).max(2) as f64).ln();
+        let cost = |of: &CandidateModel| of.fit.left / inflation + of.parameter_count as f64 * price;
         extended(self.study, library, regression, base, &left)
             .first()
             .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
@@ -191,17 +191,17 @@ impl<'a> Scale<'a> {
     fn takes_its_share(
         &self,
         regression: &Regression,
-        fewer: Option<&Explanation>,
-        more: &Explanation,
+        fewer: Option<&CandidateModel>,
+        more: &CandidateModel,
     ) -> bool {
         if fewer.is_some_and(|fewer| more.parameter_count < fewer.parameter_count) {
             return true;
         }
-        let noise = regression.count(Share::Whole) as f64;
+        let noise = regression.count(Subset::Whole) as f64;
         let before = fewer.map_or_else(
             || match more.simulated {
                 Some(_) => self.reference,
-                None => regression.residual(Share::Whole),
+                None => regression.residual(Subset::Whole),
             },
             |fewer| fewer.fit.left,
         );
@@ -213,26 +213,26 @@ impl<'a> Scale<'a> {
         &self,
         library: &Library,
         regression: &Regression,
-        explanation: &Explanation,
+        model: &CandidateModel,
     ) -> f64 {
         self.closed
             .as_ref()
-            .and_then(|closed| closed.left_held_out(library, regression, explanation))
-            .unwrap_or_else(|| library.left_held_out(regression, explanation))
+            .and_then(|closed| closed.left_held_out(library, regression, model))
+            .unwrap_or_else(|| library.left_held_out(regression, model))
     }
 }
 
 /// How much what the whole library leaves, and what interpolation may leave, is above the noise.
 fn inflation(regression: &Regression) -> f64 {
-    let whole = regression.count(Share::Whole) as f64;
+    let whole = regression.count(Subset::Whole) as f64;
     let free = (whole - regression.columns() as f64).max(1.0);
-    let sampling = NUMERICS * (regression.residual(Share::Whole) / whole - 1.0).max(0.0);
+    let sampling = NUMERICS * (regression.residual(Subset::Whole) / whole - 1.0).max(0.0);
     (regression.left_by_all() / free + sampling).max(1.0)
 }
 
 /// Selects by one cause, pairs and triples; more causes only where fewer leave something.
 pub(crate) fn select(
-    scale: &Scale<'_>,
+    criteria: &SelectionCriteria<'_>,
     library: &mut Library,
     regression: &mut Regression,
     watch: &dyn Fn(Stage),
@@ -243,23 +243,23 @@ pub(crate) fn select(
         ahead: f64::INFINITY,
         gained: 0.0,
     };
-    let study = scale.study;
+    let study = criteria.study;
     let mut pairs = Vec::new();
-    let mut fewer: Vec<Explanation> = Vec::new();
+    let mut fewer: Vec<CandidateModel> = Vec::new();
     for (index, most) in SIMULATED.into_iter().enumerate() {
         let size = index + 1;
         // Less than half of what the sensors' noise is at least: nothing is there to be explained.
-        let silent = regression.residual(Share::Whole) < 0.5 * regression.count(Share::Whole) as f64;
+        let silent = regression.residual(Subset::Whole) < 0.5 * regression.count(Subset::Whole) as f64;
         if silent {
             break;
         }
-        let enough = size > 1 && scale.is_enough(regression, selection.best.as_ref());
+        let enough = size > 1 && criteria.is_enough(regression, selection.best.as_ref());
         // Two causes with one parameter each may be what one with many imitates.
         let mut imitated = None;
         if enough {
             let Some(best) = &selection.best else { break };
-            let asked = scale.asks_for_more(library, regression, best, &fewer);
-            imitated = (!asked && size == 2 && best.parameter_count > size && scale.closed.is_some())
+            let asked = criteria.asks_for_more(library, regression, best, &fewer);
+            imitated = (!asked && size == 2 && best.parameter_count > size && criteria.closed.is_some())
                 .then(|| best.clone());
             if !asked && imitated.is_none() {
                 break;
@@ -273,58 +273,58 @@ pub(crate) fn select(
             _ => triples(library, study, regression, &pairs),
         };
         // Simulations of several causes begin at the shapes that were found of each alone.
-        if size == 1 || scale.closed.is_none() {
+        if size == 1 || criteria.closed.is_none() {
             refine(study, library, regression, &mut found);
         }
-        scale.sort(regression, &mut found, scale.inflation);
+        criteria.sort(regression, &mut found, criteria.inflation);
         if size == 2 {
             pairs.clone_from(&found);
         }
         if let Some(imitated) = &imitated {
-            found.retain(|explanation| explanation.parameter_count < imitated.parameter_count);
+            found.retain(|model| model.parameter_count < imitated.parameter_count);
         }
         let extended = if imitated.is_some() { &[] } else { &fewer[..] };
-        let mut found = scale.simulated(library, regression, found, extended, most, imitated.as_ref());
+        let mut found = criteria.simulated(library, regression, found, extended, most, imitated.as_ref());
         // What hardly shows is believed only of a simulation.
-        found.retain(|explanation| !enough || explanation.simulated.is_some());
+        found.retain(|model| !enough || model.simulated.is_some());
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
-        let inflation = scale.inflation(regression, found.first());
-        scale.sort(regression, &mut found, inflation);
+        let inflation = criteria.inflation(regression, found.first());
+        criteria.sort(regression, &mut found, inflation);
         // Where fewer causes are enough already, more of them are not to win by what errors of the computation gain there.
         if !enough {
-            scale.polish(library, regression, &mut found, inflation);
+            criteria.polish(library, regression, &mut found, inflation);
         }
-        let inflation = scale.inflation(regression, found.first());
-        tell(scale, library, regression, &found, inflation);
+        let inflation = criteria.inflation(regression, found.first());
+        tell(criteria, library, regression, &found, inflation);
         let Some(best) = found.first() else { break };
-        let best = simplest(scale, regression, &found, best);
-        let best = &scale.pruned(library, regression, best);
+        let best = simplest(criteria, regression, &found, best);
+        let best = &criteria.pruned(library, regression, best);
         let earlier = std::mem::replace(&mut fewer, found.clone());
-        let gained = scale.gain(regression, best, inflation);
+        let gained = criteria.gain(regression, best, inflation);
         let reached = selection
             .best
             .as_ref()
-            .map_or(0.0, |best| scale.gain(regression, best, inflation));
-        let held_out = scale.left_held_out(library, regression, best);
+            .map_or(0.0, |best| criteria.gain(regression, best, inflation));
+        let held_out = criteria.left_held_out(library, regression, best);
         // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
-        let chance = 4.0 * (2.0 * regression.count(Share::HeldOut) as f64).sqrt();
-        let takes_its_share = scale.takes_its_share(regression, selection.best.as_ref(), best);
+        let chance = 4.0 * (2.0 * regression.count(Subset::HeldOut) as f64).sqrt();
+        let takes_its_share = criteria.takes_its_share(regression, selection.best.as_ref(), best);
         // Where two more take little, a third would mend what the others get wrong.
         if size > 1 && !takes_its_share {
             break;
         }
-        if gained < reached + scale.least_gain(regression, enough)
+        if gained < reached + criteria.least_gain(regression, enough)
             || !takes_its_share
-            || held_out > regression.residual(Share::HeldOut) + chance
+            || held_out > regression.residual(Subset::HeldOut) + chance
         {
             continue;
         }
-        let rivals: Vec<&Explanation> = found
+        let rivals: Vec<&CandidateModel> = found
             .iter()
             .chain(&earlier)
             .filter(|other| is_rival(library, best, other))
             .collect();
-        let behind = |other: &Explanation| gained - scale.gain(regression, other, inflation);
+        let behind = |other: &CandidateModel| gained - criteria.gain(regression, other, inflation);
         selection.gained = gained - reached;
         selection.ahead = rivals
             .iter()
@@ -335,7 +335,7 @@ pub(crate) fn select(
             .filter(|other| behind(other) < APART)
             .map(|other| (*other).clone())
             .collect();
-        let polished = scale.closed.as_ref().filter(|_| enough);
+        let polished = criteria.closed.as_ref().filter(|_| enough);
         let polished = polished.and_then(|closed| closed.polished(library, regression, best));
         selection.best = Some(polished.unwrap_or_else(|| best.clone()));
     }
@@ -344,7 +344,7 @@ pub(crate) fn select(
 
 /// True of an explanation by other causes that has no more parameters than `best`, or by the same causes at other places that has as
 /// many.
-fn is_rival(library: &Library, best: &Explanation, other: &Explanation) -> bool {
+fn is_rival(library: &Library, best: &CandidateModel, other: &CandidateModel) -> bool {
     if names(library, other) != names(library, best) {
         return other.parameter_count <= best.parameter_count;
     }
@@ -352,14 +352,14 @@ fn is_rival(library: &Library, best: &Explanation, other: &Explanation) -> bool 
 }
 
 fn tell(
-    scale: &Scale<'_>,
+    criteria: &SelectionCriteria<'_>,
     library: &Library,
     regression: &Regression,
-    found: &[Explanation],
+    found: &[CandidateModel],
     inflation: f64,
 ) {
-    for explanation in found.iter().take(6) {
-        let names: Vec<String> = explanation
+    for model in found.iter().take(6) {
+        let names: Vec<String> = model
             .choices
             .iter()
             .map(|choice| {
@@ -373,9 +373,9 @@ fn tell(
             })
             .collect();
         tracing::debug!(
-            gain = scale.gain(regression, explanation, inflation),
-            left = explanation.fit.left / regression.count(Share::Whole) as f64,
-            simulated = explanation.simulated.is_some(),
+            gain = criteria.gain(regression, model, inflation),
+            left = model.fit.left / regression.count(Subset::Whole) as f64,
+            simulated = model.simulated.is_some(),
             "{}",
             names.join(" + ")
         );
@@ -385,24 +385,25 @@ fn tell(
 /// `best`, or along the measured motion one with fewer parameters that leaves as little: more parameters may mend what
 /// sampling hides. In closed loop nothing is hidden.
 fn simplest(
-    scale: &Scale<'_>,
+    criteria: &SelectionCriteria<'_>,
     regression: &Regression,
-    found: &[Explanation],
-    best: &Explanation,
-) -> Explanation {
-    let inflation = scale.inflation;
-    let apart = APART.max(NUMERICS * regression.residual(Share::Whole) / inflation);
-    let as_good = |other: &&Explanation| {
+    found: &[CandidateModel],
+    best: &CandidateModel,
+) -> CandidateModel {
+    let inflation = criteria.inflation;
+    let apart = APART.max(NUMERICS * regression.residual(Subset::Whole) / inflation);
+    let as_good = |other: &&CandidateModel| {
         other.simulated.is_none()
             && other.parameter_count < best.parameter_count
-            && scale.excess(regression, Some(other)).1 < SAMPLING
-            && scale.gain(regression, other, inflation) > scale.gain(regression, best, inflation) - apart
+            && criteria.excess(regression, Some(other)).1 < SAMPLING
+            && criteria.gain(regression, other, inflation)
+                > criteria.gain(regression, best, inflation) - apart
     };
     found.iter().find(as_good).unwrap_or(best).clone()
 }
 
-pub(crate) fn names(library: &Library, explanation: &Explanation) -> Vec<&'static str> {
-    let mut names: Vec<&'static str> = explanation
+pub(crate) fn names(library: &Library, model: &CandidateModel) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = model
         .choices
         .iter()
         .flat_map(|choice| library.cause(choice.candidate).names())

@@ -6,9 +6,9 @@
 
 use nalgebra::DMatrix;
 
-use crate::fit::candidate_model::{Choice, Explanation};
+use crate::fit::candidate_model::{CandidateModel, Choice};
 use crate::fit::library::Library;
-use crate::fit::regression::{Fit, Regression, Share};
+use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::study::Study;
 
 /// The best explanations of `base` and one cause more, best first; `left` is what is left of it, by record and channel.
@@ -16,28 +16,26 @@ pub(crate) fn extended(
     study: &Study<'_>,
     library: &mut Library,
     regression: &mut Regression,
-    base: &Explanation,
+    base: &CandidateModel,
     left: &[Vec<Vec<f64>>],
-) -> Vec<Explanation> {
+) -> Vec<CandidateModel> {
     let target = regression.add(left);
     library.add_variants_beside(study, regression, left);
     regression.complete();
     let library = &*library;
-    let mut found: Vec<Explanation> = library
+    let mut found: Vec<CandidateModel> = library
         .choices()
         .into_iter()
         .filter(|choice| library.may_act_together(&base.choices, *choice))
         .filter_map(|choice| with(study, library, regression, base, choice, target))
         .collect();
-    let price = (regression.count(Share::Whole).max(2) as f64).ln();
-    let inflation = (base.fit.left / regression.count(Share::Whole).max(1) as f64).max(1.0);
-    let cost = |explanation: &Explanation| {
-        explanation.fit.left / inflation + explanation.parameter_count as f64 * price
-    };
+    let price = (regression.count(Subset::Whole).max(2) as f64).ln();
+    let inflation = (base.fit.left / regression.count(Subset::Whole).max(1) as f64).max(1.0);
+    let cost = |model: &CandidateModel| model.fit.left / inflation + model.parameter_count as f64 * price;
     found.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     let mut seen: Vec<usize> = Vec::new();
-    found.retain(|explanation| {
-        let candidate = explanation.choices.last().map_or(0, |choice| choice.candidate);
+    found.retain(|model| {
+        let candidate = model.choices.last().map_or(0, |choice| choice.candidate);
         let new = !seen.contains(&candidate);
         seen.push(candidate);
         new
@@ -49,14 +47,14 @@ fn with(
     study: &Study<'_>,
     library: &Library,
     regression: &Regression,
-    base: &Explanation,
+    base: &CandidateModel,
     choice: Choice,
     target: usize,
-) -> Option<Explanation> {
+) -> Option<CandidateModel> {
     let mut columns = library.columns_of(base);
     let own = columns.len();
     columns.extend(library.columns(choice));
-    let (change, taken) = regression.fit_column(Share::Whole, &columns, target)?;
+    let (change, taken) = regression.fit_column(Subset::Whole, &columns, target)?;
     let mut choices = base.choices.clone();
     choices.push(choice);
     let of = |share: f64| {
@@ -68,7 +66,7 @@ fn with(
                 _ => *change,
             })
             .collect();
-        let explanation = Explanation {
+        let model = CandidateModel {
             choices: choices.clone(),
             fit: Fit {
                 covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
@@ -78,29 +76,26 @@ fn with(
             parameter_count: base.parameter_count + library.parameter_count(choice),
             simulated: None,
         };
-        library
-            .parameters(study, &explanation)
-            .is_some()
-            .then_some(explanation)
+        library.parameters(study, &model).is_some().then_some(model)
     };
     of(1.0).or_else(|| of(0.0))
 }
 
 /// The explanation without one of its causes.
-pub(crate) fn without(library: &Library, explanation: &Explanation, position: usize) -> Explanation {
+pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize) -> CandidateModel {
     let mut coefficients = Vec::new();
-    for other in (0..explanation.choices.len()).filter(|other| *other != position) {
-        coefficients.extend(library.coefficients(explanation, other));
+    for other in (0..model.choices.len()).filter(|other| *other != position) {
+        coefficients.extend(library.coefficients(model, other));
     }
-    let mut choices = explanation.choices.clone();
+    let mut choices = model.choices.clone();
     let gone = choices.remove(position);
-    Explanation {
-        parameter_count: explanation.parameter_count - library.parameter_count(gone),
+    CandidateModel {
+        parameter_count: model.parameter_count - library.parameter_count(gone),
         choices,
         fit: Fit {
             covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
             coefficients,
-            left: explanation.fit.left,
+            left: model.fit.left,
         },
         simulated: None,
     }
@@ -111,16 +106,16 @@ pub(crate) fn without(library: &Library, explanation: &Explanation, position: us
 pub(crate) fn nested(
     study: &Study<'_>,
     library: &Library,
-    explanation: &Explanation,
+    model: &CandidateModel,
     position: usize,
-) -> Vec<Explanation> {
-    let Some(parameters) = library.parameters(study, explanation) else {
+) -> Vec<CandidateModel> {
+    let Some(parameters) = library.parameters(study, model) else {
         return Vec::new();
     };
-    let whole = explanation.choices[position];
+    let whole = model.choices[position];
     let values = &parameters[position];
     let acts_at = &library.candidates[whole.candidate].location;
-    let before = explanation.choices[..position].iter();
+    let before = model.choices[..position].iter();
     let from: usize = before.map(|choice| library.columns(*choice).len()).sum();
     let to = from + library.columns(whole).len();
     let simpler = |choice: Choice| {
@@ -143,11 +138,11 @@ pub(crate) fn nested(
         if said.is_empty() || !said.iter().all(|parameter| values.contains(parameter)) {
             return None;
         }
-        let mut coefficients = explanation.fit.coefficients.clone();
+        let mut coefficients = model.fit.coefficients.clone();
         coefficients.splice(from..to, own);
-        let mut choices = explanation.choices.clone();
+        let mut choices = model.choices.clone();
         choices[position] = choice;
-        Some(Explanation {
+        Some(CandidateModel {
             parameter_count: choices
                 .iter()
                 .map(|choice| library.parameter_count(*choice))
@@ -156,7 +151,7 @@ pub(crate) fn nested(
             fit: Fit {
                 covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
                 coefficients,
-                left: explanation.fit.left,
+                left: model.fit.left,
             },
             simulated: None,
         })
@@ -165,16 +160,12 @@ pub(crate) fn nested(
 }
 
 /// Those of `found` that no earlier one is the same as.
-pub(crate) fn distinct(found: Vec<Explanation>) -> Vec<Explanation> {
+pub(crate) fn distinct(found: Vec<CandidateModel>) -> Vec<CandidateModel> {
     let mut seen: Vec<Vec<usize>> = Vec::new();
     found
         .into_iter()
-        .filter(|explanation| {
-            let mut who: Vec<usize> = explanation
-                .choices
-                .iter()
-                .map(|choice| choice.candidate)
-                .collect();
+        .filter(|model| {
+            let mut who: Vec<usize> = model.choices.iter().map(|choice| choice.candidate).collect();
             who.sort_unstable();
             let new = !seen.contains(&who);
             if new {

@@ -204,11 +204,11 @@ fn smooth_even(least: usize) -> usize {
 }
 
 /// The real transform of a stretch of a signal alone, without padding: for regression.
-pub(crate) struct Stretch {
+pub(crate) struct SegmentTransform {
     plan: Arc<dyn RealToComplex<f64>>,
 }
 
-impl Stretch {
+impl SegmentTransform {
     pub(crate) fn new(length: usize) -> Self {
         Self {
             plan: RealFftPlanner::new().plan_fft_forward(length),
@@ -216,7 +216,7 @@ impl Stretch {
     }
 
     /// Real and imaginary parts of bins 0 … `bins` − 1, so scaled that white noise of deviation 1 has deviation 1 in each.
-    pub(crate) fn parts(&self, samples: &[f64], bins: usize, into: &mut Vec<f64>) {
+    pub(crate) fn bins(&self, samples: &[f64], bins: usize, into: &mut Vec<f64>) {
         let length = samples.len();
         let mut buffer = samples.to_vec();
         let spectrum = transform(&*self.plan, &mut buffer);
@@ -295,7 +295,7 @@ mod tests {
     fn parts_of_a_stretch_keep_its_energy() {
         let samples: Vec<f64> = (0..30).map(|n| ((n * n) as f64).sin()).collect();
         let mut parts = Vec::new();
-        Stretch::new(30).parts(&samples, 16, &mut parts);
+        SegmentTransform::new(30).bins(&samples, 16, &mut parts);
         let energy = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
         assert_eq!(parts.len(), 30);
         assert!((energy(&parts) - energy(&samples)).abs() < 1e-12 * energy(&samples));

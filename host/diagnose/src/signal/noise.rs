@@ -3,7 +3,7 @@
 //! Sensor noise is taken to be white over the band of the record. Whatever else is in a residual stands above that floor
 //! somewhere and leaves it bare elsewhere.
 
-use crate::signal::grid::Stretch;
+use crate::signal::grid::SegmentTransform;
 
 /// Bands into which a spectrum is cut.
 pub(crate) const BANDS: usize = 32;
@@ -116,7 +116,7 @@ fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
         .collect();
     let mut parts = Vec::with_capacity(count);
     let bins = count / 2;
-    Stretch::new(count).parts(&windowed, bins, &mut parts);
+    SegmentTransform::new(count).bins(&windowed, bins, &mut parts);
     let scale = count as f64 / power;
     (0..BANDS)
         .map(|band| {

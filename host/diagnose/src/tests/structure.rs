@@ -541,7 +541,7 @@ fn of_long_records_the_beginnings_are_searched_and_all_is_checked() {
 fn what_only_the_whole_of_long_records_shows_is_not_overlooked() {
     let recordings = long_records(&["drift.relative_rate_per_s=0.0007"]);
     let beginning =
-        crate::conclusion::long_records::diagnosed(&believed(), &recordings, &Options::default(), &|_| ());
+        crate::conclusion::long_records::concluded(&believed(), &recordings, &Options::default(), &|_| ());
     assert!(
         beginning.is_none_or(|answer| answer.outcome != Outcome::None),
         "nothing is said to be wrong"

@@ -1,0 +1,144 @@
+//! The prediction-error fit of candidate models that are simulated.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::fit::candidate_model::{CandidateModel, Simulated};
+use crate::fit::closed_fit::ClosedFit;
+use crate::fit::library::Library;
+use crate::fit::output_error::OutputError;
+use crate::fit::regression::{Fit, Regression, Subset};
+use crate::fit::search::ROUNDS;
+use crate::fit::unknowns::{FreeParameter, SearchResult, by_choice, energy};
+
+/// How many times what the regression leaves a guess may leave before it is too far away.
+const FAR: f64 = 2.0;
+/// How many times the least that the regression leaves an explanation may leave to have its start sought in steps.
+const FAR_BEHIND: f64 = 4.0;
+
+impl OutputError<'_> {
+    fn accept(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        model: &CandidateModel,
+        found: SearchResult,
+        covariance: Vec<DMatrix<f64>>,
+    ) -> Option<CandidateModel> {
+        let mut next = model.clone();
+        let mut coefficients = Vec::new();
+        for (position, inner) in found.point.inner.iter().enumerate() {
+            let choice = next.choices[position];
+            let count = library.candidates[choice.candidate].variants[choice.variant]
+                .1
+                .len();
+            coefficients.extend_from_slice(&inner[..count]);
+            let nonlinear_parameters = library
+                .cause(choice.candidate)
+                .settled(&inner[count..], &inner[..count])
+                .unwrap_or_else(|| inner[count..].to_vec());
+            next.choices[position] =
+                library.add_variant(self.study, regression, choice.candidate, nonlinear_parameters)?;
+        }
+        next.fit.coefficients = coefficients;
+        next.fit.left = found.left;
+        next.simulated = Some(Simulated {
+            covariance,
+            starts: found.point.starts,
+            reading: None,
+        });
+        Some(next)
+    }
+}
+
+impl ClosedFit for OutputError<'_> {
+    fn fit(
+        &self,
+        library: &mut Library,
+        regression: &mut Regression,
+        model: &CandidateModel,
+        (rival, best_left): (f64, f64),
+    ) -> Option<CandidateModel> {
+        let whole = self.of_subset(Subset::Whole);
+        let (mut problem, start) = self.problem(library, model)?;
+        let guess = self
+            .residuals(&problem, &whole, &start)
+            .map_or(f64::INFINITY, |left| energy(&left));
+        let mut start = start;
+        let by_regression = model.fit.left + regression.count(Subset::Whole) as f64;
+        if guess > FAR * by_regression
+            && model.fit.left < FAR_BEHIND * best_left.max(regression.count(Subset::Whole) as f64)
+        {
+            start = self.near_to_far(&mut problem, start);
+        }
+        let found = self.search(&mut problem, &whole, start.clone(), ROUNDS, rival)?;
+        let count = regression.count(Subset::Whole);
+        let found = self.looked_at_again(&mut problem, &whole, &start, found, (rival, count));
+        let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
+        let covariance = by_choice(&slots, &found);
+        self.accept(library, regression, model, found, covariance)
+    }
+
+    fn spread_by_force_noise(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
+        self.spread(library, model)
+    }
+
+    fn left_by_baseline(&self, library: &Library, _: &Regression) -> Option<f64> {
+        let nothing = CandidateModel {
+            choices: Vec::new(),
+            fit: Fit {
+                coefficients: Vec::new(),
+                covariance: DMatrix::zeros(0, 0),
+                left: 0.0,
+            },
+            parameter_count: 0,
+            simulated: None,
+        };
+        let (mut problem, point) = self.problem(library, &nothing)?;
+        let whole = self.of_subset(Subset::Whole);
+        let found = self.search(&mut problem, &whole, point, 6, f64::INFINITY)?;
+        Some(found.left)
+    }
+
+    fn left_of(&self, library: &Library, model: &CandidateModel) -> Option<Vec<Vec<Vec<f64>>>> {
+        let simulated = model.simulated.as_ref()?;
+        let (problem, point) = self.problem(library, model)?;
+        let effects = problem.effects(self.study, &point)?;
+        self.study
+            .records
+            .par_iter()
+            .enumerate()
+            .map(|(index, record)| {
+                let count = record.grid.count();
+                let start = &simulated.starts[index];
+                let samples = self.closed.simulate(self.study, index, &effects, start, count)?;
+                let left = record.channels.iter().zip(samples).map(|(channel, samples)| {
+                    channel
+                        .measured
+                        .iter()
+                        .zip(samples)
+                        .map(|(measured, simulated)| measured - simulated)
+                        .collect()
+                });
+                Some(left.collect())
+            })
+            .collect()
+    }
+
+    fn left_held_out(&self, library: &Library, _: &Regression, model: &CandidateModel) -> Option<f64> {
+        let simulated = model.simulated.as_ref()?;
+        let (mut problem, mut point) = self.problem(library, model)?;
+        point.starts.clone_from(&simulated.starts);
+        let fitted = self.of_subset(Subset::Fitted);
+        // States of records that are held out stay where they are: the fitted parts do not feel them.
+        let found = self.search(&mut problem, &fitted, point, 4, f64::INFINITY)?;
+        let held_out = self.of_subset(Subset::HeldOut);
+        let only_here = |slot: &FreeParameter| match slot {
+            FreeParameter::Start { record, .. } => !fitted.iter().any(|segment| segment.record == *record),
+            FreeParameter::Inner { .. } => false,
+        };
+        problem.slots.retain(|(slot, _)| only_here(slot));
+        let found = self.search(&mut problem, &held_out, found.point, 4, f64::INFINITY)?;
+        Some(found.left)
+    }
+}

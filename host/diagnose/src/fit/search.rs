@@ -1,0 +1,83 @@
+//! The search of Levenberg and Marquardt for the parameters of a simulated candidate model.
+
+use nalgebra::DMatrix;
+
+use crate::fit::output_error::OutputError;
+use crate::fit::segment::Segment;
+use crate::fit::unknowns::{FitProblem, ParameterPoint, SearchResult, at_bounds, energy, predicted, stepped};
+
+/// Steps of the search at most.
+pub(crate) const ROUNDS: usize = 15;
+/// A step that gains less than this of χ² is the last.
+pub(crate) const SETTLED: f64 = 0.1;
+
+/// χ² by which an explanation may stay behind another before it is given up.
+const HOPELESS: f64 = 300.0;
+
+impl OutputError<'_> {
+    /// Levenberg and Marquardt's search from `start`; `None` where the start cannot be simulated. It ends early where it stays
+    /// behind `rival`, a χ² that another explanation has reached.
+    pub(crate) fn search(
+        &self,
+        problem: &mut FitProblem<'_>,
+        segments: &[&Segment],
+        start: ParameterPoint,
+        rounds: usize,
+        rival: f64,
+    ) -> Option<SearchResult> {
+        let mut point = start;
+        let mut residuals = self.residuals(problem, segments, &point)?;
+        let mut left = energy(&residuals);
+        let mut normal = DMatrix::zeros(0, 0);
+        if problem.slots.is_empty() {
+            return Some(SearchResult { point, left, normal });
+        }
+        let mut trust = 1e-4;
+        for round in 0..rounds {
+            let columns = self.columns(problem, segments, &point, &residuals)?;
+            let mut gradient;
+            (normal, gradient) = self.normal(problem, &columns, &point, &residuals);
+            at_bounds(problem, &point, &mut normal, &mut gradient);
+            let before = left;
+            // To first order most of it is of another shape.
+            let promised = left - predicted(&normal, &gradient);
+            if round >= 1 && promised - rival > HOPELESS && promised > 0.5 * left {
+                break;
+            }
+            let mut accepted = false;
+            for _ in 0..6 {
+                if let Some(next) = stepped(problem, &point, &normal, &gradient, trust)
+                    && let Some(after) = self.residuals(problem, segments, &next)
+                    && energy(&after) < left
+                {
+                    (point, left, residuals) = (next, energy(&after), after);
+                    trust = (0.1 * trust).max(1e-9);
+                    accepted = true;
+                    break;
+                }
+                trust = 10.0 * trust.max(1e-4);
+            }
+            let behind = |left: f64| left - rival - HOPELESS;
+            let hopeless = round >= 1 && behind(left) > 0.0 && behind(left) > 0.6 * behind(before);
+            if !accepted || before - left < SETTLED || hopeless {
+                break;
+            }
+        }
+        Some(SearchResult { point, left, normal })
+    }
+
+    /// Where searches end in a growing part of every record, from `point` on.
+    pub(crate) fn near_to_far(
+        &self,
+        problem: &mut FitProblem<'_>,
+        mut point: ParameterPoint,
+    ) -> ParameterPoint {
+        for segments in &self.horizons {
+            let segments: Vec<&Segment> = segments.iter().collect();
+            if let Some(found) = self.search(problem, &segments, point.clone(), 6, f64::INFINITY) {
+                point = found.point;
+            }
+        }
+        point
+    }
+}
