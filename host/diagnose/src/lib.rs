@@ -22,6 +22,7 @@
 mod baseline;
 mod candidates;
 mod conclusion;
+mod criteria;
 mod error;
 mod fit;
 mod motion;

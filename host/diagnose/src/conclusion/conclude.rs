@@ -3,6 +3,11 @@
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
 use crate::conclusion::parameter_estimates::{by_common_factor, parameter_estimates};
 use crate::conclusion::residual_views::residual_views;
+use crate::criteria::{
+    CHANCE_OF_DOUBT, CONFIDENCE_LOSS, CONFIDENCE_WIDTH, DOUBT, DOUBTFUL_RESIDUAL, EQUIVALENT,
+    HIGHEST_CONFIDENCE, NOISE_TOLERANCE, UNEXPLAINED_OF_FORCE, UNEXPLAINED_OF_RESPONSE,
+    UNEXPLAINED_PER_FURTHER_CAUSE, UNLIKE_SEGMENTS,
+};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
@@ -10,24 +15,8 @@ use crate::progress::{Options, Stage};
 use crate::records::checks;
 use crate::records::domain::Domain;
 use crate::records::study::Study;
-use crate::selection::select::{APART, Selection, SelectionCriteria, WITHIN_NOISE, names, select};
+use crate::selection::select::{Selection, SelectionCriteria, names, select};
 use quietcut_recording::Recording;
-
-/// Share of the residual's energy that may be left beyond noise and sampling before nothing is called explained: of responses,
-/// where the noise is known by its floor, and of forces, where derivatives of the motion bring noise that is not white.
-pub(crate) const LEFT_OF_RESPONSE: f64 = 0.012;
-const LEFT_OF_FORCE: f64 = 0.15;
-/// By what that becomes less for each further cause of an explanation that is simulated: with two or three terms much can be
-/// imitated, but not all of it.
-const FEWER_LEFT: f64 = 0.05;
-
-/// A simulated explanation that leaves more than this share of the noise beyond chance is not all of the truth, and the
-/// confidence in it becomes this share of what it would be.
-const REJECTED: f64 = 0.03;
-const DOUBT: f64 = 0.8;
-
-/// What is held out is not like the whole records where they miss so many times as much.
-const UNLIKE: f64 = 3.0;
 
 pub(crate) fn conclude(
     study: &Study<'_>,
@@ -82,7 +71,7 @@ fn answer(
         acting: 0,
         views: residual_views(study, library, selection.best.as_ref()),
     };
-    if missed.nrmse_whole > UNLIKE * missed.nrmse_heldout {
+    if missed.nrmse_whole > UNLIKE_SEGMENTS * missed.nrmse_heldout {
         diagnosis.warnings.push(format!(
             "the parts of the records that are held out miss {:.2} %, the whole records {:.2} %: most of what is wrong lies in what is fitted, and held-out parts tell little of the gain",
             100.0 * missed.nrmse_heldout,
@@ -91,21 +80,21 @@ fn answer(
     }
     let (of_noise, of_excess) = criteria.excess(regression, selection.best.as_ref());
     let allowed = match &selection.best {
-        _ if study.all_in(Domain::Force) => LEFT_OF_FORCE,
+        _ if study.all_in(Domain::Force) => UNEXPLAINED_OF_FORCE,
         Some(best) if best.simulated.is_some() => {
-            LEFT_OF_RESPONSE * FEWER_LEFT.powi(best.choices.len() as i32 - 1)
+            UNEXPLAINED_OF_RESPONSE * UNEXPLAINED_PER_FURTHER_CAUSE.powi(best.choices.len() as i32 - 1)
         }
-        _ => LEFT_OF_RESPONSE,
+        _ => UNEXPLAINED_OF_RESPONSE,
     };
-    if of_noise > WITHIN_NOISE {
+    if of_noise > NOISE_TOLERANCE {
         diagnosis.unexplained.fraction = of_excess;
     }
     let Some(best) = selection
         .best
         .as_ref()
-        .filter(|_| of_noise <= WITHIN_NOISE || of_excess <= allowed)
+        .filter(|_| of_noise <= NOISE_TOLERANCE || of_excess <= allowed)
     else {
-        if of_noise > WITHIN_NOISE {
+        if of_noise > NOISE_TOLERANCE {
             // What was tried and is not believed takes nothing off.
             diagnosis.views = residual_views(study, library, None);
             diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
@@ -114,12 +103,13 @@ fn answer(
         }
         return diagnosis;
     };
-    if of_noise > WITHIN_NOISE {
+    if of_noise > NOISE_TOLERANCE {
         diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
     }
     let left_held_out = criteria.left_held_out(library, regression, best);
     diagnosis.outcome = Outcome::Cause;
-    let chance = 5.0 * (2.0 / regression.count(Subset::Whole).max(1) as f64).sqrt() + REJECTED;
+    let chance =
+        CHANCE_OF_DOUBT * (2.0 / regression.count(Subset::Whole).max(1) as f64).sqrt() + DOUBTFUL_RESIDUAL;
     let doubt = if best.simulated.is_some() && of_noise > chance {
         DOUBT
     } else {
@@ -202,7 +192,7 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
 
 /// From the distance to the next explanation, and from what is left as a share of what is allowed.
 fn confidence(ahead: f64, left: f64) -> f64 {
-    let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * APART) / 6.0).exp());
-    let by_rest = 1.0 - 0.5 * left.clamp(0.0, 1.0).powi(2);
-    (by_rivals * by_rest).min(0.995)
+    let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * EQUIVALENT) / CONFIDENCE_WIDTH).exp());
+    let by_rest = 1.0 - CONFIDENCE_LOSS * left.clamp(0.0, 1.0).powi(2);
+    (by_rivals * by_rest).min(HIGHEST_CONFIDENCE)
 }

@@ -10,6 +10,7 @@ use std::fmt::Write;
 
 use crate::baseline::direction_of;
 use crate::candidates::cause::Regressor;
+use crate::criteria::LEAST_GUESS;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 use quietcut_simulate::Effects;
@@ -17,9 +18,6 @@ use quietcut_simulate::path::{Motion, restoring_along};
 
 /// The most terms of a formula.
 const MOST: usize = 4;
-
-/// Share of the held-out residual that a formula must take to be said.
-const WORTH: f64 = 0.1;
 
 /// Powers of x and v, as products.
 const POWERS: [(i32, i32); 16] = [
@@ -96,7 +94,7 @@ pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<St
     let coefficients = regression.fit(Subset::Fitted, &columns)?.coefficients;
     let left = regression.left(Subset::HeldOut, &columns, coefficients.as_slice());
     let taken = 1.0 - left / regression.residual(Subset::HeldOut).max(f64::MIN_POSITIVE);
-    if chosen.is_empty() || taken < WORTH {
+    if chosen.is_empty() || taken < LEAST_GUESS {
         return None;
     }
     let mut formula = String::new();

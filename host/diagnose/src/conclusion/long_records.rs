@@ -7,11 +7,10 @@
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
 use crate::conclusion::conclude;
-use crate::conclusion::conclude::LEFT_OF_RESPONSE;
+use crate::criteria::{NOISE_TOLERANCE, UNEXPLAINED_OF_RESPONSE, WORTH_SHORTENING};
 use crate::fit::regression::{Regression, Subset};
 use crate::progress::{Options, Stage};
 use crate::records::study::Study;
-use crate::selection::select::WITHIN_NOISE;
 use quietcut_model::case::Case;
 use quietcut_recording::{Kind, Recording};
 
@@ -21,8 +20,6 @@ const SEARCHED: usize = 32_768;
 const PERIODS: f64 = 60.0;
 /// Turns of the spindle that the beginning of a cut must hold.
 const TURNS: f64 = 24.0;
-/// Records are shortened where that leaves less than this share of them.
-const WORTH: f64 = 0.5;
 
 /// The beginnings of records, all of them of random forces, of blows or of cuts at one speed, and what comes after them; `None` where they are
 /// too short to be shortened.
@@ -44,7 +41,7 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
         })
         .collect::<Option<_>>()?;
     let left: usize = shortened.iter().map(Recording::len).sum();
-    ((left as f64) < WORTH * all as f64).then_some([shortened, rest])
+    ((left as f64) < WORTH_SHORTENING * all as f64).then_some([shortened, rest])
 }
 
 /// How long the turns take that the beginning of a record must hold: none of a shaker or a hammer; `None` of what is not shortened.
@@ -84,8 +81,8 @@ pub(crate) fn concluded(
     };
     let explained = Residual::of(&extended, &rest)?;
     let beyond = explained.energy - explained.count;
-    if beyond > WITHIN_NOISE * explained.count
-        && beyond > LEFT_OF_RESPONSE * (believed.energy - believed.count)
+    if beyond > NOISE_TOLERANCE * explained.count
+        && beyond > UNEXPLAINED_OF_RESPONSE * (believed.energy - believed.count)
     {
         return None;
     }

@@ -6,6 +6,7 @@
 use num_complex::Complex64;
 
 use crate::baseline::Baseline;
+use crate::criteria::{LEAST_AMPLITUDE, MISSING_FORCE_OVER_NOISE};
 use crate::records::channel::Observed;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
@@ -13,9 +14,6 @@ use quietcut_recording::Quantity;
 
 /// Bins over which the power of a residual is averaged.
 const SMOOTHED: usize = 9;
-
-/// How many times its noise the power of a residual must be to tell of a force.
-const ABOVE: f64 = 3.0;
 
 /// Periods of the slowest mode in a stretch that has one amplitude.
 const PERIODS: f64 = 2.0;
@@ -103,7 +101,7 @@ impl MissingForce {
             .collect();
         let loudest = all.iter().map(|at| at.amplitude_m).fold(0.0, f64::max);
         all.into_iter()
-            .filter(|at| at.amplitude_m > 0.02 * loudest)
+            .filter(|at| at.amplitude_m > LEAST_AMPLITUDE * loudest)
             .collect()
     }
 }
@@ -120,7 +118,7 @@ fn response_over(record: &Record, channel: &Observed, axis: usize, residual: &[f
             let omega = grid.omega(bin);
             let near = &power[bin.saturating_sub(SMOOTHED / 2)..(bin + SMOOTHED / 2 + 1).min(power.len())];
             let mean = near.iter().sum::<f64>() / near.len() as f64;
-            let weight = 1.0 - ABOVE * noise / mean.max(f64::MIN_POSITIVE);
+            let weight = 1.0 - MISSING_FORCE_OVER_NOISE * noise / mean.max(f64::MIN_POSITIVE);
             let response = transfer[bin][(axis, axis)] * channel.factor(omega) * channel.pickup.weights[axis];
             let within = bin > 0 && omega <= std::f64::consts::TAU * record.band_hz;
             if within && weight > 0.0 && response.norm() > 0.0 {

@@ -5,12 +5,12 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use crate::baseline::direction_of;
 use crate::candidates::cause::{Location, Part};
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
+use crate::criteria::{COMMON_FACTOR_CONFIDENCE, EQUIVALENT};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::covariance::covariance;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
-use crate::selection::select::APART;
 
 /// The causes of an explanation.
 pub(crate) fn parameter_estimates(
@@ -112,7 +112,7 @@ pub(crate) fn by_common_factor(
         let Some((left, change)) = library.common_factor(regression, &location) else {
             continue;
         };
-        if (left - along) / inflation > APART {
+        if (left - along) / inflation > EQUIVALENT {
             continue;
         }
         // The factor is as sure as the gain.
@@ -135,7 +135,7 @@ pub(crate) fn by_common_factor(
                 let extension = cause.extension(&known.location, &parameters);
                 Some(EstimatedCause {
                     parameters: [(key, figure(value, scale * deviation))].into(),
-                    ..empty(cause.name(), &known.location, 0.25, extension)
+                    ..empty(cause.name(), &known.location, COMMON_FACTOR_CONFIDENCE, extension)
                 })
             })
             .collect();

@@ -1,15 +1,12 @@
 //! The cuts among recordings as cuts that were tried: what came of each is what the signal chain of the device hears in it.
 
+use crate::criteria::{SAME_FEED, SAME_IMMERSION_DEG};
 use quietcut_core::detector::Verdict;
 use quietcut_core::monitor::{Monitor, State};
 
 use quietcut_model::case::Case;
 use quietcut_recording::{Kind, RecordedCut, Recording, Sensed, Speed};
 use quietcut_stability::trial_cuts::{Outcome, TestCut};
-
-/// Immersion angles and feeds that are no further apart are those of the same chart.
-const SAME_DEG: f64 = 0.5;
-const SAME_FEED: f64 = 1e-3;
 
 /// The recorded cuts that are on the chart of a case: with its immersion and feed, at one speed and one depth, both said.
 pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TestCut> {
@@ -33,8 +30,8 @@ fn is_on_chart(case: &Case, said: &RecordedCut) -> bool {
         said.is_none_or(|said| (said - believed).abs() <= apart)
     };
     said.last_rpm.is_none()
-        && near(said.start_deg, believed.start_deg, SAME_DEG)
-        && near(said.exit_deg, believed.exit_deg, SAME_DEG)
+        && near(said.start_deg, believed.start_deg, SAME_IMMERSION_DEG)
+        && near(said.exit_deg, believed.exit_deg, SAME_IMMERSION_DEG)
         && near(
             said.feed_per_tooth_mm,
             believed.feed_per_tooth_mm,

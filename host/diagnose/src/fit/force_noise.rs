@@ -18,6 +18,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::candidates::closed_loop::ClosedLoop;
+use crate::criteria::LEAST_FORCE_NOISE_VARIANCE;
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::output_error::{OutputError, projected};
@@ -30,7 +31,6 @@ const DRAWS: [usize; 2] = [4, 16];
 const SIMULATED: usize = 400_000;
 /// Half of the draws, and four at least, tell whether there is anything to it, which is this share of what is known already.
 const FIRST: usize = 4;
-const WORTH: f64 = 0.05;
 /// A stream of random numbers of its own: a record of a simulation may have noise of the same seed.
 const STREAM: u64 = 0x666f_7263_6573;
 
@@ -95,7 +95,7 @@ impl OutputError<'_> {
             let inner = problem.slots.iter().enumerate();
             inner
                 .filter(|(_, (slot, _))| matches!(slot, FreeParameter::Inner { .. }))
-                .any(|(slot, _)| more[slot] > WORTH * covariance[(slot, slot)])
+                .any(|(slot, _)| more[slot] > LEAST_FORCE_NOISE_VARIANCE * covariance[(slot, slot)])
         };
         if !is_worth(&mean(&drawn)?) {
             return None;

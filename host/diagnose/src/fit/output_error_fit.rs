@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use crate::criteria::{FAR_BEHIND, FAR_START};
 use crate::fit::candidate_model::{CandidateModel, Simulated};
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
@@ -10,11 +11,6 @@ use crate::fit::output_error::OutputError;
 use crate::fit::regression::{Fit, Regression, Subset};
 use crate::fit::search::ROUNDS;
 use crate::fit::unknowns::{FreeParameter, SearchResult, by_choice, energy};
-
-/// How many times what the regression leaves a guess may leave before it is too far away.
-const FAR: f64 = 2.0;
-/// How many times the least that the regression leaves an explanation may leave to have its start sought in steps.
-const FAR_BEHIND: f64 = 4.0;
 
 impl OutputError<'_> {
     fn accept(
@@ -66,7 +62,7 @@ impl ClosedFit for OutputError<'_> {
             .map_or(f64::INFINITY, |left| energy(&left));
         let mut start = start;
         let by_regression = model.fit.left + regression.count(Subset::Whole) as f64;
-        if guess > FAR * by_regression
+        if guess > FAR_START * by_regression
             && model.fit.left < FAR_BEHIND * best_left.max(regression.count(Subset::Whole) as f64)
         {
             start = self.near_to_far(&mut problem, start);

@@ -1,5 +1,6 @@
 //! Shapes between those of the grid.
 
+use crate::criteria::{LEAST_REFINEMENT, WORTH_REFINING};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
@@ -20,7 +21,7 @@ pub(crate) fn refine(
     };
     let whole = regression.residual(Subset::Whole);
     let worth: Vec<usize> = (0..found.len())
-        .filter(|index| whole - found[*index].fit.left > 0.5 * (whole - best))
+        .filter(|index| whole - found[*index].fit.left > WORTH_REFINING * (whole - best))
         .take(REFINED)
         .collect();
     for index in worth {
@@ -191,7 +192,7 @@ fn along_slopes(
         })
         .collect();
     with_nonlinear_parameters(study, library, regression, model, position, moved)
-        .filter(|tried| tried.fit.left < model.fit.left - 0.01)
+        .filter(|tried| tried.fit.left < model.fit.left - LEAST_REFINEMENT)
 }
 
 fn with_nonlinear_parameters(

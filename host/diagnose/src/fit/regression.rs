@@ -6,10 +6,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::criteria::RELATIVE_ERROR_OF_CUTS;
 use crate::fit::normal_equations::{Products, products};
 pub(crate) use crate::fit::segment::Subset;
 use crate::fit::segment::{Nuisance, Segment, split};
-use crate::records::record::TRUSTED_IN_CUTS;
 use crate::records::study::Study;
 use crate::signal::dot::dot;
 
@@ -75,7 +75,7 @@ impl Regression {
             products: std::array::from_fn(|_| Products::default()),
             complete: 0,
             ridge: if study.records.iter().any(|record| record.cut.is_some()) {
-                TRUSTED_IN_CUTS * TRUSTED_IN_CUTS
+                RELATIVE_ERROR_OF_CUTS * RELATIVE_ERROR_OF_CUTS
             } else {
                 ROUNDING
             },

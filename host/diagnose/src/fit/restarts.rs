@@ -1,12 +1,11 @@
 //! Searches that begin again: from beside where one ended, and from other sizes.
 
+use crate::criteria::{SEARCH_SETTLED, STUCK};
 use crate::fit::output_error::{LEAST_STEP, OutputError};
-use crate::fit::search::{ROUNDS, SETTLED};
+use crate::fit::search::ROUNDS;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResult, energy};
 
-/// χ² per number from which on a search is looked at again.
-const STUCK: f64 = 1.1;
 /// How far from where a search with friction ended it is looked at again, as shares.
 const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
 /// Sizes from which a search begins again, as shares of those from which it began.
@@ -57,7 +56,7 @@ impl OutputError<'_> {
                 if let Some(left) = self
                     .residuals(problem, segments, &moved)
                     .map(|left| energy(&left))
-                    && left < least - SETTLED
+                    && left < least - SEARCH_SETTLED
                 {
                     best = Some((left, moved));
                 }

@@ -2,17 +2,13 @@
 
 use nalgebra::DMatrix;
 
+use crate::criteria::{HOPELESS_LAG, SEARCH_SETTLED};
 use crate::fit::output_error::OutputError;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, ParameterPoint, SearchResult, at_bounds, energy, predicted, stepped};
 
 /// Steps of the search at most.
 pub(crate) const ROUNDS: usize = 15;
-/// A step that gains less than this of χ² is the last.
-pub(crate) const SETTLED: f64 = 0.1;
-
-/// χ² by which an explanation may stay behind another before it is given up.
-const HOPELESS: f64 = 300.0;
 
 impl OutputError<'_> {
     /// Levenberg and Marquardt's search from `start`; `None` where the start cannot be simulated. It ends early where it stays
@@ -41,7 +37,7 @@ impl OutputError<'_> {
             let before = left;
             // To first order most of it is of another shape.
             let promised = left - predicted(&normal, &gradient);
-            if round >= 1 && promised - rival > HOPELESS && promised > 0.5 * left {
+            if round >= 1 && promised - rival > HOPELESS_LAG && promised > 0.5 * left {
                 break;
             }
             let mut accepted = false;
@@ -57,9 +53,9 @@ impl OutputError<'_> {
                 }
                 trust = 10.0 * trust.max(1e-4);
             }
-            let behind = |left: f64| left - rival - HOPELESS;
+            let behind = |left: f64| left - rival - HOPELESS_LAG;
             let hopeless = round >= 1 && behind(left) > 0.0 && behind(left) > 0.6 * behind(before);
-            if !accepted || before - left < SETTLED || hopeless {
+            if !accepted || before - left < SEARCH_SETTLED || hopeless {
                 break;
             }
         }

@@ -5,6 +5,7 @@
 //! the cut is linear in most of what a process may have otherwise. Between samples the force jumps where teeth enter and
 //! leave: what drives the structure is its mean over each finer sample, with entry, exit and loss of contact at their instants.
 
+use crate::criteria::{SPEED_MISMATCH, UNCERTAIN_SAMPLES};
 use crate::error::DiagnoseError;
 use crate::motion::chips::{Chips, Sampling};
 use crate::motion::spindle_motion::SpindleMotion;
@@ -13,10 +14,6 @@ use quietcut_model::milling::Cut;
 use quietcut_recording::Recording;
 use quietcut_simulate::path::Motion;
 use quietcut_simulate::{Cutter, Effects, Spindle};
-
-/// Samples of forces and accelerations closer to
-/// which side they are.
-const BESIDE: f64 = 0.375;
 
 /// Share of the feed in a chip, sin φ, from which on a surface that was left long ago is looked at.
 const SHALLOW: f64 = 0.1;
@@ -79,7 +76,7 @@ impl RecordedCut {
             .map_err(wrong)?;
         let spindle_motion = SpindleMotion::new(recording, effects.spindle(Spindle::new(1.0)).fluctuation())?;
         if let Some(rpm) = said.spindle_rpm
-            && (spindle_motion.rpm() / rpm - 1.0).abs() > 0.05
+            && (spindle_motion.rpm() / rpm - 1.0).abs() > SPEED_MISMATCH
         {
             return Err(DiagnoseError::record(
                 &recording.path,
@@ -137,9 +134,9 @@ impl RecordedCut {
         ((turns * self.spindle_motion.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
     }
 
-    /// True where a tooth enters or leaves within `BESIDE` of a sample of `t`.
+    /// True where a tooth enters or leaves within `UNCERTAIN_SAMPLES` of a sample of `t`.
     pub(crate) fn is_beside(&self, t: f64) -> bool {
-        let near_rad = BESIDE / self.rate_hz * self.spindle_motion.speed_rad_per_s(t);
+        let near_rad = UNCERTAIN_SAMPLES / self.rate_hz * self.spindle_motion.speed_rad_per_s(t);
         self.cutter.teeth.iter().any(|tooth| {
             let phi = self.spindle_motion.angle_rad(t) + tooth.angle_rad;
             [self.cutter.start_rad, self.cutter.exit_rad]

@@ -4,12 +4,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::criteria::{LARGEST_MODULATION, LEAST_MODULATION_F_RATIO, LEAST_TACHOMETER_EDGES};
 use crate::error::DiagnoseError;
 use quietcut_recording::Recording;
 use quietcut_simulate::{Fluctuation, Spindle};
-
-/// Fewest edges of the tachometer: with fewer its angle is not known to a share of a sample.
-const FEWEST_EDGES: usize = 4;
 
 /// The spindle angle along a record: that of a spindle, and an angle at the start.
 #[derive(Clone, Debug)]
@@ -44,11 +42,11 @@ impl SpindleMotion {
         let missing = tacho.and_then(|tacho| tacho.missing).unwrap_or(0);
         let all_s = rises_s(&level.samples, recording.sample_rate_hz, recording.since_s);
         let edges_s = firsts_of_turns(&all_s, usize::from(per_turn), usize::from(missing));
-        if edges_s.len() < FEWEST_EDGES {
+        if edges_s.len() < LEAST_TACHOMETER_EDGES {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
-                    "tacho tells of {} whole turns; at least {FEWEST_EDGES} are needed",
+                    "tacho tells of {} whole turns; at least {LEAST_TACHOMETER_EDGES} are needed",
                     edges_s.len()
                 ),
             ));
@@ -184,8 +182,6 @@ fn firsts_of_turns(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64
 
 /// Steps of the frequency that is looked for, as a share of one swing per record.
 const STEP: f64 = 0.2;
-/// A swing must explain so much more of the edges per parameter than is left per edge.
-const BEYOND_CHANCE: f64 = 20.0;
 
 /// A swing of the speed, as tachometers tell it.
 #[derive(Clone, Copy, Debug)]
@@ -238,7 +234,7 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     let found = nearest(spindle_motions, frequency_hz);
     let gained = (found.without - found.left) / 3.0;
     let delta = found.along.hypot(found.across);
-    let is_found = gained > BEYOND_CHANCE * found.left / free && delta < 0.9;
+    let is_found = gained > LEAST_MODULATION_F_RATIO * found.left / free && delta < LARGEST_MODULATION;
     is_found.then(|| SpeedModulation {
         fluctuation: Fluctuation {
             delta,

@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use super::reading::Reading;
 use crate::baseline::{Baseline, derivatives};
 use crate::conclusion::residual_views::ResidualView;
+use crate::criteria::ASSUMED_NOISE;
 use crate::signal::noise::rms;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
@@ -19,8 +20,6 @@ const SAMPLES: f64 = 8192.0;
 const PERIODS: [f64; 2] = [20.0, 60.0];
 /// Samples per period of the fastest mode.
 const SAMPLES_PER_PERIOD: f64 = 24.0;
-/// Noise that is assumed of a sensor that has not been heard yet, as a share of what it says.
-const NOISE: f64 = 0.01;
 /// Longest time constants of the structure after which a cut has settled: records are of tools in full cut.
 const SETTLED: f64 = 12.0;
 /// The longest that is waited for that, in lengths of the record.
@@ -118,7 +117,7 @@ impl<'a> Bench<'a> {
             let known = heard
                 .map(|heard| heard.deviation)
                 .filter(|deviation| *deviation > 0.0);
-            known.unwrap_or_else(|| (NOISE * rms(&reading.samples)).max(f64::MIN_POSITIVE))
+            known.unwrap_or_else(|| (ASSUMED_NOISE * rms(&reading.samples)).max(f64::MIN_POSITIVE))
         };
         readings.iter().map(of).collect()
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::bench::Bench;
 use super::reading::{Of, Reading, Sensors};
 use crate::conclusion::answer::NextTest;
+use crate::criteria::LARGEST_PROPOSED_MOTION;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_model::structure::Direction;
@@ -13,8 +14,6 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Impact, Rig, Signal, Step};
 use quietcut_simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
 
-/// A cut whose motion is so many times that of the records is none that anyone would try.
-const TOO_LARGE: f64 = 10.0;
 /// The smallest blow of a hammer, N.
 const LEAST_BLOW_N: f64 = 1.0;
 /// Something to do, without what is measured.
@@ -232,7 +231,7 @@ impl Experiment {
                     .filter(|channel| channel.quantity == Quantity::Displacement)
                     .flat_map(|channel| &channel.samples)
                     .fold(0.0, |most: f64, value| value.abs().max(most));
-                (most <= TOO_LARGE * bench.largest_m).then_some(recording)
+                (most <= LARGEST_PROPOSED_MOTION * bench.largest_m).then_some(recording)
             }
         }
     }

@@ -19,12 +19,9 @@ use self::experiment::{Experiment, experiments};
 use self::reading::Sensors;
 use self::separation::{Difference, Rival};
 use crate::conclusion::answer::{Diagnosis, NextTest, label};
+use crate::criteria::SEPARATING_DISTANCE;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
-
-/// Squared distance beyond which a test tells nearly always: the difference of twice the log-likelihoods of two explanations D apart
-/// is D² ± 2D, and [`crate::selection::select::APART`] of it is asked for.
-const PLAIN: f64 = 60.0;
 
 /// What could be done, and what it would tell.
 struct Proposal<'a> {
@@ -48,7 +45,7 @@ pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagn
         .par_iter()
         .flat_map_iter(|experiment| proposals(&bench, experiment, &rivals))
         .collect();
-    let plain = |proposal: &&Proposal<'_>| proposal.least.squared >= PLAIN;
+    let plain = |proposal: &&Proposal<'_>| proposal.least.squared >= SEPARATING_DISTANCE;
     let best = proposals
         .iter()
         .filter(plain)
@@ -112,14 +109,14 @@ impl Proposal<'_> {
             times_noise,
         } = &self.least;
         let distance = squared.sqrt();
-        if *squared >= PLAIN {
+        if *squared >= SEPARATING_DISTANCE {
             format!(
                 "separates {one} from {other}: {channel} would differ by {times_noise:.2} times its noise, whatever their parameters are; over the record a distance of {distance:.0} deviations"
             )
         } else {
             format!(
                 "of the tests that were thought of none separates {one} from {other} plainly; this one comes nearest, with a distance of {distance:.1} deviations where {:.1} are needed",
-                PLAIN.sqrt()
+                SEPARATING_DISTANCE.sqrt()
             )
         }
     }

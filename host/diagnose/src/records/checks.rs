@@ -1,17 +1,16 @@
 //! Records that tell nothing, said plainly with what is needed.
 
 use crate::baseline::Baseline;
+use crate::criteria::{
+    CLIPPED_IMPACT_SAMPLES, CLIPPED_IMPACT_STEP, CLIPPED_SHARE, FRICTION_RATIO, GAIN_UNIT_TOLERANCE,
+    IMPOSSIBLE_RATIO, LEAST_CORRELATION_OF_KNOWN_UNIT, LEAST_CORRELATION_OF_UNKNOWN_UNIT,
+    LEAST_ENERGY_OVER_FORCE_NOISE, LEAST_PERIODS, LEAST_SAMPLES, POUND_TOLERANCE, UNIT_TOLERANCE,
+    WRONG_UNIT_RATIO,
+};
 use crate::error::DiagnoseError;
 use crate::records::channel::Observed;
 use crate::signal::noise::rms;
 use quietcut_recording::Recording;
-
-/// Fewest samples.
-const FEWEST: usize = 128;
-/// Periods of the slowest mode that a record must hold.
-const PERIODS: f64 = 3.0;
-/// Share of samples at the very ends of a channel's range, in runs, from which on it is clipped.
-const CLIPPED: f64 = 0.002;
 
 /// Refuses what no fit could use.
 pub(crate) fn record(
@@ -34,10 +33,10 @@ pub(crate) fn record(
             directions.join(", ")
         ));
     }
-    let needed_s = baseline.lowest_hz().map_or(0.0, |hertz| PERIODS / hertz);
-    if count < FEWEST || seconds < needed_s {
+    let needed_s = baseline.lowest_hz().map_or(0.0, |hertz| LEAST_PERIODS / hertz);
+    if count < LEAST_SAMPLES || seconds < needed_s {
         return wrong(format!(
-            "too short: {count} samples, {seconds:.3} s; at least {FEWEST} samples and {needed_s:.3} s ({PERIODS} periods of the slowest mode) are needed"
+            "too short: {count} samples, {seconds:.3} s; at least {LEAST_SAMPLES} samples and {needed_s:.3} s ({LEAST_PERIODS} periods of the slowest mode) are needed"
         ));
     }
     for channel in &recording.channels {
@@ -67,33 +66,16 @@ pub(crate) fn record(
     Ok(())
 }
 
-/// How many equal samples at an end of the range one blow of a hammer may be clipped to, and how many steps of the channel's resolution
-/// are steep two samples beside them.
-const FLAT: std::ops::RangeInclusive<usize> = 3..=64;
-const CLIFF: f64 = 16.0;
-
 /// Factors that a wrong unit brings, how far from it a model that is wrong as well may make it (in the logarithm), and the name of
 /// what was likely meant.
 const UNITS: [(f64, f64, &str); 6] = [
-    (4.448, 0.1, "4.45: pounds of force for N"),
-    (1e3, 0.4, "a thousand: mm, kN or g for m, N or kg"),
-    (1e6, 0.4, "a million: µm for m"),
-    (25.4, 0.4, "25.4: inches for mm"),
-    (39.37, 0.4, "39.37: inches for m"),
-    (9.806_65, 0.4, "9.81: g for m/s²"),
+    (4.448, POUND_TOLERANCE, "4.45: pounds of force for N"),
+    (1e3, UNIT_TOLERANCE, "a thousand: mm, kN or g for m, N or kg"),
+    (1e6, UNIT_TOLERANCE, "a million: µm for m"),
+    (25.4, UNIT_TOLERANCE, "25.4: inches for mm"),
+    (39.37, UNIT_TOLERANCE, "39.37: inches for m"),
+    (9.806_65, UNIT_TOLERANCE, "9.81: g for m/s²"),
 ];
-/// A model may be wrong by this factor before a unit is suspected; and by this one, of a shape that is nothing like what was measured,
-/// before nothing but a unit can be the reason: no resonance and no nonlinearity of a machine brings as much.
-const WRONG_BY: f64 = 4.0;
-const FAR_OFF: f64 = 250.0;
-/// Friction may hold a machine back to this share of what a case without it predicts. Newtons that were read as pounds are then told as a
-/// gain of the sensors.
-const HELD_BACK: f64 = 0.15;
-/// How close to a unit a gain is that is told to be one.
-const GAIN: f64 = 0.03;
-
-/// A prediction of less than so many times the energy that noise of the forces alone would bring tells nothing.
-const MOST_BY_NOISE: f64 = 25.0;
 
 /// Refuses a channel whose size cannot be that of the case: a wrong unit.
 ///
@@ -109,19 +91,23 @@ pub(crate) fn unit(
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let (own, cross) = (dot(response, response), dot(response, measured));
     let whole = dot(measured, measured);
-    if own <= MOST_BY_NOISE * by_noise || whole <= 0.0 {
+    if own <= LEAST_ENERGY_OVER_FORCE_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
     // What a constant force does says nothing of what moves.
-    if spread(response).powi(2) * response.len() as f64 > MOST_BY_NOISE * by_noise {
+    if spread(response).powi(2) * response.len() as f64 > LEAST_ENERGY_OVER_FORCE_NOISE * by_noise {
         far_off(path, name, response, measured)?;
     }
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
     let likely = likely(factor);
     // Where no unit is known that would do, the shapes must be the same.
-    let least_alike = if likely.is_some() { 0.3 } else { 0.8 };
-    if alike < least_alike || (HELD_BACK..WRONG_BY).contains(&factor) {
+    let least_alike = if likely.is_some() {
+        LEAST_CORRELATION_OF_KNOWN_UNIT
+    } else {
+        LEAST_CORRELATION_OF_UNKNOWN_UNIT
+    };
+    if alike < least_alike || (FRICTION_RATIO..WRONG_UNIT_RATIO).contains(&factor) {
         return Ok(());
     }
     Err(DiagnoseError::record(
@@ -156,8 +142,8 @@ pub(crate) fn far_off(
     let moves = spread(measured);
     let [least, most] = [moves / rms(response), moves / spread(response)];
     let factor = match () {
-        () if least.is_finite() && least > FAR_OFF => least,
-        () if most.is_finite() && moves > 0.0 && most < 1.0 / FAR_OFF => most,
+        () if least.is_finite() && least > IMPOSSIBLE_RATIO => least,
+        () if most.is_finite() && moves > 0.0 && most < 1.0 / IMPOSSIBLE_RATIO => most,
         () => return Ok(()),
     };
     Err(DiagnoseError::record(
@@ -177,7 +163,7 @@ fn spread(samples: &[f64]) -> f64 {
 
 /// What a gain that was found may be if it is none of the sensor: a unit.
 pub(crate) fn unit_of_gain(gain: f64) -> Option<&'static str> {
-    unit_within(gain.abs(), |_| GAIN)
+    unit_within(gain.abs(), |_| GAIN_UNIT_TOLERANCE)
 }
 
 /// The unit that was likely meant where something is so many times too large, or too small, by a model that may be wrong as well.
@@ -232,7 +218,7 @@ fn clipped(samples: &[f64]) -> Option<f64> {
             }
             run = 0;
         }
-        runs >= 2 && flat as f64 > CLIPPED * samples.len() as f64 && *end != 0.0
+        runs >= 2 && flat as f64 > CLIPPED_SHARE * samples.len() as f64 && *end != 0.0
     })
 }
 
@@ -248,14 +234,15 @@ fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f
         let length = samples[first..].iter().take_while(|x| at(x)).count();
         let beyond = first + length;
         let sides = [first.checked_sub(2), Some(beyond + 1)];
-        if FLAT.contains(&length)
+        if CLIPPED_IMPACT_SAMPLES.contains(&length)
             && let [Some(before), Some(after)] = sides.map(|place| Some(samples.get(place?)? - end))
         {
             steepest = steepest.max(before.abs().min(after.abs()));
         }
         first = beyond;
     }
-    steepest > CLIFF * resolution && steepest > CLIFF * written_resolution(samples, end)
+    steepest > CLIPPED_IMPACT_STEP * resolution
+        && steepest > CLIPPED_IMPACT_STEP * written_resolution(samples, end)
 }
 
 /// The step of the last digit of `end`, where all samples are written with as few digits as they seem to be.

@@ -1,6 +1,7 @@
 //! Prediction of the channels of a cut along its motion.
 
 use crate::baseline::Baseline;
+use crate::criteria::CLOSED_LOOP_SETTLED;
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::RecordedCut;
 use crate::records::cutting::Cutting;
@@ -13,7 +14,6 @@ use quietcut_recording::{Quantity, Recording};
 const ROUNDS: usize = 4;
 /// The same along the motion of a model, at most: until the motion is off the closed loop by no more than this, in units of the noise.
 const ROUNDS_OF_A_MODEL: usize = 8;
-const SETTLED: f64 = 0.03;
 
 /// Predicts all channels of a cut, and learns the motion from what is left.
 pub(super) fn predicted(
@@ -85,7 +85,7 @@ pub(super) fn predicted(
         // The first force along the motion of a model is that of the measured one still.
         let is_along = (round > 0 || record.clean.is_none()) && !record.amplifies;
         motion_estimate::learn(&mut record, baseline, &force, is_along.then_some(&slopes));
-        if record.clean.is_some() && is_along && off < SETTLED {
+        if record.clean.is_some() && is_along && off < CLOSED_LOOP_SETTLED {
             break;
         }
     }

@@ -13,6 +13,10 @@ use nalgebra::Vector3;
 use num_complex::Complex64;
 
 use crate::baseline::{Baseline, derivatives};
+use crate::criteria::{
+    AIR_LEVEL, AIR_OVER_NOISE, CHATTER_LEVEL, ENGAGED_LEVEL, ENGAGEMENT_AFTER_LEVEL, ENTRY_MARGIN,
+    EXIT_SHARE, GROWTH_FROM_REST, LEAST_AIR_AT_ENDS, LEAST_AIR_WITHIN, LEAST_ENGAGED_REVOLUTIONS,
+};
 use crate::error::DiagnoseError;
 use crate::motion::recorded_cut::cut_of;
 use crate::motion::spindle_motion::SpindleMotion;
@@ -22,27 +26,6 @@ use quietcut_recording::{Kind, Quantity, Recording};
 use quietcut_simulate::effect::Pickup;
 use quietcut_simulate::{Cutter, Passage, Spindle};
 
-/// A turn in air has less than this share of what a turn in the cut has, in some channel.
-const QUIET: f64 = 0.2;
-/// The tool is well in the cut where every channel has this share of it.
-const LOUD: f64 = 0.8;
-/// From where it is no longer quiet to full cut a depth that grows evenly takes 4/3 of the time that it takes to where it is loud.
-const BEYOND_LOUD: f64 = 1.4;
-/// Margin on the way through a face: the first touch itself is not seen.
-const UNSEEN: f64 = 1.1;
-/// Share of the way out that is over before it is quiet: chips are thin at the end of it.
-const SEEN_OUT: f64 = 0.7;
-/// Chatter is what makes the motion so many times that by the feed alone.
-const CHATTER: f64 = 2.0;
-/// A channel tells of air where a turn in the cut is so many times its noise.
-const TELLING: f64 = 3.0;
-/// Fewest turns of air at an end of a recording, and within it, where chatter may beat.
-const FEWEST_AT_ENDS: usize = 2;
-const FEWEST_WITHIN: usize = 4;
-/// From rest a resonance grows from turn to turn by more than this factor at first; in air turns are alike.
-const ALIKE: f64 = 2.0;
-/// Fewest turns in full cut that can be diagnosed.
-const FEWEST_IN_CUT: f64 = 8.0;
 /// Angles of a turn at which chips are looked at.
 const ANGLES: usize = 512;
 
@@ -67,12 +50,12 @@ pub(crate) fn in_full_engagement<'a>(
         };
         let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
         let turns = (to_s - from_s) / SpindleMotion::new(recording, None)?.turn_s();
-        if turns < FEWEST_IN_CUT {
+        if turns < LEAST_ENGAGED_REVOLUTIONS {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
                     "is in air, or the tool on its way in or out, but for {turns:.1} turns from {from_s:.3} s on; at least \
-                     {FEWEST_IN_CUT} turns in full cut are needed"
+                     {LEAST_ENGAGED_REVOLUTIONS} turns in full cut are needed"
                 ),
             ));
         }
@@ -103,22 +86,22 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
         &Forced::new(baseline, &cutter, turn_s),
     )?;
     let cut = longest_gap(&levels.quiet(), levels.count)?;
-    let is_loud = |turn: &usize| levels.smallest(*turn) >= LOUD;
+    let is_loud = |turn: &usize| levels.smallest(*turn) >= ENGAGED_LEVEL;
     let first = cut.clone().find(is_loud)?;
     let last = cut.clone().rev().find(is_loud)?;
     let by_diameter = Passage::way_in_s(&cutter, &Spindle::new(60.0 / turn_s)).ok();
-    let loud_after = BEYOND_LOUD * (first - cut.start) as f64;
+    let loud_after = ENGAGEMENT_AFTER_LEVEL * (first - cut.start) as f64;
     let way = by_diameter.map_or(loud_after, |seconds| seconds / turn_s);
     let from = match cut.start {
         0 => 0.0,
-        start => start as f64 + (UNSEEN * way).max(loud_after) + 1.0,
+        start => start as f64 + (ENTRY_MARGIN * way).max(loud_after) + 1.0,
     };
     // Who records air before the cut may stop when the cut is over, before all is quiet. Chatter is loud to the end of the way out.
-    let to = if cut.end == levels.count && cut.end - last <= FEWEST_AT_ENDS {
+    let to = if cut.end == levels.count && cut.end - last <= LEAST_AIR_AT_ENDS {
         f64::INFINITY
     } else {
-        let loud_before = BEYOND_LOUD * (cut.end - 1 - last) as f64;
-        let out = if levels.chatters { UNSEEN } else { SEEN_OUT };
+        let loud_before = ENGAGEMENT_AFTER_LEVEL * (cut.end - 1 - last) as f64;
+        let out = if levels.chatters { ENTRY_MARGIN } else { EXIT_SHARE };
         cut.end as f64 - (out * way).max(loud_before) - 1.0
     };
     let sample =
@@ -239,8 +222,8 @@ impl Levels {
                 .collect();
             let (usual, fed) = (median(&mut turns.clone()), forced.level(&pickup, rate_hz));
             let in_cut = usual.min(fed);
-            if in_cut > TELLING * noise {
-                levels.chatters |= usual > CHATTER * fed;
+            if in_cut > AIR_OVER_NOISE * noise {
+                levels.chatters |= usual > CHATTER_LEVEL * fed;
                 levels.of.push(turns.iter().map(|level| level / in_cut).collect());
                 levels.noise.push(noise / in_cut);
             }
@@ -258,11 +241,15 @@ impl Levels {
         let mut turn = 0;
         while turn < self.count {
             let from = turn;
-            while turn < self.count && self.smallest(turn) < QUIET {
+            while turn < self.count && self.smallest(turn) < AIR_LEVEL {
                 turn += 1;
             }
             let is_at_end = from == 0 || turn == self.count;
-            let fewest = if is_at_end { FEWEST_AT_ENDS } else { FEWEST_WITHIN };
+            let fewest = if is_at_end {
+                LEAST_AIR_AT_ENDS
+            } else {
+                LEAST_AIR_WITHIN
+            };
             if turn - from >= fewest && (from > 0 || !self.grows_from_rest()) {
                 stretches.push(from..turn);
             }
@@ -276,8 +263,8 @@ impl Levels {
         self.of
             .iter()
             .zip(&self.noise)
-            .filter(|(of, _)| of[0] < QUIET)
-            .all(|(of, noise)| of[1] > ALIKE * of[0] + noise)
+            .filter(|(of, _)| of[0] < AIR_LEVEL)
+            .all(|(of, noise)| of[1] > GROWTH_FROM_REST * of[0] + noise)
     }
 }
 

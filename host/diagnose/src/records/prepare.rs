@@ -8,6 +8,7 @@
 use crate::baseline::Baseline;
 use crate::baseline::dynamic_stiffness;
 use crate::baseline::receptance::{Receptance, response};
+use crate::criteria::LARGEST_FORCE_NOISE;
 use crate::error::DiagnoseError;
 use crate::motion::free_decay::Decays;
 use crate::records::channel::{Observed, main_axis};
@@ -171,9 +172,6 @@ fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
     })
 }
 
-/// A force that is white itself has no floor; its noise is taken to be no more than this share of it.
-const MOST_FORCE_NOISE: f64 = 0.02;
-
 fn floor_n(force_n: &[f64], kind: Option<Kind>) -> f64 {
     let size = rms(force_n);
     let quiet_n = if kind == Some(Kind::Hammer) {
@@ -184,7 +182,7 @@ fn floor_n(force_n: &[f64], kind: Option<Kind>) -> f64 {
     if size > 0.0 {
         white_floor(force_n, size)
             .min(quiet_n)
-            .min(MOST_FORCE_NOISE * size)
+            .min(LARGEST_FORCE_NOISE * size)
     } else {
         0.0
     }

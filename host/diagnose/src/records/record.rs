@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::baseline::Baseline;
+use crate::criteria::{MOVING_OVER_NOISE, RELATIVE_ERROR_OF_CUTS};
 use crate::motion::cut_force::CutForce;
 use crate::motion::free_decay::Decays;
 use crate::records::channel::Observed;
@@ -17,10 +18,6 @@ use crate::signal::grid::Grid;
 use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
 use quietcut_recording::{Kind, Quantity};
 use quietcut_simulate::path::{Motion, restoring_along};
-
-/// Relative error of a predicted cut. The instants at which a tooth enters or leaves are known to a fraction of a sample, and so is
-/// the step of the force there.
-pub(crate) const TRUSTED_IN_CUTS: f64 = 2e-4;
 
 /// By axis of force: what a channel reads per newton at the bins of the finer samples; empty where it hears nothing of that axis.
 pub(crate) type Responses = [Vec<Complex64>; 3];
@@ -122,7 +119,8 @@ impl Record {
     pub(crate) fn moves(&self, axis: usize) -> bool {
         !self.motion.x[axis].is_empty()
             && (self.channels.iter().any(|channel| {
-                channel.pickup.weights[axis] != 0.0 && rms(&channel.measured) > 3.0 * channel.deviation
+                channel.pickup.weights[axis] != 0.0
+                    && rms(&channel.measured) > MOVING_OVER_NOISE * channel.deviation
             }) || !self.force_n[axis].is_empty())
     }
 
@@ -261,7 +259,7 @@ impl Record {
             channel.deviation = match &self.clean {
                 Some(clean) => clean.deviations[index],
                 None if self.kind == Some(Kind::Cutting) => {
-                    floor_between_lines(&residual, size).hypot(TRUSTED_IN_CUTS * size)
+                    floor_between_lines(&residual, size).hypot(RELATIVE_ERROR_OF_CUTS * size)
                 }
                 None => white_floor_beside(&residual, size, &of_forces[index]),
             };

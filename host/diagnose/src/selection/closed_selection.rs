@@ -2,12 +2,13 @@
 
 use std::collections::VecDeque;
 
+use crate::criteria::EQUIVALENT;
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
 use crate::selection::rebaselined::extended_rebaselined;
-use crate::selection::select::{APART, SelectionCriteria};
+use crate::selection::select::SelectionCriteria;
 use crate::selection::stepwise::{distinct, extended, nested, without};
 
 /// χ² per number below which an explanation explains nearly all, and over that of another below which it is nearly as good; and how
@@ -144,7 +145,7 @@ impl SelectionCriteria<'_> {
             // may have mended what the slopes of the baseline got wrong.
             let is_simpler = found[position].parameter_count < found[0].parameter_count
                 && found[position].fit.left < NEARLY * found[0].fit.left;
-            if position > 0 && !is_simpler && before[0] - before[position] > APART + 2.0 * gained {
+            if position > 0 && !is_simpler && before[0] - before[position] > EQUIVALENT + 2.0 * gained {
                 continue;
             }
             if let Some(polished) = closed.polished(library, regression, &found[position]) {

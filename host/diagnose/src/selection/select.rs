@@ -1,5 +1,10 @@
 //! Which explanation is selected: causes are added while that gains more than it costs.
 
+use crate::criteria::{
+    CHANCE, EQUIVALENT, INTERPOLATION_ERROR, LEAST_GAIN, LEAST_SHARE, LEAST_SHARE_BESIDE_ENOUGH,
+    NOISE_TOLERANCE, NOTHING_TO_EXPLAIN, OVER_COMPUTATION_ERROR, RELATIVE_ERROR_OF_CUTS, SAMPLING_RESIDUAL,
+    SAMPLING_RESIDUAL_SIMULATED,
+};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::closed_fit::ClosedFit;
 use crate::fit::library::Library;
@@ -8,31 +13,11 @@ use crate::fit::refine::refine;
 use crate::fit::regression::{Regression, Subset};
 use crate::fit::relinearization::Relinearization;
 use crate::progress::Stage;
-use crate::records::record::TRUSTED_IN_CUTS;
 use crate::records::study::Study;
 use crate::selection::search::{pairs as best_pairs, singles, triples};
 use crate::selection::stepwise::extended;
 use quietcut_recording::Recording;
 
-/// What a cause must gain to be believed (twice the logarithm of the likelihood, less the price of its parameters).
-const BELIEVED: f64 = 20.0;
-/// Two explanations whose gains differ by less are not told apart.
-pub(crate) const APART: f64 = 16.0;
-/// Share of the residual that a right explanation may leave for reasons of sampling alone.
-const SAMPLING: f64 = 2e-3;
-/// The same where the explanation is simulated.
-const SAMPLING_SIMULATED: f64 = 5e-5;
-/// Share of the residual's energy by which interpolation between samples may mislead the comparison of explanations.
-const NUMERICS: f64 = 1e-4;
-/// What may be left beyond the noise, as a share of the noise: that of the estimate of the noise and of chance.
-pub(crate) const WITHIN_NOISE: f64 = 0.15;
-/// What further causes must take of what is left beyond the noise: less is how one wrong equation mends another.
-const SHARE: f64 = 0.2;
-/// How many times what errors of the computation may be is plainly something else: twice their amplitude.
-const PLAIN: f64 = 4.0;
-/// Of a cut: what a cause more must take where fewer are enough, as a share of the noise: by so little the noise and
-/// the computation may be wrong near a resonance.
-const SHARE_BESIDE_ENOUGH: f64 = 5e-3;
 /// Most causes that act together.
 const CAUSES: usize = 3;
 /// Explanations of the regression that are simulated, by the number of their causes.
@@ -83,7 +68,7 @@ impl<'a> SelectionCriteria<'a> {
             recordings,
             closed,
             coherent: if is_cut {
-                TRUSTED_IN_CUTS * TRUSTED_IN_CUTS * regression.signal(study)
+                RELATIVE_ERROR_OF_CUTS * RELATIVE_ERROR_OF_CUTS * regression.signal(study)
             } else {
                 0.0
             },
@@ -110,11 +95,11 @@ impl<'a> SelectionCriteria<'a> {
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
         let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
-            SHARE_BESIDE_ENOUGH
+            LEAST_SHARE_BESIDE_ENOUGH
         } else {
             0.0
         };
-        BELIEVED + PLAIN * self.coherent + share * noise
+        LEAST_GAIN + OVER_COMPUTATION_ERROR * self.coherent + share * noise
     }
 
     /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
@@ -140,7 +125,7 @@ impl<'a> SelectionCriteria<'a> {
         let noise = regression.count(Subset::Whole) as f64;
         let left = best.map_or(self.reference, |best| best.fit.left);
         let reference = self.reference.max(regression.residual(Subset::Whole));
-        let beyond = (left - noise - PLAIN * self.coherent).max(0.0);
+        let beyond = (left - noise - OVER_COMPUTATION_ERROR * self.coherent).max(0.0);
         let there = (reference - noise).max(1e-9 * noise);
         (beyond / noise, beyond / there)
     }
@@ -151,11 +136,11 @@ impl<'a> SelectionCriteria<'a> {
         let count = regression.count(Subset::Whole) as f64;
         let simulated = best.is_some_and(|best| best.simulated.is_some());
         let (inflation, sampling) = if simulated {
-            (1.0, SAMPLING_SIMULATED)
+            (1.0, SAMPLING_RESIDUAL_SIMULATED)
         } else {
-            (self.inflation, SAMPLING)
+            (self.inflation, SAMPLING_RESIDUAL)
         };
-        of_noise / inflation < (4.0 * (2.0 / count).sqrt()).min(WITHIN_NOISE)
+        of_noise / inflation < (CHANCE * (2.0 / count).sqrt()).min(NOISE_TOLERANCE)
             || (best.is_some() && of_excess < sampling)
     }
 
@@ -205,7 +190,7 @@ impl<'a> SelectionCriteria<'a> {
             },
             |fewer| fewer.fit.left,
         );
-        before - more.fit.left > SHARE * (before - noise).max(0.0)
+        before - more.fit.left > LEAST_SHARE * (before - noise).max(0.0)
     }
 
     /// What is left of the held-out parts if the parameters come from the fitted ones alone.
@@ -226,7 +211,7 @@ impl<'a> SelectionCriteria<'a> {
 fn inflation(regression: &Regression) -> f64 {
     let whole = regression.count(Subset::Whole) as f64;
     let free = (whole - regression.columns() as f64).max(1.0);
-    let sampling = NUMERICS * (regression.residual(Subset::Whole) / whole - 1.0).max(0.0);
+    let sampling = INTERPOLATION_ERROR * (regression.residual(Subset::Whole) / whole - 1.0).max(0.0);
     (regression.left_by_all() / free + sampling).max(1.0)
 }
 
@@ -249,7 +234,8 @@ pub(crate) fn select(
     for (index, most) in SIMULATED.into_iter().enumerate() {
         let size = index + 1;
         // Less than half of what the sensors' noise is at least: nothing is there to be explained.
-        let silent = regression.residual(Subset::Whole) < 0.5 * regression.count(Subset::Whole) as f64;
+        let silent =
+            regression.residual(Subset::Whole) < NOTHING_TO_EXPLAIN * regression.count(Subset::Whole) as f64;
         if silent {
             break;
         }
@@ -307,7 +293,7 @@ pub(crate) fn select(
             .map_or(0.0, |best| criteria.gain(regression, best, inflation));
         let held_out = criteria.left_held_out(library, regression, best);
         // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
-        let chance = 4.0 * (2.0 * regression.count(Subset::HeldOut) as f64).sqrt();
+        let chance = CHANCE * (2.0 * regression.count(Subset::HeldOut) as f64).sqrt();
         let takes_its_share = criteria.takes_its_share(regression, selection.best.as_ref(), best);
         // Where two more take little, a third would mend what the others get wrong.
         if size > 1 && !takes_its_share {
@@ -332,7 +318,7 @@ pub(crate) fn select(
             .fold(f64::INFINITY, f64::min);
         selection.others = rivals
             .iter()
-            .filter(|other| behind(other) < APART)
+            .filter(|other| behind(other) < EQUIVALENT)
             .map(|other| (*other).clone())
             .collect();
         let polished = criteria.closed.as_ref().filter(|_| enough);
@@ -391,11 +377,11 @@ fn simplest(
     best: &CandidateModel,
 ) -> CandidateModel {
     let inflation = criteria.inflation;
-    let apart = APART.max(NUMERICS * regression.residual(Subset::Whole) / inflation);
+    let apart = EQUIVALENT.max(INTERPOLATION_ERROR * regression.residual(Subset::Whole) / inflation);
     let as_good = |other: &&CandidateModel| {
         other.simulated.is_none()
             && other.parameter_count < best.parameter_count
-            && criteria.excess(regression, Some(other)).1 < SAMPLING
+            && criteria.excess(regression, Some(other)).1 < SAMPLING_RESIDUAL
             && criteria.gain(regression, other, inflation)
                 > criteria.gain(regression, best, inflation) - apart
     };

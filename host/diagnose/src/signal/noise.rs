@@ -3,14 +3,11 @@
 //! Sensor noise is taken to be white over the band of the record. Whatever else is in a residual stands above that floor
 //! somewhere and leaves it bare elsewhere.
 
+use crate::criteria::{LEAST_RELATIVE_NOISE, LEAST_WHITE_SHARE};
 use crate::signal::grid::SegmentTransform;
 
 /// Bands into which a spectrum is cut.
 pub(crate) const BANDS: usize = 32;
-/// White noise below this share of all noise in a band cannot be told from chance.
-const TOLD: f64 = 0.05;
-/// Nothing recorded is trusted beyond this share of its size: 90 dB, where errors of simulations add up to what is seen.
-const TRUSTED: f64 = 3e-5;
 
 /// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel itself.
 ///
@@ -57,13 +54,13 @@ fn floor(
     scatter: f64,
     other: &[f64; BANDS],
 ) -> f64 {
-    let least = (TRUSTED * size).max(f64::MIN_POSITIVE);
+    let least = (LEAST_RELATIVE_NOISE * size).max(f64::MIN_POSITIVE);
     let count = residual.len();
     if count < 4 * BANDS {
         return rms(residual).max(least);
     }
     // All noise, and how much of it is white as far as can be told.
-    let white = |all: f64, other: f64| (all - other).max(TOLD * all);
+    let white = |all: f64, other: f64| (all - other).max(LEAST_WHITE_SHARE * all);
     let bands: Vec<(f64, f64)> = band_means(residual, of_band).into_iter().zip(*other).collect();
     let mut sorted: Vec<f64> = bands.iter().map(|(all, other)| white(*all, *other)).collect();
     sorted.sort_by(f64::total_cmp);
