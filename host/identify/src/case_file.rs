@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, Vector3};
 use num_complex::Complex64;
 use toml::{Table, Value};
 
-use super::joints::JointParameter;
-use super::modes::{IdentifiedMode, ModalModel};
+use crate::modes::{IdentifiedMode, ModalModel};
+use crate::robot::joints::JointParameter;
 use quietcut_model::milling::Runout;
 use quietcut_model::structure::{Direction, Joint, Mode, Robot};
 

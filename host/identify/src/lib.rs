@@ -7,35 +7,23 @@
 
 pub mod ambient;
 pub mod case_file;
-pub mod chip;
-pub mod cubic_joints;
-pub mod cutting_test;
-pub mod describing;
-pub mod dwell;
-pub mod force_coefficients;
-pub mod harmonic_balance;
-pub mod hfrf;
-pub mod homogeneity;
-pub mod inverse_stability;
-pub mod joints;
-pub mod law;
+pub mod cutting;
+pub mod dwells;
 mod least_squares;
-pub mod linearity;
 pub mod modes;
-pub mod ncma;
-pub mod observed_cut;
-pub mod periodic_fit;
+pub mod nonlinear;
 pub mod plan;
-pub mod reciprocity;
-pub mod response;
-pub mod restoring_force;
-pub mod spectrum;
-pub mod steady;
-pub mod steady_fit;
+pub mod robot;
 pub mod student;
-pub mod subspace;
-pub mod sweep;
-mod whitening;
+
+pub use ambient::subspace;
+pub use cutting::{chip, force_coefficients, force_test, inverse_stability, observed_cut};
+pub use dwells::{dwell, steady};
+pub use nonlinear::{
+    describing, harmonic_balance, hfrf, homogeneity, law, linearity, ncma, periodic_fit, reciprocity,
+    response, restoring_force, spectrum, steady_fit, sweep,
+};
+pub use robot::{cubic_joints, joints};
 
 #[cfg(test)]
 mod tests;

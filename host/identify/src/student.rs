@@ -1,6 +1,7 @@
 //! Student's distribution: intervals from few samples.
 
-use super::steady_fit::NINETY_PERCENT;
+/// 90 % of a normal distribution lie within this many deviations.
+pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_2;
 
 /// 90 % of Student's distribution with so many degrees of freedom lie within this many deviations.
 ///

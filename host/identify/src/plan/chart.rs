@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::steady_fit::NINETY_PERCENT;
+use crate::student::NINETY_PERCENT;
 use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine};
 

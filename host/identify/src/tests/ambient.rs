@@ -10,8 +10,8 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::ambient::Ambient;
-use crate::steady_fit::NINETY_PERCENT;
-use crate::subspace::{AmbientError, modes};
+use crate::ambient::subspace::{AmbientError, modes};
+use crate::student::NINETY_PERCENT;
 use quietcut_recording::{Channel, Kind, Quantity, RecordedCut, Recording, Sidecar};
 
 /// Natural frequencies, Hz, damping ratios and shapes in x and y of a robot-like structure of unit modal masses.

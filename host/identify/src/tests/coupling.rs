@@ -4,10 +4,10 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::dwell::{Dwell, pool_variances, stretches};
-use crate::harmonic_balance::Grid;
-use crate::law::{Extra, Law, Role};
-use crate::steady_fit::Data;
+use crate::dwells::dwell::{Dwell, pool_variances, stretches};
+use crate::nonlinear::harmonic_balance::Grid;
+use crate::nonlinear::law::{Extra, Law, Role};
+use crate::nonlinear::steady_fit::Data;
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Direction, Structure};
 use quietcut_recording::{Quantity, Recording};

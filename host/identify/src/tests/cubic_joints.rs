@@ -9,11 +9,11 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::joints::{posture, tool_space, whole_jacobian};
-use crate::cubic_joints::{CubicJointFit, PostureDwells, fit};
-use crate::dwell::{Dwell, Stretch, pool_variances, stretches};
-use crate::joints::JointParameter;
-use crate::law::Extra;
-use crate::steady_fit::NINETY_PERCENT;
+use crate::dwells::dwell::{Dwell, Stretch, pool_variances, stretches};
+use crate::nonlinear::law::Extra;
+use crate::robot::cubic_joints::{CubicJointFit, PostureDwells, fit};
+use crate::robot::joints::JointParameter;
+use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::{Direction, Form, Robot, Structure};
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::cutting_test::{CuttingTest, Setup};
-use crate::force_coefficients::{ForceCoefficientError, KEYS, fit, runout};
-use crate::steady_fit::NINETY_PERCENT;
+use crate::cutting::force_coefficients::{ForceCoefficientError, KEYS, fit, runout};
+use crate::cutting::force_test::{CuttingTest, Setup};
+use crate::student::NINETY_PERCENT;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 use quietcut_simulate::rig::Noise;

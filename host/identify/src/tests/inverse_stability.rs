@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::inverse_stability::{Before, Errors, InverseMode, modes};
-use crate::observed_cut::ObservedCut;
+use crate::cutting::inverse_stability::{Before, Errors, InverseMode, modes};
+use crate::cutting::observed_cut::ObservedCut;
 use quietcut_model::case::Case;
 use quietcut_stability::{CubicTerms, Method, Pitched, Problem, Sdm, SdmOrder, SemiDiscretization};
 

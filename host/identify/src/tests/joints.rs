@@ -12,8 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::joints::{JointFit, PostureFrf, fit};
-use crate::steady_fit::NINETY_PERCENT;
+use crate::robot::joints::{JointFit, PostureFrf, fit};
+use crate::student::NINETY_PERCENT;
 use quietcut_frf::{MeasurementSettings, measure};
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Direction, FirstOrder, Form, Matrices, Robot, Structure};

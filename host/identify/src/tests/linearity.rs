@@ -4,11 +4,11 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::describing::Kind;
-use crate::dwell::{Dwell, pool_variances, stretches};
-use crate::homogeneity::regions;
-use crate::linearity::{Verdict, judge};
-use crate::steady::windows;
+use crate::dwells::dwell::{Dwell, pool_variances, stretches};
+use crate::dwells::steady::windows;
+use crate::nonlinear::describing::Kind;
+use crate::nonlinear::homogeneity::regions;
+use crate::nonlinear::linearity::{Verdict, judge};
 use quietcut_model::structure::{Direction, Form, Structure};
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Effects;
@@ -199,7 +199,7 @@ fn a_tone_of_rising_force_shows_homogeneity() {
 
 #[test]
 fn forward_and_backward_sweeps_of_a_linear_rig_agree_and_of_others_do_not() {
-    use crate::sweep::{Spectra, compare};
+    use crate::nonlinear::sweep::{Spectra, compare};
     let sweep = |effects: &[&str], ends: [f64; 2], amplitude_n: f64| {
         // 6 Hz per minute, as in the thesis.
         let signal = Signal::Sweep {
@@ -258,7 +258,7 @@ fn forward_and_backward_sweeps_of_a_linear_rig_agree_and_of_others_do_not() {
 
 #[test]
 fn cross_receptances_of_symmetric_matrices_are_reciprocal() {
-    use crate::reciprocity::compare;
+    use crate::nonlinear::reciprocity::compare;
     let record = |asymmetry: f64, seed: u64| -> Vec<Dwell> {
         let mut structure = case("kuka-kr90-half").structure.unwrap();
         if let Form::Matrices(m) = &mut structure.form {

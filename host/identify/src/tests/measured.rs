@@ -1,8 +1,8 @@
 //! Records that others measured: `QUIETCUT_DATA` names the folder.
 
-use crate::periodic_fit::{self, Period};
-use crate::response;
-use crate::restoring_force::{Options, Record, Surface, Term};
+use crate::nonlinear::periodic_fit::{self, Period};
+use crate::nonlinear::response;
+use crate::nonlinear::restoring_force::{Options, Record, Surface, Term};
 use quietcut_recording::Quantity;
 use quietcut_testkit::measured;
 

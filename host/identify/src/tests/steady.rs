@@ -6,10 +6,10 @@ use std::path::Path;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::dwell::{Dwell, Stretch, pool_variances, stretches};
-use crate::harmonic_balance::Grid;
-use crate::law::{Extra, Law, Role};
-use crate::steady_fit::{Data, Fit};
+use crate::dwells::dwell::{Dwell, Stretch, pool_variances, stretches};
+use crate::nonlinear::harmonic_balance::Grid;
+use crate::nonlinear::law::{Extra, Law, Role};
+use crate::nonlinear::steady_fit::{Data, Fit};
 use quietcut_model::structure::{Form, Structure};
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::restoring_force::{Options, Record, Surface, Term};
+use crate::nonlinear::restoring_force::{Options, Record, Surface, Term};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Noise, Rig, Signal};

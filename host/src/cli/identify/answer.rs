@@ -12,7 +12,7 @@ use crate::identify::linearity::Verdict;
 use crate::identify::modes::{ChannelNoise, ModalModel, Rejected};
 use crate::identify::ncma::Map;
 use crate::identify::reciprocity::Reciprocity;
-use crate::identify::steady_fit::NINETY_PERCENT;
+use crate::identify::student::NINETY_PERCENT;
 use crate::identify::sweep::Comparison;
 use crate::structure::Direction;
 

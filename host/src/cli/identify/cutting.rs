@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::answer::{Answer, Cutting, Figure};
 use super::{Args, Error};
 use crate::identify::case_file::{self, Estimate};
-use crate::identify::cutting_test::{CuttingTest, Setup};
 use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
+use crate::identify::force_test::{CuttingTest, Setup};
 use crate::recording::Recording;
 
 pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {

@@ -15,7 +15,7 @@ use crate::identify::dwell::Dwell;
 use crate::identify::joints::{self, JointParameter, PostureFrf};
 use crate::identify::law::Extra;
 use crate::identify::steady::{Settling, steady};
-use crate::identify::steady_fit::NINETY_PERCENT;
+use crate::identify::student::NINETY_PERCENT;
 use crate::recording::{Kind, Recording};
 use crate::structure::{Direction, Form, Robot, Structure};
 

@@ -9,9 +9,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::least_squares::{scaled_inverse, scaled_least_squares};
-use super::spectrum::{Spectral, band_of, loudest_hz};
-use super::steady_fit::NINETY_PERCENT;
+use crate::least_squares::{scaled_inverse, scaled_least_squares};
+use crate::nonlinear::spectrum::{Spectral, band_of, loudest_hz};
+use crate::student::NINETY_PERCENT;
 use quietcut_recording::Quantity;
 
 /// A term of the law along one direction.
@@ -331,7 +331,7 @@ fn receptance(terms: &[Term], theta: &DVector<f64>, mass: f64) -> impl Fn(f64) -
 }
 
 /// Standard deviations with the correlation of the residual in time: sums over blocks (Newey–West in its block form).
-pub(super) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<DVector<f64>> {
+pub(crate) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<DVector<f64>> {
     let inverse = scaled_inverse(&matrix.tr_mul(matrix))?;
     let blocks = 40.min(matrix.nrows() / (2 * matrix.ncols()).max(1)).max(1);
     let size = matrix.nrows().div_ceil(blocks);

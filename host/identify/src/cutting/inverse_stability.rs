@@ -16,10 +16,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::modes::IdentifiedMode;
-use super::modes::shape::{normalize, rank_one};
-use super::observed_cut::ObservedCut;
-use super::steady_fit::NINETY_PERCENT;
+use crate::cutting::observed_cut::ObservedCut;
+use crate::modes::IdentifiedMode;
+use crate::modes::shape::{normalize, rank_one};
+use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::{Direction, FirstOrder, Mode};
 use quietcut_stability::{Problem, StabilityError, point};
 

@@ -7,10 +7,10 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::describing::{self, Kind};
-use super::dwell::{Dwell, Line};
-use super::homogeneity::line;
-use super::steady_fit::derivative;
+use crate::dwells::differentiation::derivative;
+use crate::dwells::dwell::{Dwell, Line};
+use crate::nonlinear::describing::{self, Kind};
+use crate::nonlinear::homogeneity::line;
 
 /// What was found.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -207,7 +207,7 @@ impl<'a> Base<'a> {
         if features.is_empty() {
             return right.norm_squared();
         }
-        match super::least_squares::scaled_least_squares(&matrix, &right) {
+        match crate::least_squares::scaled_least_squares(&matrix, &right) {
             Some(solution) => (&right - matrix * solution).norm_squared(),
             None => right.norm_squared(),
         }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
-use super::dwell::{Dwell, Stretch, direction_of, pool_variances, stretches};
+use crate::dwells::dwell::{Dwell, Stretch, direction_of, pool_variances, stretches};
 use quietcut_recording::Recording;
 
 /// How much of each dwell is transient.

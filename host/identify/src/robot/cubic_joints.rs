@@ -3,7 +3,7 @@
 //! In deviations q of the joint angles from a posture q₀, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = J(q₀)ᵀ F and u = J(q₀) q: a cubic
 //! term of one joint couples all directions of the tool, differently at every posture. Joint angles are not measured: they are
 //! those of the periodic motion that the parameters give under the measured force. What the tool then does is fitted to what
-//! it did, weighed as in [`steady_fit`](super::steady_fit). A first guess comes from the receptances at the lowest force of every
+//! it did, weighed as in [`steady_fit`](crate::nonlinear::steady_fit). A first guess comes from the receptances at the lowest force of every
 //! frequency, and then from the equivalent linearization of the joints at the measured amplitudes a_j of their angles:
 //! k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j².
 
@@ -14,13 +14,13 @@ use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::dwell::{Dwell, Line};
-use super::harmonic_balance::{Grid, Problem, Solution};
-use super::joints::{self, JointFitError, JointParameter, PostureFrf};
-use super::law::{Extra, Law, Role};
-use super::least_squares::{Normal, Spread, minimum, nearer};
-use super::steady_fit::derivative;
-use super::whitening::Seen;
+use crate::dwells::differentiation::derivative;
+use crate::dwells::dwell::{Dwell, Line};
+use crate::least_squares::{Normal, Spread, minimum, nearer};
+use crate::nonlinear::harmonic_balance::{Grid, Problem, Solution};
+use crate::nonlinear::law::{Extra, Law, Role};
+use crate::nonlinear::whitening::Seen;
+use crate::robot::joints::{self, JointFitError, JointParameter, PostureFrf};
 use quietcut_frf::{Frf, FrfTable};
 use quietcut_model::structure::{Direction, Robot};
 

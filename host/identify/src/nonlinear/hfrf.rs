@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::dwell::Dwell;
-use super::law::{Extra, Law, Role};
-use super::least_squares::{scaled_inverse, scaled_least_squares};
-use super::steady_fit::derivative;
+use crate::dwells::differentiation::derivative;
+use crate::dwells::dwell::Dwell;
+use crate::least_squares::{scaled_inverse, scaled_least_squares};
+use crate::nonlinear::law::{Extra, Law, Role};
 
 /// H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) at one frequency, m/N, m/N³, m/N⁵.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,7 @@
 //! each posture H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (eqs 3.14, 3.15 without the inverse of J). What is fitted are the
 //! logarithms of the parameters; weights are the errors of the measured receptances. A first guess of the stiffnesses comes
 //! from the lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in compliance. Cubic terms, which need several levels of force:
-//! [`cubic_joints`](super::cubic_joints).
+//! [`cubic_joints`](crate::robot::cubic_joints).
 
 use std::f64::consts::TAU;
 
@@ -12,9 +12,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::least_squares::{FitError, scaled_inverse, scaled_least_squares, scaled_solve};
-use super::steady_fit::NINETY_PERCENT;
-use super::student::ninety_percent;
+use crate::least_squares::{FitError, scaled_inverse, scaled_least_squares, scaled_solve};
+use crate::student::NINETY_PERCENT;
+use crate::student::ninety_percent;
 use quietcut_frf::FrfTable;
 use quietcut_model::structure::Robot;
 
@@ -147,7 +147,7 @@ impl JointParameter {
     }
 
     /// Gives it another value.
-    pub(super) fn set(self, robot: &mut Robot, value: f64) {
+    pub(crate) fn set(self, robot: &mut Robot, value: f64) {
         if let Some(slot) = self.slot(robot) {
             *slot = value;
         }

@@ -7,14 +7,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dwell::{Dwell, Line};
-use super::harmonic_balance::{Grid, Problem, Solution};
-use super::law::Law;
-pub use super::least_squares::FitError;
-use super::least_squares::{Normal, Spread, minimum, scaled_least_squares};
-use super::whitening::Seen;
+use crate::dwells::differentiation::{derivative, undo};
+use crate::dwells::dwell::{Dwell, Line};
+pub use crate::least_squares::FitError;
+use crate::least_squares::{Normal, Spread, minimum, scaled_least_squares};
+use crate::nonlinear::harmonic_balance::{Grid, Problem, Solution};
+use crate::nonlinear::law::Law;
+use crate::nonlinear::whitening::Seen;
+use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::Direction;
-use quietcut_recording::Quantity;
 
 /// A fit of a law.
 #[derive(Clone, Debug)]
@@ -30,9 +31,6 @@ pub struct Fit {
     /// True where the covariance is the sandwich.
     pub robust: bool,
 }
-
-/// 90 % of a normal distribution lie within this many deviations.
-pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_2;
 
 /// Data of a fit: dwells and the directions that are the degrees of freedom of the law.
 #[derive(Clone, Copy)]
@@ -199,27 +197,4 @@ impl Fit {
     pub fn half_width(&self, parameter: usize) -> f64 {
         NINETY_PERCENT * self.covariance[(parameter, parameter)].max(0.0).sqrt()
     }
-}
-
-/// How often a channel is differentiated.
-pub(super) fn derivative(quantity: Quantity) -> u8 {
-    match quantity {
-        Quantity::Velocity => 1,
-        Quantity::Acceleration => 2,
-        _ => 0,
-    }
-}
-
-/// Coefficients of the integral.
-pub(super) fn undo(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
-    let mut integral = x.clone();
-    for _ in 0..order {
-        integral[0] = 0.0;
-        for h in 1..=x.len() / 2 {
-            let (c, s) = (integral[2 * h - 1], integral[2 * h]);
-            let factor = 1.0 / (h as f64 * omega);
-            (integral[2 * h - 1], integral[2 * h]) = (-factor * s, factor * c);
-        }
-    }
-    integral
 }

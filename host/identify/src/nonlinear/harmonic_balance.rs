@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-use super::law::Law;
+use crate::nonlinear::law::Law;
 
 /// Instants of a period and the harmonics on them.
 #[derive(Clone, Debug)]
@@ -255,8 +255,8 @@ impl Solution {
 
 #[cfg(test)]
 mod tests {
-    use super::super::law::{Extra, Role};
     use super::*;
+    use crate::nonlinear::law::{Extra, Role};
 
     fn duffing() -> (Law, Vec<f64>) {
         let law = Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping]);

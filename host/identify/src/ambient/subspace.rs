@@ -12,9 +12,9 @@ use nalgebra::{Cholesky, DMatrix};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::ambient::Ambient;
-use super::steady_fit::NINETY_PERCENT;
-use super::student::ninety_percent;
+use super::recording::Ambient;
+use crate::student::NINETY_PERCENT;
+use crate::student::ninety_percent;
 
 /// A mode with deviations: 1.645 of them are half the 90 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]

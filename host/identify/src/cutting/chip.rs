@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::cutting_test::CuttingTest;
+use crate::cutting::force_test::CuttingTest;
 
 /// A tooth in its chip at the instant of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,8 +11,8 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
-use super::least_squares::scaled_least_squares;
-use super::restoring_force::{Term, deviations};
+use crate::least_squares::scaled_least_squares;
+use crate::nonlinear::restoring_force::{Term, deviations};
 
 /// One period of a periodic test.
 #[derive(Clone, Copy, Debug)]

@@ -96,7 +96,7 @@ fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
 }
 
 /// Level and slope of the line through the points, by least squares.
-pub(super) fn line(points: &[(f64, f64)]) -> [f64; 2] {
+pub(crate) fn line(points: &[(f64, f64)]) -> [f64; 2] {
     let n = points.len() as f64;
     let (sx, sy) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
     let (mx, my) = (sx / n, sy / n);

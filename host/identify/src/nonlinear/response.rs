@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use super::restoring_force::Term;
+use crate::nonlinear::restoring_force::Term;
 
 /// Instants between two samples at which the force is interpolated: even, two to a step of the integration.
 const FINER: usize = 8;

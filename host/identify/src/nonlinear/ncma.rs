@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use num_complex::Complex64;
 
-use super::least_squares::{scaled_inverse, scaled_least_squares};
+use crate::least_squares::{scaled_inverse, scaled_least_squares};
 
 /// A receptance at constant force over frequency.
 #[derive(Clone, Debug, PartialEq)]

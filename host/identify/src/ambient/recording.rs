@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::least_squares::scaled_solve;
+use crate::least_squares::scaled_solve;
 use quietcut_recording::{Quantity, Recording, SpindleAngle};
 
 /// Motion that is driven by something that nobody measured.

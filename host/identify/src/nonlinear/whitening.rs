@@ -2,18 +2,18 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::dwell::{Dwell, Line};
-use super::harmonic_balance::Solution;
-use super::steady_fit::derivative;
+use crate::dwells::differentiation::derivative;
+use crate::dwells::dwell::{Dwell, Line};
+use crate::nonlinear::harmonic_balance::Solution;
 use quietcut_model::structure::Direction;
 
 /// How degrees of freedom q are seen and driven: u = S q in `directions`, and forces on q are Sᵀ F.
 #[derive(Clone, Copy)]
-pub(super) struct Seen<'a> {
+pub(crate) struct Seen<'a> {
     /// The directions of u.
-    pub(super) directions: &'a [Direction],
+    pub(crate) directions: &'a [Direction],
     /// S, a row for each direction.
-    pub(super) shape: &'a DMatrix<f64>,
+    pub(crate) shape: &'a DMatrix<f64>,
 }
 
 impl Seen<'_> {
@@ -24,7 +24,7 @@ impl Seen<'_> {
     }
 
     /// Fourier coefficients of the force on every degree of freedom; its mean is left out, load cells do not have it.
-    pub(super) fn force(&self, dwell: &Dwell, width: usize) -> DVector<f64> {
+    pub(crate) fn force(&self, dwell: &Dwell, width: usize) -> DVector<f64> {
         let dofs = self.shape.ncols();
         let mut force = DVector::zeros(dofs * width);
         for line in &dwell.forces {
@@ -55,7 +55,7 @@ impl Seen<'_> {
     ///
     /// Noise of the motion, and noise of the force and of the frequency carried through the law by its derivatives. `None` where
     /// the motion is singular, or nothing was measured.
-    pub(super) fn whitened(
+    pub(crate) fn whitened(
         &self,
         dwell: &Dwell,
         solution: &Solution,

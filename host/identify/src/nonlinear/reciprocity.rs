@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-use super::dwell::Dwell;
-use super::steady_fit::derivative;
+use crate::dwells::differentiation::derivative;
+use crate::dwells::dwell::Dwell;
 use quietcut_model::structure::Direction;
 
 /// How H_ij and H_ji compare.

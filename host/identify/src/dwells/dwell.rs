@@ -61,7 +61,7 @@ impl Line {
 }
 
 /// The direction of a channel of force or motion, by its name.
-pub(super) fn direction_of(channel: &Channel) -> Option<Direction> {
+pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
     let direction = match channel.quantity {
         Quantity::Displacement => channel.name.as_str(),
         Quantity::Force | Quantity::Velocity | Quantity::Acceleration => channel.name.get(1..)?,

@@ -12,11 +12,11 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
-use super::chip::{Chip, chips};
-use super::cutting_test::CuttingTest;
-use super::least_squares::{scaled_inverse, scaled_least_squares, scaled_solve};
-use super::steady_fit::NINETY_PERCENT;
-use super::student::ninety_percent;
+use crate::cutting::chip::{Chip, chips};
+use crate::cutting::force_test::CuttingTest;
+use crate::least_squares::{scaled_inverse, scaled_least_squares, scaled_solve};
+use crate::student::NINETY_PERCENT;
+use crate::student::ninety_percent;
 use quietcut_model::milling::{Material, Runout, Tool, ToothForce, TurningVector};
 
 /// The coefficients as they are called in cases: MPa, and N/mm.

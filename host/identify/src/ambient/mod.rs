@@ -1,0 +1,6 @@
+//! Modes from motion alone, under a force that nobody measured.
+
+mod recording;
+pub mod subspace;
+
+pub use recording::Ambient;

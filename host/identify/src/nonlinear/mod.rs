@@ -1,0 +1,17 @@
+//! Nonlinear restoring forces: which are there, and how large they are.
+
+pub mod describing;
+pub mod harmonic_balance;
+pub mod hfrf;
+pub mod homogeneity;
+pub mod law;
+pub mod linearity;
+pub mod ncma;
+pub mod periodic_fit;
+pub mod reciprocity;
+pub mod response;
+pub mod restoring_force;
+pub mod spectrum;
+pub mod steady_fit;
+pub mod sweep;
+pub(crate) mod whitening;
