@@ -1,4 +1,4 @@
-//! Why a diagnosis cannot be made.
+//! Errors of a diagnosis.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use quietcut_model::case::CaseError;
 use quietcut_recording::RecordingError;
 use quietcut_simulate::SimulateError;
 
-/// What is wrong with case or recordings.
+/// The case or a recording cannot be diagnosed.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
-    /// The case lacks something.
+    /// The case lacks a required part.
     #[error(transparent)]
     Case(#[from] CaseError),
     /// A recording lacks a channel.
@@ -20,18 +20,18 @@ pub enum DiagnoseError {
     Simulate {
         /// The case.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         error: SimulateError,
     },
-    /// A recording from which nothing can be learned.
+    /// A recording that cannot be compared with the baseline.
     #[error("{path}: {what}")]
     Record {
         /// The recording.
         path: PathBuf,
-        /// What is wrong, and what is needed.
+        /// The defect, and what is required.
         what: String,
     },
-    /// No recording.
+    /// No recording is given.
     #[error("a recording is needed")]
     NoRecording,
 }

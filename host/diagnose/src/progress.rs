@@ -1,21 +1,21 @@
-//! What a caller may set, and how far a diagnosis is.
+//! Options of a diagnosis, and its progress.
 
-/// How to diagnose.
+/// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// Seed of whatever is drawn.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// How far a diagnosis is.
+/// Stage of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Recordings are set against what the case predicts.
+    /// Recordings are compared with the prediction of the baseline.
     Records,
-    /// What each cause would look like in them.
+    /// The regressors of each cause are computed.
     Library,
-    /// So many causes at a time are tried.
+    /// Candidate models with this number of causes are compared.
     Causes(usize),
-    /// What was found is put into figures.
+    /// Parameters and intervals of the selected candidate model are computed.
     Answer,
 }

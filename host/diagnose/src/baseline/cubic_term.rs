@@ -1,4 +1,4 @@
-//! The cubic matrices of a structure as a term of its own: f_r = C₃ v∘³ + K₃ x∘³.
+//! The cubic matrices of a structure as a restoring force f_r = C₃ v∘³ + K₃ x∘³.
 
 use nalgebra::Matrix3;
 
@@ -11,8 +11,8 @@ struct CubicMatrices {
     stiffness: Matrix3<f64>,
 }
 
-/// The term of a structure's cubic matrices along x, y and z; `None` where it has none. Rows of rotations are left out: no
-/// force of the tool is one.
+/// The restoring force of the cubic matrices of a structure along x, y and z; `None` without such matrices. Rows of rotations are left out,
+/// because no force at the tool is a moment.
 pub(crate) fn cubic_term(structure: &Structure) -> Option<Box<dyn Term>> {
     let Form::Matrices(matrices) = &structure.form else {
         return None;

@@ -1,4 +1,4 @@
-//! The dynamic stiffness of a structure: the force that a motion needs.
+//! The dynamic stiffness of a structure: force per displacement.
 
 use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
@@ -9,8 +9,8 @@ use quietcut_model::structure::{FirstOrder, Form, Structure};
 
 /// Z(iω) = −ω²M + iωC + K along the machine's `axes`, N/m, at the bins of `grid`.
 ///
-/// Of matrices without rotations it is that sum, also where K is singular and no receptance exists; else the inverse of the
-/// receptance over the axes. Zero where neither is known.
+/// Matrices without rotations give this sum, also where K is singular and no receptance exists. Other structures give the inverse of the
+/// receptance over the axes. Zero where neither exists.
 pub(crate) fn table(
     structure: &Structure,
     first_order: &FirstOrder,

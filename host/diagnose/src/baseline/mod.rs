@@ -1,4 +1,4 @@
-//! The baseline model: the case with its extensions, as numbers that later rooms compute with.
+//! The baseline model: the case file with its extensions, in numbers.
 
 mod cubic_term;
 pub(crate) mod dynamic_stiffness;
@@ -12,33 +12,34 @@ use quietcut_model::structure::{Direction, FirstOrder, Structure};
 use quietcut_model::{Effects, ModelError, Term};
 use quietcut_simulate::effect::Pickup;
 
-/// The baseline: the case with its extensions.
+/// The baseline model (case file with its extensions).
 pub(crate) struct Baseline<'a> {
-    /// The case.
+    /// The case file.
     pub case: &'a Case,
-    /// Its structure, as it stands in the file.
+    /// Structure of the case file, without extensions.
     pub structure: &'a Structure,
-    /// Its extensions.
+    /// Extensions of the case file.
     pub effects: Effects,
-    /// The structure with what the case's extensions make of its numbers.
+    /// Structure with the mass, damping and stiffness that the extensions change.
     pub altered: Structure,
-    /// What the equation of motion has besides the linear structure.
+    /// Restoring forces beside the linear structure.
     pub terms: Vec<Box<dyn Term>>,
-    /// The linear structure with all that extensions change in it.
+    /// The linear structure with all linear extensions, in first-order form.
     pub first_order: FirstOrder,
-    /// Its receptance.
+    /// Receptance of the linear structure.
     pub receptance: Receptance,
-    /// True where a jump of the force makes the velocity jump, so that accelerations are means over a sample: see [`quietcut_simulate::Dynamics::velocity_jumps`].
+    /// True where a step of the force makes the velocity jump, so that accelerations are averages over a sample: see
+    /// [`quietcut_simulate::Dynamics::velocity_jumps`].
     pub velocity_jumps: bool,
-    /// The machine's axes (0, 1, 2) that the structure has.
+    /// The machine's axes (0, 1, 2) in which the structure moves.
     pub axes: Vec<usize>,
 }
 
 impl<'a> Baseline<'a> {
-    /// The baseline of a case.
+    /// The baseline model of a case.
     ///
     /// # Errors
-    /// No structure, an indefinite one, or an extension that it cannot have.
+    /// A missing or indefinite structure, or an extension that does not apply to it.
     pub(crate) fn new(case: &'a Case) -> Result<Self, DiagnoseError> {
         let structure = case.structure()?;
         let wrong = |error| DiagnoseError::simulate(&case.path, error);
@@ -63,16 +64,16 @@ impl<'a> Baseline<'a> {
         })
     }
 
-    /// The linear structure with one effect more.
+    /// The linear structure with one further effect.
     ///
     /// # Errors
-    /// What the effect cannot do to this structure.
+    /// The effect does not apply to this structure.
     pub(crate) fn altered(&self, effect: &Effects) -> Result<FirstOrder, ModelError> {
         let (dynamics, _) = self.effects.clone().and(effect).dynamics(self.structure)?;
         Ok(dynamics.first_order())
     }
 
-    /// True where the structure has a motion without stiffness: a stage that can go away.
+    /// True of a structure with a rigid-body mode.
     pub(crate) fn is_free(&self) -> bool {
         let poles = self.first_order.poles();
         let largest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
@@ -88,7 +89,7 @@ impl<'a> Baseline<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// The lowest natural frequency, Hz; `None` where nothing vibrates.
+    /// The lowest natural frequency, Hz; `None` without oscillating modes.
     pub(crate) fn lowest_hz(&self) -> Option<f64> {
         self.first_order
             .poles()
@@ -98,7 +99,7 @@ impl<'a> Baseline<'a> {
             .min_by(f64::total_cmp)
     }
 
-    /// What a channel reads, as the baseline has it; `None` for what is neither force nor motion along x, y or z.
+    /// The sensor behind a channel name; `None` for a quantity that is neither force nor motion along x, y or z.
     pub(crate) fn pickup(&self, name: &str) -> Option<Pickup> {
         pickup_of(name).map(|pickup| self.effects.pickup(pickup))
     }
@@ -118,7 +119,7 @@ pub(crate) fn direction_of(axis: usize) -> Direction {
     [Direction::X, Direction::Y, Direction::Z][axis.min(2)]
 }
 
-/// A channel of the conventions of recordings: fx, x, vx, ax …
+/// The sensor that a channel name stands for: fx, x, vx, ax …
 fn pickup_of(name: &str) -> Option<Pickup> {
     use quietcut_recording::Quantity;
     let (quantity, axis) = match name.as_bytes() {
@@ -132,7 +133,7 @@ fn pickup_of(name: &str) -> Option<Pickup> {
     Some(Pickup::of_axis(quantity, axis))
 }
 
-/// The terms of one effect alone.
+/// The restoring forces of effects, without those of the baseline.
 pub(crate) fn terms_of(
     effects: &Effects,
     structure: &Structure,
@@ -144,7 +145,7 @@ pub(crate) fn terms_of(
     Ok(terms)
 }
 
-/// Number of derivatives that a channel's quantity is of displacement.
+/// Number of time derivatives from displacement to a quantity.
 pub(crate) fn derivatives(quantity: quietcut_recording::Quantity) -> i32 {
     match quantity {
         quietcut_recording::Quantity::Velocity => 1,

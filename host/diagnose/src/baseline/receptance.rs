@@ -1,4 +1,4 @@
-//! The receptance of the baseline as a sum over its poles: fast at many frequencies, and its free decays.
+//! The receptance of the baseline as a sum over its poles, fast at many frequencies.
 
 use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
@@ -7,16 +7,16 @@ use rayon::prelude::*;
 use crate::signal::grid::Grid;
 use quietcut_model::structure::FirstOrder;
 
-/// Poles closer than this, relative, are one.
+/// Relative distance below which two poles count as one: rounding of the eigenvalues.
 const SAME: f64 = 1e-9;
-/// Modes with less than this share of the largest 1/mass are not felt.
+/// Modes with less than this share of the largest 1/mass along an axis are left out.
 const FELT: f64 = 1e-3;
 
 /// H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N; rows displacement, columns force.
 #[derive(Clone, Debug)]
 pub(crate) struct Receptance {
     terms: Vec<(Complex64, Matrix3<Complex64>)>,
-    /// Where poles with too few shapes leave no such sum: the structure itself.
+    /// The structure itself, where a defective system matrix has no such sum.
     whole: Option<FirstOrder>,
 }
 
@@ -79,8 +79,7 @@ impl Receptance {
         sum
     }
 
-    /// Poles above the real axis that the force along `axis` moves, seen along it, and what each has there of 1/mass:
-    /// 2·Im(λ)·|R|, 1/kg.
+    /// Poles in the upper half plane that a force along `axis` excites, and the inverse modal mass 2·Im(λ)·|R| of each at that axis, 1/kg.
     pub(crate) fn modes_along(&self, axis: usize) -> impl Iterator<Item = (Complex64, f64)> {
         let per_mass = move |(pole, residue): &(Complex64, Matrix3<Complex64>)| {
             2.0 * pole.im * residue[(axis, axis)].norm()
@@ -92,7 +91,7 @@ impl Receptance {
             .filter(move |(pole, per_mass)| pole.im > 0.0 && *per_mass > FELT * largest)
     }
 
-    /// Root of Σ |R_r/(iω − λ_r)|² along the diagonal entry of `axis`: what H would be if its parts did not cancel, m/N.
+    /// Root of Σ |R_r/(iω − λ_r)|² on the diagonal entry of `axis`, m/N: |H| if the modes did not cancel each other.
     pub(crate) fn size_at(&self, omega: f64, axis: usize) -> f64 {
         let s = Complex64::new(0.0, omega);
         self.terms

@@ -1,16 +1,16 @@
 //! The sampled force of a cut.
 
-/// The force of a cut, N, in the machine's axes.
+/// The force of a cut along the machine's axes, N.
 #[derive(Clone, Debug)]
 pub(crate) struct CutForce {
-    /// Its mean over each finer sample.
+    /// Mean over each finer sample.
     pub mean_n: [Vec<f64>; 3],
-    /// At the samples of the record, where forces are measured; 0 at those beside an entry or an exit.
+    /// Force at the samples of the record, where forces are measured; 0 at samples beside an entry or exit.
     pub sampled_n: [Vec<f64>; 3],
 }
 
 impl CutForce {
-    /// This less `other`, over `divisor`.
+    /// (`self` − `other`)/`divisor`.
     pub(crate) fn difference(&self, other: &Self, divisor: f64) -> Self {
         let of = |a: &[Vec<f64>; 3], b: &[Vec<f64>; 3]| {
             std::array::from_fn(|axis| {

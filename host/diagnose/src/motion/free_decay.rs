@@ -1,4 +1,4 @@
-//! Free decays: what a record owes to the state in which it began.
+//! Free decays: the response of a record to its initial state.
 
 use std::borrow::Cow;
 
@@ -10,14 +10,14 @@ use crate::signal::grid::Grid;
 use quietcut_recording::Quantity;
 use quietcut_simulate::effect::Pickup;
 
-/// The decay of each state of the baseline as each channel reads it, and how much of each the record holds.
+/// Free decays of the baseline in each channel, and the initial state of the record.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Decays {
-    /// By channel, by state: samples.
+    /// Unit responses, by channel, state and sample.
     columns: Vec<Vec<Vec<f64>>>,
-    /// By channel: samples that are not compared, which owe nothing to a decay.
+    /// By channel: samples that are not compared.
     skipped: Vec<Vec<usize>>,
-    /// The state at the start of the record.
+    /// Initial state of the record.
     pub start: Vec<f64>,
 }
 
@@ -67,12 +67,12 @@ impl Decays {
         self.start.len()
     }
 
-    /// The decay of a state in a channel.
+    /// Response of a channel to the unit initial state of one state variable.
     pub(crate) fn column(&self, channel: usize, state: usize) -> &[f64] {
         &self.columns[channel][state]
     }
 
-    /// The state that explains most of `residuals`, each channel measured by its `sizes`.
+    /// Fits the initial state to `residuals` by least squares, with each channel weighted by one over its `sizes`.
     pub(crate) fn fit(&mut self, residuals: &[Vec<f64>], sizes: &[f64]) {
         let order = self.start.len();
         let mut gram = DMatrix::<f64>::zeros(order, order);
@@ -88,7 +88,7 @@ impl Decays {
                 }
             }
         }
-        // States that no channel sees have no size: they stay zero.
+        // States that no channel observes keep the value zero.
         let scale: Vec<f64> = (0..order).map(|i| gram[(i, i)].sqrt()).collect();
         for i in 0..order {
             for j in 0..order {
@@ -107,7 +107,7 @@ impl Decays {
             .collect();
     }
 
-    /// The decays of a channel at the samples that are compared.
+    /// Unit responses of a channel, zero at the samples that are not compared.
     fn compared(&self, channel: usize) -> Cow<'_, [Vec<f64>]> {
         let mut columns = Cow::Borrowed(&self.columns[channel][..]);
         if !self.skipped[channel].is_empty() {
@@ -120,7 +120,7 @@ impl Decays {
         columns
     }
 
-    /// What a channel reads without the decay of the record.
+    /// Samples of a channel without the free decay.
     pub(crate) fn without(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
         let mut without = samples.to_vec();
         for (column, start) in self.compared(channel).iter().zip(&self.start) {
@@ -131,7 +131,7 @@ impl Decays {
         without
     }
 
-    /// Adds the decay of the record to what a channel reads.
+    /// Adds the free decay to the samples of a channel.
     pub(crate) fn add_to(&self, channel: usize, samples: &mut [f64]) {
         for (column, start) in self.compared(channel).iter().zip(&self.start) {
             for (sample, value) in samples.iter_mut().zip(column) {

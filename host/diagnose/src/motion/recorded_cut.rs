@@ -1,9 +1,9 @@
-//! The force of a recorded cut along a motion that is known.
+//! The force of a recorded cut along a known motion.
 //!
-//! With the measured motion u the chip of every tooth is known: h = min over earlier passes p of
-//! n·(u − u(t − pτ)) + (r_j − r_(j+p)) sin γ + p f sin φ sin γ (a surface is what all earlier passes left), and the force of
-//! the cut is linear in most of what a process may have otherwise. Between samples the force jumps where teeth enter and
-//! leave: what drives the structure is its mean over each finer sample, with entry, exit and loss of contact at their instants.
+//! The measured motion u determines the chip thickness of every tooth: h = min over earlier passes p of n·(u − u(t − pτ)) + (r_j − r_(j+p))
+//! sin γ + p f sin φ sin γ, because all earlier passes left the surface. The force of the cut is linear in most parameters of the process.
+//! It jumps between samples where teeth enter and leave: its mean over each finer sample drives the structure, with entry, exit and loss of
+//! contact at their instants.
 
 use crate::criteria::{SPEED_MISMATCH, UNCERTAIN_SAMPLES};
 use crate::error::DiagnoseError;
@@ -15,27 +15,27 @@ use quietcut_recording::Recording;
 use quietcut_simulate::path::Motion;
 use quietcut_simulate::{Cutter, Effects, Spindle};
 
-/// Share of the feed in a chip, sin φ, from which on a surface that was left long ago is looked at.
+/// Share of the feed in a chip, sin φ, down to which earlier surfaces are evaluated.
 const SHALLOW: f64 = 0.1;
-/// Passes that a tooth may jump over, at most.
+/// Largest number of passes that a tooth skips.
 const MOST_JUMPED: usize = 24;
 
 /// A recorded cut.
 #[derive(Clone, Debug)]
 pub(crate) struct RecordedCut {
-    /// The tool in its cut, as the case has it.
+    /// The tool and its engagement.
     pub cutter: Cutter,
-    /// How the spindle turns.
+    /// The spindle angle.
     pub spindle_motion: SpindleMotion,
     /// Samples per second.
     rate_hz: f64,
     /// Samples of the record.
     count: usize,
-    /// Earlier passes that a surface may come from, of a cut in which teeth jump over several.
+    /// Number of earlier passes that may have left the surface, of a cut whose teeth skip passes.
     passes: Option<usize>,
 }
 
-/// Immersion and feed of a recording: from its sidecar, and what that does not say from the case.
+/// Immersion and feed of a recording, from its sidecar, else from the case.
 ///
 /// # Errors
 /// The case has no cut.
@@ -51,10 +51,10 @@ pub(crate) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, Diagnose
 }
 
 impl RecordedCut {
-    /// The cut of a recording: working point from its sidecar, the rest from the case with its extensions.
+    /// The cut of a recording: its working point from the sidecar, the rest from the case with its extensions.
     ///
     /// # Errors
-    /// The case has no tool, material or cut, the sidecar no depth, the recording no tachometer; an extension that cannot be.
+    /// No tool, material or cut in the case, no depth in the sidecar, no tachometer in the recording; or an extension that does not apply.
     pub(crate) fn new(case: &Case, effects: &Effects, recording: &Recording) -> Result<Self, DiagnoseError> {
         let (tool, material, cut) = (case.tool()?, case.material()?, cut_of(case, recording)?);
         let said = recording.sidecar.cut.unwrap_or_default();
@@ -95,7 +95,7 @@ impl RecordedCut {
         })
     }
 
-    /// Its chips along `motion`, whose samples are `finer` times as dense as those of the record, for a spindle that turns so.
+    /// The chips along `motion`, whose samples are `finer` times as dense as those of the record, for this motion of the spindle.
     pub(crate) fn chips(
         &self,
         spindle_motion: &SpindleMotion,
@@ -109,7 +109,7 @@ impl RecordedCut {
             finer,
             passes: self.passes,
         };
-        // Where no force is measured none is compared at samples.
+        // Without force sensors no force is compared at samples.
         Chips::new(&self.cutter, spindle_motion, motion, sampling, |sample| {
             with_force && !self.is_beside(sample as f64 / self.rate_hz)
         })
@@ -120,21 +120,21 @@ impl RecordedCut {
         self.rate_hz
     }
 
-    /// Lets teeth jump over passes as a tool that swings by `swing_m` does: where the feed adds a share `SHALLOW` of itself to a chip,
-    /// near the ends of a slot, what it cut ahead is caught up with after swing / (share · feed) passes.
+    /// Lets teeth skip passes as a tool with amplitude `swing_m` does. Near the ends of a slot, where the feed adds only the share
+    /// `SHALLOW` of itself to a chip, a cut ahead of the surface is caught up after swing / (share · feed) passes.
     pub(crate) fn let_jump(&mut self, swing_m: f64) {
         let jumped = swing_m / (SHALLOW * self.cutter.feed_per_tooth_m).max(f64::MIN_POSITIVE);
         self.passes = Some((jumped.ceil() as usize).min(MOST_JUMPED) + 2);
     }
 
-    /// Samples of the first turn, or of as many as a surface may come from: what they cut was left before the record.
+    /// Number of samples in the first revolution, or in as many as the surface depends on: the record lacks the passes before it.
     pub(crate) fn first_turn(&self) -> usize {
         let passes = self.passes.unwrap_or(1).max(self.cutter.teeth.len());
         let turns = passes as f64 / self.cutter.teeth.len() as f64;
         ((turns * self.spindle_motion.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
     }
 
-    /// True where a tooth enters or leaves within `UNCERTAIN_SAMPLES` of a sample of `t`.
+    /// True where a tooth enters or leaves within `UNCERTAIN_SAMPLES` samples of `t`.
     pub(crate) fn is_beside(&self, t: f64) -> bool {
         let near_rad = UNCERTAIN_SAMPLES / self.rate_hz * self.spindle_motion.speed_rad_per_s(t);
         self.cutter.teeth.iter().any(|tooth| {

@@ -1,4 +1,4 @@
-//! How the spindle of a recorded cut turns.
+//! The spindle angle of a recorded cut, from its tachometer.
 
 use std::f64::consts::TAU;
 
@@ -9,12 +9,12 @@ use crate::error::DiagnoseError;
 use quietcut_recording::Recording;
 use quietcut_simulate::{Fluctuation, Spindle};
 
-/// The spindle angle along a record: that of a spindle, and an angle at the start.
+/// The spindle angle along a record.
 #[derive(Clone, Debug)]
 pub(crate) struct SpindleMotion {
     spindle: Spindle,
     rpm: f64,
-    /// The angle at the beginning of the whole recording, from which a fluctuation counts as well.
+    /// Angle at the beginning of the whole recording, where the phase of a fluctuation counts from as well.
     start_rad: f64,
     fluctuation: Option<Fluctuation>,
     /// See [`Recording::since_s`].
@@ -24,11 +24,10 @@ pub(crate) struct SpindleMotion {
 }
 
 impl SpindleMotion {
-    /// From the tachometer of a recording: the steady turning (with the fluctuation that the case has) whose whole turns are
-    /// nearest to the edges.
+    /// Fits the spindle angle to the tachometer of a recording: constant speed, with the fluctuation of the case if there is one.
     ///
     /// # Errors
-    /// No tachometer, too few edges, or more than one per turn without saying so.
+    /// No tachometer, too few edges, or several per revolution that are not declared.
     pub(crate) fn new(
         recording: &Recording,
         fluctuation: Option<Fluctuation>,
@@ -62,7 +61,7 @@ impl SpindleMotion {
         .fitted())
     }
 
-    /// The same edges with another fluctuation.
+    /// The spindle angle from the same edges with another fluctuation.
     pub(crate) fn with(&self, fluctuation: Fluctuation) -> Self {
         Self {
             fluctuation: Some(fluctuation),
@@ -71,12 +70,12 @@ impl SpindleMotion {
         .fitted()
     }
 
-    /// Speed and start angle for which whole turns come nearest to the edges; the fluctuation depends on the speed only by
-    /// its size, so that two rounds settle it.
+    /// Least-squares fit of speed and start angle to the edges. The fluctuation depends on the speed only by its amplitude, so that three
+    /// iterations settle it.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
-            // Edge k at 2πk: the angle of the spindle there, less what fluctuates, is a line.
+            // At edge k the angle is 2πk: without the fluctuation it is a line in time.
             let modulation_s = |t: f64| self.modulation_s(t);
             let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
             let mean_t = times.iter().sum::<f64>() / count;
@@ -109,36 +108,35 @@ impl SpindleMotion {
         self.rpm
     }
 
-    /// The angle `t` after the first sample, rad: immersion angle of tooth 1.
+    /// Immersion angle of tooth 1 at `t` after the first sample, rad.
     pub(crate) fn angle_rad(&self, t: f64) -> f64 {
         self.start_rad + self.spindle.angle_rad(self.since_s(t))
     }
 
-    /// The speed `t` after the first sample, rad/s.
+    /// Speed at `t` after the first sample, rad/s.
     pub(crate) fn speed_rad_per_s(&self, t: f64) -> f64 {
         self.spindle.speed_at_rad_per_s(self.since_s(t))
     }
 
-    /// How long after the beginning of the whole recording `t` after the first sample is, s.
+    /// Time since the beginning of the whole recording at `t` after the first sample, s.
     pub(crate) fn since_s(&self, t: f64) -> f64 {
         self.since_s + t
     }
 
-    /// How long before `t` after the first sample the spindle stood `angle_rad` back, s.
+    /// Regenerative delay at `t` for a pitch of `angle_rad`, s.
     pub(crate) fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
         self.spindle.delay_s(self.since_s(t), angle_rad)
     }
 
-    /// Mean of the time of a turn, s.
+    /// Mean revolution period, s.
     pub(crate) fn turn_s(&self) -> f64 {
         60.0 / self.rpm
     }
 }
 
-/// When the level rises through the middle of its range, s, once it has been in the lower quarter; between samples by a straight
-/// line.
+/// Times of rising edges, s: crossings of mid-range after the level was in the lower quarter, by linear interpolation.
 ///
-/// A device finds its threshold as it goes; here the whole record is known.
+/// The device adapts its threshold on the way; here the range of the whole record is known.
 fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
     let (low, high) = level
         .iter()
@@ -159,14 +157,14 @@ fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
     rises_s
 }
 
-/// Of the edges those of the first position of the wheel: with a gap the one after it, else every `positions`-th.
+/// The first edge of each revolution: the one after the gap of the wheel, else every `positions`-th.
 fn firsts_of_turns(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64> {
     if positions <= 1 {
         return edges_s.to_vec();
     }
     let there = positions - missing;
     let intervals: Vec<f64> = edges_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    // The widest interval of the first turn is the gap.
+    // The widest interval of the first revolution is the gap.
     let first = if missing == 0 || there < 2 {
         0
     } else {
@@ -180,22 +178,22 @@ fn firsts_of_turns(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64
     edges_s.iter().skip(first).step_by(there).copied().collect()
 }
 
-/// Steps of the frequency that is looked for, as a share of one swing per record.
+/// Step of the frequency grid, as a share of one period per record.
 const STEP: f64 = 0.2;
 
-/// A swing of the speed, as tachometers tell it.
+/// A speed modulation, estimated from tachometers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpeedModulation {
-    /// The swing.
+    /// Amplitude, frequency and phase.
     pub fluctuation: Fluctuation,
-    /// Standard deviations of δ, f_m in Hz and ψ in rad: from what is left of the times of the edges.
+    /// Standard deviations of δ, f_m in Hz and ψ in rad, from the residual of the edge times.
     pub deviation: [f64; 3],
 }
 
-/// The swing of the speed that comes nearest to the edges of all records; `None` where none stands out.
+/// The speed modulation that fits the edges of all records best; `None` if none is significant.
 ///
-/// Edge k comes at t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + a constant: linear in all but the frequency,
-/// with T₀ and the constant those of each record.
+/// Edge k comes at t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + constant. That is linear in all but the frequency; T₀ and
+/// the constant belong to each record.
 pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<SpeedModulation> {
     let longest_s = spindle_motions
         .iter()
@@ -220,7 +218,7 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
         .map(|index| low_hz + step_hz * index as f64)
         .map(|hertz| (nearest(spindle_motions, hertz).left, hertz))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    // Golden section about the best of the grid.
+    // Golden-section search about the best frequency of the grid.
     let (mut from, mut to) = (best_hz - step_hz, best_hz + step_hz);
     for _ in 0..40 {
         let third = 0.381_966 * (to - from);
@@ -245,7 +243,7 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     })
 }
 
-/// Standard deviations of δ, f_m and ψ for edges whose times have the given variance, s².
+/// Standard deviations of δ, f_m and ψ for edge times with the given variance, s².
 fn deviation(
     spindle_motions: &[&SpindleMotion],
     frequency_hz: f64,
@@ -285,12 +283,12 @@ fn deviation(
         .map(|gradient| (gradient.transpose() * covariance * gradient)[0].max(0.0).sqrt())
 }
 
-/// The fit of a swing of a given frequency.
+/// Least-squares fit of a modulation of given frequency.
 struct Nearest {
     /// δ cos ψ and δ sin ψ.
     along: f64,
     across: f64,
-    /// Σ of squares of what is left of the times of the edges, s², with the swing and without.
+    /// Residual sum of squares of the edge times, s², with and without the modulation.
     left: f64,
     without: f64,
 }
@@ -329,7 +327,7 @@ fn nearest(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> Nearest {
     }
 }
 
-/// A function of the time of each edge, without the part that grows evenly from edge to edge.
+/// A function of the time of each edge, without its linear trend over the edges.
 fn without_line(edges_s: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
     let values: Vec<f64> = edges_s.iter().map(|t| of(*t)).collect();
     let count = values.len() as f64;
@@ -374,7 +372,7 @@ mod tests {
             let steady = Spindle::new(rpm);
             let spindle = fluctuation.map_or(steady, |fluctuation| steady.fluctuating(fluctuation));
             let times = (0..24).map(|k| spindle.time_s(TAU * f64::from(k) + start));
-            // Known to two microseconds, in a fixed disorder.
+            // Jitter of two microseconds, in a fixed disorder.
             times
                 .enumerate()
                 .map(|(k, t)| t + 2e-6 * (7.3 * (k * k) as f64).sin())
@@ -388,7 +386,7 @@ mod tests {
             fluctuation: found,
             deviation,
         } = speed_modulation(&swings.each_ref()).unwrap();
-        // Two microseconds against a swing of δ/ω = 1.1 ms over 24 edges.
+        // Jitter of two microseconds against an amplitude δ/ω = 1.1 ms over 24 edges.
         assert!((found.delta / truth.delta - 1.0).abs() < 3e-3, "{found:?}");
         assert!(
             (found.frequency_hz - truth.frequency_hz).abs() < 2e-3,
@@ -401,7 +399,7 @@ mod tests {
             found.phase_rad - truth.phase_rad,
         ];
         for (error, deviation) in errors.iter().zip(deviation) {
-            // What the fixed disorder makes of them is of the size that is told.
+            // The error by the fixed disorder agrees with the stated standard deviation.
             assert!(error.abs() < 4.0 * deviation, "{errors:?} {deviation:?}");
             assert!(deviation < 1e-2, "{deviation:?}");
         }

@@ -1,4 +1,4 @@
-//! Records that tell nothing, said plainly with what is needed.
+//! Checks that refuse a recording which cannot be compared, with a message that says what is required.
 
 use crate::baseline::Baseline;
 use crate::criteria::{
@@ -12,7 +12,7 @@ use crate::records::channel::Observed;
 use crate::signal::noise::rms;
 use quietcut_recording::Recording;
 
-/// Refuses what no fit could use.
+/// Refuses a recording that is too short, without a required channel, clipped, or not finite.
 pub(crate) fn record(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -66,8 +66,8 @@ pub(crate) fn record(
     Ok(())
 }
 
-/// Factors that a wrong unit brings, how far from it a model that is wrong as well may make it (in the logarithm), and the name of
-/// what was likely meant.
+/// Ratios by which a wrong unit scales a channel, the tolerance of each as a difference of logarithms, and the unit that was probably
+/// meant.
 const UNITS: [(f64, f64, &str); 6] = [
     (4.448, POUND_TOLERANCE, "4.45: pounds of force for N"),
     (1e3, UNIT_TOLERANCE, "a thousand: mm, kN or g for m, N or kg"),
@@ -77,10 +77,10 @@ const UNITS: [(f64, f64, &str); 6] = [
     (9.806_65, UNIT_TOLERANCE, "9.81: g for m/s²"),
 ];
 
-/// Refuses a channel whose size cannot be that of the case: a wrong unit.
+/// Refuses a channel whose size disagrees with the prediction by the ratio of a wrong unit.
 ///
-/// `response` is what the case predicts of the forces alone of what was `measured`, `by_noise` the energy that it would have by the
-/// noise of the force sensors. The factor is that by which it fits best; it counts where the two look alike.
+/// `response` is the response to the forces alone that the baseline predicts for `measured`; `by_noise` is the energy of the response to
+/// the noise of the force sensors. The ratio is the least-squares factor between the two; it counts only where they correlate.
 pub(crate) fn unit(
     path: &std::path::Path,
     name: &str,
@@ -94,14 +94,14 @@ pub(crate) fn unit(
     if own <= LEAST_ENERGY_OVER_FORCE_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
-    // What a constant force does says nothing of what moves.
+    // The response to a constant force carries no information on the vibration.
     if spread(response).powi(2) * response.len() as f64 > LEAST_ENERGY_OVER_FORCE_NOISE * by_noise {
         far_off(path, name, response, measured)?;
     }
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
     let likely = likely(factor);
-    // Where no unit is known that would do, the shapes must be the same.
+    // A ratio that no known unit has requires a higher correlation.
     let least_alike = if likely.is_some() {
         LEAST_CORRELATION_OF_KNOWN_UNIT
     } else {
@@ -119,8 +119,8 @@ pub(crate) fn unit(
     ))
 }
 
-/// Of channels of a cut that were checked: the first complaint, or none where one of them is right. Then so is the unit of the others,
-/// if they are not out of all proportion: one edge coefficient makes ten times an axial force that was believed to be small.
+/// The result of the checks of a cut: the first refusal, or success if one channel passes. If one unit is right, so are the others within
+/// the limits of [`far_off`]: a wrong edge coefficient alone changes a small axial force by a factor of ten.
 pub(crate) fn unless_one_is_right(
     checked: impl IntoIterator<Item = Result<(), DiagnoseError>>,
 ) -> Result<(), DiagnoseError> {
@@ -131,8 +131,9 @@ pub(crate) fn unless_one_is_right(
     checked.into_iter().collect()
 }
 
-/// Refuses a channel that reads out of all proportion to its prediction, whatever their shapes. Offsets of sensors do not count; too
-/// large is what moves more than the prediction is with its mean, since what is left of even teeth in a slot is next to nothing.
+/// Refuses a channel whose amplitude differs from its prediction by a factor that no machine reaches, whatever its waveform. Offsets of
+/// sensors do not count. Too large is a channel that varies more than its prediction with the mean, because the variation by evenly pitched
+/// teeth in a slot nearly vanishes.
 pub(crate) fn far_off(
     path: &std::path::Path,
     name: &str,
@@ -155,18 +156,18 @@ pub(crate) fn far_off(
     ))
 }
 
-/// Root mean square about the mean.
+/// Standard deviation.
 fn spread(samples: &[f64]) -> f64 {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     rms(&samples.iter().map(|x| x - mean).collect::<Vec<_>>())
 }
 
-/// What a gain that was found may be if it is none of the sensor: a unit.
+/// The wrong unit that a gain may stand for, instead of a fault of the sensor.
 pub(crate) fn unit_of_gain(gain: f64) -> Option<&'static str> {
     unit_within(gain.abs(), |_| GAIN_UNIT_TOLERANCE)
 }
 
-/// The unit that was likely meant where something is so many times too large, or too small, by a model that may be wrong as well.
+/// The unit that was probably meant if a channel is larger or smaller than predicted by `factor`.
 fn likely(factor: f64) -> Option<&'static str> {
     unit_within(factor, |share| share)
 }
@@ -183,8 +184,8 @@ fn said(likely: Option<&str>) -> String {
     likely.map_or_else(String::new, |meant| format!(" It is about {meant}."))
 }
 
-/// The level at which a channel is cut off: flat tops of three and more equal samples at an end of its range, many of them, or one
-/// that the signal reaches and leaves steeply.
+/// The level at which a channel is clipped: many flat tops of three and more equal samples at an end of its range, or a single one with
+/// steep flanks.
 fn clipped(samples: &[f64]) -> Option<f64> {
     let (low, high) = samples
         .iter()
@@ -200,7 +201,7 @@ fn clipped(samples: &[f64]) -> Option<f64> {
         .map(|pair| (pair[1] - pair[0]).abs())
         .filter(|step| *step > 1e-9 * range)
         .fold(f64::INFINITY, f64::min);
-    // A digital channel has few levels; flat tops of a slow signal on coarse levels are no clipping.
+    // A digital channel has few levels: flat tops of a slow signal on coarse levels are no clipping.
     [high, low].into_iter().find(|end| {
         let at = |x: &f64| (x - end).abs() <= 1e-9 * range;
         if *end != 0.0 && has_cliff(samples, at, *end, resolution) {
@@ -222,8 +223,8 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     })
 }
 
-/// True where some flat top, no longer than a blow, is reached and left steeply. Of a smooth top whose level three samples share, the
-/// second ones beside them are at most twelve levels below: 9c under the peak where c keeps a level, and one for rounding.
+/// True if a flat top no longer than an impact has steep flanks. Two samples beside a smooth top that three samples share, the signal is at
+/// most twelve levels lower: 9c below the peak of a parabola with curvature c that stays within a level, and one for rounding.
 fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f64) -> bool {
     let (mut first, mut steepest) = (0, 0.0_f64);
     while first < samples.len() {
@@ -245,7 +246,7 @@ fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f
         && steepest > CLIPPED_IMPACT_STEP * written_resolution(samples, end)
 }
 
-/// The step of the last digit of `end`, where all samples are written with as few digits as they seem to be.
+/// The value of the last digit of `end`, if all samples are written with as many digits as the longest has.
 fn written_resolution(samples: &[f64], end: f64) -> f64 {
     let digits = |x: &f64| {
         let text = format!("{x:e}");
@@ -275,15 +276,15 @@ mod tests {
         assert_eq!(clipped(&whole), None);
         let cut: Vec<f64> = whole.iter().map(|x| x.min(0.8)).collect();
         assert_eq!(clipped(&cut), Some(0.8));
-        // On 64 levels the top of a blow is flat, and is left level by level.
+        // On 64 levels the top of an impact is flat, but its flanks fall level by level.
         let coarse: Vec<f64> = whole.iter().map(|x| (64.0 * x).round() / 64.0).collect();
         assert_eq!(clipped(&coarse), None);
-        // Written with three digits it has finer steps beside it than at its top.
+        // A sample with three digits is written with finer steps beside the top than at the top.
         for digits in [2, 3] {
             let written = whole.iter().map(|x| format!("{x:.digits$e}").parse().unwrap());
             assert_eq!(clipped(&written.collect::<Vec<f64>>()), None);
         }
-        // What is held and let go is no blow.
+        // A force that is held and released is no impact.
         let held: Vec<f64> = (0..2000).map(|n| if n < 900 { 1.0 } else { 0.0 }).collect();
         assert_eq!(clipped(&held), None);
     }

@@ -10,12 +10,15 @@ use crate::records::{amplification, checks, motion_estimate};
 use crate::signal::noise::rms;
 use quietcut_recording::{Quantity, Recording};
 
-/// Rounds in which force and motion settle: the motion comes from the force, the chip from the motion.
+/// Iterations in which force and motion settle: the force determines the motion, and the motion the chip thickness.
 const ROUNDS: usize = 4;
-/// The same along the motion of a model, at most: until the motion is off the closed loop by no more than this, in units of the noise.
+/// Largest number of iterations along the motion of a model. They end when the motion is within [`CLOSED_LOOP_SETTLED`] of its closed loop.
 const ROUNDS_OF_A_MODEL: usize = 8;
 
-/// Predicts all channels of a cut, and learns the motion from what is left.
+/// The record with the prediction of all channels of a cut, and with the motion that the residual corrects.
+///
+/// # Errors
+/// A cut that the case cannot describe, or a channel of impossible size.
 pub(super) fn predicted(
     mut record: Record,
     baseline: &Baseline<'_>,
@@ -82,27 +85,27 @@ pub(super) fn predicted(
             check_units(&record)?;
         }
         let off = record.off_the_closed_loop();
-        // The first force along the motion of a model is that of the measured one still.
+        // In the first iteration along the motion of a model, the force still is that along the measured motion.
         let is_along = (round > 0 || record.clean.is_none()) && !record.amplifies;
         motion_estimate::learn(&mut record, baseline, &force, is_along.then_some(&slopes));
         if record.clean.is_some() && is_along && off < CLOSED_LOOP_SETTLED {
             break;
         }
     }
-    // What the causes add is measured from the force along the motion as it is known now.
+    // The regressors of causes are differences from the force along the final motion.
     cutting.follow(&record.motion);
     record.cut = Some(cutting);
     Ok(record)
 }
 
-/// Refuses channels whose size cannot be that of this cut. What is predicted first is along no motion at all: forces are about
-/// those of the chips as they are fed; the motion may be larger by far where regeneration amplifies it.
+/// Refuses channels whose size cannot be that of this cut. The first prediction has no motion: measured forces are close to those by the
+/// feed alone, but regeneration may amplify the motion.
 fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     let mut forces = Vec::new();
     for (index, channel) in record.channels.iter().enumerate() {
         let mut response = record.decays.without(index, &channel.predicted);
         let mut measured = channel.measured.clone();
-        // There it is as measured.
+        // Skipped samples are set to the measured value.
         for &sample in &record.skipped[index] {
             (response[sample], measured[sample]) = (0.0, 0.0);
         }
@@ -117,7 +120,7 @@ fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     checks::unless_one_is_right(forces)
 }
 
-/// Compares what comes after the first turn, and of all but short records what comes before the last.
+/// Leaves out the first revolution, and the last of all but short records.
 fn compare_without_ends(record: &mut Record, cut: &RecordedCut) {
     let (turn, count) = (cut.first_turn(), record.grid.count());
     record.compared = turn..if count > 4 * turn { count - turn } else { count };

@@ -12,13 +12,13 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Cutter;
 use quietcut_simulate::path::Motion;
 
-/// A cut with its force as it is believed.
+/// A recorded cut with the force of the baseline along a motion.
 pub(crate) struct Cutting {
-    /// The cut.
+    /// The recorded cut.
     pub cut: RecordedCut,
-    /// Its chips along the motion.
+    /// The chips along the motion.
     chips: Chips,
-    /// Its force along the motion, as the baseline has it.
+    /// The force of the baseline along the motion.
     pub force: CutForce,
     finer: usize,
     /// True where forces are measured.
@@ -49,8 +49,8 @@ impl Cutting {
         })
     }
 
-    /// Samples of a channel that are not compared: forces and accelerations jump where a tooth enters or leaves, and the tachometer
-    /// does not say on which side a sample beside that is.
+    /// Samples of a channel that are not compared. Forces and accelerations jump where a tooth enters or leaves, and the tachometer leaves
+    /// open on which side of the jump a nearby sample lies.
     pub(super) fn skipped(&self, channel: &Observed) -> Vec<usize> {
         if !matches!(channel.pickup.quantity, Quantity::Force | Quantity::Acceleration) {
             return Vec::new();
@@ -59,12 +59,12 @@ impl Cutting {
         (0..channel.measured.len()).filter(is_beside).collect()
     }
 
-    /// How its force answers to a small motion beside the one that its chips are of.
+    /// The force linearized about the motion of the chips.
     pub(crate) fn mean_slopes(&self) -> MeanSlopes {
         self.chips.mean_slopes(&self.cut.cutter, &self.cut.spindle_motion)
     }
 
-    /// Goes along another motion.
+    /// Recomputes chips and force along another motion.
     pub(super) fn follow(&mut self, motion: &Motion) {
         self.chips = self
             .cut
@@ -72,12 +72,12 @@ impl Cutting {
         self.force = self.force_of(&self.cut.cutter, motion);
     }
 
-    /// The force of another tool along the motion that the chips are of.
+    /// The force of another tool along the motion of the chips.
     pub(crate) fn force_of(&self, cutter: &Cutter, motion: &Motion) -> CutForce {
         self.chips.force(cutter, &self.cut.spindle_motion, motion)
     }
 
-    /// The force of the believed tool where it turns or moves otherwise.
+    /// The force of the baseline's tool with another motion of the spindle or of the tool.
     pub(crate) fn force_along(&self, spindle_motion: &SpindleMotion, motion: &Motion) -> CutForce {
         self.cut
             .chips(spindle_motion, motion, self.finer, self.with_force)

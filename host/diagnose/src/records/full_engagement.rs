@@ -1,9 +1,10 @@
-//! Where recorded cuts are in full cut.
+//! The part of a recorded cut with full engagement.
 //!
-//! A case describes a tool in full immersion and depth. Recordings of real cuts begin and end in air, and between air and full cut
-//! the tool goes through a face of the workpiece, where the case says nothing of the chips. So only what is in full cut is compared.
-//! Air is where a turn of the spindle is quiet, against the other turns of the recording and against what the teeth shake the believed
-//! machine by: cuts may grow into chatter, and those turns are not quiet that have the chips of the feed alone.
+//! A case describes a tool at full immersion and depth. Recordings of real cuts begin and end in air, and on its way in and out the tool
+//! crosses a face of the workpiece, where the case does not define the chips. So only the part with full engagement is compared. A
+//! revolution is in air if its vibration is small both against the other revolutions of the recording and against the response of the
+//! baseline to the feed alone: the level of a cut that grows into chatter exceeds that of the feed by far, and revolutions with the chips
+//! of the feed alone are no air.
 
 use std::borrow::Cow;
 use std::f64::consts::TAU;
@@ -26,14 +27,14 @@ use quietcut_recording::{Kind, Quantity, Recording};
 use quietcut_simulate::effect::Pickup;
 use quietcut_simulate::{Cutter, Passage, Spindle};
 
-/// Angles of a turn at which chips are looked at.
+/// Angles per revolution at which the chips are evaluated.
 const ANGLES: usize = 512;
 
-/// Recordings without what is not in full cut, and a sentence about each that was shortened; those that are in full cut throughout, and
-/// those that are of no cut, as they are.
+/// The recordings without the parts that lack full engagement, and a sentence about each that was shortened. Recordings with full
+/// engagement throughout, and those of other tests, stay as they are.
 ///
 /// # Errors
-/// A recording whose full cut is too short to be diagnosed.
+/// A recording with too few revolutions of full engagement.
 pub(crate) fn in_full_engagement<'a>(
     case: &Case,
     recordings: &'a [Recording],
@@ -72,7 +73,7 @@ fn is_of_a_cut(recording: &Recording) -> bool {
     recording.sidecar.kind == Some(Kind::Cutting)
 }
 
-/// The samples in which a recorded cut is in full cut; `None` where there is no air in it, or nothing that could tell.
+/// The samples of a recorded cut with full engagement; `None` if it contains no air, or if no channel shows air.
 fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>> {
     if !is_of_a_cut(recording) {
         return None;
@@ -96,7 +97,7 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
         0 => 0.0,
         start => start as f64 + (ENTRY_MARGIN * way).max(loud_after) + 1.0,
     };
-    // Who records air before the cut may stop when the cut is over, before all is quiet. Chatter is loud to the end of the way out.
+    // A recording may stop at the end of the cut, before the vibration has decayed. Chatter stays loud until the tool has left.
     let to = if cut.end == levels.count && cut.end - last <= LEAST_AIR_AT_ENDS {
         f64::INFINITY
     } else {
@@ -110,7 +111,7 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
     Some(from..to.max(from))
 }
 
-/// The tool in its cut; `None` where something of it is not said, which is complained of elsewhere.
+/// The tool in its cut; `None` if a required value is missing, which another check reports.
 fn cutter(baseline: &Baseline<'_>, recording: &Recording) -> Option<Cutter> {
     let case = baseline.case;
     let depth_mm = recording.sidecar.cut?.axial_depth_mm?;
@@ -119,7 +120,7 @@ fn cutter(baseline: &Baseline<'_>, recording: &Recording) -> Option<Cutter> {
     baseline.effects.cutter(cutter).ok()
 }
 
-/// What the chips of the feed alone do to the believed machine: harmonics of the turn of force, N, and of displacement, m.
+/// Response of the baseline to the chips of the feed alone: harmonics of the revolution of force, N, and of displacement, m.
 struct Forced {
     omega: f64,
     harmonics: Vec<[Vector3<Complex64>; 2]>,
@@ -148,7 +149,7 @@ impl Forced {
         Self { omega, harmonics }
     }
 
-    /// Standard deviation of what a channel reads within a turn, of what is below half its sample rate.
+    /// Standard deviation of a channel over a revolution, from the harmonics below half its sample rate.
     fn level(&self, pickup: &Pickup, rate_hz: f64) -> f64 {
         let squares = self.harmonics.iter().enumerate().map(|(index, [force, x])| {
             let omega = (index + 1) as f64 * self.omega;
@@ -167,7 +168,7 @@ impl Forced {
     }
 }
 
-/// The force of teeth of one radius on a tool that stands still beside its axis.
+/// Cutting force of a rigid tool without runout, N.
 fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
     let arc = cutter.exit_rad - cutter.start_rad;
     cutter
@@ -187,20 +188,20 @@ fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
         .sum()
 }
 
-/// How much each channel moves within each turn, over what it does in the cut: the median of its turns, or where chatter makes that
-/// more, what the feed alone makes of it.
+/// Standard deviation of each channel in each revolution over that in the cut. The reference is the median of the revolutions, or the
+/// response to the feed alone where chatter makes the median larger.
 struct Levels {
     count: usize,
-    /// True where the median is more by far.
+    /// True if the median exceeds the response to the feed by the factor of chatter.
     chatters: bool,
-    /// By channel.
+    /// Levels by channel and revolution.
     of: Vec<Vec<f64>>,
-    /// The noise of each.
+    /// Noise of each channel over its reference.
     noise: Vec<f64>,
 }
 
 impl Levels {
-    /// `None` where no channel tells.
+    /// `None` if no channel exceeds its noise enough to show air.
     fn of(baseline: &Baseline<'_>, recording: &Recording, turn_s: f64, forced: &Forced) -> Option<Self> {
         let rate_hz = recording.sample_rate_hz;
         let per_turn = turn_s * rate_hz;
@@ -235,7 +236,7 @@ impl Levels {
         self.of.iter().map(|of| of[turn]).fold(f64::INFINITY, f64::min)
     }
 
-    /// The stretches of air.
+    /// The ranges of revolutions in air.
     fn quiet(&self) -> Vec<Range<usize>> {
         let mut stretches = Vec::new();
         let mut turn = 0;
@@ -258,7 +259,7 @@ impl Levels {
         stretches
     }
 
-    /// True where a channel that is quiet at first grows at once, as a resonance does in a cut that begins with the recording.
+    /// True if the channels that are small in the first revolution grow at once, as a resonance does when a cut begins with the recording.
     fn grows_from_rest(&self) -> bool {
         self.of
             .iter()
@@ -268,7 +269,7 @@ impl Levels {
     }
 }
 
-/// Standard deviation without that of the noise.
+/// Standard deviation after the noise variance is subtracted.
 fn deviation(samples: &[f64], noise: f64) -> f64 {
     let count = samples.len().max(1) as f64;
     let mean = samples.iter().sum::<f64>() / count;
@@ -276,7 +277,7 @@ fn deviation(samples: &[f64], noise: f64) -> f64 {
     (square - noise * noise).max(0.0).sqrt()
 }
 
-/// The longest stretch of turns between those that are given; `None` where none are.
+/// The longest range of revolutions between the given ones; `None` if none is given.
 fn longest_gap(stretches: &[Range<usize>], count: usize) -> Option<Range<usize>> {
     if stretches.is_empty() {
         return None;
@@ -294,7 +295,7 @@ mod tests {
     use crate::{Options, diagnose};
     use quietcut_simulate::{Entry, VirtualCut};
 
-    /// How long the tool takes through a face at 900 rev/min with two teeth and 0.15 mm of feed each, s: its radius over the feed.
+    /// Time of the tool through a face at 900 rev/min with two teeth and a feed of 0.15 mm per tooth, s: its radius over the feed rate.
     const WAY_S: f64 = 6.35 / (0.3 * 15.0);
     const SECONDS: f64 = 8.0;
     const AIR_S: f64 = 0.2;
@@ -323,7 +324,7 @@ mod tests {
             (SLOT, 1.0, Entry::Feed, &[Force, Displacement][..], 0.005),
             (SLOT, 1.0, Entry::Feed, &[Displacement], 0.005),
             (SLOT, 1.0, Entry::Feed, &[Acceleration], 0.05),
-            // Chatter grows over all of it.
+            // Chatter grows over the whole cut.
             (SLOT, 3.0, Entry::Feed, &[Displacement], 0.005),
             (SLOT, 1.0, ramp, &[Displacement], 0.005),
             ("kuka-kr90-acetal", 1.0, Entry::Feed, &[Force, Acceleration], 0.02),
@@ -333,7 +334,7 @@ mod tests {
             let range = range(&Baseline::new(&case).unwrap(), &recording).unwrap();
             let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
             println!("{name} {depth_mm} mm {entry:?} {measured:?}: {from_s} to {to_s} s");
-            // It touches, and is in the air again, at AIR_S from the ends; slow decays after the exit look like a part of it.
+            // The tool touches, and is in air again, at AIR_S from the ends. Slow free decays after the exit look like a part of the cut.
             let way_s = if entry == ramp { 1.0 } else { WAY_S };
             let touches = [AIR_S, SECONDS - AIR_S];
             assert!(from_s >= touches[0] + way_s && from_s < touches[0] + 1.6 * WAY_S);
@@ -346,7 +347,7 @@ mod tests {
         for (depth_mm, measured) in [
             (1.0, Quantity::Displacement),
             (1.0, Quantity::Acceleration),
-            // Grows to chatter.
+            // Grows into chatter.
             (4.0, Quantity::Displacement),
         ] {
             let case = case(SLOT, "");
@@ -363,7 +364,7 @@ mod tests {
 
     #[test]
     fn a_cut_is_diagnosed_where_it_is_in_full_cut() {
-        // What swings and grows counts from the start of the recording, not from that of the full cut.
+        // Modulation and wear count from the start of the recording, not from that of full engagement.
         let swings = "\n[extension.speed-fluctuation]\ndelta = 0.01\nfrequency_hz = 0.7\nphase_deg = 40.0\n";
         let wears = "\n[extension.wear]\nrelative_rate_per_s = 0.1\n";
         let (cut, believed) = (case(SLOT, &[swings, wears].concat()), case(SLOT, swings));

@@ -56,7 +56,7 @@ fn is_cut(recording: &Recording) -> bool {
 fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Result<Record, DiagnoseError> {
     let domain = Domain::of(baseline, recording)?;
     let is_cut = recording.sidecar.kind == Some(Kind::Cutting);
-    // What drives a cut is its model; forces that were measured are compared with it.
+    // The cut model supplies the force of a cut; measured forces are compared with it.
     let force_n = if is_cut {
         std::array::from_fn(|_| Vec::new())
     } else {
@@ -66,11 +66,11 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     checks::record(baseline, recording, &channels)?;
     let highest_hz = highest_hz(recording);
     let rate_hz = recording.sample_rate_hz;
-    // Harmonics of terms of the motion up to the sixteenth stay below half the finer rate.
+    // Harmonics of nonlinear terms up to the sixteenth stay below half the finer rate.
     let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
         .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
         .next_power_of_two();
-    // What comes around from the end of a cut is a free decay at its beginning, which is taken off.
+    // The circular convolution wraps the end of a cut around to its beginning. There it is a free decay, which is subtracted.
     let decays = if is_cut { 2.0 } else { 8.0 };
     let room_s = decays * baseline.slowest_decay_s();
     let grid = Grid::new(recording.len(), rate_hz, room_s, finer);
@@ -105,7 +105,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
         closed: None,
         highest_hz,
         lowest_hz: baseline.lowest_hz().unwrap_or(0.0),
-        // Forces of a cut reach to the end of the band.
+        // Forces of a cut have harmonics up to half the sample rate.
         band_hz: if is_cut {
             0.5 * rate_hz
         } else {
@@ -133,7 +133,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
     let is_cut = record.kind == Some(Kind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
-        // Across the force a little of another axis is as large as what is predicted.
+        // Along an axis without force, a small cross-sensitivity exceeds the prediction.
         let axis = main_axis(channel)?;
         if record.force_n[axis].is_empty() || is_cut && channel.pickup.quantity == Quantity::Force {
             return None;
@@ -154,13 +154,13 @@ fn checked(record: Record) -> Result<Record, DiagnoseError> {
     Ok(record)
 }
 
-/// Σ y² of what a channel reads of the response to the noise of the force sensors, over the samples of the record.
+/// Energy Σ y² of a channel's response to the noise of the force sensors, over the samples of the record.
 fn energy_by_force_noise(record: &Record, channel: usize) -> f64 {
     let power = record.power_by_force_noise(channel);
     power.iter().sum::<f64>() / BANDS as f64 * record.grid.count() as f64
 }
 
-/// Forces along the axes of the baseline, as they act: a force sensor that the baseline knows to be wrong is corrected.
+/// Forces along the axes of the baseline, N, corrected for the faults of force sensors that the baseline contains.
 fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
     std::array::from_fn(|axis| {
         let name = ["fx", "fy", "fz"][axis];
@@ -188,7 +188,7 @@ fn floor_n(force_n: &[f64], kind: Option<Kind>) -> f64 {
     }
 }
 
-/// Places that mean the tool tip.
+/// Sensor locations in a sidecar that mean the tool tip.
 const TOOL_TIP: [&str; 5] = ["tool-tip", "tool tip", "tip", "tcp", "tool"];
 
 fn elsewhere(recording: &Recording) -> Vec<String> {
@@ -214,7 +214,7 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             let pickup = baseline.pickup(&channel.name)?;
             let axes_known = (0..3).all(|axis| pickup.weights[axis] == 0.0 || baseline.axes.contains(&axis));
             let is_force = pickup.quantity == Quantity::Force;
-            // The force of a cut is an answer as well.
+            // The force of a cut is an output as well.
             let compared =
                 is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(Kind::Cutting);
             let is_mean = baseline.velocity_jumps && pickup.quantity == Quantity::Acceleration;
@@ -234,8 +234,7 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
         .collect()
 }
 
-/// The frequency below which all but half a percent of the power of every channel of motion lies, Hz; at least three times
-/// the resolution of the record.
+/// Frequency below which 99.5 % of the power of every channel of motion lies, Hz; at least three times the resolution of the record.
 fn highest_hz(recording: &Recording) -> f64 {
     let grid = Grid::new(recording.len(), recording.sample_rate_hz, 0.0, 1);
     let of_motion = recording.channels.iter().filter(|channel| {

@@ -1,4 +1,4 @@
-//! One recording beside what the baseline predicts of it.
+//! One recording beside the prediction of the baseline.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -19,85 +19,84 @@ use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
 use quietcut_recording::{Kind, Quantity};
 use quietcut_simulate::path::{Motion, restoring_along};
 
-/// By axis of force: what a channel reads per newton at the bins of the finer samples; empty where it hears nothing of that axis.
+/// By axis of force: response of a channel per newton at the bins of the finer samples; empty for an axis without response.
 pub(crate) type Responses = [Vec<Complex64>; 3];
 
-/// What the channels of a record read without their noise, as a better model has it.
+/// Noise-free samples of the channels, as a better model predicts them.
 #[derive(Clone, Debug)]
 pub(crate) struct Clean {
-    /// By channel.
+    /// Samples by channel.
     readings: Vec<Vec<f64>>,
-    /// The noise of each.
+    /// Standard deviation of the noise of each channel.
     deviations: Vec<f64>,
 }
 
-/// One recording with its prediction.
+/// One recording beside the prediction of the baseline. No room after this one changes it.
 pub(crate) struct Record {
-    /// Where it was read from.
+    /// File of the recording.
     pub path: PathBuf,
-    /// What kind of test it is.
+    /// Kind of the test.
     pub kind: Option<Kind>,
-    /// In what it is compared.
+    /// Quantity in which it is compared.
     pub domain: Domain,
-    /// Channels whose sensors sit somewhere else than at the tool tip.
+    /// Channels whose sensors are not at the tool tip.
     pub elsewhere: Vec<String>,
-    /// Its transforms.
+    /// Transforms of the record.
     pub grid: Grid,
-    /// The channels that are compared.
+    /// Channels that are compared.
     pub channels: Vec<Observed>,
-    /// Forces that drive the structure, N, in the machine's axes; empty where none does.
+    /// Forces that excite the structure along the machine's axes, N; empty for an axis without force.
     pub force_n: [Vec<f64>; 3],
-    /// Floor of each force's spectrum as a deviation of white noise, N: its sensor's noise, and what sampling hides.
+    /// Noise floor of each force as a standard deviation of white noise, N: noise of the sensor and aliasing.
     pub force_deviation_n: [f64; 3],
-    /// The motion as far as it is known: measured where that tells more than the model, else as the model has it.
+    /// Estimated motion: measured at frequencies where the measurement is more certain than the model, else predicted.
     pub motion: Motion,
-    /// Its displacement at the samples of the record as spectra, continued smoothly before and after: what that adds are free
+    /// Spectra of the displacement at the samples of the record, continued smoothly beyond both ends. The continuation adds only free
     /// decays.
     pub displacement: [Vec<Complex64>; 3],
-    /// By channel, of a cut: what it reads of the motion as far as it is known, with what sampling folds into it.
+    /// By channel, of a cut: samples of the estimated motion, with aliasing.
     pub readings: Vec<Vec<f64>>,
-    /// Below this lies all but a two-hundredth of the motion's power, Hz.
+    /// Frequency below which 99.5 % of the power of the motion lies, Hz.
     pub highest_hz: f64,
-    /// Lowest natural frequency of the baseline, Hz; 0 where nothing vibrates.
+    /// Lowest natural frequency of the baseline, Hz; 0 without oscillating modes.
     pub lowest_hz: f64,
     /// Highest frequency at which the record is compared, Hz.
     pub band_hz: f64,
-    /// H(iω) of the baseline at the bins of the finer samples, m/N; in the domain of force the dynamic stiffness at the bins
-    /// of the samples, N/m.
+    /// Receptance H(iω) of the baseline at the bins of the finer samples, m/N. In the domain of force: dynamic stiffness at the bins of the
+    /// samples, N/m.
     pub transfer: Vec<Matrix3<Complex64>>,
-    /// Those of each channel.
+    /// Responses of each channel.
     pub(super) responses: Vec<Responses>,
-    /// The samples that are compared: those before are only the past of what follows, and at the end of a cut the motion is known
-    /// less well, where its sensors derive from it.
+    /// Samples that are compared. Those before them only determine the chips that follow. At the end of a cut the motion is less certain,
+    /// if its sensors measure derivatives.
     pub compared: Range<usize>,
     /// By channel: samples that are not compared.
     pub skipped: Vec<Vec<usize>>,
-    /// Free decays of the baseline, as the channels read them.
+    /// Free decays of the baseline in the channels.
     pub decays: Decays,
-    /// The cut, where it is the record of one.
+    /// The cut, if the record is of one.
     pub cut: Option<Cutting>,
-    /// By channel, of a cut: what it reads of the motion that the baseline has in closed loop.
+    /// By channel, of a cut: prediction of the baseline in closed loop.
     pub(super) closed: Option<Vec<Vec<f64>>>,
-    /// What the motion is learned from, where that is known better than from what was measured.
+    /// Noise-free samples that determine the motion, if a better model supplies them.
     pub clean: Option<Clean>,
-    /// True of a cut in which force and motion amplify one another, so that the motion is taken as it was measured (see `amplification`).
+    /// True of a cut near chatter, whose motion is taken as measured (see `amplification`).
     pub(crate) amplifies: bool,
-    /// By axis, of a cut: the share of the measured motion in the one that chips are computed along, at the bins of the samples.
+    /// By axis, of a cut: weight of the measured motion in the estimated one, at the bins of the samples.
     pub(crate) measured_share: [Vec<f64>; 3],
 }
 
-/// What is known of a record before it is read.
+/// Information on a record from an earlier prediction.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Known {
-    /// What the channels read without their noise.
+    /// Noise-free samples of the channels.
     pub(crate) clean: Option<Clean>,
-    /// Whether the cut amplifies; else the record itself says.
+    /// Whether the cut is near chatter; `None` to determine it from the record.
     pub(crate) amplifies: Option<bool>,
 }
 
 impl Record {
-    /// Power of what a channel reads of the response to the noise of the force sensors, in bands up to half the sample rate: the mean
-    /// of σ² |H|² in each.
+    /// Power of a channel's response to the noise of the force sensors, in bands up to half the sample rate: the mean of σ² |H|² in each.
     pub(super) fn power_by_force_noise(&self, channel: usize) -> [f64; BANDS] {
         let per_band = std::f64::consts::PI * self.grid.rate_hz() / BANDS as f64 / self.grid.omega(1);
         let from = |band: usize| (band as f64 * per_band).round() as usize;
@@ -115,7 +114,7 @@ impl Record {
         })
     }
 
-    /// True where the motion along `axis` is more than what could be noise.
+    /// True if the motion along `axis` exceeds the noise.
     pub(crate) fn moves(&self, axis: usize) -> bool {
         !self.motion.x[axis].is_empty()
             && (self.channels.iter().any(|channel| {
@@ -124,13 +123,13 @@ impl Record {
             }) || !self.force_n[axis].is_empty())
     }
 
-    /// Samples that a channel reads of the response to forces in the machine's axes, given as spectra of the samples or of
-    /// finer ones.
+    /// Samples of a channel's response to forces along the machine's axes, given as spectra at the bins of the samples or of the finer
+    /// samples.
     pub(crate) fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: usize) -> Vec<f64> {
         self.read_by(force, &self.responses[channel], channel)
     }
 
-    /// The same by other responses than those of the channel.
+    /// [`Self::read_response`] with other responses than those of the channel.
     pub(crate) fn read_by(
         &self,
         force: &[Option<Vec<Complex64>>; 3],
@@ -157,19 +156,20 @@ impl Record {
         }
     }
 
-    /// The delay of a channel that reads steps, as the accelerations of a cut are: its responses are those of a channel in time.
+    /// The delay of a channel that reads steps, as the acceleration of a cut has them. It is applied in time, and the responses of the
+    /// channel are without it.
     fn step_delay_s(&self, channel: &Observed) -> f64 {
         let reads_steps =
             self.kind == Some(Kind::Cutting) && channel.pickup.quantity == Quantity::Acceleration;
         if reads_steps { channel.pickup.delay_s } else { 0.0 }
     }
 
-    /// True where some channel hears a force along `axis`.
+    /// True if some channel responds to a force along `axis`.
     pub(crate) fn responds(&self, axis: usize) -> bool {
         self.responses.iter().any(|response| !response[axis].is_empty())
     }
 
-    /// What a channel reads per newton where its sensor moves by `transfer`, m/N at the bins of the finer samples.
+    /// Response of a channel per newton for the receptance `transfer` at its sensor, m/N, at the bins of the finer samples.
     pub(crate) fn responses_by(
         &self,
         channel: &Observed,
@@ -195,13 +195,13 @@ impl Record {
         })
     }
 
-    /// The receptance of the place of a channel's sensor at the bins of the finer samples, m/N: that of the tool, unless the baseline
-    /// knows its modes there.
+    /// Receptance at a channel's sensor at the bins of the finer samples, m/N: that at the tool tip, unless the baseline has mode shapes at
+    /// the sensor.
     pub(crate) fn seen_by<'a>(&'a self, channel: &'a Observed) -> &'a [Matrix3<Complex64>] {
         channel.seen.as_deref().unwrap_or(&self.transfer)
     }
 
-    /// [`Observed::factor`] at a bin; zero at the last one of the finer samples, where it would not be real.
+    /// [`Observed::factor`] at a bin. It is zero at the last bin of the finer samples, where it would not be real.
     pub(crate) fn factor(&self, channel: &Observed, bin: usize) -> Complex64 {
         if bin + 1 == self.grid.fine_bins() {
             Complex64::ZERO
@@ -210,7 +210,7 @@ impl Record {
         }
     }
 
-    /// −f_r of the baseline's terms along the motion, as forces.
+    /// Adds the restoring forces −f_r of the baseline along the motion to `force`.
     pub(crate) fn add_terms(&self, baseline: &Baseline<'_>, force: &mut [Option<Vec<Complex64>>; 3]) {
         for term in &baseline.terms {
             let restoring = restoring_along(&**term, &self.motion);
@@ -228,13 +228,14 @@ impl Record {
         }
     }
 
-    /// The free decays of the baseline in every channel.
+    /// Computes the free decays of the baseline in every channel.
     pub(crate) fn prepare_decays(&mut self, baseline: &Baseline<'_>) {
         let pickups = self.channels.iter().map(|channel| &channel.pickup);
         self.decays = Decays::of(baseline, &self.grid, pickups, &self.skipped);
     }
 
-    /// Takes a prediction without free decay, as measured where it is not compared, adds the one that fits best, and looks at the noise of what is left.
+    /// Accepts a prediction without free decay: sets skipped samples to the measured value, adds the free decay that fits best, and
+    /// estimates the noise from the residual.
     pub(crate) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
         for ((channel, mut predicted), skipped) in self.channels.iter_mut().zip(predicted).zip(&self.skipped)
         {
@@ -266,7 +267,8 @@ impl Record {
         }
     }
 
-    /// What the channels read in closed loop, but for samples that are not compared; goes along that if the motion is a model's.
+    /// Stores the prediction in closed loop, with skipped samples as predicted. If the motion is that of a model, it becomes this
+    /// prediction.
     pub(crate) fn close(&mut self, mut closed: Vec<Vec<f64>>) {
         for ((closed, channel), skipped) in closed.iter_mut().zip(&self.channels).zip(&self.skipped) {
             for &sample in skipped {
@@ -279,7 +281,7 @@ impl Record {
         self.closed = Some(closed);
     }
 
-    /// By how much the motion is off the closed loop, in units of the noise: the most of any channel.
+    /// Largest distance of the motion from its closed loop over all channels, in units of the noise.
     pub(crate) fn off_the_closed_loop(&self) -> f64 {
         (0..self.channels.len())
             .filter(|index| self.channels[*index].pickup.quantity != Quantity::Force)
@@ -287,7 +289,7 @@ impl Record {
             .fold(0.0, f64::max)
     }
 
-    /// What the channels read without their noise, if the baseline is right.
+    /// Noise-free samples of the channels, if the baseline is right.
     pub(crate) fn predicted(&self) -> Clean {
         let open = || {
             self.channels
@@ -301,7 +303,7 @@ impl Record {
         }
     }
 
-    /// What the motion corrects in a channel: what was measured, or known to be so without noise, less what is predicted.
+    /// Correction of a channel by the motion: measured, or noise-free where known, minus predicted samples.
     pub(crate) fn to_correct(&self, channel: usize) -> Vec<f64> {
         let observed = &self.channels[channel];
         match &self.clean {
@@ -313,8 +315,8 @@ impl Record {
         }
     }
 
-    /// What every channel reads of a cutting force: the response to it, or the force itself, at the samples of the record. The
-    /// motion is taken at its instants, without a filter: it has what lies above half the sample rate folded into it.
+    /// Samples of every channel for a cutting force: the response to it, or the force itself. The motion is sampled without filter: its
+    /// part above half the sample rate is aliased.
     pub(crate) fn read_cut(&self, force: &CutForce) -> Vec<Vec<f64>> {
         let spectra = self.cut_spectra(force);
         self.channels
@@ -335,7 +337,7 @@ impl Record {
             .collect()
     }
 
-    /// Spectra of a cutting force at the bins of the finer grid; the mean over a finer sample is set right.
+    /// Spectra of a cutting force at the bins of the finer samples, corrected for the averaging over a finer sample.
     pub(crate) fn cut_spectra(&self, force: &CutForce) -> [Option<Vec<Complex64>>; 3] {
         let step_s = 1.0 / (self.grid.rate_hz() * self.grid.finer() as f64);
         std::array::from_fn(|axis| {

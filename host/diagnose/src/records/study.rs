@@ -1,4 +1,4 @@
-//! What a diagnosis looks at: the baseline, as the case has it, and the records, each beside its prediction.
+//! The baseline and the recordings of one diagnosis.
 
 use crate::baseline::Baseline;
 use crate::error::DiagnoseError;
@@ -9,28 +9,28 @@ use quietcut_model::case::Case;
 use quietcut_model::structure::Form;
 use quietcut_recording::Recording;
 
-/// Baseline and records.
+/// The baseline and the recordings of one diagnosis.
 pub(crate) struct Study<'a> {
-    /// What is believed.
+    /// The baseline model (case file).
     pub baseline: Baseline<'a>,
-    /// What was measured.
+    /// Recordings of tests or cuts, each beside the prediction of the baseline.
     pub records: Vec<Record>,
 }
 
 impl<'a> Study<'a> {
-    /// Reads the records against the baseline.
+    /// Compares recordings with the baseline of a case.
     ///
     /// # Errors
-    /// A case that cannot be simulated, or a record that tells nothing.
+    /// A case that cannot be simulated, or a recording that cannot be compared.
     pub(crate) fn new(case: &'a Case, recordings: &[Recording]) -> Result<Self, DiagnoseError> {
         Self::with(case, recordings, |_| Known::default())
     }
 
-    /// The same with what is `known`: the motion as a case that explains a record says that its channels read it, where there is such.
+    /// The same with information on each record from an earlier prediction, such as noise-free samples of its channels.
     ///
-    /// Along a measured motion every term carries the noise of that motion, which is also in the residual: the coefficient of a
-    /// term is then off by about the square of noise over signal, which is more than its deviation once
-    /// (noise over signal)·√(number of samples) is above one. Along the motion of a model that explains the records it is not.
+    /// Along a measured motion every regressor contains the noise of that motion, and so does the residual. This biases coefficients by
+    /// about (noise/signal)², relative, which exceeds their standard deviation if (noise/signal)·√(number of samples) > 1. Along the motion
+    /// of a candidate model there is no such bias.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -51,7 +51,7 @@ impl<'a> Study<'a> {
         Ok(Self { baseline, records })
     }
 
-    /// Axes that a force or a motion drives in some record, with a motion to show for it.
+    /// Axes that a force or a motion excites in some record, with measurable motion.
     pub(crate) fn driven_axes(&self) -> Vec<usize> {
         self.baseline
             .axes
@@ -61,12 +61,12 @@ impl<'a> Study<'a> {
             .collect()
     }
 
-    /// True where every record is judged in `domain`.
+    /// True if every record is compared in `domain`.
     pub(crate) fn all_in(&self, domain: Domain) -> bool {
         self.records.iter().all(|record| record.domain == domain)
     }
 
-    /// True where a sidecar says that a channel, or with no channel named any, sits somewhere else than at the tool tip.
+    /// True if a sidecar places the sensor of a channel away from the tool tip; of any channel if none is named.
     pub(crate) fn sits_elsewhere(&self, channel: Option<&str>) -> bool {
         self.records
             .iter()
@@ -74,7 +74,7 @@ impl<'a> Study<'a> {
             .any(|name| channel.is_none_or(|channel| channel == name))
     }
 
-    /// True where the case has its structure as modes.
+    /// True if the case gives its structure as modes.
     pub(crate) fn has_modes(&self) -> bool {
         matches!(self.baseline.structure.form, Form::Modes(_))
     }

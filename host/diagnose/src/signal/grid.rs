@@ -1,4 +1,4 @@
-//! The instants and frequencies of one record: padded transforms between samples, finer samples and spectra.
+//! Time and frequency grid of one record: zero-padded transforms, interpolated samples and spectra.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-/// Transforms of one record of `count` samples, followed by room in which what has been excited can die away.
+/// Transforms of one record of `count` samples, padded with zeros in which the response decays.
 ///
-/// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals are taken to have
-/// come through an anti-aliasing filter: between samples they are what their spectrum says.
+/// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals are band-limited to half the sample
+/// rate, so that the spectrum defines them between samples.
 #[derive(Clone)]
 pub(crate) struct Grid {
     count: usize,
@@ -23,7 +23,7 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// A grid for `count` samples at `rate_hz` with at least `room_s` behind them, and one `finer` times as dense.
+    /// A grid for `count` samples at `rate_hz` with at least `room_s` of padding, and a finer grid with `finer` samples per sample.
     pub(crate) fn new(count: usize, rate_hz: f64, room_s: f64, finer: usize) -> Self {
         let room = ((room_s * rate_hz) as usize).clamp(count.min(4096), 3 * count.max(1));
         let length = smooth_even(count + room);
@@ -40,17 +40,17 @@ impl Grid {
         }
     }
 
-    /// Samples of the record.
+    /// Number of samples of the record.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// Samples with the room behind them.
+    /// Number of samples with padding.
     pub(crate) fn length(&self) -> usize {
         self.length
     }
 
-    /// Finer samples per sample.
+    /// Number of finer samples per sample.
     pub(crate) fn finer(&self) -> usize {
         self.finer
     }
@@ -60,7 +60,7 @@ impl Grid {
         self.rate_hz
     }
 
-    /// Bins of a spectrum.
+    /// Number of bins of a spectrum.
     pub(crate) fn bins(&self) -> usize {
         self.length / 2 + 1
     }
@@ -70,16 +70,16 @@ impl Grid {
         TAU * self.rate_hz * bin as f64 / self.length as f64
     }
 
-    /// Spectrum of a signal that is zero after the record.
+    /// Spectrum of a signal that is zero outside the record.
     pub(crate) fn spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.length];
         padded[..samples.len()].copy_from_slice(samples);
         transform(&*self.forward, &mut padded)
     }
 
-    /// Spectrum of a signal that goes on smoothly before and after the record: turned about its end points, and faded out.
+    /// Spectrum of a signal that continues smoothly beyond both ends of the record: reflected at its end points, and faded out.
     ///
-    /// Derivatives by (iω) are then good up to the ends.
+    /// Derivatives (iω)·X are then accurate up to the ends.
     pub(crate) fn continued_spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.length];
         let count = samples.len();
@@ -93,7 +93,7 @@ impl Grid {
         transform(&*self.forward, &mut padded)
     }
 
-    /// The samples of the record of a spectrum.
+    /// Inverse transform at the samples of the record.
     pub(crate) fn samples(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let mut bins = spectrum.to_vec();
         let mut samples = back(&*self.inverse, &mut bins, self.length);
@@ -101,7 +101,7 @@ impl Grid {
         samples
     }
 
-    /// The finer samples of the record of a spectrum.
+    /// Inverse transform at the finer samples of the record.
     pub(crate) fn fine_samples(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let mut bins = vec![Complex64::ZERO; self.finer * self.length / 2 + 1];
         bins[..spectrum.len()].copy_from_slice(spectrum);
@@ -116,12 +116,12 @@ impl Grid {
         samples
     }
 
-    /// Bins of a spectrum of finer samples; the first of them are those of [`Self::bins`].
+    /// Number of bins of a spectrum of finer samples. Its first bins are those of [`Self::bins`].
     pub(crate) fn fine_bins(&self) -> usize {
         self.finer * self.length / 2 + 1
     }
 
-    /// Spectrum of a signal given by finer samples that is zero after the record, scaled as that of its samples.
+    /// Spectrum of finer samples of a signal that is zero outside the record, in the scale of [`Self::spectrum`].
     pub(crate) fn spectrum_of_fine(&self, fine: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.finer * self.length];
         padded[..fine.len()].copy_from_slice(fine);
@@ -133,8 +133,8 @@ impl Grid {
         bins
     }
 
-    /// The samples `delay_s` before each sample of the grid of a spectrum at the bins of the finer samples. What is a step from one
-    /// finer sample to the next stays one: turning the spectrum would make it ring.
+    /// Samples of a spectrum of finer samples, delayed by `delay_s`. The interpolation is cubic in time, because a phase shift of the
+    /// spectrum would make steps ring.
     pub(crate) fn late_samples_of_fine(&self, spectrum: &[Complex64], delay_s: f64) -> Vec<f64> {
         let fine = self.fine_samples(spectrum);
         let late = delay_s * self.rate_hz() * self.finer() as f64;
@@ -143,8 +143,8 @@ impl Grid {
             .collect()
     }
 
-    /// The samples of the record of a spectrum of finer samples: what a sensor without a filter reads. Every `finer`-th sample
-    /// has the spectrum folded at the bins of the samples, aliases included.
+    /// Samples of the record from a spectrum of finer samples, as a sensor without anti-aliasing filter reads them: the spectrum is folded
+    /// about half the sample rate.
     pub(crate) fn samples_of_fine(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let whole = self.finer * self.length;
         let at = |bin: usize| {
@@ -161,7 +161,7 @@ impl Grid {
     }
 }
 
-/// Transforms fail only on lengths that do not fit; these do.
+/// Forward transform. It fails only if lengths differ, and here they are equal.
 fn transform(plan: &dyn RealToComplex<f64>, samples: &mut [f64]) -> Vec<Complex64> {
     let mut bins = plan.make_output_vec();
     let _ = plan.process(samples, &mut bins);
@@ -184,7 +184,7 @@ fn back(plan: &dyn ComplexToReal<f64>, bins: &mut [Complex64], normalize_by: usi
     samples
 }
 
-/// The smallest even number from `least` on that has no factor above 5.
+/// The smallest even number ≥ `least` without a prime factor above 5.
 fn smooth_even(least: usize) -> usize {
     let mut best = usize::MAX;
     let mut five = 1;
@@ -203,7 +203,7 @@ fn smooth_even(least: usize) -> usize {
     best
 }
 
-/// The real transform of a stretch of a signal alone, without padding: for regression.
+/// Real transform of a segment of a signal without padding, for regression.
 pub(crate) struct SegmentTransform {
     plan: Arc<dyn RealToComplex<f64>>,
 }
@@ -215,7 +215,7 @@ impl SegmentTransform {
         }
     }
 
-    /// Real and imaginary parts of bins 0 … `bins` − 1, so scaled that white noise of deviation 1 has deviation 1 in each.
+    /// Real and imaginary parts of bins 0 … `bins` − 1, scaled so that unit-variance noise has unit variance in each part.
     pub(crate) fn bins(&self, samples: &[f64], bins: usize, into: &mut Vec<f64>) {
         let length = samples.len();
         let mut buffer = samples.to_vec();
@@ -232,7 +232,7 @@ impl SegmentTransform {
     }
 }
 
-/// A cubic through the two samples beside `place` with the slopes of their neighbours.
+/// Catmull–Rom interpolation at `place`, counted in samples.
 pub(crate) fn catmull_rom(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
@@ -286,7 +286,7 @@ mod tests {
         let derivative = grid.samples(&spectrum);
         for (n, value) in derivative.iter().enumerate() {
             let truth = TAU * 1.7 * (TAU * 1.7 * n as f64 / rate + 0.4).cos();
-            // At the ends the second derivative jumps.
+            // The second derivative of the continuation jumps at the ends.
             assert!((value - truth).abs() < 0.03 * TAU * 1.7, "{n}: {value} {truth}");
         }
     }
@@ -317,7 +317,7 @@ mod tests {
     fn a_late_step_stays_a_step() {
         let grid = Grid::new(64, 100.0, 0.0, 8);
         let fine: Vec<f64> = (0..64 * 8).map(|k| f64::from(u8::from(k >= 32 * 8))).collect();
-        // By 0.3 of a sample: the step is between samples 32 and 33, which are further from it than the cubic reaches.
+        // A delay of 0.3 samples puts the step between samples 32 and 33, both outside the support of the cubic.
         let late = grid.late_samples_of_fine(&grid.spectrum_of_fine(&fine), 0.003);
         for (sample, value) in late.iter().enumerate() {
             let truth = f64::from(u8::from(sample > 32));

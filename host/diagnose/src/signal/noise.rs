@@ -1,44 +1,43 @@
-//! How much a sensor's noise is: the floor of what the model leaves.
+//! Noise floors: the noise variance of a channel, estimated from its residual.
 //!
-//! Sensor noise is taken to be white over the band of the record. Whatever else is in a residual stands above that floor
-//! somewhere and leaves it bare elsewhere.
+//! Sensor noise is white over the band of the record. Any other part of a residual rises above that floor in some bands and leaves it
+//! visible in others.
 
 use crate::criteria::{LEAST_RELATIVE_NOISE, LEAST_WHITE_SHARE};
 use crate::signal::grid::SegmentTransform;
 
-/// Bands into which a spectrum is cut.
+/// Number of bands of a noise floor.
 pub(crate) const BANDS: usize = 32;
 
-/// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel itself.
+/// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel.
 ///
-/// The mean of the periodogram in each of 32 bands, the lower quartile of these, and then the mean of all bands that are
-/// within three deviations of it: with nothing but noise, all of them.
+/// The estimate starts at the lower quartile of the mean periodogram of 32 bands, and is then the mean of all bands within three standard
+/// deviations of it. Of noise alone these are all bands.
 pub(crate) fn white_floor(residual: &[f64], size: f64) -> f64 {
     white_floor_beside(residual, size, &[0.0; BANDS])
 }
 
-/// [`white_floor`] of a residual in which there is other noise besides, of this power in each of the [`BANDS`] from zero to half the
-/// sample rate.
+/// [`white_floor`] of a residual with other noise, whose power is given in each of the [`BANDS`] from zero to half the sample rate.
 pub(crate) fn white_floor_beside(residual: &[f64], size: f64, other: &[f64; BANDS]) -> f64 {
     floor(residual, size, mean, 1.0, other)
 }
 
-/// [`white_floor`] of a residual that has lines in every band, as that of a cut: by the median of each band, which lines, being few
-/// of its bins, do not move.
+/// [`white_floor`] of a residual with spectral lines in every band, as of a cut. The median of a band hardly depends on its few lines.
 pub(crate) fn floor_between_lines(residual: &[f64], size: f64) -> f64 {
     let of_band = |squares: &mut [f64]| median(squares) / MEDIAN;
     floor(residual, size, of_band, MEDIAN_SPREAD, &[0.0; BANDS])
 }
 
-/// The median of the square of a normal deviate, and by how much a mean that is taken from it scatters more than the mean itself.
+/// Median of a squared unit-variance normal variable.
 const MEDIAN: f64 = 0.454_936;
+/// Standard deviation of a variance estimated from a median over that of one estimated from a mean.
 const MEDIAN_SPREAD: f64 = 1.65;
 
 fn mean(squares: &mut [f64]) -> f64 {
     squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
-/// The middle of values that it puts in another order; 0 of none.
+/// The median; 0 of no values. It reorders the values.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -59,13 +58,13 @@ fn floor(
     if count < 4 * BANDS {
         return rms(residual).max(least);
     }
-    // All noise, and how much of it is white as far as can be told.
+    // White part of the noise of a band.
     let white = |all: f64, other: f64| (all - other).max(LEAST_WHITE_SHARE * all);
     let bands: Vec<(f64, f64)> = band_means(residual, of_band).into_iter().zip(*other).collect();
     let mut sorted: Vec<f64> = bands.iter().map(|(all, other)| white(*all, *other)).collect();
     sorted.sort_by(f64::total_cmp);
     let per_band = (count / (2 * BANDS)) as f64;
-    // Hann's window makes neighbouring bins alike: a third of them count.
+    // Hann's window correlates neighbouring bins: a third of them are independent.
     let spread = 3.0 * scatter * (3.0 / per_band).sqrt();
     let mut level = sorted[BANDS / 4];
     for _ in 0..8 {
@@ -80,7 +79,7 @@ fn floor(
         if near.is_empty() {
             break;
         }
-        // The power of a band scatters as it is large: where there is much of the other noise little is told of the white one.
+        // The standard deviation of the power of a band is proportional to the power. Bands with much other noise have little weight.
         let weight = |other: f64| (level / (level + other)).powi(2);
         let whole: f64 = near.iter().map(|(_, other)| weight(*other)).sum();
         let mean = |of: fn(&(f64, f64)) -> f64| {
@@ -95,7 +94,7 @@ fn floor(
     level.sqrt().max(least)
 }
 
-/// Mean of the periodogram, per real part, in each band, taken by `of_band`: σ² where there is white noise.
+/// Mean of the periodogram per real part in each band, from the estimator `of_band`: σ² of white noise.
 fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
     let count = residual.len();
     let mean = residual.iter().sum::<f64>() / count as f64;
@@ -128,8 +127,8 @@ fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
 /// Samples of a window of [`quiet_floor`].
 const QUIET: usize = 256;
 
-/// Standard deviation of the noise of a channel that is silent most of the time, as the force of a hammer is, whose blows reach to the end
-/// of the band: the lower quartile of that of windows. Infinite where it is too short.
+/// Standard deviation of the noise of a channel that is zero most of the time, as the force of a hammer is: the lower quartile over
+/// windows. The spectrum of impacts reaches to the end of the band and hides the floor. Infinite for a record that is too short.
 pub(crate) fn quiet_floor(samples: &[f64]) -> f64 {
     let mut squares: Vec<f64> = samples
         .chunks_exact(QUIET)
@@ -164,16 +163,16 @@ mod tests {
         let residual: Vec<f64> = (0..6000)
             .map(|n| {
                 let noise: f64 = StandardNormal.sample(&mut random);
-                // A line in every forty-eighth bin, as of 24 turns of two teeth.
+                // A line in every forty-eighth bin, as of 24 revolutions with two teeth.
                 let t = std::f64::consts::TAU * f64::from(n) / 6000.0;
                 noise + (1..62).map(|k| (48.3 * f64::from(k) * t).sin()).sum::<f64>()
             })
             .collect();
         let size = rms(&residual);
         let floor = floor_between_lines(&residual, size);
-        // A line and what leaks from it through Hann's window stands above the noise in six bins of 48.3. The median of the power
-        // is then at most the quantile 0.5/0.876 of the noise's, -ln(1 - 0.571)/ln 2 = 1.22 of its median: 10.5 % more in
-        // amplitude; 5.5 % is three deviations of the median of 3 000 powers of which every second is independent.
+        // A line and its leakage through Hann's window exceed the noise in six of 48.3 bins. The median of the power is then at most the
+        // quantile 0.5/0.876 of the noise's, -ln(1 - 0.571)/ln 2 = 1.22 of its median: 10.5 % more in amplitude. 5.5 % is three standard
+        // deviations of the median of 3 000 powers of which every second is independent.
         assert!((0.945..1.16).contains(&floor), "{floor}");
         assert!(white_floor(&residual, size) > 1.5);
     }
@@ -182,7 +181,7 @@ mod tests {
     fn the_floor_is_that_of_the_sensor_beside_other_noise_that_is_known() {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
-        // Differences of noise of twice the size have the power 4·|1 − e^(−iω)|²: nothing at zero, sixteen at half the sample rate.
+        // Differences of noise of twice the amplitude have the power 4·|1 − e^(−iω)|²: zero at ω = 0, sixteen at half the sample rate.
         let mut last = 0.0;
         let residual: Vec<f64> = (0..6000)
             .map(|_| {
@@ -197,7 +196,8 @@ mod tests {
         };
         let size = rms(&residual);
         let floor = white_floor_beside(&residual, size, &std::array::from_fn(power));
-        // Three deviations are 6 % where nothing else is; with up to sixteen times as much besides it is known half as well.
+        // Three standard deviations are 6 % without other noise; with up to sixteen times the power of other noise the floor is half as
+        // certain.
         assert!((floor - 1.0).abs() < 0.12, "{floor}");
         assert!(white_floor(&residual, size) > 1.3);
     }
@@ -214,7 +214,7 @@ mod tests {
                 })
                 .collect();
             let floor = white_floor(&signal, rms(&signal));
-            // 6000 samples, most of them beside the tones: 2 % is three deviations.
+            // 6000 samples, most of them beside the tones: 2 % is three standard deviations.
             assert!((floor - 1.0).abs() < 0.04, "{loud}: {floor}");
         }
     }
@@ -225,13 +225,13 @@ mod tests {
         let force: Vec<f64> = (0..40_000)
             .map(|n| {
                 let noise: f64 = StandardNormal.sample(&mut random);
-                // Half a sine of 20 samples, every 5 s of 2 kHz.
+                // Half a sine of 20 samples, every 5 s at 2 kHz.
                 let blow = (std::f64::consts::PI * f64::from(n % 10_000) / 20.0).sin();
                 noise + if n % 10_000 < 20 { 5000.0 * blow } else { 0.0 }
             })
             .collect();
         let floor = quiet_floor(&force);
-        // The lower quartile of variances of 256 samples is 6 % below their mean, and 156 windows know it to 1 %.
+        // The lower quartile of variances of 256 samples is 6 % below their mean; 156 windows determine it to 1 %.
         assert!((0.95..0.99).contains(&floor), "{floor}");
         assert!(white_floor(&force, rms(&force)) > 1.2);
     }
