@@ -88,14 +88,15 @@ fn run(options: &Options) -> Result<usize, String> {
     } else {
         known.iter().map(|(question, _)| question.clone()).collect()
     };
-    let is_meant = |question: &Question| {
-        question.group.contains(&options.only)
-            || question.commands.iter().any(|line| line.contains(&options.only))
-    };
-    if options.record && !options.only.is_empty() {
-        return Err("--record takes all questions; leave --only out".to_owned());
-    }
-    questions.retain(is_meant);
+    questions.retain(|question| {
+        let has_pattern = |text: &String| text.contains(&options.only);
+        // A reference file is written whole: there a pattern is the name of its group.
+        let is_group = question.group == options.only;
+        options.only.is_empty()
+            || is_group
+            || (!options.record
+                && (has_pattern(&question.group) || question.commands.iter().any(has_pattern)))
+    });
     if questions.is_empty() {
         return Err("no question matches".to_owned());
     }

@@ -236,9 +236,9 @@ fn seeded_diagnoses() -> Vec<Question> {
         "--effect cubic-damping=1e8 --effect cubic-damping.direction=x",
         "--effect quadratic-stiffness=1e9 --effect quadratic-stiffness.direction=x",
         "--effect coulomb-friction=2 --effect coulomb-friction.direction=x",
-        "--effect gain=1.1",
-        "--effect delay=0.001",
-        "--effect backlash=1e-5",
+        "--effect sensor-gain=1.1",
+        "--effect sensor-delay=0.001",
+        "--effect backlash=1e-5 --effect backlash.direction=x",
         "",
     ];
     let mut found = Vec::new();

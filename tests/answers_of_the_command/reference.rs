@@ -17,6 +17,13 @@ pub(crate) fn read(folder: &Path, full: bool) -> Result<Vec<(Question, Json)>, S
         .filter(|path| path.extension().is_some_and(|ending| ending == "json"))
         .collect();
     paths.sort();
+    for group in ONLY_FULL.iter().filter(|_| full) {
+        if !folder.join(format!("{group}.json")).exists() {
+            return Err(format!(
+                "no reference of {group}: tests/answers --full --record --only {group}"
+            ));
+        }
+    }
     let mut found = Vec::new();
     for path in paths {
         let group = path

@@ -15,14 +15,21 @@ const NEVER: &[(&str, &str)] = &[
     ("out", "paths of files; the files themselves are compared"),
 ];
 
+/// Keys that are compared in the answers of all verbs but one: verb, key, reason.
+const NEVER_OF_VERB: &[(&str, &str, &str)] = &[
+    ("demo", "seconds", "time that the command took"),
+    ("info", "uptime_s", "time since the simulated device was started"),
+];
+
 /// Keys that only the rule of bits compares.
 const ONLY_BITS: &[(&str, &str)] = &[(
     "text_hash",
     "hash of all bytes of a table: another processor rounds differently; the reference holds rows and sums",
 )];
 
-/// Whether `rule` passes over the value of `key`.
-pub(crate) fn is_uncompared(key: &str, rule: Rule) -> bool {
+/// Whether `rule` passes over the value of `key` in an answer of `verb`.
+pub(crate) fn is_uncompared(verb: &str, key: &str, rule: Rule) -> bool {
     let among = |list: &[(&str, &str)]| list.iter().any(|(name, _)| *name == key);
-    among(NEVER) || (rule == Rule::Tolerance && among(ONLY_BITS))
+    let of_verb = NEVER_OF_VERB.iter().any(|(v, k, _)| *v == verb && *k == key);
+    among(NEVER) || of_verb || (rule == Rule::Tolerance && among(ONLY_BITS))
 }
