@@ -6,7 +6,6 @@
 //! the feed (Altintas): runout and a stable vibration do not act on them as long as every tooth stays in its chip. Intervals come from the scatter between
 //! revolutions.
 
-use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -14,10 +13,11 @@ use rayon::prelude::*;
 
 use crate::cutting::chip::{Chip, chips};
 use crate::cutting::force_test::CuttingTest;
+use crate::cutting::prepared_test::{Prepared, prepared};
 use crate::least_squares::{scaled_inverse, scaled_least_squares, scaled_solve};
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
-use quietcut_model::milling::{Material, Runout, Tool, ToothForce, TurningVector};
+use quietcut_model::milling::Runout;
 
 /// The coefficients as they are called in cases: MPa, and N/mm.
 pub const KEYS: [&str; 6] = [
@@ -85,19 +85,6 @@ pub enum ForceCoefficientError {
     /// The fit does not settle.
     #[error("the fit does not converge: chips that come and go with the runout; larger feeds are needed")]
     NotConverged,
-}
-
-/// A test with what does not change while fitting.
-struct Prepared<'a> {
-    test: &'a CuttingTest,
-    /// a e and a e/sin γ at an angle, N per unit of each coefficient and meter of chip; N per unit.
-    cutting: [TurningVector; 3],
-    edge: [TurningVector; 3],
-    /// Samples within one of an entry or exit: half of what they measure is another engagement.
-    switching: BTreeSet<usize>,
-    revolutions: Vec<[usize; 2]>,
-    /// 1/σ² of each direction.
-    weights: [f64; 3],
 }
 
 /// The coefficients, and how far teeth stand out.
@@ -178,84 +165,6 @@ pub fn fit(tests: &[CuttingTest]) -> Result<Fit, ForceCoefficientError> {
     fitter.weigh(&state);
     let state = fitter.settle(state)?;
     Ok(fitter.finish(&state))
-}
-
-/// Vectors of a tool of depth `depth_m`: N per unit of a coefficient.
-fn vectors(test: &CuttingTest) -> [ToothForce; 3] {
-    let tool = Tool {
-        teeth: test.teeth,
-        edge_angle_deg: test.edge_angle.to_degrees(),
-        diameter_mm: None,
-        pitch_deg: vec![360.0 / test.teeth as f64; test.teeth],
-        runout: None,
-    };
-    std::array::from_fn(|index| {
-        let unit = |place: usize| f64::from(u8::from(place == index));
-        let material = Material {
-            ktc_mpa: unit(0),
-            krc_mpa: unit(1),
-            kac_mpa: unit(2),
-            kte_n_per_mm: unit(0),
-            kre_n_per_mm: unit(1),
-            kae_n_per_mm: unit(2),
-        };
-        ToothForce::new(&tool, &material)
-    })
-}
-
-fn prepared(test: &CuttingTest) -> Prepared<'_> {
-    let scaled = |vector: TurningVector| TurningVector {
-        constant: vector.constant * test.depth_m,
-        cosine: vector.cosine * test.depth_m,
-        sine: vector.sine * test.depth_m,
-    };
-    let vectors = vectors(test);
-    let [from, to] = test.full_cut;
-    let mut switching = BTreeSet::new();
-    let passes = |angle: f64| (angle / test.pitch()) as i64;
-    for pass in passes(test.angle[from]) - 1..=passes(test.angle[to - 1]) + 1 {
-        for end in [test.start, test.exit] {
-            let sample = test.sample_at(end + pass as f64 * test.pitch());
-            switching.extend([sample.saturating_sub(1), sample]);
-        }
-    }
-    Prepared {
-        test,
-        cutting: vectors.map(|force| scaled(force.cutting)),
-        edge: vectors.map(|force| scaled(force.edge)),
-        switching,
-        revolutions: test.revolutions(),
-        weights: [1.0; 3],
-    }
-}
-
-impl Prepared<'_> {
-    /// The mean force of a revolution without runout and vibration, N per unit of each coefficient; and the measured one, N.
-    ///
-    /// Both are those of the same samples, so that entry and exit between samples move neither against the other.
-    fn mean_forces(&self, [from, to]: [usize; 2]) -> ([Vector3<f64>; 6], Vector3<f64>) {
-        let test = self.test;
-        let mut sums = [Vector3::zeros(); 6];
-        let (mut force, mut count) = (Vector3::zeros(), 0);
-        for sample in (from..to).filter(|sample| !self.switching.contains(sample)) {
-            let angle = test.angle[sample];
-            force += test.force[sample];
-            count += 1;
-            for tooth in 0..test.teeth {
-                let phi = (angle + tooth as f64 * test.pitch()).rem_euclid(TAU);
-                if phi < test.start || phi >= test.exit {
-                    continue;
-                }
-                let thickness_m = test.feed_per_tooth_m * phi.sin() * test.edge_angle.sin();
-                for part in 0..3 {
-                    sums[part] += self.cutting[part].at(phi) * thickness_m;
-                    sums[part + 3] += self.edge[part].at(phi);
-                }
-            }
-        }
-        let count = f64::from(count.max(1));
-        (sums.map(|sum| sum / count), force / count)
-    }
 }
 
 struct Fitter<'a> {

@@ -5,3 +5,4 @@ pub mod force_coefficients;
 pub mod force_test;
 pub mod inverse_stability;
 pub mod observed_cut;
+mod prepared_test;

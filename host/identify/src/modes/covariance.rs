@@ -7,8 +7,9 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::Receptances;
-use super::pole_residue::{PoleResidue, jacobian, normal, shared};
+use super::jacobian::{jacobian, normal};
+use super::pole_residue::{PoleResidue, shared};
+use super::receptances::Receptances;
 use super::weights::Weights;
 
 /// Lines over which what is left is correlated: a Hann window joins two on each side.
@@ -19,7 +20,7 @@ pub(super) fn covariance(data: &Receptances, fit: &PoleResidue, weights: &Weight
     let jacobian = jacobian(data, fit, weights);
     let normal = normal(&jacobian);
     let bread = constrained_inverse(fit, &shared(data), &normal)?;
-    let left = fit.left(data, weights);
+    let left = weights.left(fit, data);
     let same_line = &bread * meat(&jacobian, &left, 0) * &bread;
     let all = &bread * meat(&jacobian, &left, LAGS) * &bread;
     // Correlations from few lines may cancel more than there is.

@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-use super::Receptances;
+use super::receptances::Receptances;
 use quietcut_numerics::complex_eigenvalues::eigenvalues;
 
 /// Part of the unit circle that the band takes: the receptances need not close to a circle.

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::ModesError;
+use super::error::ModesError;
 use quietcut_frf::FrfTable;
 use quietcut_model::structure::Direction;
 

@@ -4,7 +4,10 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-use super::{ModesError, OVERDAMPED, Receptances, Rejected, denominator, reject};
+use super::denominator;
+use super::error::ModesError;
+use super::receptances::Receptances;
+use super::rejected::{OVERDAMPED, Rejected, reject};
 use quietcut_frf::rational_fit::residues;
 
 /// A pole is the same as one of the order before within these parts of frequency and damping ratio, and this modal

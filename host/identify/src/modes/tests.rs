@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use quietcut_frf::{Frf, FrfTable};
-use quietcut_model::structure::{Form, Structure};
+use quietcut_model::structure::{Direction, Form, Mode, Structure};
 use quietcut_testkit::case;
 
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];

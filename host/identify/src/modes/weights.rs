@@ -6,8 +6,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::Receptances;
 use super::pole_residue::PoleResidue;
+use super::receptances::Receptances;
 
 /// Lines for each receptance from which on the correlation between receptances is known well enough to weigh by.
 const LINES_PER_RECEPTANCE: usize = 6;
@@ -28,6 +28,19 @@ pub(super) struct Weights {
 }
 
 impl Weights {
+    /// What is left of all receptances, as it is weighed.
+    pub(super) fn left(&self, fit: &PoleResidue, data: &Receptances) -> Vec<DVector<Complex64>> {
+        let plain: Vec<DVector<Complex64>> = (0..data.values.len())
+            .map(|k| DVector::from_vec(fit.left_of(data, &self.deviation, k)))
+            .collect();
+        self.mixed(plain)
+    }
+
+    /// The sum of the squares of what is left.
+    pub(super) fn squares(&self, fit: &PoleResidue, data: &Receptances) -> f64 {
+        self.left(fit, data).iter().map(DVector::norm_squared).sum()
+    }
+
     pub(super) fn of(deviation: &[Vec<f64>]) -> Self {
         Self {
             deviation: deviation.to_vec(),

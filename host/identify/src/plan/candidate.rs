@@ -7,8 +7,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Means;
 use super::chart::{KnownChart, KnownLimit};
+use super::means::Means;
 use super::unknowns::Unknowns;
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Direction, FirstOrder, Structure};

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use super::Means;
+use super::means::Means;
 use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_model::structure::{Form, Joint, Matrices, Mode};
 use quietcut_stability::Variable;

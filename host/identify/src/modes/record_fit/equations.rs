@@ -3,8 +3,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 use num_complex::Complex64;
 
+use super::data::Data;
 use super::line::{Line, of_forces, powers};
-use super::{Data, SMOOTH, Unknowns, Variances};
+use super::unknowns::{SMOOTH, Unknowns};
+use super::variances::Variances;
 
 /// Lines whose derivatives are multiplied in one go.
 const BLOCK: usize = 64;

@@ -3,7 +3,9 @@
 use nalgebra::{Cholesky, Matrix3, Vector3};
 use num_complex::Complex64;
 
-use super::{Data, SMOOTH, Unknowns, Variances};
+use super::data::Data;
+use super::unknowns::{SMOOTH, Unknowns};
+use super::variances::Variances;
 use crate::modes::shape;
 
 /// Responses and forces beyond those of the record are zero, with a variance of one.

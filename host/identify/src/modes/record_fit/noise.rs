@@ -7,8 +7,10 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
 
+use super::data::Data;
 use super::line::{Line, gain};
-use super::{Data, Transient, Unknowns, Variances};
+use super::unknowns::{Transient, Unknowns};
+use super::variances::Variances;
 use quietcut_frf::ChannelLines;
 
 /// Steps of scoring in one round.

@@ -1,0 +1,102 @@
+//! The identified model: its modes, and what is known of them.
+
+use num_complex::Complex64;
+
+use super::mode::IdentifiedMode;
+use super::rejected::Rejected;
+use super::shape;
+use super::stabilization::Stabilization;
+use quietcut_model::structure::Direction;
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct ModalModel {
+    /// Directions of the entries of the left shapes.
+    pub forces: Vec<Direction>,
+    /// Directions of the entries of the right shapes.
+    pub responses: Vec<Direction>,
+    /// The modes by rising frequency.
+    pub modes: Vec<IdentifiedMode>,
+    /// For each receptance, by its directions of response and force: the compliance of modes above the band, m/N, and the
+    /// inertia of those below, the coefficient of 1/s², 1/kg.
+    pub outside: Vec<(Direction, Direction, [f64; 2])>,
+    /// Root mean square of what is left over that of the receptances, each receptance counting alike.
+    pub fit_error: f64,
+    /// Mean square of what is left over its stated variance; near 1 where only noise is left. `None` where the data have
+    /// no stated variance.
+    pub misfit: Option<f64>,
+    /// Poles of every order.
+    pub stabilization: Stabilization,
+    /// Poles that are no modes.
+    pub rejected: Vec<Rejected>,
+    /// What whoever uses it should know.
+    pub warnings: Vec<String>,
+}
+
+/// Part of the receptances that may be left of a good fit.
+const GOOD_FIT: f64 = 0.1;
+
+/// Fewest lines within the width of a resonance, 2ζf, for its damping to be measured rather than extrapolated.
+const LINES_PER_WIDTH: f64 = 3.0;
+
+/// What a model from lines so far apart does not know well.
+pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if model.fit_error > GOOD_FIT {
+        warnings.push(format!(
+            "{:.0} % of the receptances are left; more modes, a narrower band, or a linear structure are needed",
+            100.0 * model.fit_error
+        ));
+    }
+    for mode in &model.modes {
+        let (hertz, damping) = (mode.mode.frequency_hz, mode.mode.damping_ratio);
+        let width_hz = 2.0 * damping * hertz;
+        let lines = width_hz / spacing_hz;
+        if lines < LINES_PER_WIDTH {
+            warnings.push(format!(
+                "{lines:.1} lines within the width of the mode at {hertz:.3} Hz ({width_hz:.3} Hz); a finer resolution is needed for its damping"
+            ));
+        }
+        if mode.damping_ratio_std > 0.1 * damping {
+            warnings.push(format!(
+                "the damping of the mode at {hertz:.3} Hz is known to {:.0} % only (one standard deviation)",
+                100.0 * mode.damping_ratio_std / damping
+            ));
+        }
+    }
+    for pair in model.modes.windows(2) {
+        let apart = pair[1].mode.frequency_hz - pair[0].mode.frequency_hz;
+        let deviation = pair[0].frequency_std_hz.hypot(pair[1].frequency_std_hz);
+        if apart < 3.0 * deviation {
+            warnings.push(format!(
+                "the modes at {:.3} and {:.3} Hz are not told apart by the data",
+                pair[0].mode.frequency_hz, pair[1].mode.frequency_hz
+            ));
+        }
+    }
+    warnings
+}
+
+impl ModalModel {
+    /// Directions in which the structure is both driven and seen: those that a case can have.
+    pub fn directions(&self) -> Vec<Direction> {
+        let both = self.responses.iter().copied();
+        both.filter(|direction| self.forces.contains(direction)).collect()
+    }
+
+    /// The receptance of the fit, with what stands for modes outside the band, m/N; `None` where it was not measured.
+    pub fn receptance(&self, response: Direction, force: Direction, frequency_hz: f64) -> Option<Complex64> {
+        let p = self.responses.iter().position(|known| *known == response)?;
+        let q = self.forces.iter().position(|known| *known == force)?;
+        let (.., [above, below]) = self
+            .outside
+            .iter()
+            .find(|(known, by, _)| (*known, *by) == (response, force))?;
+        let s = Complex64::new(0.0, std::f64::consts::TAU * frequency_hz);
+        let modes = self.modes.iter().map(|mode| {
+            let residue = mode.mode.right[p] * mode.mode.left[q];
+            shape::pair(residue, s, mode.mode.pole())
+        });
+        Some(modes.sum::<Complex64>() + above + below / (s * s))
+    }
+}

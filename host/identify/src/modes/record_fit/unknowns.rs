@@ -1,0 +1,51 @@
+//! The unknowns of a fit on whole records.
+
+use nalgebra::DVector;
+use num_complex::Complex64;
+
+use crate::modes::pole_residue::PoleResidue;
+
+/// Coefficients of the polynomial of a transient.
+pub(super) const SMOOTH: usize = 3;
+
+/// The unknowns: the structure and the transient of each record.
+#[derive(Clone)]
+pub(super) struct Unknowns {
+    pub(super) structure: PoleResidue,
+    pub(super) transients: Vec<Transient>,
+}
+
+/// T_p(s) = Σ_r c_pr/(s − λ_r) + conjugate at the conjugate pole + Σ_j a_pj (s/i s₀)ʲ iʲ of the responses p of one record.
+#[derive(Clone)]
+pub(super) struct Transient {
+    /// c by response and mode.
+    pub(super) residues: Vec<Vec<Complex64>>,
+    /// a by response.
+    pub(super) smooth: Vec<[f64; SMOOTH]>,
+}
+
+impl Unknowns {
+    /// Each record's transient after the structure: residues by response and mode, then polynomials.
+    pub(super) fn moved(&self, structure: &DVector<f64>, transients: &[DVector<f64>]) -> Self {
+        let mut moved = self.clone();
+        moved.structure = self.structure.moved(structure.as_slice());
+        for (transient, step) in moved.transients.iter_mut().zip(transients) {
+            let mut values = step.iter();
+            let mut next = || values.next().copied().unwrap_or(0.0);
+            for residue in transient.residues.iter_mut().flatten() {
+                *residue += Complex64::new(next(), next());
+            }
+            for value in transient.smooth.iter_mut().flatten() {
+                *value += next();
+            }
+        }
+        moved
+    }
+}
+
+impl Transient {
+    /// How many numbers it is.
+    pub(super) fn width(&self) -> usize {
+        self.residues.iter().map(|row| 2 * row.len() + SMOOTH).sum()
+    }
+}

@@ -1,0 +1,25 @@
+//! Poles that are no modes.
+
+use num_complex::Complex64;
+
+/// A pole that is no mode.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Rejected {
+    /// Its frequency |λ|/2π, Hz.
+    pub frequency_hz: f64,
+    /// Its damping ratio.
+    pub damping_ratio: f64,
+    /// What speaks against it.
+    pub why: String,
+}
+
+/// Damping ratios from here on are no resonance: what bends the receptances so slowly is the residual of other modes.
+pub(super) const OVERDAMPED: f64 = 0.5;
+
+pub(super) fn reject(pole: Complex64, why: String) -> Rejected {
+    Rejected {
+        frequency_hz: pole.norm() / std::f64::consts::TAU,
+        damping_ratio: -pole.re / pole.norm(),
+        why,
+    }
+}

@@ -1,0 +1,80 @@
+//! The parameters of the joints of a robot.
+
+use quietcut_model::structure::Robot;
+
+/// What is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointParameter {
+    /// Stiffness of a joint, from 0.
+    Stiffness(usize),
+    /// Damping of a joint, from 0.
+    Damping(usize),
+    /// Cubic stiffness of a joint, from 0.
+    CubicStiffness(usize),
+    /// Cubic damping of a joint, from 0.
+    CubicDamping(usize),
+    /// Mass of the last link.
+    Payload,
+}
+
+impl JointParameter {
+    /// The key in a case.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Stiffness(_) => "stiffness_nm_per_rad",
+            Self::Damping(_) => "damping_nms_per_rad",
+            Self::CubicStiffness(_) => "cubic_stiffness_nm_per_rad3",
+            Self::CubicDamping(_) => "cubic_damping_nms3_per_rad3",
+            Self::Payload => "mass_kg",
+        }
+    }
+
+    /// The joint, from 0, that it belongs to in a robot of so many.
+    pub fn joint(self, joints: usize) -> usize {
+        match self {
+            Self::Stiffness(joint)
+            | Self::Damping(joint)
+            | Self::CubicStiffness(joint)
+            | Self::CubicDamping(joint) => joint,
+            Self::Payload => joints.saturating_sub(1),
+        }
+    }
+
+    /// True for terms that do not act at vanishing force; they may be negative.
+    pub fn is_cubic(self) -> bool {
+        matches!(self, Self::CubicStiffness(_) | Self::CubicDamping(_))
+    }
+
+    /// The name for people, with the joint counted from 1.
+    pub fn name(self) -> String {
+        match self {
+            Self::Payload => format!("payload {}", self.key()),
+            Self::Stiffness(joint)
+            | Self::Damping(joint)
+            | Self::CubicStiffness(joint)
+            | Self::CubicDamping(joint) => format!("joint {} {}", joint + 1, self.key()),
+        }
+    }
+
+    pub(super) fn slot(self, robot: &mut Robot) -> Option<&mut f64> {
+        Some(match self {
+            Self::Stiffness(joint) => &mut robot.joints.get_mut(joint)?.stiffness_nm_per_rad,
+            Self::Damping(joint) => &mut robot.joints.get_mut(joint)?.damping_nms_per_rad,
+            Self::CubicStiffness(joint) => &mut robot.joints.get_mut(joint)?.cubic_stiffness_nm_per_rad3,
+            Self::CubicDamping(joint) => &mut robot.joints.get_mut(joint)?.cubic_damping_nms3_per_rad3,
+            Self::Payload => &mut robot.joints.last_mut()?.mass_kg,
+        })
+    }
+
+    /// Its value.
+    pub fn value(self, robot: &Robot) -> f64 {
+        self.slot(&mut robot.clone()).map_or(f64::NAN, |value| *value)
+    }
+
+    /// Gives it another value.
+    pub(crate) fn set(self, robot: &mut Robot, value: f64) {
+        if let Some(slot) = self.slot(robot) {
+            *slot = value;
+        }
+    }
+}
