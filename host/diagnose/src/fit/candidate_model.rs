@@ -7,44 +7,44 @@ use nalgebra::DMatrix;
 use crate::fit::regression::Fit;
 use crate::records::record::Clean;
 
-/// One candidate with one of its shapes.
+/// A candidate with one set of its nonlinear parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Choice {
-    /// The candidate.
+    /// Index of the candidate in the library.
     pub candidate: usize,
-    /// Its shape.
+    /// Index of its nonlinear parameters.
     pub variant: usize,
 }
 
-/// Causes that act together, fitted.
+/// A set of causes with fitted parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateModel {
-    /// What acts.
+    /// The causes, each at its location.
     pub choices: Vec<Choice>,
-    /// The fit of all their coefficients, in the order of the choices.
+    /// The fit of all coefficients, in the order of the choices.
     pub fit: Fit,
-    /// Parameters that were fitted, those of the shape included.
+    /// Number of fitted parameters, nonlinear ones included.
     pub parameter_count: usize,
-    /// What simulation says, where the records can be simulated: coefficients, shapes and what is left are then its own.
+    /// Result of the prediction-error fit, if there is one: coefficients, nonlinear parameters and χ² are then its own.
     pub simulated: Option<Simulated>,
 }
 
-/// Parameters that make a simulation agree with the records.
+/// Result of a prediction-error fit.
 #[derive(Clone, Debug)]
 pub(crate) struct Simulated {
-    /// By choice: covariance of coefficients and, behind them, of the shape, for noise of deviation 1.
+    /// By choice: covariance of the coefficients, followed by the nonlinear parameters, for unit-variance noise.
     pub covariance: Vec<DMatrix<f64>>,
-    /// By record: states at its start; empty where it starts from rest.
+    /// By record: initial state; empty for a start from rest.
     pub starts: Vec<Vec<f64>>,
-    /// The records with the extended case, where that is kept.
+    /// Prediction of the records by the extended case, if it is kept.
     pub reading: Option<Arc<Reading>>,
 }
 
-/// Records with an extended case.
+/// Prediction of the records by an extended case.
 #[derive(Debug)]
 pub(crate) struct Reading {
-    /// By record and channel: measured less computed.
+    /// By record and channel: measured minus predicted samples.
     pub residuals: Vec<Vec<Vec<f64>>>,
-    /// What the channels read without their noise.
+    /// Noise-free samples of the channels.
     pub predicted: Vec<Clean>,
 }

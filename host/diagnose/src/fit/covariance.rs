@@ -8,9 +8,10 @@ use crate::fit::regression::{Regression, Subset};
 use crate::records::domain::Domain;
 use crate::records::study::Study;
 
-/// By choice: the covariance of its coefficients and, behind them, of the parameters of its shape, for noise of deviation 1, of which
-/// there is so many times the power. What is left of forces is no noise: errors of the motion's derivatives and of the equations,
-/// of which the covariance is taken as they are.
+/// By choice: covariance of the coefficients, followed by the nonlinear parameters, for unit-variance noise.
+///
+/// The residual of forces is not noise, but errors of the equations and of differentiated motion. Their covariance is estimated from the
+/// residual; it is divided by `inflation`, by which the caller multiplies the noise variance.
 pub(crate) fn covariance(
     study: &Study<'_>,
     library: &Library,

@@ -1,12 +1,12 @@
-//! What noise of the forces does to the parameters of a machine that is not linear.
+//! Covariance of the parameters of a nonlinear machine under the noise of force sensors.
 //!
-//! The simulation goes under the measured force f, the machine under f − n. What that leaves is weighed by the receptance of the
-//! baseline, S = diag(σ²) + Σ σ_f² h hᴴ (`whitening`). A machine with a fold near its resonance, or one that friction holds, answers to n
-//! otherwise: when it jumps, or lets go, hangs on n as it hangs on the parameters, which then seem to be known far better than they
-//! are. With J the slopes in units of the noise and N = JᵀJ, what is left by n, e, moves the parameters by δ = N⁻¹ Jᵀ e. Noise n_k is
-//! drawn, and of e_k = y(f + n_k) − y(f) the part that N has already, e'_k = H n_k, is taken off:
-//! C = D N⁻¹ D, D_i² = max(1, 1 + mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii), the parametric bootstrap with one step of the search (Efron and Tibshirani,
-//! An Introduction to the Bootstrap, 1993, ch. 6) with the linear machine as control variate. Intervals only become wider.
+//! The simulation is driven by the measured force f, the machine by f − n. The residual that n causes is whitened with the receptance of
+//! the baseline, S = diag(σ²) + Σ σ_f² h hᴴ (`whitening`). That is wrong for a machine with a fold near its resonance, or with dry
+//! friction: whether it jumps or slips depends on n as on the parameters, so that the covariance of the fit is far too small. With J the
+//! Jacobian in units of the noise and N = JᵀJ, the residual e by n moves the parameters by δ = N⁻¹ Jᵀ e. This file draws noise n_k,
+//! computes e_k = y(f + n_k) − y(f), and subtracts the part e'_k = H n_k that N already contains: C = D N⁻¹ D, D_i² = max(1, 1 +
+//! mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii). This is a parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani, An Introduction to
+//! the Bootstrap, 1993, ch. 6) and the linear machine as control variate. Intervals only become wider.
 
 use std::ops::Range;
 
@@ -25,20 +25,20 @@ use crate::fit::output_error::{OutputError, projected};
 use crate::fit::segment::{Segment, Subset};
 use crate::fit::unknowns::{FreeParameter, at_bounds, covariance};
 
-/// How often noise is drawn: by 16 a deviation is known to a fifth, by 4 to a third. Of long records as often as so many samples are
-/// simulated.
+/// Least and largest number of draws: 16 determine a standard deviation to a fifth, 4 to a third.
 const DRAWS: [usize; 2] = [4, 16];
+/// Samples that are simulated for all draws of long records.
 const SIMULATED: usize = 400_000;
-/// Half of the draws, and four at least, tell whether there is anything to it, which is this share of what is known already.
+/// Least number of draws of the first half, which decides whether the effect is significant.
 const FIRST: usize = 4;
-/// A stream of random numbers of its own: a record of a simulation may have noise of the same seed.
+/// Stream of the random numbers, so that they differ from the noise of a simulated record with the same seed.
 const STREAM: u64 = 0x666f_7263_6573;
 
 /// Forces along the axes, at the samples of a record.
 type Forces = [Vec<f64>; 3];
 
 impl OutputError<'_> {
-    /// See the head of the file; `None` where no force has noise, or nothing but the linear structure answers to it.
+    /// The candidate model with the covariance of this file; `None` if no force has noise or the extended case is linear.
     pub(crate) fn spread(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
         let simulated = model.simulated.as_ref()?;
         let mut deviations = self
@@ -101,7 +101,7 @@ impl OutputError<'_> {
             return None;
         }
         drawn.extend(draws(first..most));
-        // What a few draws tell of a variance makes of a normal distribution one of Student's, with the variance ν/(ν − 2).
+        // The variance of few draws turns a normal distribution into Student's, with the variance ν/(ν − 2).
         let degrees = drawn.iter().flatten().count().max(3) as f64;
         let more = mean(&drawn)? * (degrees / (degrees - 2.0));
         let mut spread = model.clone();
@@ -125,7 +125,7 @@ impl OutputError<'_> {
         Some(spread)
     }
 
-    /// Noise as that of the sensors of force is, by record.
+    /// A draw of the noise of the force sensors, by record.
     fn drawn(&self, draw: u64) -> Vec<Forces> {
         let mut random = ChaCha8Rng::seed_from_u64(draw);
         random.set_stream(STREAM);
@@ -146,7 +146,7 @@ impl OutputError<'_> {
             .collect()
     }
 
-    /// The measured forces with `noise`.
+    /// The measured forces plus `noise`.
     fn with(&self, noise: &[Forces]) -> Vec<Forces> {
         let records = self.study.records.iter().zip(noise);
         records
@@ -159,7 +159,7 @@ impl OutputError<'_> {
             .collect()
     }
 
-    /// What is left by record where the baseline answers to `noise`, in units of the noise.
+    /// Whitened response of the baseline to `noise`, by record.
     fn by_baseline(&self, noise: &[Forces], segments: &[&Segment]) -> Vec<Vec<f64>> {
         let records = self.study.records.iter().zip(noise).enumerate();
         records
@@ -177,8 +177,7 @@ impl OutputError<'_> {
     }
 }
 
-/// The mean of draws. One that could not be simulated, since the machine ran away, moved at least as far as the one that moved
-/// farthest; `None` where none could.
+/// Mean of the draws. A draw whose simulation diverged counts as the largest of the others; `None` if all diverged.
 fn mean(drawn: &[Option<DVector<f64>>]) -> Option<DVector<f64>> {
     let farthest = drawn.iter().flatten().cloned().reduce(|a, b| a.sup(&b))?;
     let sum: DVector<f64> = drawn.iter().map(|draw| draw.as_ref().unwrap_or(&farthest)).sum();
@@ -237,7 +236,8 @@ mod tests {
                 ((k3.value - K3_N_PER_M3) / (0.5 * (high - low))).powi(2)
             })
             .sum();
-        // Of a normal distribution 1/1.645; twice that has six draws of it one time in a thousand. By the receptance alone it is three.
+        // A normal distribution scatters by 1/1.645 half-widths; six draws of it exceed twice that once in a thousand. With the receptance
+        // alone the scatter is three.
         let scatter = (squares / count).sqrt();
         assert!(scatter < 1.2, "{scatter} half-widths");
     }

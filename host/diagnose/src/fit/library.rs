@@ -1,4 +1,4 @@
-//! Which causes explain the residual, and which do so equally well.
+//! All causes at all locations of a study, with their columns of the regression.
 
 use rayon::prelude::*;
 
@@ -9,26 +9,26 @@ use crate::fit::regression::{Regression, Subset};
 use crate::records::record::Record;
 use crate::records::study::Study;
 
-/// A cause at a place, with the columns of each of its shapes.
+/// A cause at a location, with the regression columns for each set of its nonlinear parameters.
 pub(crate) struct Candidate {
-    /// Its cause, a place in the library.
+    /// Index of the cause in the library.
     pub cause: usize,
-    /// Where.
+    /// Axis, mode or channel in which it acts.
     pub location: Location,
-    /// Shapes and the columns that they have.
+    /// Sets of nonlinear parameters, each with its columns.
     pub variants: Vec<(Vec<f64>, Vec<usize>)>,
 }
 
-/// The library on a scene.
+/// The causes of a study and their candidates.
 pub(crate) struct Library {
     /// All causes.
     pub causes: Vec<Box<dyn Cause>>,
-    /// Where they could act.
+    /// Causes at their locations.
     pub candidates: Vec<Candidate>,
 }
 
 impl Library {
-    /// All causes on a scene, with their columns added to the regression.
+    /// Computes the regressors of all causes and adds them to the regression.
     pub(crate) fn new(study: &Study<'_>, regression: &mut Regression) -> Self {
         let causes = candidates::all();
         let placed: Vec<(usize, Location, Vec<f64>)> = causes
@@ -44,7 +44,7 @@ impl Library {
                 })
             })
             .collect();
-        // Along each of several axes it adds what it adds along one after the other.
+        // The regressors along several axes are those along each of them.
         let (each, placed): (Vec<_>, Vec<_>) = placed
             .into_iter()
             .partition(|(_, location, _)| matches!(location, Location::EachOf(_)));
@@ -91,7 +91,7 @@ impl Library {
         }
     }
 
-    /// The columns of a cause along each of several axes: those along one after the other; `None` where one of them is not known.
+    /// Columns of a cause along each of several axes; `None` if the columns along one of them are missing.
     fn columns_along_each(
         &self,
         cause: usize,
@@ -118,7 +118,7 @@ impl Library {
         &*self.causes[self.candidates[candidate].cause]
     }
 
-    /// Every candidate with every shape.
+    /// Every candidate with every set of its nonlinear parameters.
     pub(crate) fn choices(&self) -> Vec<Choice> {
         self.candidates
             .iter()
@@ -134,7 +134,7 @@ impl Library {
         &self.candidates[choice.candidate].variants[choice.variant].1
     }
 
-    /// The fit of some choices; `None` where they cannot be told from each other, or are not physical.
+    /// Linear fit of some choices; `None` if they are not identifiable or not physical.
     pub(crate) fn explain(
         &self,
         study: &Study<'_>,
@@ -156,7 +156,7 @@ impl Library {
         self.parameters(study, &model).map(|_| model)
     }
 
-    /// Parameters of a choice that are fitted; what settles by itself is none.
+    /// Number of fitted parameters of a choice. Nonlinear parameters that follow from the coefficients do not count.
     pub(crate) fn parameter_count(&self, choice: Choice) -> usize {
         let (nonlinear_parameters, columns) = &self.candidates[choice.candidate].variants[choice.variant];
         let settles = self
@@ -166,7 +166,7 @@ impl Library {
         columns.len() + if settles { 0 } else { nonlinear_parameters.len() }
     }
 
-    /// All columns of an explanation, choice after choice.
+    /// All columns of a candidate model, choice after choice.
     pub(crate) fn columns_of(&self, model: &CandidateModel) -> Vec<usize> {
         model
             .choices
@@ -176,7 +176,7 @@ impl Library {
             .collect()
     }
 
-    /// The coefficients of one of the choices.
+    /// Coefficients of one choice.
     pub(crate) fn coefficients(&self, model: &CandidateModel, position: usize) -> Vec<f64> {
         let from: usize = model.choices[..position]
             .iter()
@@ -185,7 +185,7 @@ impl Library {
         model.fit.coefficients[from..from + self.columns(model.choices[position]).len()].to_vec()
     }
 
-    /// What an explanation adds to the residual of each channel of a record.
+    /// Contribution of a candidate model to the residual of each channel of a record.
     pub(crate) fn explained(
         &self,
         study: &Study<'_>,
@@ -210,7 +210,7 @@ impl Library {
         sum
     }
 
-    /// What is left of the held-out parts if the coefficients come from the fitted ones alone.
+    /// χ² on the held-out segments with the coefficients of the fitted segments.
     pub(crate) fn left_held_out(&self, regression: &Regression, model: &CandidateModel) -> f64 {
         let columns = self.columns_of(model);
         match regression.fit(Subset::Fitted, &columns) {
@@ -219,7 +219,7 @@ impl Library {
         }
     }
 
-    /// The parameters of every cause of an explanation.
+    /// Parameters of every cause of a candidate model; `None` if one is not physical.
     pub(crate) fn parameters(
         &self,
         study: &Study<'_>,
@@ -244,7 +244,7 @@ impl Library {
             .collect()
     }
 
-    /// The extensions that make an explanation part of a case.
+    /// The extensions that add a candidate model to a case.
     pub(crate) fn extensions(
         &self,
         study: &Study<'_>,
@@ -259,8 +259,7 @@ impl Library {
         Some(parts.map(|part| (part.name, part.extension)).collect())
     }
 
-    /// By choice of an explanation: columns of the change of what it adds per unit of each parameter of its shape; none where the
-    /// shape is no freedom of the fit.
+    /// By choice: columns of the derivatives with respect to its nonlinear parameters; none if these follow from the coefficients.
     pub(crate) fn slopes_of(
         &self,
         study: &Study<'_>,
@@ -284,7 +283,7 @@ impl Library {
             .collect()
     }
 
-    /// Columns of the change of what a choice with these coefficients adds, per unit of each parameter of its shape.
+    /// Columns of the derivatives of a choice with respect to its nonlinear parameters, by central differences.
     pub(crate) fn slopes(
         &self,
         study: &Study<'_>,
@@ -334,7 +333,7 @@ impl Library {
             .collect()
     }
 
-    /// What is left if one factor on mass, stiffness and damping at `place` stands for everything, and that factor less one.
+    /// χ² with one common factor on mass, stiffness and damping at `location`, and that factor minus one.
     pub(crate) fn common_factor(&self, regression: &Regression, location: &Location) -> Option<(f64, f64)> {
         let columns: Vec<usize> = ["mass", "stiffness", "damping"]
             .iter()
@@ -346,7 +345,7 @@ impl Library {
             })
             .collect::<Option<_>>()?;
         let at = |factor: f64| regression.left(Subset::Whole, &columns, &vec![factor; columns.len()]);
-        // A parabola in the factor.
+        // χ² is a parabola in the factor.
         let (below, middle, above) = (at(-1.0), at(0.0), at(1.0));
         let curvature = below + above - 2.0 * middle;
         if curvature <= 0.0 {
@@ -356,7 +355,7 @@ impl Library {
         Some((at(best), best))
     }
 
-    /// Adds the shapes that are worth a look for what an explanation leaves.
+    /// Adds the sets of nonlinear parameters that the residual `left` of a candidate model suggests.
     pub(crate) fn add_variants_beside(
         &mut self,
         study: &Study<'_>,
@@ -371,7 +370,7 @@ impl Library {
         }
     }
 
-    /// Adds a shape to a candidate; `None` where it has no columns.
+    /// Adds a set of nonlinear parameters to a candidate; `None` if it has no regressors.
     pub(crate) fn add_variant(
         &mut self,
         study: &Study<'_>,
@@ -406,7 +405,7 @@ impl Library {
     }
 }
 
-/// Samples by coefficient, record and channel.
+/// Regressors by coefficient, record and channel.
 fn columns(
     study: &Study<'_>,
     cause: &dyn Cause,

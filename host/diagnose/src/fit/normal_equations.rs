@@ -1,33 +1,33 @@
-//! Products of columns: what every fit of some of them is made of.
+//! Inner products of regression columns, from which every fit of some of them is solved.
 
 use nalgebra::DMatrix;
 
-/// Samples at a time: so many of all columns stay in the cache.
+/// Samples per block: this part of all columns stays in the cache.
 const BLOCK: usize = 1024;
 
-/// Products of the columns of one share of the records.
+/// Inner products of the columns on one subset of the records.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Products {
-    /// Of the columns from the first on, with all before: the lower triangle, row by row. Later columns are not in it yet.
+    /// Lower triangle of the Gram matrix, row by row, of the columns up to the last call of [`Self::complete`].
     gram: Vec<Vec<f64>>,
-    /// Of every column with itself.
+    /// Squared length of every column.
     squares: Vec<f64>,
-    /// Of every column with the residual.
+    /// Inner product of every column with the residual.
     pub(crate) with_residual: Vec<f64>,
-    /// Of the residual with itself.
+    /// Squared length of the residual.
     pub(crate) residual: f64,
-    /// Real numbers that were compared, less those that decays and offsets took.
+    /// Number of compared values, without those that free decays and offsets take.
     pub(crate) count: usize,
 }
 
 impl Products {
-    /// One column more, with its square and its product with the residual.
+    /// Adds a column, given its squared length and its product with the residual.
     pub(crate) fn add(&mut self, square: f64, with_residual: f64) {
         self.squares.push(square);
         self.with_residual.push(with_residual);
     }
 
-    /// Adds the products of further columns with all before them, given as rows over all columns.
+    /// Adds the products of further columns with all columns before them, given as rows.
     pub(crate) fn complete(&mut self, rows: &DMatrix<f64>) {
         for row in rows.row_iter() {
             let until = self.gram.len() + 1;
@@ -40,7 +40,7 @@ impl Products {
         self.squares[column]
     }
 
-    /// Product of two columns; `None` where it was not computed yet.
+    /// Product of two columns; `None` if it is not computed yet.
     pub(crate) fn known(&self, i: usize, j: usize) -> Option<f64> {
         if i == j {
             return Some(self.squares[i]);
@@ -49,10 +49,10 @@ impl Products {
     }
 }
 
-/// Products of the columns from `first` on with all of `columns`, one row each.
+/// Products of the columns from `first` on with all `columns`, one row each.
 ///
-/// 2·(new columns)·(columns)·(samples) flops, as products of matrices that stay in the cache: one dot after the other would wait
-/// for the memory.
+/// The cost is 2·(new columns)·(columns)·(samples) flops. Products of blocks stay in the cache, whereas single inner products would be
+/// limited by memory.
 pub(crate) fn products(columns: &[&[f64]], first: usize) -> DMatrix<f64> {
     let (size, length) = (columns.len(), columns.first().map_or(0, |column| column.len()));
     let mut sum = DMatrix::zeros(size - first, size);

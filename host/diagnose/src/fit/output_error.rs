@@ -1,10 +1,9 @@
-//! Parameters that make the simulation agree with the records: equation error to start, output error to finish.
+//! Residuals of simulated candidate models, and their Jacobian (output error).
 //!
-//! Regression along the measured motion is biased by the noise in that motion and by what sampling hides between samples. The
-//! simulation has neither: with r(θ) = y − y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ
-//! (Ljung, System Identification, 1999, chapter 7; Levenberg and Marquardt's steps with slopes by differences). Of a record
-//! that begins anywhere its initial state is estimated beside θ. Where the whole record is too long for the first guess, its
-//! beginning is fitted first.
+//! Regression along the measured motion is biased by the noise in that motion and by aliasing. A simulation has neither: with r(θ) = y −
+//! y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ (Ljung, System Identification, 1999, chapter 7). The Jacobian
+//! is computed by differences. A record with an unknown initial state has it among the parameters. A start that is too far from the whole
+//! record is improved on its beginning.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,29 +18,30 @@ use crate::records::study::Study;
 use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
-/// Shares of a record that are fitted first where a guess is too far away for the whole.
+/// Shares of a record on which a distant start is fitted first.
 const HORIZONS: [f64; 2] = [0.12, 0.35];
 
-/// Least step of a difference, as a share of its parameter: rounding of the integration. Where friction holds and lets go,
-/// accelerations jump, and a jump is before or after a sample: steps must move many of them.
+/// Least step of a difference, as a share of its parameter: rounding of the integration.
 pub(crate) const LEAST_STEP: f64 = 1e-7;
+
+/// The same with dry friction. Accelerations jump where it slips or sticks, and a jump moves by whole samples: a step must move many.
 const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
-/// Simulations compared with records.
+/// Simulations compared with the records.
 pub(crate) struct OutputError<'a> {
     pub(crate) study: &'a Study<'a>,
     pub(crate) closed: ClosedLoop,
-    /// Parts of each share, in the order of the records.
+    /// Segments of each subset, in the order of the records.
     segments: Vec<Segment>,
     pub(crate) horizons: Vec<Vec<Segment>>,
-    /// True where every record is of a structure that is let go.
+    /// True if every record is a free decay.
     pub(crate) is_let_go: bool,
 }
 
-/// One column of the slopes: of which record, by which slot.
+/// One column of the Jacobian: record, free parameter, values.
 pub(crate) type Column = (usize, usize, Vec<f64>);
 
-/// Jᵀ r for `size` slots.
+/// Jᵀ r for `size` free parameters.
 pub(crate) fn projected(columns: &[Column], size: usize, residuals: &[Vec<f64>]) -> DVector<f64> {
     let mut sum = DVector::zeros(size);
     for (record, slot, column) in columns {
@@ -51,10 +51,10 @@ pub(crate) fn projected(columns: &[Column], size: usize, residuals: &[Vec<f64>])
 }
 
 impl<'a> OutputError<'a> {
-    /// `None` where some record cannot be simulated.
+    /// `None` if some record cannot be simulated.
     pub(crate) fn new(study: &'a Study<'a>) -> Option<Self> {
         let closed = ClosedLoop::new(study)?;
-        // What is let go has its own start among the parameters.
+        // The initial state of a free decay is among the parameters.
         let unknown = |record: &crate::records::record::Record| {
             if starts_anywhere(record) {
                 Nuisance::Offsets
@@ -87,7 +87,7 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// What is left of some parts of one record as `closed` drives it, in units of the noise.
+    /// Whitened residual of some segments of one record under the forces of `closed`.
     fn residual(
         &self,
         closed: &ClosedLoop,
@@ -121,7 +121,7 @@ impl<'a> OutputError<'a> {
         self.residuals_by(&self.closed, problem, segments, point)
     }
 
-    /// The same where other forces drive the records.
+    /// [`Self::residuals`] under other forces.
     pub(crate) fn residuals_by(
         &self,
         closed: &ClosedLoop,
@@ -136,7 +136,7 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// The columns of J = ∂y_simulated/∂slot by differences, by record and slot; records one behind the other.
+    /// Columns of J = ∂y_simulated/∂θ by differences, record after record.
     pub(crate) fn columns(
         &self,
         problem: &FitProblem<'_>,
@@ -148,7 +148,7 @@ impl<'a> OutputError<'a> {
             .slots
             .iter()
             .map(|(slot, step)| {
-                // Where a step leaves what is physical, the other way is taken.
+                // If a step leaves the physical range, the opposite one is taken.
                 [*step, -step].into_iter().find_map(|step| {
                     let mut moved = point.clone();
                     *slot.of(&mut moved) += step;
@@ -175,7 +175,7 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Jᵀ J and Jᵀ r of these columns; steps become such that each moves χ² by about one.
+    /// Jᵀ J and Jᵀ r. It also adapts the steps, so that each changes χ² by about one.
     pub(crate) fn normal(
         &self,
         problem: &mut FitProblem<'_>,
@@ -222,7 +222,7 @@ impl<'a> OutputError<'a> {
         (normal, gradient)
     }
 
-    /// What may move, from what the regression says.
+    /// The free parameters of a candidate model, with its regression as the start.
     pub(crate) fn problem<'b>(
         &self,
         library: &'b Library,
@@ -297,7 +297,7 @@ impl<'a> OutputError<'a> {
         Some((problem, point))
     }
 
-    /// The state of the baseline at the start of a record, once what the explanation adds is taken off.
+    /// Initial state of the baseline in a record, after the contribution of the candidate model is subtracted.
     fn state_at_start(&self, library: &Library, model: &CandidateModel, index: usize) -> Vec<f64> {
         let record = &self.study.records[index];
         let explained = library.explained(self.study, record, model);

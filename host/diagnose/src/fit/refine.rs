@@ -1,4 +1,4 @@
-//! Shapes between those of the grid.
+//! Refinement of nonlinear parameters between the points of their grid.
 
 use crate::criteria::{LEAST_REFINEMENT, WORTH_REFINING};
 use crate::fit::candidate_model::CandidateModel;
@@ -6,10 +6,10 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 
-/// Explanations whose shapes are refined.
+/// Number of candidate models that are refined.
 const REFINED: usize = 3;
 
-/// Refines the shapes of the best few explanations.
+/// Refines the nonlinear parameters of the best candidate models.
 pub(crate) fn refine(
     study: &Study<'_>,
     library: &mut Library,
@@ -57,10 +57,11 @@ fn one(
     }
 }
 
-/// Most steps towards a shape that settles by itself: where teeth lose contact it takes some.
+/// Largest number of iterations of nonlinear parameters that follow from the coefficients. Loss of contact slows them down.
 const SETTLINGS: usize = 12;
 
-/// Goes to the shape that the coefficients ask for until it stays, by half where all of the way leaves more.
+/// Iterates the nonlinear parameters that follow from the coefficients to their fixed point, with half steps where a whole step increases
+/// χ².
 fn settle(
     study: &Study<'_>,
     library: &mut Library,
@@ -97,7 +98,7 @@ fn settle(
             with_nonlinear_parameters(study, library, regression, &model, position, next.collect())
                 .filter(|better| better.fit.left < model.fit.left)
         });
-        // What leaves less where it contradicts itself is no explanation.
+        // A smaller χ² away from the fixed point contradicts itself and does not count.
         let better =
             better.or_else(|| with_nonlinear_parameters(study, library, regression, &model, position, asked));
         let Some(better) = better else {
@@ -108,10 +109,10 @@ fn settle(
     model
 }
 
-/// Most steps along the slopes.
+/// Largest number of Gauss–Newton steps.
 const SLOPES_FOLLOWED: usize = 3;
 
-/// Steps along each parameter, shorter where they do not help; then where the slopes point.
+/// Searches each nonlinear parameter with decreasing steps, then takes Gauss–Newton steps.
 fn search(
     study: &Study<'_>,
     library: &mut Library,
@@ -135,7 +136,7 @@ fn search(
             for sign in [1.0, -1.0] {
                 let mut moved = nonlinear_parameters.clone();
                 let step = sign * steps[parameter];
-                // Sizes are moved by factors, what may be zero by shares of its range.
+                // Positive parameters move by factors, others by shares of their range.
                 moved[parameter] = if low > 0.0 {
                     nonlinear_parameters[parameter] * (1.0 + step)
                 } else {
@@ -165,7 +166,7 @@ fn search(
     model
 }
 
-/// One Gauss–Newton step in the shape; `None` where it does not help.
+/// One Gauss–Newton step in the nonlinear parameters; `None` if it does not decrease χ².
 fn along_slopes(
     study: &Study<'_>,
     library: &mut Library,

@@ -1,7 +1,7 @@
-//! Least squares of all regressors at once, in units of the noise, with free decays taken out.
+//! Least squares of all regressors in units of the noise, after free decays are projected out.
 //!
-//! Every record is looked at as a whole, and cut into blocks that are fitted and blocks that are held out. In each of
-//! these parts residual and regressors are whitened. Their products (Gram matrices) then give the fit of any set of regressors.
+//! Every record counts as a whole, and is also divided into fitted and held-out segments. Residual and regressors of each segment are
+//! whitened. Their inner products (Gram matrices) then give the fit of any set of regressors.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -13,51 +13,51 @@ use crate::fit::segment::{Nuisance, Segment, split};
 use crate::records::study::Study;
 use crate::signal::dot::dot;
 
-/// What is added to the squares of columns, as a share, where all columns of the library are fitted at once.
+/// Ridge on the unit diagonal of the normal equations of all columns of the library, which are nearly dependent.
 const SOFTENED: f64 = 1e-9;
 
-/// The same of the columns of a fit, where only rounding makes columns that are one look like two; of a cut, which is computed less
-/// well, columns must be apart by more than the errors of the computation.
+/// Ridge on the unit diagonal of the normal equations of a fit: rounding. Columns of a cut are less accurate and have the square of its
+/// relative error in its place.
 const ROUNDING: f64 = 1e-13;
 
-/// A fit of some columns.
+/// Linear fit of some columns.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     /// The coefficients.
     pub coefficients: Vec<f64>,
-    /// Their covariance for noise of deviation 1.
+    /// Covariance of the coefficients for unit-variance noise.
     pub covariance: DMatrix<f64>,
-    /// What is left, in units of the noise.
+    /// χ²: residual sum of squares in units of the noise.
     pub left: f64,
 }
 
-/// How some columns would take more of a residual.
+/// Linear fit of some columns to another residual.
 #[derive(Clone, Debug)]
 pub(crate) struct Refit {
     /// The change of their coefficients.
     pub change: Vec<f64>,
-    /// Σ residual² before, in units of the noise.
+    /// χ² before the change.
     pub before: f64,
-    /// What the change takes of it.
+    /// Decrease of χ² by the change.
     pub taken: f64,
 }
 
-/// All columns of a scene.
+/// All columns of a study.
 pub(crate) struct Regression {
     segments: Vec<Segment>,
-    /// By column, by part.
+    /// Values by column and segment.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
-    /// Fitted, held out, whole.
+    /// Products on the fitted, held-out and whole records.
     products: [Products; 3],
-    /// So many columns have all their products.
+    /// Number of columns whose products are complete.
     complete: usize,
-    /// What is added to the squares of columns, as a share, in every fit.
+    /// Ridge on the unit diagonal of the normal equations of every fit.
     ridge: f64,
 }
 
 impl Regression {
-    /// The residuals of a scene.
+    /// The whitened residuals of a study, without columns.
     pub(crate) fn new(study: &Study<'_>) -> Self {
         let segments = split(study, |_| Nuisance::StartAndOffsets);
         let residuals: Vec<Vec<f64>> = segments
@@ -84,7 +84,7 @@ impl Regression {
         regression
     }
 
-    /// Products of all that is there, but for those of different columns.
+    /// Recomputes the products of each column with itself and with the residual.
     fn sum(&mut self) {
         self.products = std::array::from_fn(|_| Products::default());
         self.complete = 0;
@@ -111,11 +111,11 @@ impl Regression {
         }
     }
 
-    /// Takes the noise of each record for so many times what it is that all columns together leave as much of one as of another.
+    /// Rescales the noise variance of each record so that the full model leaves the same normalized residual in every record (feasible
+    /// GLS).
     ///
-    /// What is left of forces is no noise but what the equations get wrong, and that is larger in one record than in another: least
-    /// squares in units of the noise would listen to the record that is described worst (weights by estimated variances, as in
-    /// feasible generalized least squares).
+    /// The residual of forces is not noise, but errors of the equations, which differ between records. Unscaled least squares would fit the
+    /// record that the equations describe worst.
     pub(crate) fn level_records(&mut self) {
         let records = self
             .segments
@@ -144,7 +144,7 @@ impl Regression {
         self.sum();
     }
 
-    /// What all columns leave of one part.
+    /// χ² of one segment with all columns.
     fn left_of_segment(&self, segment: usize) -> f64 {
         let residual = &self.residuals[segment];
         let mut columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[segment][..]).collect();
@@ -169,7 +169,7 @@ impl Regression {
         }
     }
 
-    /// Σ y² of what was measured in the whole records, in units of the noise.
+    /// Σ y² of the measured samples of whole records, in units of the noise.
     pub(crate) fn signal(&self, study: &Study<'_>) -> f64 {
         let of_segment = |segment: &Segment| {
             let channels = study.records[segment.record].channels.iter();
@@ -184,8 +184,8 @@ impl Regression {
         whole.map(of_segment).sum()
     }
 
-    /// Adds a regressor, given as samples by record and channel; its number. Its products with others are computed as they are
-    /// asked for, until [`Self::complete`].
+    /// Adds a regressor, given as samples by record and channel, and returns its column. Its products with other columns are computed on
+    /// demand until [`Self::complete`].
     pub(crate) fn add(&mut self, samples: &[Vec<Vec<f64>>]) -> usize {
         let column: Vec<Vec<f64>> = self
             .segments
@@ -197,7 +197,7 @@ impl Regression {
         self.columns.len() - 1
     }
 
-    /// Computes all products that are not known yet: before many sets of columns are tried.
+    /// Computes all missing products, before many sets of columns are fitted.
     pub(crate) fn complete(&mut self) {
         let (first, size) = (self.complete, self.columns.len());
         if first == size {
@@ -220,12 +220,12 @@ impl Regression {
         self.complete = size;
     }
 
-    /// Length of a column over a share, per unit of its coefficient.
+    /// Length of a column on a subset, per unit of its coefficient.
     pub(crate) fn length(&self, subset: Subset, column: usize) -> f64 {
         self.products(subset).square(column).sqrt()
     }
 
-    /// Product of two columns over a share.
+    /// Inner product of two columns on a subset.
     fn product(&self, subset: Subset, i: usize, j: usize) -> f64 {
         self.products(subset).known(i, j).unwrap_or_else(|| {
             let mine = self
@@ -242,17 +242,17 @@ impl Regression {
         &self.products[subset as usize]
     }
 
-    /// Σ residual² in units of the noise.
+    /// χ² without any column.
     pub(crate) fn residual(&self, subset: Subset) -> f64 {
         self.products(subset).residual
     }
 
-    /// Numbers that are compared.
+    /// Number of compared values.
     pub(crate) fn count(&self, subset: Subset) -> usize {
         self.products(subset).count
     }
 
-    /// Root mean square of the residual over that of what was measured, on a share; channels count alike.
+    /// Prediction error (NRMSE) on a subset; all channels have equal weight.
     pub(crate) fn missed(&self, study: &Study<'_>, subset: Subset) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
         for segment in self.segments.iter().filter(|segment| segment.subset == subset) {
@@ -273,12 +273,12 @@ impl Regression {
         self.columns.len()
     }
 
-    /// The fit of some columns to a share; `None` where they are one and the same, or nothing.
+    /// Linear fit of some columns on a subset; `None` if they are dependent or zero.
     pub(crate) fn fit(&self, subset: Subset, columns: &[usize]) -> Option<Fit> {
         self.solve(subset, columns, self.ridge)
     }
 
-    /// Coefficients of `columns` that fit the column `target`, and how much of its energy they take.
+    /// Coefficients of `columns` that fit the column `target`, and the energy that they explain.
     pub(crate) fn fit_column(
         &self,
         subset: Subset,
@@ -294,8 +294,8 @@ impl Regression {
         Some((solution, taken))
     }
 
-    /// The change of the coefficients of `columns` that takes most of `residuals`, given by record and channel; `None` where the
-    /// columns are one and the same, or nothing.
+    /// The change of the coefficients of `columns` that fits `residuals`, given by record and channel; `None` if the columns are dependent
+    /// or zero.
     pub(crate) fn refit(
         &self,
         subset: Subset,
@@ -321,7 +321,7 @@ impl Regression {
         })
     }
 
-    /// What is left of `residuals`, given by record and channel, with given coefficients of `columns`.
+    /// χ² of `residuals`, given by record and channel, after `coefficients` of `columns`.
     pub(crate) fn left_with(
         &self,
         subset: Subset,
@@ -341,9 +341,9 @@ impl Regression {
         sum
     }
 
-    /// The covariance of a fit to a share whose residual is no noise of deviation 1 but an error of the equations, which has a
-    /// spectrum of its own: (XᵀX)⁻¹ Xᵀ diag(r²/(1 − h)²) X (XᵀX)⁻¹ with h = diag(X (XᵀX)⁻¹ Xᵀ), one number of the spectrum
-    /// independent of the next (HC3 of MacKinnon and White, 1985).
+    /// Covariance of a fit whose residual is not unit-variance noise, but an error of the equations with an unknown spectrum: (XᵀX)⁻¹ Xᵀ
+    /// diag(r²/(1 − h)²) X (XᵀX)⁻¹ with h = diag(X (XᵀX)⁻¹ Xᵀ). The values of the spectrum are independent of each other (HC3 of MacKinnon
+    /// and White, 1985).
     pub(crate) fn covariance_by_residual(
         &self,
         subset: Subset,
@@ -381,7 +381,7 @@ impl Regression {
             .collect()
     }
 
-    /// What is left if all columns may explain, numerically dependent ones softened.
+    /// χ² with all columns of the library.
     pub(crate) fn left_by_all(&self) -> f64 {
         let whole = self.products(Subset::Whole);
         let all: Vec<usize> = (0..self.columns.len())
@@ -405,7 +405,7 @@ impl Regression {
         })
     }
 
-    /// Solution and inverse of the normal equations, `right` in the order of the columns; `None` where columns are one and the same, or nothing.
+    /// Solution and inverse of the normal equations, with `right` in the order of the columns; `None` if the columns are dependent or zero.
     fn normal(
         &self,
         subset: Subset,
@@ -440,7 +440,7 @@ impl Regression {
         Some(((0..size).map(|i| solution[i] / scale[i]).collect(), covariance))
     }
 
-    /// What is left of a share with given coefficients.
+    /// χ² on a subset with given coefficients.
     pub(crate) fn left(&self, subset: Subset, columns: &[usize], coefficients: &[f64]) -> f64 {
         let products = self.products(subset);
         let mut left = products.residual;

@@ -1,4 +1,4 @@
-//! Searches that begin again: from beside where one ended, and from other sizes.
+//! Restarts of a search that is stuck: near its end, and from other amplitudes.
 
 use crate::criteria::{SEARCH_SETTLED, STUCK};
 use crate::fit::output_error::{LEAST_STEP, OutputError};
@@ -6,20 +6,20 @@ use crate::fit::search::ROUNDS;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResult, energy};
 
-/// How far from where a search with friction ended it is looked at again, as shares.
+/// Relative distances from the end of a search with friction at which it restarts.
 const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
-/// Sizes from which a search begins again, as shares of those from which it began.
+/// Factors on the start of a search at which it restarts.
 const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// Parameters of causes whose sizes are sought so: of more there are too many places to begin.
+/// Largest number of parameters that restart from other amplitudes: the number of starts grows exponentially.
 const FEW: usize = 2;
-/// How many of the best beginnings are followed to the end.
+/// Number of the best starts that are followed to the end.
 const FOLLOWED: usize = 3;
-/// Steps of the search in the beginning of a record.
+/// Iterations on the beginning of a record.
 const ROUNDS_AT_FIRST: usize = 4;
 
 impl OutputError<'_> {
-    /// What was `found` from `start`, or better where a search that begins again finds that. `count` numbers are compared, and
-    /// another explanation has reached the χ² of `rival`.
+    /// The search result `found` from `start`, or a better one of a restart. `count` values are compared, and another candidate model has
+    /// reached the χ² `rival`.
     pub(crate) fn looked_at_again(
         &self,
         problem: &mut FitProblem<'_>,
@@ -39,7 +39,7 @@ impl OutputError<'_> {
         found
     }
 
-    /// The search once more from the best of what lies near where it ended: whether friction lets go at all is a cliff.
+    /// Restarts the search from the best point near its end: χ² is discontinuous where friction begins to slip.
     fn beside(
         &self,
         problem: &mut FitProblem<'_>,
@@ -66,8 +66,7 @@ impl OutputError<'_> {
         again.filter(|again| again.left < ended.left).unwrap_or(ended)
     }
 
-    /// The best of searches from other sizes: where a structure is let go, the phase of all that follows hangs on them, and
-    /// between two sizes there are hills.
+    /// The best of searches from other amplitudes. The phase of a free decay depends on them, and χ² has several minima.
     fn elsewhere(
         &self,
         problem: &mut FitProblem<'_>,

@@ -7,12 +7,12 @@ use crate::fit::output_error::OutputError;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, ParameterPoint, SearchResult, at_bounds, energy, predicted, stepped};
 
-/// Steps of the search at most.
+/// Largest number of iterations of a search.
 pub(crate) const ROUNDS: usize = 15;
 
 impl OutputError<'_> {
-    /// Levenberg and Marquardt's search from `start`; `None` where the start cannot be simulated. It ends early where it stays
-    /// behind `rival`, a χ² that another explanation has reached.
+    /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated. It ends early if its χ² stays behind `rival`,
+    /// which another candidate model has reached.
     pub(crate) fn search(
         &self,
         problem: &mut FitProblem<'_>,
@@ -35,7 +35,7 @@ impl OutputError<'_> {
             (normal, gradient) = self.normal(problem, &columns, &point, &residuals);
             at_bounds(problem, &point, &mut normal, &mut gradient);
             let before = left;
-            // To first order most of it is of another shape.
+            // To first order most of the residual cannot be fitted.
             let promised = left - predicted(&normal, &gradient);
             if round >= 1 && promised - rival > HOPELESS_LAG && promised > 0.5 * left {
                 break;
@@ -62,7 +62,7 @@ impl OutputError<'_> {
         Some(SearchResult { point, left, normal })
     }
 
-    /// Where searches end in a growing part of every record, from `point` on.
+    /// Improves `point` by searches on growing parts of every record.
     pub(crate) fn near_to_far(
         &self,
         problem: &mut FitProblem<'_>,

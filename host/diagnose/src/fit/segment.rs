@@ -1,5 +1,5 @@
-//! Parts of records as they are compared: transformed, cut to the band, in units of the noise, and freed of what decays of
-//! the initial state and constant offsets of the sensors could explain.
+//! Segments of records as they are compared: transformed, band-limited, whitened, and orthogonal to free decays and constant offsets of the
+//! sensors.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -12,46 +12,46 @@ use crate::signal::dot::dot;
 use crate::signal::grid::SegmentTransform;
 use quietcut_recording::Kind;
 
-/// A part of a record.
+/// A segment of a record.
 pub(crate) struct Segment {
-    /// Its record, by its place in the scene.
+    /// Index of its record in the study.
     pub(crate) record: usize,
     pub(crate) range: Range<usize>,
     pub(crate) subset: Subset,
-    /// One over how many times the noise of its record is taken for what it is.
+    /// One over the factor on the noise of its record.
     pub(crate) weight: f64,
     bins: usize,
     transform: SegmentTransform,
     whitening: Whitening,
-    /// By channel: samples, counted from the start of the part, that are not compared.
+    /// By channel: samples that are not compared, counted from the start of the segment.
     skipped: Vec<Vec<usize>>,
-    /// Orthonormal: what decays and offsets can be.
+    /// Orthonormal basis of free decays and offsets.
     nuisance: Vec<Vec<f64>>,
 }
 
-/// What a part may owe to what nobody knows.
+/// Unknown contributions that are projected out of a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Nuisance {
-    /// The state at its start, as free decays of the baseline, and the offsets of sensors.
+    /// Free decays of the baseline from an unknown initial state, and offsets of sensors.
     StartAndOffsets,
     /// Offsets of sensors alone.
     Offsets,
 }
 
-/// Which parts count.
+/// The segments that count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subset {
-    /// Those that are fitted.
+    /// Fitted segments.
     Fitted,
-    /// Those that are held out.
+    /// Held-out segments.
     HeldOut,
-    /// Each record as a whole.
+    /// Whole records.
     Whole,
 }
 
-/// Each record as a whole, and in four blocks of a third, a sixth, a third and a sixth of which the short ones are held out:
-/// they hold other times, and of a sweep other frequencies, than what is fitted. Of several free decays the last is held out
-/// whole: the end of a decay tells nothing.
+/// Each record as a whole, and in four segments of a third, a sixth, a third and a sixth. The short ones are held out: they contain other
+/// times, and of a sweep other frequencies, than the fitted ones. Of several free decays the last is held out as a whole, because the end
+/// of a decay carries no information.
 pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) -> Vec<Segment> {
     let several = study.records.len() > 1;
     let last = study.records.len().saturating_sub(1);
@@ -87,7 +87,7 @@ pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) ->
 }
 
 impl Segment {
-    /// A part of the record at `index`.
+    /// A segment of the record at `index`.
     pub(crate) fn new(
         study: &Study<'_>,
         index: usize,
@@ -121,8 +121,8 @@ impl Segment {
         segment
     }
 
-    /// Transformed, cut to the band, in units of the noise, and without what nuisances explain; `samples` are those of the
-    /// whole record, channel by channel.
+    /// Transforms a segment of `samples`, given by channel for the whole record, limits its band, whitens it, and projects out free decays
+    /// and offsets.
     pub(crate) fn whiten(&self, samples: &[Vec<f64>]) -> Vec<f64> {
         let mut column = raw(self, samples);
         for nuisance in &self.nuisance {
@@ -137,7 +137,7 @@ impl Segment {
         column
     }
 
-    /// Numbers that nuisances take, and that are not compared.
+    /// Number of values that are projected out or not compared.
     pub(crate) fn taken(&self) -> usize {
         self.nuisance.len() + self.skipped.iter().map(Vec::len).sum::<usize>()
     }
@@ -161,7 +161,7 @@ fn raw(segment: &Segment, samples: &[Vec<f64>]) -> Vec<f64> {
     column
 }
 
-/// An orthonormal basis of decays and offsets in a part; where forces are compared there is neither.
+/// Orthonormal basis of free decays and offsets in a segment; empty where forces are compared.
 fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f64>> {
     if record.domain == Domain::Force {
         return Vec::new();
@@ -174,7 +174,7 @@ fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f6
         Nuisance::Offsets => 0,
     };
     for state in 0..states {
-        // The decay of a part begins with the part.
+        // The free decay of a segment begins with the segment.
         let shifted: Vec<Vec<f64>> = (0..channels)
             .map(|channel| {
                 let column = record.decays.column(channel, state);
@@ -194,7 +194,7 @@ fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f6
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut column in raws {
         let size = dot(&column, &column).sqrt();
-        // Twice is enough: what is left after the first pass is rounding.
+        // Two passes of Gram–Schmidt leave only rounding.
         for _ in 0..2 {
             for known in &basis {
                 let along = dot(&column, known);

@@ -1,4 +1,4 @@
-//! What an output-error fit may move, and the steps that it takes.
+//! The free parameters of a prediction-error fit, and the steps of its search.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,16 +8,16 @@ use crate::records::study::Study;
 use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
-/// Parameters and initial states.
+/// Values of all parameters and initial states.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterPoint {
-    /// By choice: coefficients and, behind them, the shape.
+    /// By choice: coefficients, followed by the nonlinear parameters.
     pub(crate) inner: Vec<Vec<f64>>,
-    /// By record: states at its start; empty where it starts from rest.
+    /// By record: initial state; empty for a start from rest.
     pub(crate) starts: Vec<Vec<f64>>,
 }
 
-/// One number of a point that may move.
+/// One parameter or initial state that is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum FreeParameter {
     Inner {
@@ -31,7 +31,7 @@ pub(crate) enum FreeParameter {
     },
 }
 
-/// What is fitted: causes, and which numbers may move, each with the step of its difference.
+/// A candidate model with its free parameters, each with the step of its difference.
 pub(crate) struct FitProblem<'a> {
     pub(crate) library: &'a Library,
     pub(crate) choices: &'a [Choice],
@@ -40,11 +40,11 @@ pub(crate) struct FitProblem<'a> {
     pub(crate) least_step: f64,
 }
 
-/// Where a search ended.
+/// End of a search.
 pub(crate) struct SearchResult {
     pub(crate) point: ParameterPoint,
     pub(crate) left: f64,
-    /// Jᵀ J of the slots.
+    /// Jᵀ J of the free parameters.
     pub(crate) normal: DMatrix<f64>,
 }
 
@@ -56,7 +56,7 @@ impl FreeParameter {
         }
     }
 
-    /// False where a record does not feel it.
+    /// False if the response of a record does not depend on it.
     pub(crate) fn is_felt_by(self, record: usize) -> bool {
         match self {
             Self::Inner { .. } => true,
@@ -66,13 +66,13 @@ impl FreeParameter {
 }
 
 impl FitProblem<'_> {
-    /// What may move besides the states at the start.
+    /// Free parameters without the initial states.
     pub(crate) fn inner(&self) -> impl Iterator<Item = FreeParameter> {
         let slots = self.slots.iter().map(|(slot, _)| *slot);
         slots.filter(|slot| matches!(slot, FreeParameter::Inner { .. }))
     }
 
-    /// The effects at a point; `None` where it is not physical.
+    /// The effects at a point; `None` if it is not physical.
     pub(crate) fn effects(&self, study: &Study<'_>, point: &ParameterPoint) -> Option<Effects> {
         let Self { library, choices, .. } = self;
         let mut tables = Vec::new();
@@ -90,12 +90,12 @@ impl FitProblem<'_> {
     }
 }
 
-/// Σ r² over all records.
+/// χ² of all records.
 pub(crate) fn energy(residuals: &[Vec<f64>]) -> f64 {
     residuals.iter().map(|residual| dot(residual, residual)).sum()
 }
 
-/// (Jᵀ J + trust·diag) step = Jᵀ r, taken within the bounds; `None` where that has no solution.
+/// Solves (Jᵀ J + trust·diag) step = Jᵀ r and takes the step within the bounds; `None` if there is no solution.
 pub(crate) fn stepped(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
@@ -119,13 +119,13 @@ pub(crate) fn stepped(
     Some(next)
 }
 
-/// What a whole step takes of χ², to first order.
+/// Decrease of χ² by a whole step, to first order.
 pub(crate) fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     let right = gradient.component_mul(&roots(normal));
     scaled(normal, 1e-9).map_or(0.0, |factor| right.dot(&factor.solve(&right)))
 }
 
-/// What stands at a bound and is pushed beyond it stays there.
+/// Fixes the parameters that stand at a bound and would leave it.
 pub(crate) fn at_bounds(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
@@ -148,7 +148,7 @@ pub(crate) fn at_bounds(
     }
 }
 
-/// One over the roots of the diagonal; zero where nothing is felt.
+/// One over the square roots of the diagonal; zero for a parameter without effect.
 fn roots(normal: &DMatrix<f64>) -> DVector<f64> {
     normal.diagonal().map(|entry| {
         if entry > 0.0 && entry.is_finite() {
@@ -159,7 +159,7 @@ fn roots(normal: &DMatrix<f64>) -> DVector<f64> {
     })
 }
 
-/// The matrix with a diagonal of one and `ridge` on it, factored.
+/// Cholesky factor of the matrix scaled to a unit diagonal, plus `ridge` on it.
 fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
     let roots = roots(normal);
     let mut scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
@@ -171,7 +171,7 @@ fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, n
     scaled.cholesky()
 }
 
-/// The inverse of Jᵀ J: the covariance of the slots for noise of deviation 1; zero for what does not move.
+/// (Jᵀ J)⁻¹: covariance of the free parameters for unit-variance noise; zero for a fixed parameter.
 pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let roots = roots(normal);
     let inverse = scaled(normal, 1e-12)?.inverse();
@@ -180,7 +180,7 @@ pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }))
 }
 
-/// Covariance for noise of deviation 1 of the numbers of each choice, initial states being unknown; zero for what did not move.
+/// By choice: covariance of its parameters for unit-variance noise, with unknown initial states; zero for a fixed parameter.
 pub(crate) fn by_choice(slots: &[FreeParameter], found: &SearchResult) -> Vec<DMatrix<f64>> {
     let mut all: Vec<DMatrix<f64>> = found
         .point

@@ -1,4 +1,4 @@
-//! What makes the noise of a record white, with deviation 1, and independent from channel to channel.
+//! Whitening of a record: its noise becomes unit-variance and independent between channels.
 
 use nalgebra::Cholesky;
 use num_complex::Complex64;
@@ -7,22 +7,22 @@ use crate::records::amplification::LoopNoise;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 
-/// The noise of the channels at each bin: that of the sensors, and what they read of the response to the noise of the force sensors and
-/// to what sampling hides of the forces, both taken as the floor of their spectra. The latter all channels have in common:
-/// S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ over the channels, h what they read per newton of a force.
+/// Covariance of the channels at each bin: S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ. The first part is the noise of the sensors. The second is the
+/// response h to the noise of the force sensors and to aliased forces, both as the noise floor σ_f of each force; all channels have it in
+/// common.
 #[derive(Default)]
 pub(crate) struct Whitening {
     channels: usize,
-    /// By bin: how many numbers it has in each channel, one where it is real.
+    /// By bin: number of values per channel, one if it is real.
     numbers: Vec<usize>,
     /// By bin and channel: one over the diagonal of L.
     weights: Vec<f64>,
-    /// By bin: the rows of L to the left of the diagonal; empty where the channels have nothing in common.
+    /// By bin: rows of L to the left of the diagonal; empty if the channels are independent.
     common: Vec<Complex64>,
 }
 
 impl Whitening {
-    /// That of a stretch of a record, so many samples long, of which so many bins are compared.
+    /// Whitening of a segment of `length` samples, of which `bins` bins are compared.
     pub(crate) fn of(record: &Record, length: usize, bins: usize) -> Self {
         let channels = record.channels.len();
         let is_real = |bin: usize| bin == 0 || 2 * bin == length;
@@ -68,7 +68,7 @@ impl Whitening {
         whitening
     }
 
-    /// L⁻¹ of the numbers of all channels, one channel behind the other.
+    /// Multiplies by L⁻¹ the values of all channels, channel after channel.
     pub(crate) fn apply(&self, column: &mut [f64]) {
         let per_channel = column.len() / self.channels.max(1);
         let rows = if self.common.is_empty() {
@@ -100,7 +100,7 @@ impl Whitening {
     }
 }
 
-/// h σ_f of each channel, and in it of each force along these axes with its deviation, at ω.
+/// h σ_f of each channel for each of the `forces`, given by axis and standard deviation, at ω.
 fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mut [Complex64]) {
     let nearest = (omega / record.grid.omega(1)).round() as usize;
     let of_channels = read.chunks_exact_mut(forces.len().max(1));
@@ -116,7 +116,7 @@ fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mu
     }
 }
 
-/// L of S = diag(σ²) + R Rᴴ by Cholesky, row by row; `read` is R, one row for each channel.
+/// L of S = diag(σ²) + R Rᴴ by Cholesky, row by row; `read` is R, with one row per channel.
 fn factorize(deviations: &[f64], read: &[Complex64], rows: &mut [Complex64]) {
     let (channels, forces) = (deviations.len(), read.len() / deviations.len().max(1));
     for i in 0..channels {
@@ -130,7 +130,7 @@ fn factorize(deviations: &[f64], read: &[Complex64], rows: &mut [Complex64]) {
                 sum -= rows[i * channels + k] * rows[j * channels + k].conj();
             }
             rows[i * channels + j] = if i == j {
-                // No channel has less noise than its own.
+                // No channel has less noise than its own sensor.
                 Complex64::from(sum.re.max(own).sqrt())
             } else {
                 sum / rows[j * channels + j].re
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn what_channels_have_in_common_counts_once() {
-        // Two channels that read one thing and nothing else, with three numbers: a constant and one bin with real and imaginary part.
+        // Two channels that read only one common signal, with three values: a constant, and one bin with real and imaginary part.
         let rows = [Complex64::new(3.0, -1.0), Complex64::new(0.0, 2.0)];
         let whitening = Whitening {
             channels: 2,
@@ -172,13 +172,13 @@ mod tests {
             weights: vec![1.0, 0.5, 1.0, 0.25],
             common: rows.to_vec(),
         };
-        // The first channel, and the second as the shared rows make it of the first.
+        // The second channel is the first times the shared row.
         let z = Complex64::new(2.0, 5.0);
         let second = rows[1] * z;
         let mut column = vec![7.0, z.re, z.im, 21.0, second.re, second.im];
         whitening.apply(&mut column);
         assert_eq!(column, [7.0, 2.0, 5.0, 0.0, 0.0, 0.0]);
-        // What is only in the second is weighed by its own noise.
+        // A signal in the second channel alone is scaled by its own noise.
         let mut column = vec![0.0, 0.0, 0.0, 4.0, 8.0, -4.0];
         whitening.apply(&mut column);
         assert_eq!(column, [0.0, 0.0, 0.0, 2.0, 2.0, -1.0]);
