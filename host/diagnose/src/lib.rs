@@ -48,10 +48,10 @@ use quietcut_recording::Recording;
 use records::full_engagement;
 use records::study::Study;
 
-/// What the case gets wrong about the recordings, and why.
+/// Finds what the case gets wrong about the recordings, and why.
 ///
 /// # Errors
-/// The case cannot be simulated, or a recording tells nothing: too short, clipped, without a channel that is needed.
+/// The case cannot be simulated, or a recording cannot be compared: too short, clipped, or without a required channel.
 pub fn diagnose(
     case: &Case,
     recordings: &[Recording],
@@ -60,7 +60,7 @@ pub fn diagnose(
     diagnose_watched(case, recordings, options, &|_| ())
 }
 
-/// The same, with word of each stage as it begins.
+/// [`diagnose`] with a callback at the beginning of each stage.
 ///
 /// # Errors
 /// As [`diagnose`].

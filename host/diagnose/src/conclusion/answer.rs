@@ -1,4 +1,4 @@
-//! The answer of a diagnosis, as JSON has it.
+//! The answer of a diagnosis, as JSON contains it.
 
 use std::collections::BTreeMap;
 
@@ -7,20 +7,20 @@ use serde::Serialize;
 use crate::conclusion::lobes::{Chart, Lobes};
 use crate::conclusion::residual_views::ResidualView;
 
-/// A normal deviate is within this many deviations with 90 %.
+/// Half-width of the 90 % interval of a normal distribution, in standard deviations.
 pub(crate) const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
 
-/// What was found.
+/// Outcome of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// The causes are named.
+    /// The causes are identified.
     Cause,
-    /// The model is right within the noise.
+    /// The baseline agrees with the records within the noise.
     None,
-    /// Several causes explain the records equally well.
+    /// Several candidate models explain the records equally well.
     Confounded,
-    /// Something is wrong that no known cause explains.
+    /// No known cause explains the residual.
     Unexplained,
 }
 
@@ -33,37 +33,37 @@ pub struct Figure {
     pub ci90: [f64; 2],
 }
 
-/// A cause with its parameters.
+/// A cause with its estimated parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EstimatedCause {
     /// Its name, as in `[extension.NAME]`.
     pub name: &'static str,
-    /// How sure it is, 0 to 1.
+    /// Confidence in the cause, 0 to 1.
     pub confidence: f64,
-    /// The direction that it acts in, where it is one.
+    /// Direction of the force, of a cause along one axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
-    /// The directions that it joins.
+    /// The two directions that it couples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub directions: Option<[&'static str; 2]>,
-    /// The channel that it acts in.
+    /// The channel in which it acts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
     /// Parameters by key.
     pub parameters: BTreeMap<&'static str, Figure>,
-    /// The table `[extension.NAME]` that makes it part of a case.
+    /// The table `[extension.NAME]` that adds it to a case.
     #[serde(skip)]
     pub extension: toml::Table,
-    /// Which cause of its explanation it belongs to: one that acts along two directions stands in the answer twice.
+    /// Index of its cause in the candidate model: a cause along two directions has two entries.
     #[serde(skip)]
     pub choice: usize,
-    /// The same table with one principal direction of what was fitted at either end of its 90 % interval.
+    /// The same table at both ends of the 90 % interval along each principal direction of the covariance.
     #[serde(skip)]
     pub moved: Vec<[toml::Table; 2]>,
 }
 
 impl EstimatedCause {
-    /// Its direction, directions or channel, as far as it has them.
+    /// Its direction, directions or channel; empty if it has none.
     pub fn location(&self) -> String {
         let directions = self.directions.map(|[one, other]| format!("{one} and {other}"));
         let channel = self.channel.clone();
@@ -74,7 +74,7 @@ impl EstimatedCause {
     }
 }
 
-/// The causes of one explanation, each with its channel or directions: `mass along x with sensor-gain of ax`.
+/// The causes of one candidate model, each with its channel or directions: `mass along x with sensor-gain of ax`.
 pub(crate) fn label(causes: &[EstimatedCause]) -> String {
     let mut names: Vec<String> = Vec::new();
     for cause in causes {
@@ -91,31 +91,31 @@ pub(crate) fn label(causes: &[EstimatedCause]) -> String {
     names.join(" with ")
 }
 
-/// How well a model predicts.
+/// Prediction error of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// Root mean square of the residual over that of the channels, on held-out parts of records; every channel counts alike.
+    /// NRMSE on held-out segments: root mean square of the residual over that of the channel; all channels have equal weight.
     pub nrmse_heldout: f64,
-    /// The same of the whole records.
+    /// NRMSE on the whole records.
     pub nrmse_whole: f64,
 }
 
-/// What the extension gains.
+/// Gain by the extension.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gain {
-    /// Share of the held-out residual's energy beyond that of the noise that the extension removes: 1 − (E_after − n)/(E_before − n), with
-    /// energies in units of the noise and n numbers that are compared; −1 where it is that or less.
+    /// Share of the held-out residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before − n), with energies
+    /// in units of the noise and n compared values; at least −1.
     pub residual_energy_removed: f64,
-    /// Its 90 % interval: of the same machine, with the noise drawn anew. It ends at −1, where twice as much is left: less is not told
-    /// apart, and where hardly more than noise was held out nothing is.
+    /// Its 90 % interval over draws of the noise. It ends at −1, where the extension doubles the residual energy. If the held-out residual
+    /// is close to noise, the interval is wide.
     pub ci90: [f64; 2],
 }
 
 impl Gain {
-    /// Of what the case and the extended case leave of `count` numbers, in units of the noise.
+    /// From the χ² `before` and `after` the extension, of `count` compared values.
     ///
-    /// Each energy is that of a signal s² in noise: a non-central χ² with variance 2n + 4s². The noise of both is the same; they are
-    /// taken as independent, which makes the interval wider where both leave much.
+    /// Each energy is that of a signal s² in noise: a non-central χ² with variance 2n + 4s². The noise of both is the same; it is taken as
+    /// independent, which widens the interval if both residuals are large.
     pub(crate) fn new(before: f64, after: f64, count: f64) -> Self {
         let there = (before - count).max(1e-9 * before);
         let left = (after - count) / there;
@@ -132,55 +132,55 @@ impl Gain {
     }
 }
 
-/// What is left.
+/// The unexplained residual.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// Share of the residual's energy that is neither explained nor noise.
+    /// Share of the residual energy that is neither explained nor noise.
     pub fraction: f64,
-    /// Where it sits.
+    /// Its channel, frequency and time.
     #[serde(rename = "where")]
     pub location: String,
-    /// A formula for it, which is a guess.
+    /// A formula that may describe it: a guess.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guess: Option<String>,
 }
 
-/// The experiment that would tell more.
+/// The experiment that separates confounded candidate models.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextTest {
-    /// What kind of recording.
+    /// Kind of the recording.
     pub kind: &'static str,
-    /// The direction of the force, of a test of the structure.
+    /// Direction of the force, in a test of the structure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
-    /// Amplitudes of the force, one after the other, N; of a blow its peak.
+    /// Force amplitudes, one after the other, N; peak force of an impact.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub force_n: Vec<f64>,
-    /// Where a sweep begins and ends, or the frequency of a step twice, Hz.
+    /// First and last frequency of a sweep; twice the frequency of a step sine, Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band_hz: Option<[f64; 2]>,
-    /// Of a cut: spindle speed, rev/min.
+    /// Spindle speed of a cut, rev/min.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_rpm: Option<f64>,
-    /// Of a cut: axial depth, mm.
+    /// Axial depth of a cut, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axial_depth_mm: Option<f64>,
-    /// Of a cut: feed per tooth, mm.
+    /// Feed per tooth of a cut, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feed_per_tooth_mm: Option<f64>,
-    /// How long it is recorded, s.
+    /// Duration, s.
     pub seconds: f64,
-    /// What must be measured besides the channels of the records.
+    /// Further quantities to measure beside the channels of the records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measure: Option<&'static str>,
-    /// How far apart the explanations would be that it separates least, in standard deviations: about 8 tell nearly always.
+    /// Smallest distance between two candidate models in this test, in standard deviations. About 8 separate them nearly always.
     pub distance: f64,
-    /// What it separates, and how.
+    /// The candidate models that it separates, and the channel that does.
     pub why: String,
 }
 
 impl NextTest {
-    /// What to do, in a sentence without its end.
+    /// The test as a sentence without full stop.
     pub fn what(&self) -> String {
         let list = |values: &[f64]| {
             let values: Vec<String> = values.iter().map(|value| format!("{value:.3}")).collect();
@@ -215,53 +215,52 @@ impl NextTest {
 /// The answer.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
-    /// What was found.
+    /// Outcome.
     pub outcome: Outcome,
-    /// How well the case predicts.
+    /// Prediction error of the baseline.
     pub baseline: Quality,
-    /// The causes, the surest first; where they are confounded, all of the set.
+    /// The causes, the most certain first; if they are confounded, those of all candidate models.
     pub causes: Vec<EstimatedCause>,
-    /// Names that mean the same on these records.
+    /// Names that are equivalent on these records.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub equivalent: Vec<Vec<&'static str>>,
-    /// How well the extended case predicts.
+    /// Prediction error of the extended case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extended: Option<Quality>,
-    /// What the extension gains.
+    /// Gain by the extension.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<Gain>,
-    /// What is left.
+    /// The unexplained residual.
     pub unexplained: Unexplained,
-    /// What it changes of the limits; `None` where nothing was found, or limits cannot be computed.
+    /// Effect on the stability limits; `None` without an extension, or if limits cannot be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobes: Option<Lobes>,
-    /// The lobes of the case with the cuts that are known, where nothing was found.
+    /// Lobes of the case with the known cuts, without an extension.
     #[serde(skip)]
     pub believed: Option<Chart>,
-    /// What would tell more.
+    /// The experiment that separates confounded candidate models.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub next_test: Option<NextTest>,
-    /// What should be known about the records.
+    /// Remarks on the records.
     pub warnings: Vec<String>,
-    /// The explanations that are left, each with all its causes, which act together: more than one where the answer is `Confounded`.
+    /// The equivalent candidate models, each with the causes that act together: more than one if the outcome is `Confounded`.
     #[serde(skip_serializing_if = "is_single")]
     pub explanations: Vec<Vec<EstimatedCause>>,
-    /// How many of `causes`, from the first, act together in the extended case.
+    /// Number of `causes`, from the first, that act together in the extended case.
     #[serde(skip)]
     pub acting: usize,
-    /// The residuals, channel by channel.
+    /// The residuals by channel.
     #[serde(skip)]
     pub views: Vec<ResidualView>,
 }
 
-/// Nothing that `causes` does not say.
+/// True if `causes` contains the same.
 fn is_single(explanations: &[Vec<EstimatedCause>]) -> bool {
     explanations.len() < 2
 }
 
 impl Diagnosis {
-    /// Adds causes that explain the records together as well as those that act: each name once, or where it is the same names at
-    /// `other_places`, each place once.
+    /// Adds the causes of an equivalent candidate model: each name once, or with `other_locations` each location once.
     pub(crate) fn add_rival(&mut self, causes: Vec<EstimatedCause>, other_locations: bool) {
         for cause in &causes {
             let is_known = self.causes.iter().any(|known| {
@@ -284,13 +283,13 @@ impl Diagnosis {
         }
     }
 
-    /// The explanations that are left, in words: each with all that must act together.
+    /// The equivalent candidate models in words, each with all its causes.
     pub fn alternatives(&self) -> String {
         let labels: Vec<String> = self.explanations.iter().map(|causes| label(causes)).collect();
         labels.join("; or ")
     }
 
-    /// The names of the causes, each once: a cause that acts along several directions stands in the answer once for each.
+    /// The names of the causes, each once. A cause along several directions has an entry for each.
     pub fn names(&self) -> Vec<&'static str> {
         let mut names = Vec::new();
         for cause in &self.causes {
@@ -308,15 +307,15 @@ mod tests {
 
     #[test]
     fn a_gain_is_said_where_there_is_one_to_be_measured() {
-        // Of 1 000 numbers: twice their noise before, and noise after.
+        // χ² of 1 000 values: twice the noise before, the noise after.
         let gain = Gain::new(2000.0, 1000.0, 1000.0);
         assert_eq!(gain.residual_energy_removed, 1.0);
-        // √(2 000)/1 000 after, and as much of what was there before: 1.645·0.0447.
+        // √(2 000)/1 000 after, and the same for the energy before: 1.645·0.0447.
         assert!(
             (gain.ci90[0] - 0.926).abs() < 1e-3 && gain.ci90[1] == 1.0,
             "{gain:?}"
         );
-        // Nothing but noise before: whatever is removed, it is not known.
+        // With noise alone before, the explained share is unknown.
         let gain = Gain::new(990.0, 980.0, 1000.0);
         assert_eq!(gain.ci90, [-1.0, 1.0]);
         assert_eq!(Gain::new(1001.0, 1500.0, 1000.0).residual_energy_removed, -1.0);

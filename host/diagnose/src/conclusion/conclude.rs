@@ -1,4 +1,4 @@
-//! From evidence to an answer.
+//! From a study to its answer.
 
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
 use crate::conclusion::parameter_estimates::{by_common_factor, parameter_estimates};
@@ -95,7 +95,7 @@ fn answer(
         .filter(|_| of_noise <= NOISE_TOLERANCE || of_excess <= allowed)
     else {
         if of_noise > NOISE_TOLERANCE {
-            // What was tried and is not believed takes nothing off.
+            // A rejected candidate model explains nothing.
             diagnosis.views = residual_views(study, library, None);
             diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
             diagnosis.outcome = Outcome::Unexplained;
@@ -116,7 +116,7 @@ fn answer(
         1.0
     };
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
-    // Errors of the computation go along with the signal: where they are like a cause, they are not averaged away.
+    // Errors of the computation are proportional to the signal: if they resemble a cause, they do not average out.
     let uncertain = inflation + criteria.coherent;
     let spread = |model: &CandidateModel| {
         let closed = criteria.closed.as_ref();
@@ -169,8 +169,8 @@ fn answer(
     diagnosis
 }
 
-/// Makes the names that not all explanations have one group, of which none is surer than the others; where all have the same names at
-/// other places, those that are at other places.
+/// Groups the names that not all equivalent candidate models contain, and bounds their confidence. If all models have the same names, the
+/// group is those at different locations.
 fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.outcome = Outcome::Confounded;
     let mut group = diagnosis.names();
@@ -190,7 +190,7 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.equivalent = vec![group];
 }
 
-/// From the distance to the next explanation, and from what is left as a share of what is allowed.
+/// Confidence from the lead over the best rival, and from the residual as a share of the allowed one.
 fn confidence(ahead: f64, left: f64) -> f64 {
     let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * EQUIVALENT) / CONFIDENCE_WIDTH).exp());
     let by_rest = 1.0 - CONFIDENCE_LOSS * left.clamp(0.0, 1.0).powi(2);

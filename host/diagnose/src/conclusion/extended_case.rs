@@ -1,4 +1,4 @@
-//! The case with what was found.
+//! The case with the estimated extension.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use crate::conclusion::answer::{Diagnosis, EstimatedCause, Figure, Outcome};
 use crate::conclusion::lobes::Moved;
 use quietcut_model::case::Case;
 
-/// What is said of a key behind its value: the intervals of the causes that have it, or have it by number (`ratio_1`, `ratio_2` …).
+/// Comment with the 90 % intervals of a key, of all causes that have it, also by number (`ratio_1`, `ratio_2` …).
 fn intervals(causes: &[&EstimatedCause], key: &str) -> String {
     let is_of_key = |known: &str| {
         let behind = known
@@ -36,7 +36,7 @@ impl Diagnosis {
         found.map(|cause| (cause.name, &cause.extension))
     }
 
-    /// The extended case; `None` where nothing was found.
+    /// The extended case; `None` without causes.
     pub fn extended(&self, case: &Case) -> Option<Case> {
         (self.acting > 0).then(|| {
             let mut extended = case.clone();
@@ -45,8 +45,8 @@ impl Diagnosis {
         })
     }
 
-    /// The extended case with each principal direction of what was fitted at either end of its 90 % interval: those of one cause after
-    /// the other, which are taken to be independent of one another.
+    /// The extended case at both ends of the 90 % interval along each principal direction of the covariance, cause after cause. Causes are
+    /// taken as independent.
     pub fn moved(&self, case: &Case) -> Vec<Moved> {
         let found = &self.causes[..self.acting];
         let choices = found
@@ -75,10 +75,10 @@ impl Diagnosis {
         all
     }
 
-    /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each cause that acts, and
-    /// the 90 % intervals of its parameters as comments. `None` where nothing was found.
+    /// The text of the extended case: that of the case, with a table `[extension.NAME]` for each acting cause, and the 90 % intervals of
+    /// its parameters as comments. `None` without causes.
     ///
-    /// Where causes are confounded, those named first are taken.
+    /// Of confounded candidate models it contains the first.
     pub fn extended_case(&self, case_text: &str) -> Option<String> {
         if !matches!(self.outcome, Outcome::Cause | Outcome::Confounded) {
             return None;

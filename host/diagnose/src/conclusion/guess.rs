@@ -1,10 +1,10 @@
-//! A formula for what no known cause explains: a guess, and no more.
+//! A formula for a residual that no known cause explains.
 //!
-//! The missing restoring force along an axis is taken to be Σ cᵢ φᵢ(x, v) with few of many terms: products of powers x^i v^j,
-//! what switches with the sign of the velocity, and the state z of Bouc–Wen loops of several yields. Terms are added one by one,
-//! each time the one that takes most of the residual, as long as Schwarz's criterion n ln(left) + k ln n falls. What the formula takes of
-//! data that it was not fitted to says what it is worth. S. A. Billings, Nonlinear System Identification, 2013, ch. 3 (forward
-//! regression); S. L. Brunton et al., PNAS 113 (2016) 3932 (sparse regression).
+//! The missing restoring force along an axis is Σ cᵢ φᵢ(x, v) with few of many terms: products of powers x^i v^j, terms that switch with
+//! the sign of the velocity, and the state z of Bouc–Wen loops with several yields. Forward regression adds the term that explains most of
+//! the residual, as long as Schwarz's criterion n ln χ² + k ln n decreases. The share of the held-out residual that the formula explains is
+//! its worth. S. A. Billings, Nonlinear System Identification, 2013, ch. 3 (forward regression); S. L. Brunton et al., PNAS 113 (2016) 3932
+//! (sparse regression).
 
 use std::fmt::Write;
 
@@ -16,10 +16,10 @@ use crate::records::study::Study;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::{Motion, restoring_along};
 
-/// The most terms of a formula.
+/// Largest number of terms of a formula.
 const MOST: usize = 4;
 
-/// Powers of x and v, as products.
+/// Exponents of x and v in products of powers.
 const POWERS: [(i32, i32); 16] = [
     (1, 0),
     (0, 1),
@@ -39,7 +39,7 @@ const POWERS: [(i32, i32); 16] = [
     (0, 5),
 ];
 
-/// Yields of the loops that are tried, as shares of the largest displacement.
+/// Yields of the Bouc–Wen loops, as shares of the largest displacement.
 const YIELDS: [f64; 4] = [0.05, 0.15, 0.4, 0.8];
 
 /// One term along one axis.
@@ -58,7 +58,7 @@ enum Term {
     Loop(f64),
 }
 
-/// The formula with what it is worth; `None` where none takes a tenth of what is held out.
+/// The formula with its worth; `None` if it explains less than a tenth of the held-out residual.
 pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<String> {
     let mut all: Vec<(usize, Term, usize)> = Vec::new();
     for axis in study.driven_axes() {
@@ -123,7 +123,7 @@ fn terms(study: &Study<'_>, axis: usize) -> Vec<Term> {
     powers.chain(others).chain(loops).collect()
 }
 
-/// Samples by record and channel per unit of the coefficient; `None` where the term cannot be computed.
+/// Samples by record and channel per unit of the coefficient; `None` if the term does not apply.
 fn column(study: &Study<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>>>> {
     let columns: Vec<Vec<Vec<f64>>> = study
         .records
@@ -164,7 +164,7 @@ fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: Term) -> Option<
             ];
             let effects = Effects::parse(texts.iter().map(String::as_str)).ok()?;
             let terms = effects.0.first()?.terms(study.baseline.structure).ok()?;
-            // z − x, with x taken off again.
+            // The term is z − x; x is added to get z.
             let difference = restoring_along(&**terms.first()?, motion).into_iter().nth(axis)?;
             difference
                 .iter()

@@ -1,4 +1,4 @@
-//! What an extension changes for the user: limits, chatter frequencies, calls of stable and unstable.
+//! The effect of an extension on stability limits, chatter frequencies and predictions of trial cuts.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,66 +13,67 @@ use quietcut_stability::{
     needs_orbit, spaced,
 };
 
-/// Speeds of the charts.
+/// Number of speeds of a chart.
 const SPEEDS: usize = 41;
 
-/// The same where a speed takes seconds, as forced orbits over the revolution do.
+/// Number of speeds of a chart whose limits take seconds each, as those of forced orbits over the revolution do.
 const FEW_SPEEDS: usize = 2;
 
-/// Speeds at which the lowest limit is sought.
+/// Number of speeds at which the lowest limit is searched.
 const COARSE: usize = 12;
 
-/// Depths between which it is, mm.
+/// Smallest depth of that search, mm.
 const SHALLOWEST_MM: f64 = 0.01;
+/// Largest depth of that search, mm.
 const DEEPEST_MM: f64 = 200.0;
 
-/// How many times the lowest limit charts go down to.
+/// Depth of a chart over the lowest limit.
 const DEPTH: f64 = 4.0;
 
-/// How many times the deepest cut they do.
+/// Depth of a chart over the deepest cut.
 const BELOW_CUTS: f64 = 1.2;
 
-/// The limit at one speed before and after; `None` for none up to the last depth.
+/// The limit at one speed before and after the extension; `None` if it is above the largest depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Where stability is first lost by the case, mm.
+    /// Limit of the case, mm.
     pub limit_before_mm: Option<f64>,
-    /// Where by the extended case, mm.
+    /// Limit of the extended case, mm.
     pub limit_after_mm: Option<f64>,
-    /// The 90 % interval of that, from those of the parameters that were found; an upper end of `None` is beyond the last depth.
+    /// 90 % interval of the limit of the extended case, from those of its parameters; an upper end of `None` is above the largest depth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_after_ci90_mm: Option<[Option<f64>; 2]>,
     /// Spindle speed, rev/min.
     pub at_rpm: f64,
-    /// How it is lost by the case.
+    /// Type of the stability loss of the case.
     pub kind_before: Option<Kind>,
-    /// How by the extended case.
+    /// Type of the stability loss of the extended case.
     pub kind_after: Option<Kind>,
-    /// Frequency of the chatter by the case, Hz.
+    /// Chatter frequency of the case, Hz.
     pub chatter_before_hz: Option<f64>,
-    /// Frequency by the extended case, Hz.
+    /// Chatter frequency of the extended case, Hz.
     pub chatter_after_hz: Option<f64>,
 }
 
-/// How cuts that were tried or recorded are called.
+/// Predictions of trial cuts and recorded cuts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct CallsChange {
-    /// By the case.
+    /// Predictions of the case.
     pub before: Calls,
-    /// By the extended case.
+    /// Predictions of the extended case.
     pub after: Calls,
 }
 
-/// The lobes of one case with the cuts that were tried or recorded.
+/// The lobes of one case with trial cuts and recorded cuts.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// How they were computed.
+    /// Method of the limits.
     pub method: &'static str,
-    /// The depth up to which limits were sought, mm.
+    /// Largest depth of the search for limits, mm.
     pub searched_mm: f64,
-    /// The limits, speed by speed.
+    /// The limits by speed.
     pub lines: Vec<SpeedLine>,
-    /// The cuts, each with what the lobes say of it.
+    /// The cuts, each with the verdict on its prediction.
     pub cuts: Vec<(TestCut, Call)>,
 }
 
@@ -82,16 +83,16 @@ pub struct Lobes {
     /// At the speed of the recorded cuts, else where the two differ most.
     #[serde(flatten)]
     pub at: Change,
-    /// The depth up to which limits were sought, mm.
+    /// Largest depth of the search for limits, mm.
     pub searched_mm: f64,
-    /// The moment for which limits of a case with drift or wear hold: the end of the longest recording, s.
+    /// Time at which limits with drift or wear hold: the end of the longest recording, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_s: Option<f64>,
-    /// How the limits of the extended case were computed.
+    /// Method of the limits of the extended case.
     pub method_after: &'static str,
     /// At every speed.
     pub speeds: Vec<Change>,
-    /// How cuts that were tried or recorded are called, where there are any.
+    /// Predictions of trial cuts and recorded cuts, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calls: Option<CallsChange>,
     /// Both charts.
@@ -99,10 +100,10 @@ pub struct Lobes {
     pub charts: [Chart; 2],
 }
 
-/// An extended case with one direction of its parameters moved to either end of their 90 % interval.
+/// An extended case at both ends of the 90 % interval along one direction of its parameters.
 pub type Moved = [Case; 2];
 
-/// The lobes of a case over the speeds of the cuts that were tried or recorded, else of the machine.
+/// The lobes of a case over the speeds of trial cuts and recorded cuts, else of the machine.
 ///
 /// # Errors
 /// A case without tool, material or cut, or one whose limits cannot be computed.
@@ -113,7 +114,7 @@ pub fn believed(case: &Case, recordings: &[Recording], cuts: &[TestCut]) -> Resu
     Chart::new(&*method, &range, &cuts)
 }
 
-/// The limits of a case and of its extension, over the same speeds; `moved` says how well the parameters of the extension are known.
+/// The limits of a case and of the extended case over the same speeds; `moved` contains the uncertainty of the extension.
 ///
 /// # Errors
 /// As [`believed`], also for the extended case.
@@ -163,8 +164,8 @@ pub fn lobes(
     })
 }
 
-/// The 90 % intervals of limits: those of the directions of parameters, which are independent of one another, added by their
-/// squares, upward and downward apart. None where a moved case has no limits.
+/// The 90 % intervals of the limits. Directions of the parameters are independent: their changes add by squares, upward and downward apart.
+/// None if the limits of a moved case cannot be computed.
 fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[Moved], after_s: Option<f64>) {
     if moved.is_empty() {
         return;
@@ -202,11 +203,11 @@ fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[Moved], after_s: Opt
     }
 }
 
-/// The cuts that are known.
+/// Trial cuts and recorded cuts.
 struct Cuts<'a> {
     tried: &'a [TestCut],
     recorded: Vec<TestCut>,
-    /// Speeds of all recorded cuts, also of those that are on no chart of the case.
+    /// Speeds of all recorded cuts, also of those that belong to another chart.
     recorded_rpm: Vec<f64>,
 }
 
@@ -228,7 +229,7 @@ impl<'a> Cuts<'a> {
     }
 }
 
-/// Speeds and depths of charts.
+/// Speeds and depths of a chart.
 struct Range {
     speeds_rpm: Vec<f64>,
     searched_mm: f64,
@@ -269,7 +270,7 @@ impl Chart {
         })
     }
 
-    /// How often the cuts are called right.
+    /// Counts of right and wrong predictions.
     pub fn calls(&self) -> Calls {
         let calls: Vec<Call> = self.cuts.iter().map(|(_, call)| *call).collect();
         Calls::of(&calls)
@@ -290,7 +291,7 @@ fn is_costly(case: &Case) -> bool {
 }
 
 impl Change {
-    /// Natural logarithm of the limit after over that before; none counts as the last depth.
+    /// Natural logarithm of the limit after over that before; a limit of `None` counts as the largest depth.
     pub fn relative(&self, searched_mm: f64) -> f64 {
         let limit = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm).max(1e-6 * searched_mm);
         (limit(self.limit_after_mm) / limit(self.limit_before_mm)).ln()
@@ -325,7 +326,7 @@ fn method(case: &Case, after_s: Option<f64>) -> Result<Box<dyn Method>, Stabilit
     }
 }
 
-/// Those of the cuts, else around those of the recorded cuts, else of the machine; with the speeds of recorded cuts among them.
+/// Speeds of trial cuts, else around those of recorded cuts, else of the machine; recorded speeds are always among them.
 fn speeds(
     case: &Case,
     cuts: &[TestCut],
@@ -356,7 +357,7 @@ fn speeds(
     Ok(speeds)
 }
 
-/// Some times the lowest limit, found by doubling.
+/// A multiple of the lowest limit, which doubling the depth finds.
 fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityError> {
     let every = speeds_rpm.len().div_ceil(COARSE).max(1);
     let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();
@@ -377,7 +378,7 @@ mod tests {
     use super::*;
     use quietcut_stability::trial_cuts::Outcome;
 
-    /// The robot with all its stiffness changed by this share.
+    /// The robot with all stiffness changed by this share.
     fn stiffened(change: f64) -> Case {
         let mut case = quietcut_testkit::case("kuka-kr90-acetal");
         let mut table = toml::Table::new();
@@ -403,7 +404,7 @@ mod tests {
         let found = between(0.06, 0.14);
         for (at, change) in found.speeds.iter().enumerate() {
             let center_mm = change.limit_after_mm.unwrap_or(found.searched_mm);
-            // Ends that lie on one side of the limit reach to that side alone.
+            // If both ends lie on one side of the limit, the interval extends to that side alone.
             let [one, other] = [&low, &high].map(|ends| ends.speeds[at].limit_after_ci90_mm.unwrap());
             let [from_mm, to_mm] = change.limit_after_ci90_mm.unwrap();
             assert!(from_mm.unwrap() <= center_mm && to_mm.is_none_or(|to_mm| to_mm >= center_mm));
@@ -411,7 +412,7 @@ mod tests {
             let last = |limit_mm: Option<f64>| limit_mm.unwrap_or(f64::INFINITY);
             assert_eq!(last(to_mm), last(one[1]).max(last(other[1])));
         }
-        // Twice the same direction is √2 as far.
+        // The same direction twice extends √2 as far.
         let moved = [stiffened(0.06), stiffened(0.14)];
         let twice = lobes(&case, &stiffened(0.1), &[moved.clone(), moved], &[], &[]).unwrap();
         let reach = |lobes: &Lobes| {

@@ -1,8 +1,8 @@
-//! Long records of random forces, of blows and of cuts: their beginnings are searched, and what is found there is held against the rest.
+//! Long records of random forces, impacts and cuts: the search uses their beginnings, and the rest validates the result.
 //!
-//! A search computes its records hundreds of times, and a random excitation, some blows or a cut at one speed tell in their first
-//! seconds what they tell in a minute; what changes over the minute does not show there. So the answer holds only if it leaves as little of
-//! the rest as of the beginnings; and what it gains is told of the rest alone, which nothing was fitted to.
+//! A search predicts its records hundreds of times. The first seconds of a random excitation, of impacts or of a cut at one speed carry
+//! nearly the information of a minute, except on changes over the minute. So the answer counts only if its residual is as small on the rest
+//! as on the beginnings. The gain is stated for the rest alone, to which nothing was fitted.
 
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
@@ -14,15 +14,15 @@ use crate::records::study::Study;
 use quietcut_model::case::Case;
 use quietcut_recording::{Kind, Recording};
 
-/// Samples of all records together that are searched.
+/// Number of samples of all records together that are searched.
 const SEARCHED: usize = 32_768;
-/// Periods of the slowest mode that the beginning of each record must hold.
+/// Least number of periods of the slowest mode in the beginning of each record.
 const PERIODS: f64 = 60.0;
-/// Turns of the spindle that the beginning of a cut must hold.
+/// Least number of revolutions in the beginning of a cut.
 const TURNS: f64 = 24.0;
 
-/// The beginnings of records, all of them of random forces, of blows or of cuts at one speed, and what comes after them; `None` where they are
-/// too short to be shortened.
+/// The beginnings of the records and the rest of each, if all are of random forces, of impacts or of cuts at one speed; `None` if they are
+/// too short.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
     let all: usize = recordings.iter().map(Recording::len).sum();
@@ -31,7 +31,7 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
         .map(|recording| {
             let turns_s = turns_s(recording)?;
             let samples = |seconds: f64| (seconds * recording.sample_rate_hz).ceil() as usize;
-            // What a cut left from its entry on is past after as many turns.
+            // After this many revolutions, the transient of the entry has decayed.
             let from = samples(turns_s);
             let least = samples((PERIODS / lowest_hz).max(turns_s));
             let count = (SEARCHED / recordings.len()).max(least);
@@ -44,7 +44,7 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
     ((left as f64) < WORTH_SHORTENING * all as f64).then_some([shortened, rest])
 }
 
-/// How long the turns take that the beginning of a record must hold: none of a shaker or a hammer; `None` of what is not shortened.
+/// Least duration of the beginning of a cut, s; zero for shaker and hammer; `None` for tests that are not shortened.
 fn turns_s(recording: &Recording) -> Option<f64> {
     match (recording.sidecar.kind, &recording.sidecar.cut) {
         (Some(Kind::Shaker | Kind::Hammer), _) => Some(0.0),
@@ -53,7 +53,7 @@ fn turns_s(recording: &Recording) -> Option<f64> {
     }
 }
 
-/// What the beginnings of the records tell, where that holds for all of them; `None` where it does not, or where they are short.
+/// The answer from the beginnings of the records, if it holds for all of them; `None` if not, or if the records are short.
 pub(crate) fn concluded(
     case: &Case,
     recordings: &[Recording],
@@ -74,7 +74,7 @@ pub(crate) fn concluded(
         searched_s.fold(0.0, f64::max)
     ));
     let extended = match diagnosis.outcome {
-        // More of the same explains nothing.
+        // Further samples cannot explain it.
         Outcome::Unexplained => return Some(diagnosis),
         Outcome::None => case.clone(),
         _ => diagnosis.extended(case)?,
@@ -86,7 +86,7 @@ pub(crate) fn concluded(
     {
         return None;
     }
-    // Nothing was fitted to any of the rest.
+    // Nothing was fitted to the rest.
     let quality = |missed: f64| Quality {
         nrmse_heldout: missed,
         nrmse_whole: missed,
@@ -99,13 +99,13 @@ pub(crate) fn concluded(
     Some(diagnosis)
 }
 
-/// What a case leaves of records.
+/// Residual of a case on records.
 struct Residual {
-    /// In units of the noise.
+    /// χ².
     energy: f64,
-    /// Numbers that were compared.
+    /// Number of compared values.
     count: f64,
-    /// Residual over signal.
+    /// NRMSE.
     missed: f64,
 }
 

@@ -1,7 +1,7 @@
-//! The restoring force that a residual says is missing, along the axis of its channel.
+//! The restoring force that a residual implies, along the axis of its channel.
 //!
-//! Of a response y = H (F − f_r) the residual y − H F is −H f_r: f_r is what it is, over −H, where the residual stands above its
-//! noise. In the domain of forces the residual is f_r itself.
+//! The residual of a response y = H (F − f_r) is y − H F = −H f_r. It is divided by −H where it exceeds its noise. In the domain of forces
+//! the residual is f_r itself.
 
 use num_complex::Complex64;
 
@@ -12,13 +12,13 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 use quietcut_recording::Quantity;
 
-/// Bins over which the power of a residual is averaged.
+/// Number of bins over which the power of a residual is averaged.
 const SMOOTHED: usize = 9;
 
-/// Periods of the slowest mode in a stretch that has one amplitude.
+/// Periods of the slowest mode in a segment that has one amplitude.
 const PERIODS: f64 = 2.0;
 
-/// A missing force along the motion.
+/// A missing restoring force along the motion.
 #[derive(Clone, Debug)]
 pub struct MissingForce {
     /// Displacement, m.
@@ -27,16 +27,16 @@ pub struct MissingForce {
     pub v: Vec<f64>,
     /// Force, N.
     pub force_n: Vec<f64>,
-    /// Static stiffness of the case there, N/m; 0 where it has none.
+    /// Static stiffness of the baseline along the axis, N/m; 0 without stiffness.
     pub stiffness: f64,
-    /// Samples of a stretch over which stiffness and damping are taken.
+    /// Samples of a segment over which stiffness and damping are fitted.
     stretch: usize,
 }
 
-/// Stiffness and damping of a stretch at its amplitude.
+/// Stiffness and damping of the missing force in a segment, at its amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtAmplitude {
-    /// Largest distance from the middle, m.
+    /// Largest distance from the mean, m.
     pub amplitude_m: f64,
     /// Missing force over displacement, N/m.
     pub stiffness: f64,
@@ -45,7 +45,7 @@ pub struct AtAmplitude {
 }
 
 impl MissingForce {
-    /// The force that the residual of a channel tells of; `None` for a channel of forces of a cut, or an axis without motion.
+    /// The force that the residual of a channel implies; `None` for the force of a cut, or for an axis without motion.
     pub(crate) fn of(
         baseline: &Baseline<'_>,
         record: &Record,
@@ -65,7 +65,7 @@ impl MissingForce {
             Domain::Response => response_over(record, channel, axis, residual),
         };
         let at_rest = baseline.receptance.at(0.0)[(axis, axis)].re;
-        // Where nothing oscillates by itself, a record has twenty stretches.
+        // A record without oscillating modes has twenty segments.
         let duration_s = residual.len() as f64 / record.grid.rate_hz();
         let stretch_s = baseline.lowest_hz().map_or(0.05 * duration_s, |hz| PERIODS / hz);
         Some(Self {
@@ -77,7 +77,7 @@ impl MissingForce {
         })
     }
 
-    /// Stiffness and damping that the force adds, stretch by stretch; stretches much quieter than the loudest tell nothing.
+    /// Stiffness and damping of the missing force by segment, without segments of small amplitude.
     pub fn at_amplitudes(&self) -> Vec<AtAmplitude> {
         let all: Vec<AtAmplitude> = self
             .x
@@ -106,7 +106,7 @@ impl MissingForce {
     }
 }
 
-/// −residual over the receptance of its axis, where it stands above its noise.
+/// −residual/receptance along its axis, at bins where it exceeds the noise.
 fn response_over(record: &Record, channel: &Observed, axis: usize, residual: &[f64]) -> Vec<f64> {
     let grid = &record.grid;
     let spectrum = grid.spectrum(residual);

@@ -1,4 +1,4 @@
-//! Causes with their parameters and intervals, as an answer says them.
+//! Causes with estimated parameters and their 90 % intervals.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -12,7 +12,7 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 
-/// The causes of an explanation.
+/// The causes of a candidate model with their estimated parameters.
 pub(crate) fn parameter_estimates(
     study: &Study<'_>,
     library: &Library,
@@ -84,7 +84,7 @@ pub(crate) fn parameter_estimates(
     all
 }
 
-/// Mass, stiffness and damping by one factor, where that is the same as the gain that was found.
+/// Mass, stiffness and damping changed by one factor, if that is equivalent to the gain of a sensor.
 pub(crate) fn by_common_factor(
     study: &Study<'_>,
     library: &Library,
@@ -98,7 +98,7 @@ pub(crate) fn by_common_factor(
     if !["sensor-gain", "sensor-offset-from-tool-tip"].contains(&library.cause(choice.candidate).name()) {
         return Vec::new();
     }
-    // Along the measured motion, as the common factor is.
+    // Both along the measured motion.
     let along = match regression.fit(Subset::Whole, &library.columns_of(best)) {
         Some(fit) => fit.left,
         None => best.fit.left,
@@ -115,7 +115,7 @@ pub(crate) fn by_common_factor(
         if (left - along) / inflation > EQUIVALENT {
             continue;
         }
-        // The factor is as sure as the gain.
+        // The factor has the relative uncertainty of the gain.
         let deviation = best.fit.covariance[(0, 0)].max(0.0).sqrt() * inflation.sqrt();
         return library
             .candidates
@@ -129,7 +129,7 @@ pub(crate) fn by_common_factor(
                 let of = |change: f64| cause.parameters(study, &known.location, &[], &[change]);
                 let parameters = of(change)?;
                 let (key, value) = *parameters.first()?;
-                // Linear in the change.
+                // Parameters are linear in the change.
                 let (_, beyond) = *of(change + 1.0)?.first()?;
                 let scale = beyond - value;
                 let extension = cause.extension(&known.location, &parameters);
@@ -170,15 +170,15 @@ fn figure(value: f64, deviation: f64) -> Figure {
     }
 }
 
-/// The parts of a cause with each principal direction of its covariance at the ends of its 90 % interval; a direction in which no
-/// such cause is physical at one end stays where it is there.
+/// A cause at both ends of the 90 % interval along each principal direction of its covariance. An end that is not physical is replaced by
+/// the estimate.
 fn moved(
     parts_of: &dyn Fn(&[f64]) -> Option<Vec<Part>>,
     inner: &[f64],
     covariance: &DMatrix<f64>,
     inflation: f64,
 ) -> Vec<[Vec<Part>; 2]> {
-    // In units of the deviations: coefficients are of different kinds and sizes.
+    // Scaled by the standard deviations, because coefficients have different units.
     let scales: Vec<f64> = covariance
         .diagonal()
         .iter()
@@ -214,7 +214,7 @@ fn moved(
         .collect()
 }
 
-/// Standard deviations of what `values` says, by differences.
+/// Standard deviations of `values`, by numerical differentiation.
 fn deviations(
     values: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
     inner: &[f64],

@@ -1,4 +1,4 @@
-//! The cuts among recordings as cuts that were tried: what came of each is what the signal chain of the device hears in it.
+//! Recorded cuts as trial cuts. The signal chain of the device determines the outcome of each.
 
 use crate::criteria::{SAME_FEED, SAME_IMMERSION_DEG};
 use quietcut_core::detector::Verdict;
@@ -8,7 +8,7 @@ use quietcut_model::case::Case;
 use quietcut_recording::{Kind, RecordedCut, Recording, Sensed, Speed};
 use quietcut_stability::trial_cuts::{Outcome, TestCut};
 
-/// The recorded cuts that are on the chart of a case: with its immersion and feed, at one speed and one depth, both said.
+/// The recorded cuts that belong to the chart of a case: its immersion and feed, and one given speed and depth.
 pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TestCut> {
     recordings
         .iter()
@@ -39,8 +39,8 @@ fn is_on_chart(case: &Case, said: &RecordedCut) -> bool {
         )
 }
 
-/// Chatter where it is heard at any time, stable where that is heard and no chatter; marginal where nothing can be told, or the recording
-/// has nothing that the device could hear.
+/// Chatter if the device detects it at any time; stable if it reports a verdict without chatter; marginal if it reports none, or if the
+/// recording has no channel that it uses.
 fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
     let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
     let speed = Speed {
@@ -62,7 +62,7 @@ fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
         match report.judgement.verdict {
             verdict if verdict.is_chatter() => return Outcome::Chatter,
             Verdict::Stable | Verdict::Forced | Verdict::Runout => heard = Outcome::Stable,
-            // Before the tool enters, and after it has left.
+            // Before the entry and after the exit of the tool.
             _ => {}
         }
     }
@@ -107,7 +107,7 @@ mod tests {
         elsewhere.sidecar.cut.as_mut().unwrap().exit_deg = Some(150.0);
         let cuts = recorded_cuts(&case, &[shallow, record(1.8 * limit_mm), silent, elsewhere]);
         let outcomes: Vec<Outcome> = cuts.iter().map(|cut| cut.outcome).collect();
-        // That of another immersion is on another chart.
+        // A cut of another immersion belongs to another chart.
         assert_eq!(outcomes, [Outcome::Stable, Outcome::Chatter, Outcome::Marginal]);
         assert_eq!((cuts[1].rpm, cuts[1].depth_mm), (900.0, 1.8 * limit_mm));
     }

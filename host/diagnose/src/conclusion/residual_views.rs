@@ -1,4 +1,4 @@
-//! The residual as people look at it.
+//! The residuals of a study, for pictures and tables.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use crate::records::study::Study;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
-/// One channel of one record: what was measured, what the case misses of it, and what the extended case misses.
+/// One channel of one record: measured samples, and the residuals of the baseline and of the extended case.
 #[derive(Clone, Debug)]
 pub struct ResidualView {
     /// The record.
@@ -27,35 +27,35 @@ pub struct ResidualView {
     pub rate_hz: f64,
     /// Highest frequency at which it is compared, Hz.
     pub highest_hz: f64,
-    /// Deviation of its noise.
+    /// Standard deviation of its noise.
     pub deviation: f64,
-    /// What was measured.
+    /// Measured samples.
     pub measured: Vec<f64>,
-    /// Measured less what the case says along the measured motion.
+    /// Residual of the baseline along the measured motion.
     pub residual: Vec<f64>,
-    /// The same with what was found; empty where nothing was.
+    /// Residual of the extended case; empty without an extension.
     pub left: Vec<f64>,
-    /// The force that the residual tells of; `None` where there is no motion that it could act on.
+    /// The force that the residual implies; `None` without motion on which it could act.
     pub missing: Option<MissingForce>,
-    /// What a cut has besides; `None` for other tests.
+    /// Spindle motion of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,
 }
 
-/// How the spindle turns under a channel of a cut.
+/// A channel of a cut over the spindle angle.
 #[derive(Clone, Debug)]
 pub struct SpindleMotionView {
     /// Mean speed, rev/min.
     pub rpm: f64,
     /// Number of teeth.
     pub teeth: usize,
-    /// What was measured as each tooth passes the immersion angle 0, with the number of the pass.
+    /// Measured value at each tooth passing of the immersion angle 0, with the number of the passing.
     pub measured: Vec<(u32, f64)>,
-    /// The same of the residual.
+    /// Residual at each tooth passing.
     pub residual: Vec<(u32, f64)>,
 }
 
 impl ResidualView {
-    /// Amplitudes of a signal of this channel over frequency, averaged to at most `points` points: (Hz, RMS per line).
+    /// Amplitude spectrum of a signal of this channel, averaged to at most `points` points: (Hz, RMS per line).
     pub fn spectrum(&self, samples: &[f64], points: usize) -> Vec<(f64, f64)> {
         if samples.is_empty() {
             return Vec::new();
@@ -74,13 +74,13 @@ impl ResidualView {
             .collect()
     }
 
-    /// Root mean squares: measured, residual, left.
+    /// Root mean squares: measured, residual of the baseline, residual of the extended case.
     pub fn sizes(&self) -> [f64; 3] {
         [rms(&self.measured), rms(&self.residual), rms(&self.left)]
     }
 }
 
-/// Views of every channel, with the explanation taken off where there is one.
+/// Views of every channel, with the residual of the candidate model if there is one.
 pub(crate) fn residual_views(
     study: &Study<'_>,
     library: &Library,
@@ -122,7 +122,7 @@ pub(crate) fn residual_views(
     all
 }
 
-/// What an explanation leaves of each channel, once the free decay that it leaves has been taken out.
+/// Residual of a candidate model in each channel, without the free decay that fits it.
 fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &CandidateModel) -> Vec<Vec<f64>> {
     let explained = library.explained(study, record, best);
     let left: Vec<Vec<f64>> = record
@@ -146,7 +146,7 @@ fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Candida
         .collect()
 }
 
-/// Where teeth pass, in samples, with the numbers of the passes.
+/// Tooth passings in samples, with their numbers.
 fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
     let rate_hz = record.grid.rate_hz();
@@ -165,7 +165,7 @@ fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     found
 }
 
-/// Samples at these places, in straight lines between neighbours.
+/// Samples at these passings, by linear interpolation.
 fn strobe(passes: &[(u32, f64)], samples: &[f64]) -> Vec<(u32, f64)> {
     passes
         .iter()

@@ -1,4 +1,4 @@
-//! Where the unexplained part of a residual sits.
+//! Frequency, time and amplitude of an unexplained residual.
 
 use std::f64::consts::TAU;
 
@@ -6,13 +6,13 @@ use crate::conclusion::residual_views::ResidualView;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
-/// Stretches into which a record is cut to see where it moves most.
+/// Number of segments into which a record is divided.
 const STRETCHES: usize = 40;
-/// Lines of the spectrum on each side that still count as one peak.
+/// Lines on each side of a peak of the spectrum that belong to it.
 const NEAR: usize = 8;
 
-/// Frequency (and spindle order), time and amplitude at which most of what is left sits: of what was found, or of the case where
-/// nothing was, in the channel where it is largest beside its noise.
+/// Frequency, spindle order, time and amplitude of the largest residual over its noise: of the extended case, or of the baseline without an
+/// extension.
 pub(crate) fn describe(views: &[ResidualView]) -> String {
     let worst = views.iter().max_by(|a, b| {
         let beside_noise = |view: &ResidualView| rms(left(view)) / view.deviation.max(f64::MIN_POSITIVE);
@@ -58,7 +58,7 @@ fn of_channel(view: &ResidualView) -> String {
     )
 }
 
-/// The frequency with the most energy, and the share of all that is near it.
+/// The frequency of the highest line, and the share of the energy near it.
 fn peak(view: &ResidualView, samples: &[f64]) -> Option<(f64, f64)> {
     if samples.is_empty() {
         return None;
@@ -79,7 +79,7 @@ fn stretch(samples: &[f64]) -> usize {
     samples.len().div_ceil(STRETCHES).max(1)
 }
 
-/// Energy in each stretch.
+/// Energy in each segment.
 fn stretches(samples: &[f64]) -> Vec<f64> {
     samples
         .chunks(stretch(samples))
@@ -87,8 +87,8 @@ fn stretches(samples: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The share of `energy` in the quarter of the stretches in which the channel itself has most: about a quarter of what does not depend
-/// on amplitude, more of what grows with it.
+/// Share of `energy` in the quarter of the segments with the largest measured amplitude: about a quarter if the residual does not depend on
+/// the amplitude, more if it grows with it.
 fn where_it_moves_most(energy: &[f64], measured: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..measured.len().min(energy.len())).collect();
     order.sort_by(|a, b| measured[*b].total_cmp(&measured[*a]));

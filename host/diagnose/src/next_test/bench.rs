@@ -1,4 +1,4 @@
-//! A machine and its sensors, as the records show them.
+//! The machine and its sensors in simulated tests.
 
 use std::f64::consts::TAU;
 
@@ -14,22 +14,22 @@ use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
 use quietcut_recording::{Channel, Kind, Quantity, Recording};
 
-/// Most samples that are simulated of one test.
+/// Largest number of samples of a simulated test.
 const SAMPLES: f64 = 8192.0;
-/// Periods of the slowest mode that a test of the structure lasts at most, and at least.
+/// Least and largest duration of a test of the structure, in periods of the slowest mode.
 const PERIODS: [f64; 2] = [20.0, 60.0];
 /// Samples per period of the fastest mode.
 const SAMPLES_PER_PERIOD: f64 = 24.0;
-/// Longest time constants of the structure after which a cut has settled: records are of tools in full cut.
+/// Duration of the transient of a cut, in longest time constants of the structure: records are of full engagement.
 const SETTLED: f64 = 12.0;
-/// The longest that is waited for that, in lengths of the record.
+/// Largest duration of that transient, in durations of the record.
 const WAITED: f64 = 4.0;
 
-/// A channel of motion that was heard.
+/// A channel of motion in the records.
 pub(super) struct Heard {
     pub(super) name: String,
     quantity: Quantity,
-    /// Deviation of its noise; 0 where it is not known.
+    /// Standard deviation of its noise; 0 if unknown.
     deviation: f64,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct Heard {
 pub(super) struct CutSoFar {
     pub(super) rpm: f64,
     pub(super) depth_mm: f64,
-    /// As its file says it, beside the case.
+    /// Immersion and feed, from its sidecar, else from the case.
     pub(super) cut: Cut,
 }
 
@@ -47,22 +47,22 @@ pub(super) struct Bench<'a> {
     pub(super) case: &'a Case,
     pub(super) baseline: Baseline<'a>,
     pub(super) channels: Vec<Heard>,
-    /// Natural frequencies, the lowest and the highest.
+    /// Lowest and highest natural frequency, Hz.
     pub(super) modes_hz: [f64; 2],
-    /// True where the force of a cut was measured.
+    /// True if the force of a cut was measured.
     pub(super) has_force: bool,
-    /// Peak force of the tests of the structure, N; what moves it as far as the records where none was measured.
+    /// Peak force of the tests of the structure, N; without a measured force the one that reaches the displacement of the records.
     pub(super) force_n: f64,
     /// Peak displacement of the records.
     pub(super) largest_m: f64,
-    /// Length of a test.
+    /// Duration of a test, s.
     pub(super) seconds: f64,
     pub(super) rate_hz: f64,
     pub(super) cut: Option<CutSoFar>,
 }
 
 impl<'a> Bench<'a> {
-    /// `None` where the machine cannot be simulated, or does not vibrate.
+    /// `None` if the machine cannot be simulated, or has no oscillating modes.
     pub(super) fn new(case: &'a Case, recordings: &[Recording], views: &[ResidualView]) -> Option<Self> {
         let baseline = Baseline::new(case).ok()?;
         let modes_hz = [baseline.lowest_hz()?, highest_hz(&baseline)?];
@@ -110,7 +110,7 @@ impl<'a> Bench<'a> {
         compliance(&self.baseline, 0.0)
     }
 
-    /// The noise of each reading.
+    /// Standard deviation of the noise of each reading.
     pub(super) fn deviations(&self, readings: &[Reading]) -> Vec<f64> {
         let of = |reading: &Reading| {
             let heard = self.channels.iter().find(|heard| heard.name == reading.name);
@@ -122,12 +122,12 @@ impl<'a> Bench<'a> {
         readings.iter().map(of).collect()
     }
 
-    /// How long a cut takes until nothing is left of its beginning, s.
+    /// Duration of the transient of a cut, s.
     pub(super) fn settled_s(&self) -> f64 {
         (SETTLED * self.baseline.slowest_decay_s()).min(WAITED * self.seconds)
     }
 
-    /// What the sensors measure, each once.
+    /// The quantities of the sensors, each once.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
         let mut all: Vec<Quantity> = Vec::new();
         for heard in &self.channels {
@@ -191,7 +191,7 @@ fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
     })
 }
 
-/// The noise of a channel, the mean over the records; 0 where it is not known.
+/// Standard deviation of the noise of a channel, the quadratic mean over the records; 0 if unknown.
 fn deviation(views: &[ResidualView], name: &str) -> f64 {
     let known: Vec<f64> = views
         .iter()

@@ -1,4 +1,4 @@
-//! Experiments that a machine could make, and what their sensors would say.
+//! Experiments on the machine, and their simulated readings.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -14,9 +14,9 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Impact, Rig, Signal, Step};
 use quietcut_simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
 
-/// The smallest blow of a hammer, N.
+/// Smallest peak force of an impact, N.
 const LEAST_BLOW_N: f64 = 1.0;
-/// Something to do, without what is measured.
+/// A test without its sensors.
 #[derive(Clone, Debug)]
 pub(super) enum Doing {
     /// A force on the structure at standstill.
@@ -30,16 +30,16 @@ pub(super) enum Doing {
     },
 }
 
-/// An experiment.
+/// A test with its sample rate and effort.
 #[derive(Clone, Debug)]
 pub(super) struct Experiment {
     pub(super) doing: Doing,
     rate_hz: f64,
-    /// How much more work it is than another.
+    /// Effort relative to other tests.
     pub(super) effort: f64,
 }
 
-/// Everything that is thought of, with what each costs.
+/// All experiments, with their effort.
 pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
     let mut all = Vec::new();
     for direction in &bench.baseline.structure.directions {
@@ -49,7 +49,7 @@ pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
     all
 }
 
-/// A blow, a sweep at three levels and over a longer time, and three levels at the lowest resonance.
+/// An impact, sweeps at three levels and over a longer time, and three levels at the lowest resonance.
 fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
     let [lowest_hz, highest_hz] = bench.modes_hz;
     let experiment = |signal: Signal, effort: f64| Experiment {
@@ -79,8 +79,8 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
         experiment(sweep(3.0, 1.0), 1.3),
         experiment(sweep(1.0, 4.0), 1.5),
     ];
-    // Up to the highest mode a half sine of this length excites without a gap: its first zero is at 1.5/pulse. It moves the
-    // structure as far as the records have it: x = ω·impulse/k.
+    // The spectrum of a half sine has its first zero at 1.5/pulse, above the highest mode. The impact reaches the displacement of the
+    // records: x = ω·impulse/k.
     let pulse_s = 0.75 / highest_hz;
     let impulse_ns = bench.largest_m / (TAU * lowest_hz * bench.static_compliance());
     let peak_n = (impulse_ns / (2.0 / PI * pulse_s)).max(LEAST_BLOW_N);
@@ -99,12 +99,12 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
     all
 }
 
-/// The recorded cut again, at other speeds, depths and feeds, and for longer.
+/// The recorded cut at other speeds, depths and feeds, and over a longer time.
 fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
     let Some(so_far) = &bench.cut else {
         return Vec::new();
     };
-    // Speed, depth, feed and length, each over what it was.
+    // Factors on speed, depth, feed and duration.
     let some = [
         (1.0, 1.0, 1.0, 1.0),
         (0.8, 1.0, 1.0, 1.0),
@@ -130,7 +130,7 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
 }
 
 impl Experiment {
-    /// The sensors with which it can be made.
+    /// The sensor sets of this test.
     pub(super) fn sensors(&self) -> Vec<Sensors> {
         match self.doing {
             Doing::Rig { .. } => vec![Sensors::Mounted, Sensors::Second],
@@ -138,10 +138,10 @@ impl Experiment {
         }
     }
 
-    /// What all sensors say of it, while the machine is `case`; `None` where that cannot be simulated, or moves too far.
+    /// Readings of all sensors if the machine is `case`; `None` if it cannot be simulated, or moves too far.
     pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Option<Vec<Reading>> {
         let mounted = self.recording(bench, case)?;
-        // A sensor that is put beside the mounted ones has none of their faults.
+        // A second sensor beside the mounted one has none of its faults.
         let mut faultless = case.clone();
         faultless
             .extensions
@@ -236,7 +236,7 @@ impl Experiment {
         }
     }
 
-    /// As the answer has it.
+    /// The test as the answer contains it.
     pub(super) fn described(&self, sensors: Sensors, distance: f64, why: String) -> NextTest {
         let plain = NextTest {
             kind: "",

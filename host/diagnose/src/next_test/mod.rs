@@ -1,9 +1,9 @@
-//! The experiment that separates what is still confounded.
+//! The experiment that separates confounded candidate models.
 //!
-//! Every explanation that is left is simulated in experiments that the machine could make ([`experiment`]), and what their sensors
-//! would say is compared, in units of the noise and beyond what the parameters of the one can do to look like the other
-//! ([`separation`]). The least effort that separates all of them plainly is proposed: A. C. Atkinson and V. V. Fedorov, The design of
-//! experiments for discriminating between two rival models, Biometrika 62 (1975), T-optimality.
+//! Every equivalent candidate model is simulated in experiments on the machine ([`experiment`]). Their readings are compared in units of
+//! the noise, after the parameters of one model are fitted to the other ([`separation`]). The proposal is the least effort that separates
+//! all of them: A. C. Atkinson and V. V. Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62
+//! (1975), T-optimality.
 
 mod bench;
 mod experiment;
@@ -23,16 +23,16 @@ use crate::criteria::SEPARATING_DISTANCE;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
-/// What could be done, and what it would tell.
+/// An experiment with a set of sensors, and its separation.
 struct Proposal<'a> {
     experiment: &'a Experiment,
     sensors: Sensors,
-    /// Between the two explanations that it separates least.
+    /// The two candidate models that it separates least.
     least: Difference,
     between: [usize; 2],
 }
 
-/// The experiment for the explanations of `diagnosis`; `None` where there are not two, or where nothing can be simulated.
+/// The experiment that separates the candidate models of `diagnosis`; `None` if there is only one, or if none can be simulated.
 pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagnosis) -> Option<NextTest> {
     let explanations = &diagnosis.explanations;
     if explanations.len() < 2 {
@@ -65,7 +65,7 @@ pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagn
     )
 }
 
-/// What one experiment tells, with the sensors that there are and with more.
+/// Proposals of one experiment, with each set of sensors.
 fn proposals<'a>(bench: &Bench<'_>, experiment: &'a Experiment, rivals: &[Rival<'_>]) -> Vec<Proposal<'a>> {
     let readings: Option<Vec<_>> = rivals
         .iter()

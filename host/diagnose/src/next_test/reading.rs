@@ -1,17 +1,17 @@
 //! The readings of the sensors in an experiment.
 
-/// Which sensors are heard.
+/// A set of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sensors {
-    /// Those that made the records.
+    /// The sensors of the records.
     Mounted,
-    /// Those, and beside each of them another at the tool.
+    /// These, and a second one at the tool beside each.
     Second,
-    /// Those, and a dynamometer.
+    /// These, and a dynamometer.
     Force,
 }
 
-/// Which sensor a reading is of.
+/// The sensor of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Of {
     Mounted,
@@ -19,7 +19,7 @@ pub(super) enum Of {
     Force,
 }
 
-/// What one sensor says.
+/// Samples of one sensor.
 pub(super) struct Reading {
     pub(super) name: String,
     pub(super) of: Of,

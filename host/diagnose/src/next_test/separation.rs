@@ -1,4 +1,4 @@
-//! How far apart two explanations are in an experiment.
+//! The distance of two candidate models in an experiment.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,35 +9,35 @@ use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use quietcut_model::case::Case;
 
-/// The least step of a parameter by which readings are differenced, as a share of it: the simulation is exact to 1e-9.
+/// Least step of a parameter for differences of readings, as a share of it: the simulation is exact to 1e-9.
 const LEAST_STEP: f64 = 1e-4;
 
-/// An explanation: the causes that act together.
+/// A candidate model: the causes that act together.
 pub(super) struct Rival<'a> {
     pub(super) causes: &'a [EstimatedCause],
 }
 
-/// What an explanation says of an experiment.
+/// Readings of an experiment under a candidate model.
 pub(super) struct Predicted {
     readings: Vec<Reading>,
-    /// By parameter: readings with it moved by a step, and that step in standard deviations of what is known of it.
+    /// By parameter: readings with the parameter moved by a step, and that step in its standard deviations.
     moved: Vec<(Vec<Reading>, f64)>,
 }
 
-/// How plainly two explanations differ.
+/// Distance of two candidate models.
 #[derive(Clone, Debug)]
 pub(super) struct Difference {
-    /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², readings in deviations of their noise and δ in those of the parameters; of the two ways
-    /// round the smaller.
+    /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², the smaller of the two directions; readings in standard deviations of their noise, δ in
+    /// those of the parameters.
     pub(super) squared: f64,
-    /// The channel that says most of it.
+    /// The channel that differs most.
     pub(super) channel: String,
-    /// Root mean square of the difference there, over the noise.
+    /// Root mean square of its difference over the noise.
     pub(super) times_noise: f64,
 }
 
 impl Rival<'_> {
-    /// The readings of an experiment; `None` where it cannot be simulated with this explanation, or runs away.
+    /// The readings of an experiment; `None` if it cannot be simulated with this candidate model, or diverges.
     pub(super) fn simulated(&self, bench: &Bench<'_>, experiment: &Experiment) -> Option<Predicted> {
         let readings = experiment.readings(bench, &self.case(bench.case, None))?;
         let moved = self
@@ -51,7 +51,7 @@ impl Rival<'_> {
         Some(Predicted { readings, moved })
     }
 
-    /// Parameters that are not exactly known: cause, key, step, and the step in standard deviations.
+    /// Uncertain parameters: cause, key, step, and the step in standard deviations.
     fn steps(&self) -> Vec<(usize, &'static str, f64, f64)> {
         let of = |(index, cause): (usize, &EstimatedCause)| {
             let figures: Vec<(&'static str, Figure)> = cause
@@ -76,7 +76,7 @@ impl Rival<'_> {
         self.causes.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The case with these causes, one parameter of one of them moved.
+    /// The case with these causes, with one parameter of one cause moved.
     fn case(&self, case: &Case, moved: Option<(usize, &'static str, f64)>) -> Case {
         let tables: Vec<(&str, toml::Table)> = self
             .causes
@@ -98,8 +98,7 @@ impl Rival<'_> {
     }
 }
 
-/// Adds to a number of a table, or of a list in it (`ratio_2` is the second of `ratio`). Keys that only say the same in other words
-/// are in no table.
+/// Adds to a number of a table, or of a list in it (`ratio_2` is the second of `ratio`). Keys that restate others are in no table.
 fn move_by(table: &mut toml::Table, key: &str, step: f64) {
     let add = |value: &mut toml::Value| {
         if let toml::Value::Float(number) = value {
@@ -121,7 +120,7 @@ fn move_by(table: &mut toml::Table, key: &str, step: f64) {
     }
 }
 
-/// How far `one` and `other` are apart for these sensors.
+/// Distance of `one` and `other` for these sensors.
 pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sensors: Sensors) -> Difference {
     let there = nearest(bench, one, other, sensors);
     let back = nearest(bench, other, one, sensors);
@@ -132,7 +131,7 @@ pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sen
     }
 }
 
-/// What is left of `truth` where the parameters of `model` are free within what is known of them.
+/// Difference of `truth` from `model` after the parameters of `model` are fitted within their uncertainty.
 fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sensors) -> Difference {
     let deviations = bench.deviations(&truth.readings);
     let heard: Vec<usize> = (0..truth.readings.len())
@@ -142,7 +141,7 @@ fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sen
         let values = heard.iter().flat_map(|&index| {
             let pairs = a[index].samples.iter().zip(&b[index].samples);
             let difference: Vec<f64> = pairs.map(|(a, b)| (a - b) / deviations[index]).collect();
-            // Sensors have offsets of their own.
+            // Sensors have unknown offsets.
             let mean = difference.iter().sum::<f64>() / difference.len().max(1) as f64;
             difference.into_iter().map(move |value| value - mean)
         });
@@ -174,7 +173,7 @@ fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sen
     }
 }
 
-/// What is left of `apart`, and the least of ‖apart − Jδ‖² + Σ (step δ)².
+/// Residual of `apart`, and the minimum of ‖apart − Jδ‖² + Σ (step δ)².
 pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64]) -> (DVector<f64>, f64) {
     if columns.is_empty() {
         return (apart.clone(), apart.norm_squared());

@@ -1,4 +1,4 @@
-//! The proposed test, made: it must tell apart what was confounded.
+//! The proposed test is carried out and must separate what was confounded.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn case(name: &str) -> Case {
     Case::read(Path::new(&path)).unwrap()
 }
 
-/// The same share of noise on every channel.
+/// Noise of 1 % on every channel.
 fn noisy(mut recording: Recording, seed: u64) -> Recording {
     let noise = Noise {
         relative: 0.01,
@@ -26,7 +26,7 @@ fn noisy(mut recording: Recording, seed: u64) -> Recording {
     recording
 }
 
-/// Two stable cuts whose displacement is measured, without force; what came of their beginning is past.
+/// Two stable cuts with measured displacement and without force, after their transient.
 fn cuts(case: &Case, effects: &Effects) -> Vec<Recording> {
     [(900.0, 0.2), (1230.0, 0.15)]
         .into_iter()
@@ -64,12 +64,12 @@ fn parameters_take_what_they_can_within_what_is_known_of_them() {
     let column = DVector::from_vec(vec![1.0, 0.0, 1.0, -1.0]);
     for step in [0.1, 1.0, 30.0] {
         let (_, squared) = least(&apart, std::slice::from_ref(&column), &[step]);
-        // By trying out.
+        // Brute-force minimum.
         let brute = (-4000..=4000)
             .map(|n| 1e-3 * f64::from(n))
             .map(|delta| (&apart - &column * delta).norm_squared() + (step * delta).powi(2))
             .fold(f64::INFINITY, f64::min);
-        // A grid of 1e-3 misses the least of a parabola of this curvature by at most (3 + 900)·2.5e-7.
+        // A grid of 1e-3 misses the minimum of a parabola of this curvature by at most (3 + 900)·2.5e-7.
         assert!(
             (0.0..2.5e-4).contains(&(brute - squared)),
             "{step}: {squared} {brute}"

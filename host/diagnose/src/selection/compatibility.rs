@@ -1,10 +1,10 @@
-//! Which causes may act together.
+//! Which causes may act together in a candidate model.
 
 use crate::candidates::cause::Location;
 use crate::fit::candidate_model::{CandidateModel, Choice};
 use crate::fit::library::Library;
 
-/// What the force of a cause is a function of.
+/// The variable that determines the force of a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Law {
     OfDisplacement,
@@ -12,9 +12,11 @@ enum Law {
 }
 
 impl Library {
-    /// A case holds one extension of a name: the same cause does not act twice. And three terms of one law, of the displacement or
-    /// of the velocity along one axis, are the series of a law that nobody knows, and no causes: a spring that changes with time
-    /// counts as a spring, and a loop, which is what friction is before it slips, as friction.
+    /// True if a further cause may join a candidate model.
+    ///
+    /// A case holds one extension of a name, so the same cause does not act twice. Three terms in the displacement, or three in the
+    /// velocity, along one axis are the series of an unknown law and no causes. A time-varying spring counts as a spring; hysteresis, which
+    /// is friction before it slips, counts as friction.
     pub(crate) fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
         let new = self.cause(other.candidate).names();
         let is_new = some.iter().all(|choice| {
@@ -30,7 +32,7 @@ impl Library {
         is_new && alike < 2 && !some.iter().any(|choice| self.share_a_term(*choice, other))
     }
 
-    /// True of explanations by the same causes, wherever these act.
+    /// True of candidate models with the same causes, at any location.
     pub(crate) fn are_same_causes(&self, one: &CandidateModel, other: &CandidateModel) -> bool {
         let causes = |of: &CandidateModel| {
             let mut causes: Vec<usize> = of
@@ -44,7 +46,7 @@ impl Library {
         causes(one) == causes(other)
     }
 
-    /// True of explanations by the same causes at the same places.
+    /// True of candidate models with the same causes at the same locations.
     pub(crate) fn are_at_same_locations(&self, one: &CandidateModel, other: &CandidateModel) -> bool {
         let is_in = |choice: &Choice, of: &CandidateModel| {
             let known = &self.candidates[choice.candidate];
@@ -56,8 +58,8 @@ impl Library {
         one.choices.len() == other.choices.len() && one.choices.iter().all(|choice| is_in(choice, other))
     }
 
-    /// True of a cubic spring beside softening and hardening, which has one, and of a gain beside a ratio for each mode of the same
-    /// channel: between the two nothing would be determined.
+    /// True of a cubic spring beside softening-hardening, which contains one, and of a gain beside a ratio for each mode of the same
+    /// channel: together they are not identifiable.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
         let name = |choice: Choice| self.cause(choice.candidate).name();
         let location = |choice: Choice| &self.candidates[choice.candidate].location;
@@ -70,7 +72,7 @@ impl Library {
             || are_both(reading) && location(one) == location(other) && (is_by_mode(one) || is_by_mode(other))
     }
 
-    /// True of terms of one law along one axis.
+    /// True of two terms in the same variable along a common axis.
     fn are_alike(&self, one: Choice, other: Choice) -> bool {
         match (self.law(one), self.law(other)) {
             (Some((law, location)), Some((other_law, other_location))) => {
@@ -80,7 +82,7 @@ impl Library {
         }
     }
 
-    /// Of what a choice is a law, and where.
+    /// The variable of a cause, and its location.
     fn law(&self, choice: Choice) -> Option<(Law, &Location)> {
         let law = match self.cause(choice.candidate).name() {
             "stiffness"
@@ -96,7 +98,7 @@ impl Library {
     }
 }
 
-/// True of places that are the same, or have an axis in common.
+/// True of equal locations, and of locations with a common axis.
 fn meet(one: &Location, other: &Location) -> bool {
     match (one, other) {
         (Location::EachOf(axes), Location::Axis(axis)) | (Location::Axis(axis), Location::EachOf(axes)) => {

@@ -1,9 +1,8 @@
-//! One cause more, sought around the machine as the causes found so far have it.
+//! A further cause, searched with the extended case as the baseline.
 //!
-//! Columns are what a cause adds through the receptance of the baseline, y = H(iω)·f. Where a cause that was found moves a resonance
-//! by more than its width, that receptance is of another machine, and what acts beside it looks like nothing in the library. With the
-//! extended case for a baseline columns and residual are of the machine as it is (Gauss and Newton's linearization at the last
-//! point in place of the first).
+//! Regressors pass through the receptance of the baseline, y = H(iω)·f. If a cause moves a resonance by more than its width, that
+//! receptance belongs to another machine, and regressors of further causes do not fit. With the extended case as the baseline, regressors
+//! and residual are linearized at the last point of Gauss and Newton's iteration in place of the first.
 
 use nalgebra::DMatrix;
 
@@ -16,8 +15,8 @@ use crate::selection::search::singles;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
-/// The best explanations of `base` and one cause more around the case that `base` makes, best first; none where `base` leaves the
-/// linear structure as it is, since there nothing would be new.
+/// The best candidate models of `base` and one further cause, from the extended case of `base` as the baseline, best first. None if `base`
+/// does not change the linear structure, because the baseline would be the same.
 pub(crate) fn extended_rebaselined(
     study: &Study<'_>,
     recordings: &[Recording],

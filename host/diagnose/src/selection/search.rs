@@ -7,10 +7,10 @@ use crate::fit::library::Library;
 use crate::fit::regression::Regression;
 use crate::records::study::Study;
 
-/// How many of the best pairs are tried with a third cause.
+/// Number of the best pairs that are tried with a third cause.
 const PAIRS_KEPT: usize = 24;
 
-/// The best explanation by each single candidate, best first.
+/// The best candidate model of each single candidate, best first.
 pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let found = library
         .choices()
@@ -20,7 +20,7 @@ pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regress
     best_of_each(found)
 }
 
-/// The best explanation by each pair of candidates, best first.
+/// The best candidate model of each pair of candidates, best first.
 pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let choices = library.choices();
     let found = choices
@@ -37,7 +37,7 @@ pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regressio
     best_of_each(found)
 }
 
-/// The best explanation by each triple that contains one of the best pairs, best first.
+/// The best candidate model of each triple that contains one of the best pairs, best first.
 pub(crate) fn triples(
     library: &Library,
     study: &Study<'_>,

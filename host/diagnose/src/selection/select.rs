@@ -1,4 +1,4 @@
-//! Which explanation is selected: causes are added while that gains more than it costs.
+//! Selection of a candidate model: causes are added while their gain exceeds their price.
 
 use crate::criteria::{
     CHANCE, EQUIVALENT, INTERPOLATION_ERROR, LEAST_GAIN, LEAST_SHARE, LEAST_SHARE_BESIDE_ENOUGH,
@@ -18,32 +18,32 @@ use crate::selection::search::{pairs as best_pairs, singles, triples};
 use crate::selection::stepwise::extended;
 use quietcut_recording::Recording;
 
-/// Most causes that act together.
+/// Largest number of causes that act together.
 const CAUSES: usize = 3;
-/// Explanations of the regression that are simulated, by the number of their causes.
+/// Number of candidate models of the regression that are simulated, by their number of causes.
 const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 
-/// What was selected: the best explanation, and those that are as good with as many causes.
+/// The selected candidate model, and those that are equivalent to it.
 pub(crate) struct Selection {
     pub(crate) best: Option<CandidateModel>,
     pub(crate) others: Vec<CandidateModel>,
-    /// By how much the best is ahead of the next that is another.
+    /// Lead of the best gain over that of the best rival.
     pub(crate) ahead: f64,
-    /// By how much it is ahead of what fewer causes reach.
+    /// Lead of the best gain over that with fewer causes.
     pub(crate) gained: f64,
 }
 
-/// What explanations are weighed by.
+/// Quantities by which candidate models are compared.
 pub(crate) struct SelectionCriteria<'a> {
     pub(crate) study: &'a Study<'a>,
     pub(crate) recordings: &'a [Recording],
-    /// Fits in closed loop, where there are such.
+    /// The prediction-error fit; `None` if the records allow none.
     pub(crate) closed: Option<Box<dyn ClosedFit + 'a>>,
-    /// How much what the whole library leaves, and what interpolation may leave, is above the noise: along the measured motion.
+    /// Residual of the whole library, with the error of interpolation, over the noise variance, along the measured motion.
     inflation: f64,
-    /// What the case alone leaves, in units of the noise.
+    /// χ² of the baseline.
     pub(crate) reference: f64,
-    /// The most that errors of the computation, which go along with the signal, leave or give to a cause, in units of the noise.
+    /// Largest χ² that errors of the computation, which are proportional to the signal, leave or give to a cause.
     pub(crate) coherent: f64,
 }
 
@@ -58,7 +58,7 @@ impl<'a> SelectionCriteria<'a> {
             Some(output_error) => Some(Box::new(output_error)),
             None => Relinearization::new(study, recordings).map(|closed| Box::new(closed) as Box<_>),
         };
-        // Simulations are free to begin elsewhere, and do not carry the noise of the measured motion: like is compared with like.
+        // Simulations fit their initial states and lack the noise of the measured motion, and so must their reference.
         let by_baseline = closed
             .as_ref()
             .and_then(|closed| closed.left_by_baseline(library, regression));
@@ -77,7 +77,7 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// How much the noise is above what it is taken for, by what `best` leaves of it.
+    /// Residual of `best` over the noise variance.
     pub(crate) fn inflation(&self, regression: &Regression, best: Option<&CandidateModel>) -> f64 {
         match best {
             Some(best) if best.simulated.is_some() => {
@@ -91,7 +91,7 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// What a cause must gain to be believed beside what errors of the computation may give it.
+    /// Least gain of a further cause, beside the gain by errors of the computation.
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
         let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
@@ -102,10 +102,10 @@ impl<'a> SelectionCriteria<'a> {
         LEAST_GAIN + OVER_COMPUTATION_ERROR * self.coherent + share * noise
     }
 
-    /// How much of the residual an explanation takes, in units of the noise, beyond what as many parameters take of noise.
+    /// Gain of a candidate model: decrease of χ² minus the price of its parameters (Schwarz).
     pub(crate) fn gain(&self, regression: &Regression, model: &CandidateModel, inflation: f64) -> f64 {
         let count = regression.count(Subset::Whole).max(2) as f64;
-        // Like is compared with like.
+        // Simulated candidate models are compared with the simulated baseline.
         let reference = match model.simulated {
             Some(_) => self.reference,
             None => regression.residual(Subset::Whole),
@@ -120,7 +120,7 @@ impl<'a> SelectionCriteria<'a> {
         });
     }
 
-    /// What is left beyond the noise, as a share of the noise and as a share of what was there beyond the noise.
+    /// Residual energy above the noise: as a share of the noise, and as a share of that of the baseline.
     pub(crate) fn excess(&self, regression: &Regression, best: Option<&CandidateModel>) -> (f64, f64) {
         let noise = regression.count(Subset::Whole) as f64;
         let left = best.map_or(self.reference, |best| best.fit.left);
@@ -130,7 +130,7 @@ impl<'a> SelectionCriteria<'a> {
         (beyond / noise, beyond / there)
     }
 
-    /// True where what is left is noise, or so little of what there was that sampling alone may leave it.
+    /// True if the residual is noise, or as small as the error by sampling.
     fn is_enough(&self, regression: &Regression, best: Option<&CandidateModel>) -> bool {
         let (of_noise, of_excess) = self.excess(regression, best);
         let count = regression.count(Subset::Whole) as f64;
@@ -144,7 +144,7 @@ impl<'a> SelectionCriteria<'a> {
             || (best.is_some() && of_excess < sampling)
     }
 
-    /// True where what the best simulation of `found` leaves is like a cause more, although `best` leaves hardly more than noise.
+    /// True if the residual of the best simulation of `found` resembles a further cause, although that of `best` is close to noise.
     fn asks_for_more(
         &self,
         library: &mut Library,
@@ -172,7 +172,7 @@ impl<'a> SelectionCriteria<'a> {
             .is_some_and(|more| cost(best) - cost(more) > self.least_gain(regression, true))
     }
 
-    /// True where `more` takes enough of what `fewer` leave beyond the noise; what has fewer parameters need not.
+    /// True if `more` explains enough of the residual energy of `fewer` above the noise, or has fewer parameters.
     fn takes_its_share(
         &self,
         regression: &Regression,
@@ -193,7 +193,7 @@ impl<'a> SelectionCriteria<'a> {
         before - more.fit.left > LEAST_SHARE * (before - noise).max(0.0)
     }
 
-    /// What is left of the held-out parts if the parameters come from the fitted ones alone.
+    /// χ² on the held-out segments with the parameters of the fitted segments.
     pub(crate) fn left_held_out(
         &self,
         library: &Library,
@@ -207,7 +207,7 @@ impl<'a> SelectionCriteria<'a> {
     }
 }
 
-/// How much what the whole library leaves, and what interpolation may leave, is above the noise.
+/// Residual of the whole library, with the error of interpolation, over the noise variance.
 fn inflation(regression: &Regression) -> f64 {
     let whole = regression.count(Subset::Whole) as f64;
     let free = (whole - regression.columns() as f64).max(1.0);
@@ -215,7 +215,7 @@ fn inflation(regression: &Regression) -> f64 {
     (regression.left_by_all() / free + sampling).max(1.0)
 }
 
-/// Selects by one cause, pairs and triples; more causes only where fewer leave something.
+/// Selects among one cause, pairs and triples. More causes are tried only if fewer leave a residual.
 pub(crate) fn select(
     criteria: &SelectionCriteria<'_>,
     library: &mut Library,
@@ -233,14 +233,14 @@ pub(crate) fn select(
     let mut fewer: Vec<CandidateModel> = Vec::new();
     for (index, most) in SIMULATED.into_iter().enumerate() {
         let size = index + 1;
-        // Less than half of what the sensors' noise is at least: nothing is there to be explained.
+        // A residual below half of the noise floor contains nothing to explain.
         let silent =
             regression.residual(Subset::Whole) < NOTHING_TO_EXPLAIN * regression.count(Subset::Whole) as f64;
         if silent {
             break;
         }
         let enough = size > 1 && criteria.is_enough(regression, selection.best.as_ref());
-        // Two causes with one parameter each may be what one with many imitates.
+        // One cause with many parameters may imitate two causes with one parameter each.
         let mut imitated = None;
         if enough {
             let Some(best) = &selection.best else { break };
@@ -258,7 +258,7 @@ pub(crate) fn select(
             2 => best_pairs(library, study, regression),
             _ => triples(library, study, regression, &pairs),
         };
-        // Simulations of several causes begin at the shapes that were found of each alone.
+        // Simulations of several causes start from the nonlinear parameters of each cause alone.
         if size == 1 || criteria.closed.is_none() {
             refine(study, library, regression, &mut found);
         }
@@ -271,12 +271,12 @@ pub(crate) fn select(
         }
         let extended = if imitated.is_some() { &[] } else { &fewer[..] };
         let mut found = criteria.simulated(library, regression, found, extended, most, imitated.as_ref());
-        // What hardly shows is believed only of a simulation.
+        // A small effect counts only if it is simulated.
         found.retain(|model| !enough || model.simulated.is_some());
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = criteria.inflation(regression, found.first());
         criteria.sort(regression, &mut found, inflation);
-        // Where fewer causes are enough already, more of them are not to win by what errors of the computation gain there.
+        // If fewer causes are sufficient, more must not win by errors of the computation.
         if !enough {
             criteria.polish(library, regression, &mut found, inflation);
         }
@@ -292,10 +292,10 @@ pub(crate) fn select(
             .as_ref()
             .map_or(0.0, |best| criteria.gain(regression, best, inflation));
         let held_out = criteria.left_held_out(library, regression, best);
-        // What is held out may hold nothing of the effect, as the end of a decay; but it must not speak against it.
+        // Held-out segments may contain nothing of an effect, as the end of a free decay; but they must not contradict it.
         let chance = CHANCE * (2.0 * regression.count(Subset::HeldOut) as f64).sqrt();
         let takes_its_share = criteria.takes_its_share(regression, selection.best.as_ref(), best);
-        // Where two more take little, a third would mend what the others get wrong.
+        // If two causes explain little, a third would compensate for the errors of the others.
         if size > 1 && !takes_its_share {
             break;
         }
@@ -328,8 +328,7 @@ pub(crate) fn select(
     selection
 }
 
-/// True of an explanation by other causes that has no more parameters than `best`, or by the same causes at other places that has as
-/// many.
+/// True of a candidate model of other causes with no more parameters than `best`, or of the same causes at other locations with as many.
 fn is_rival(library: &Library, best: &CandidateModel, other: &CandidateModel) -> bool {
     if names(library, other) != names(library, best) {
         return other.parameter_count <= best.parameter_count;
@@ -368,8 +367,8 @@ fn tell(
     }
 }
 
-/// `best`, or along the measured motion one with fewer parameters that leaves as little: more parameters may mend what
-/// sampling hides. In closed loop nothing is hidden.
+/// `best`, or along the measured motion a candidate model with fewer parameters and a residual as small: further parameters may compensate
+/// for aliasing. Simulations have none.
 fn simplest(
     criteria: &SelectionCriteria<'_>,
     regression: &Regression,

@@ -1,8 +1,7 @@
-//! Explanations with one cause more or one less, from what a simulation leaves.
+//! Candidate models with one cause more or less, from the residual of a simulation.
 //!
-//! The residual of a simulated explanation holds neither the noise of the measured motion nor what sampling hides: which cause
-//! it asks for next is seen there (the score test), and what a later cause has made needless is taken out again: a whole cause, or
-//! what makes it more than a simpler one.
+//! The residual of a simulation contains neither the noise of the measured motion nor aliasing. It shows the next cause (score test). A
+//! cause that a later one made redundant is removed again, or is replaced by a simpler one.
 
 use nalgebra::DMatrix;
 
@@ -11,7 +10,7 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::study::Study;
 
-/// The best explanations of `base` and one cause more, best first; `left` is what is left of it, by record and channel.
+/// The best candidate models of `base` and one further cause, best first; `left` is the residual of `base`, by record and channel.
 pub(crate) fn extended(
     study: &Study<'_>,
     library: &mut Library,
@@ -81,7 +80,7 @@ fn with(
     of(1.0).or_else(|| of(0.0))
 }
 
-/// The explanation without one of its causes.
+/// The candidate model without one of its causes.
 pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize) -> CandidateModel {
     let mut coefficients = Vec::new();
     for other in (0..model.choices.len()).filter(|other| *other != position) {
@@ -101,8 +100,8 @@ pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize
     }
 }
 
-/// The explanation with a simpler cause in the place of one of its own: at the same place, with some of its parameters and no others
-/// (a cubic spring for one that softens and hardens), at the values that they have.
+/// The candidate model with one cause replaced by a simpler one at the same location, which has some of its parameters and no others (a
+/// cubic spring for softening-hardening), with the same values.
 pub(crate) fn nested(
     study: &Study<'_>,
     library: &Library,
@@ -127,7 +126,7 @@ pub(crate) fn nested(
         {
             return None;
         }
-        // Its coefficients are its parameters, or it has none of these values.
+        // The coefficients of the simpler cause must be its parameters.
         let cause = library.cause(choice.candidate);
         let own: Vec<f64> = values
             .iter()
@@ -159,7 +158,7 @@ pub(crate) fn nested(
     library.choices().into_iter().filter_map(simpler).collect()
 }
 
-/// Those of `found` that no earlier one is the same as.
+/// The candidate models without those whose causes occur earlier in the list.
 pub(crate) fn distinct(found: Vec<CandidateModel>) -> Vec<CandidateModel> {
     let mut seen: Vec<Vec<usize>> = Vec::new();
     found
