@@ -1,9 +1,13 @@
-//! MAT-files of level 5, compressed or not: every real numeric vector is a channel, every column of a matrix too.
+//! MAT-files of level 5, compressed or not: every real numeric vector is a channel.
+//!
+//! The longer side of a matrix is time: of a matrix N × 3 the columns are channels, of a matrix 3 × N the rows. The columns of
+//! a square matrix are channels.
 //!
 //! The format is documented by MathWorks ("MAT-File Format", level 5). Text, structures, objects and sparse arrays
 //! are passed over; level 7.3 is HDF5 and is refused. A vector of which there is one sample is a parameter, no channel.
 //!
-//! A file is read in pieces and its numbers go straight to their channels: a long record is in memory once.
+//! A file is read in pieces and its numbers go straight to their channels: a long record is in memory once. Memory is
+//! bounded by the length of the file, not by the sizes that its headers state.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, copy, sink};
@@ -20,11 +24,22 @@ const HEADER: usize = 128;
 /// Bytes that are read at once; a multiple of every number's size.
 const PIECE: usize = 1 << 16;
 
-/// What a compressed element may grow to: far beyond any recording, and less than memory.
-const INFLATED_MAX: u64 = 4 << 30;
-
-/// The most that deflate packs into a byte.
+/// The most that deflate packs into a byte: a compressed element that states more is damaged.
 const INFLATION_MAX: u64 = 1032;
+
+/// Bytes of values that any file may hold: a million samples of eight channels that were not connected, whose zeros are
+/// compressed to nearly nothing.
+const VALUES_MIN: u64 = 64 << 20;
+
+/// Bytes of values that a file may hold for each of its own bytes. Bytes that become 8-byte numbers take a factor of 8; measured
+/// channels are compressed by a factor below 20.
+const VALUES_PER_BYTE: u64 = 200;
+
+/// Values to make room for before any has been read, where the file is shorter.
+const TRUSTED: u64 = 1 << 16;
+
+/// Bytes of an element that holds flags, dimensions or a name. Names have up to 63 characters.
+const SMALL_MAX: u64 = 4096;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
@@ -63,15 +78,14 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
 /// A real numeric matrix: a vector is one column, however it lies.
 struct Variable {
     name: String,
-    rows: usize,
-    columns: usize,
+    /// The channels, all of one length.
     values: Vec<Vec<f64>>,
 }
 
 impl Variable {
-    /// The longer side.
+    /// Samples of each channel: the longer side.
     fn samples(&self) -> usize {
-        self.rows.max(self.columns)
+        self.values.first().map_or(0, Vec::len)
     }
 
     fn into_columns(self) -> Vec<RawColumn> {
@@ -123,31 +137,67 @@ fn variables(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Variable>, Str
         room: length,
         big_endian,
     };
+    let mut room = ValueRoom {
+        file: length,
+        bytes: length.saturating_mul(VALUES_PER_BYTE).max(VALUES_MIN),
+    };
     let mut variables = Vec::new();
     while !source.is_at_end()? {
         let tag = source.tag()?;
         match tag.kind {
-            COMPRESSED => variables.extend(inflated(&mut source, tag.length)?),
-            MATRIX => variables.extend(source.within(&tag, matrix)?),
+            COMPRESSED => variables.extend(inflated(&mut source, tag.length, &mut room)?),
+            MATRIX => variables.extend(source.within(&tag, |inner| matrix(inner, &mut room))?),
             _ => source.skip(&tag)?,
         }
     }
     Ok(variables)
 }
 
+/// Memory for the values of a file.
+struct ValueRoom {
+    /// Bytes of the file.
+    file: u64,
+    /// Bytes of values that it may still hold.
+    bytes: u64,
+}
+
+impl ValueRoom {
+    /// Takes the room of `count` values of a variable.
+    fn take(&mut self, name: &str, count: u64) -> Result<(), String> {
+        let needed = count.saturating_mul(size_of::<f64>() as u64);
+        self.bytes = self.bytes.checked_sub(needed).ok_or_else(|| {
+            format!(
+                "variable \"{name}\" has {count} values, which inflate a file of {} bytes beyond {} times its length; no \
+                 recording is compressed so far: the file is damaged, or save it without compression (-v6)",
+                self.file, VALUES_PER_BYTE
+            )
+        })?;
+        Ok(())
+    }
+
+    /// Values of a channel to make room for before they are read, where a variable has `channels`.
+    fn trusted(&self, channels: usize) -> usize {
+        usize::try_from(self.file.max(TRUSTED) / channels.max(1) as u64 + 1).unwrap_or(usize::MAX)
+    }
+}
+
 /// The matrix in a compressed element of `length` bytes.
-fn inflated(source: &mut Source<'_>, length: u64) -> Result<Option<Variable>, String> {
+fn inflated(source: &mut Source<'_>, length: u64, room: &mut ValueRoom) -> Result<Option<Variable>, String> {
+    if length > source.room {
+        return Err(source.cut_off(length));
+    }
     let before = source.at + length;
+    let inflated_max = length.saturating_mul(INFLATION_MAX);
     let mut packed = (&mut *source.reader).take(length);
-    let mut inflated = BufReader::with_capacity(PIECE, ZlibDecoder::new(&mut packed).take(INFLATED_MAX));
+    let mut inflated = BufReader::with_capacity(PIECE, ZlibDecoder::new(&mut packed).take(inflated_max));
     let mut inner = Source {
         reader: &mut inflated,
         at: 0,
-        room: length.saturating_mul(INFLATION_MAX).min(INFLATED_MAX),
+        room: inflated_max,
         big_endian: source.big_endian,
     };
     let found = inner.tag().and_then(|tag| match tag.kind {
-        MATRIX => inner.within(&tag, matrix),
+        MATRIX => inner.within(&tag, |inner| matrix(inner, room)),
         _ => Ok(None),
     });
     let found =
@@ -159,7 +209,7 @@ fn inflated(source: &mut Source<'_>, length: u64) -> Result<Option<Variable>, St
 }
 
 /// The matrix in the data of a matrix element; `None` where it is none of real numbers.
-fn matrix(source: &mut Source<'_>) -> Result<Option<Variable>, String> {
+fn matrix(source: &mut Source<'_>, room: &mut ValueRoom) -> Result<Option<Variable>, String> {
     let flags = source.small()?;
     let Some(flags) = flags.get(..4) else {
         return Ok(None);
@@ -192,23 +242,29 @@ fn matrix(source: &mut Source<'_>) -> Result<Option<Variable>, String> {
             "variable \"{name}\" is {rows} by {columns}, but has {count} values"
         ));
     }
-    // A row of samples is one channel, as a column is; a matrix has one channel per column.
-    let samples = if rows.max(columns) == count { count } else { rows };
+    if tag.length > source.room {
+        return Err(source.cut_off(tag.length));
+    }
+    room.take(&name, count as u64)?;
+    let (samples, channels) = (rows.max(columns), rows.min(columns));
+    let trusted = samples.min(room.trusted(channels));
     let mut values: Vec<Vec<f64>> = Vec::new();
-    source.numbers(&tag, |value| match values.last_mut() {
-        Some(column) if column.len() < samples => column.push(value),
-        _ => {
-            let mut column = Vec::with_capacity(samples);
-            column.push(value);
-            values.push(column);
+    // Values come column by column.
+    let in_rows = rows < columns;
+    let mut index = 0;
+    source.numbers(&tag, |value| {
+        let channel = if in_rows { index % rows } else { index / rows };
+        index += 1;
+        match values.get_mut(channel) {
+            Some(samples) => samples.push(value),
+            None => {
+                let mut samples = Vec::with_capacity(trusted);
+                samples.push(value);
+                values.push(samples);
+            }
         }
     })?;
-    Ok(Some(Variable {
-        name,
-        rows,
-        columns,
-        values,
-    }))
+    Ok(Some(Variable { name, values }))
 }
 
 /// Bytes of a number as it is stored; `None` where a type is no number.
@@ -336,6 +392,12 @@ impl Source<'_> {
     /// The data of the next element, which is a few bytes.
     fn small(&mut self) -> Result<Vec<u8>, String> {
         let tag = self.tag()?;
+        if tag.length > SMALL_MAX {
+            return Err(format!(
+                "flags, dimensions or a name of {} bytes at byte {}; at most {SMALL_MAX} are possible",
+                tag.length, self.at
+            ));
+        }
         let mut data = Vec::new();
         self.pieces(&tag, |piece| data.extend_from_slice(piece))?;
         Ok(data)

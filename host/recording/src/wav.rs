@@ -1,4 +1,6 @@
 //! WAV: every channel is called ch1, ch2 …; the sidecar gives names and units. Full scale is 1.
+//!
+//! Memory is bounded by the length of the file, not by the sizes that its header states.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -16,12 +18,30 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
         path: path.into(),
         what: format!("not a WAV file of samples: {error}"),
     };
+    let bytes = file
+        .metadata()
+        .map_err(|cause| FileError::Read {
+            path: path.into(),
+            cause,
+        })?
+        .len();
     let mut reader = hound::WavReader::new(BufReader::new(file)).map_err(wrong)?;
     let spec = reader.spec();
+    let samples = bytes / u64::from(spec.bits_per_sample.div_ceil(8).max(1));
+    if u64::from(spec.channels) > samples {
+        return Err(RecordingError::Content {
+            path: path.into(),
+            what: format!(
+                "its header states {} channels, but the file has room for {samples} samples: the header is damaged",
+                spec.channels
+            ),
+        });
+    }
     let columns = match spec.sample_format {
-        hound::SampleFormat::Float => columns::<f32>(&mut reader, 1.0),
+        hound::SampleFormat::Float => columns::<f32>(&mut reader, samples, 1.0),
         hound::SampleFormat::Int => {
-            columns::<i32>(&mut reader, 2f64.powi(i32::from(spec.bits_per_sample) - 1))
+            let full_scale = 2f64.powi(i32::from(spec.bits_per_sample) - 1);
+            columns::<i32>(&mut reader, samples, full_scale)
         }
     }
     .map_err(wrong)?;
@@ -38,19 +58,20 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     })
 }
 
-/// The channels, whose samples are parts of `full_scale`.
+/// The channels, whose samples are parts of `full_scale`; the file has room for `samples_max` in all.
 fn columns<S: hound::Sample + Into<f64>>(
     reader: &mut hound::WavReader<impl Read>,
+    samples_max: u64,
     full_scale: f64,
 ) -> Result<Vec<RawColumn>, hound::Error> {
     let count = usize::from(reader.spec().channels.max(1));
-    let length = reader.duration() as usize;
+    let most = usize::try_from(samples_max).unwrap_or(usize::MAX) / count;
+    let length = most.min(reader.duration() as usize);
     let mut columns: Vec<RawColumn> = (0..count)
         .map(|channel| RawColumn {
             name: format!("ch{}", channel + 1),
             unit: None,
-            // The header of a damaged file may say anything.
-            samples: Vec::with_capacity(length.min(1 << 24)),
+            samples: Vec::with_capacity(length),
         })
         .collect();
     for (index, sample) in reader.samples::<S>().enumerate() {

@@ -90,6 +90,78 @@ fn what_is_no_such_file_is_refused_with_the_reason() {
     assert!(said(&wrong).contains("4 by 1, but has 3 values"));
 }
 
+#[test]
+fn the_longer_side_of_a_matrix_is_time() {
+    let channels = |rows, columns, count: u32| {
+        let values: Vec<f64> = (0..count).map(f64::from).collect();
+        let bytes = file(&[matrix_element("a", 6, rows, columns, 9, &doubles(&values))]);
+        let columns: Vec<RawColumn> = of(&bytes)
+            .unwrap()
+            .into_iter()
+            .flat_map(Variable::into_columns)
+            .collect();
+        columns
+            .into_iter()
+            .map(|column| (column.name, column.samples))
+            .collect::<Vec<_>>()
+    };
+    let named = |name: &str, samples: [f64; 4]| (name.to_owned(), samples.to_vec());
+    // Values are stored column by column.
+    assert_eq!(
+        channels(3, 4, 12),
+        [
+            named("a1", [0.0, 3.0, 6.0, 9.0]),
+            named("a2", [1.0, 4.0, 7.0, 10.0]),
+            named("a3", [2.0, 5.0, 8.0, 11.0]),
+        ]
+    );
+    assert_eq!(
+        channels(4, 2, 8),
+        [
+            named("a1", [0.0, 1.0, 2.0, 3.0]),
+            named("a2", [4.0, 5.0, 6.0, 7.0])
+        ]
+    );
+    assert_eq!(channels(1, 4, 4), [named("a", [0.0, 1.0, 2.0, 3.0])]);
+    assert_eq!(channels(0, 4, 0), []);
+}
+
+#[test]
+fn channels_in_rows_stand_beside_a_vector_of_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mat");
+    let bytes = file(&[
+        matrix_element("t", 6, 1, 4, 9, &doubles(&[0.0, 0.1, 0.2, 0.3])),
+        matrix_element(
+            "a",
+            6,
+            2,
+            4,
+            9,
+            &doubles(&[1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0]),
+        ),
+    ]);
+    std::fs::write(&path, bytes).unwrap();
+    let recording = crate::Recording::read(&path).unwrap();
+    assert_eq!(recording.len(), 4);
+    assert_eq!(recording.channel("a1").unwrap().samples, [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(recording.channel("a2").unwrap().samples, [-1.0, -2.0, -3.0, -4.0]);
+}
+
+#[test]
+fn a_dead_channel_may_be_compressed_and_a_bomb_may_not() {
+    let zeros = |count: usize| {
+        let matrix = matrix_element("a", 6, 1, count as i32, 2, &vec![0; count]);
+        of(&file(&[compressed(&matrix)]))
+    };
+    assert_eq!(zeros(1 << 20).unwrap()[0].samples(), 1 << 20);
+    let said = zeros(1 << 24).map(|_| ()).unwrap_err();
+    assert!(
+        said.contains("16777216 values") && said.contains("200 times"),
+        "{said}"
+    );
+}
+
 proptest! {
     /// Whatever the bytes, there is an answer.
     #[test]
