@@ -40,7 +40,7 @@ pub struct Sensed {
 /// What the user says of the spindle and the tool where the recording does not.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Speed {
-    /// Spindle speed, rev/min; for a recording without a tachometer.
+    /// Spindle speed, rev/min; goes before a recorded tachometer, whose edges are then left out.
     pub rpm: Option<f64>,
     /// Number of teeth; goes before what the recording says.
     pub teeth: Option<u8>,
@@ -63,7 +63,9 @@ impl Sensed {
             .fold(0.0_f64, |largest, sample| largest.max(sample.abs()));
         let count = count(largest, is_calibrated);
         let teeth = teeth(recording, speed)?;
-        let wheel = wheel(recording);
+        // A stated speed goes before the tachometer, as the number of teeth does: that is the way around a tachometer that
+        // miscounts.
+        let wheel = wheel(recording).filter(|_| speed.rpm.is_none());
         let cut = recording.sidecar.cut.unwrap_or_default();
         let rpm = speed.rpm.or(cut.spindle_rpm.filter(|_| cut.last_rpm.is_none()));
         if wheel.is_none() && rpm.is_none() {
@@ -92,7 +94,11 @@ impl Sensed {
             settings,
             working_point: working_point(recording),
             blocks: blocks(&axes, count, rate),
-            edges: edges(recording),
+            edges: if wheel.is_some() {
+                edges(recording)
+            } else {
+                Vec::new()
+            },
             is_calibrated,
         })
     }
