@@ -92,8 +92,13 @@ impl FrfTable {
                     "h{name} does not have one value for each of {lines} frequencies"
                 ));
             }
-            if !entry.receptance.iter().all(|h| h.is_finite()) {
-                return Some(format!("h{name} has a value that is no finite number"));
+            if let Some(line) = entry.receptance.iter().position(|h| !h.is_finite()) {
+                return Some(format!(
+                    "h{name} at {} Hz (line {} of {lines}) is {}, no finite number; leave that frequency out or measure it again",
+                    self.frequency_hz[line],
+                    line + 1,
+                    entry.receptance[line]
+                ));
             }
             if let Some(wrong) = coherence.iter().find(|c| !(0.0..=1.0).contains(*c)) {
                 return Some(format!(

@@ -72,7 +72,8 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
 
 /// Frequencies without one at which the receptance is no number: 0 Hz of a mobility or an accelerance.
 fn without_rest(entry: &Frf, frequencies: &[f64]) -> Vec<f64> {
-    let from = usize::from(entry.receptance.first().is_some_and(|value| !value.is_finite()));
+    let is_rest = frequencies.first() == Some(&0.0);
+    let from = usize::from(is_rest && entry.receptance.first().is_some_and(|value| !value.is_finite()));
     frequencies.get(from..).unwrap_or_default().to_vec()
 }
 

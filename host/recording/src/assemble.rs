@@ -131,6 +131,13 @@ fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
     let (Some(first), Some(last)) = (time.first(), time.last()) else {
         return Err(wrong("there are no samples".into()));
     };
+    if let Some(index) = time.iter().position(|stamp| !stamp.is_finite()) {
+        return Err(wrong(format!(
+            "time of sample {} is {}; a number is needed",
+            index + 1,
+            time[index]
+        )));
+    }
     if time.len() < 2 || last <= first {
         return Err(wrong(format!(
             "time goes from {first} to {last} s in {} samples; it must grow",

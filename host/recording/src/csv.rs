@@ -16,14 +16,15 @@ const DIGITS: usize = 9;
 /// Bytes that are read at once.
 const PIECE: usize = 1 << 18;
 
-pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
+/// Reads a file; `finite` refuses NaN and infinity with the line in which they stand.
+pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
         cause,
     };
     let file = File::open(path).map_err(unreadable)?;
     let length = file.metadata().map_err(unreadable)?.len();
-    let columns = columns(path, file, length, PIECE)?;
+    let columns = columns(path, file, length, PIECE, finite)?;
     if columns.iter().all(|column| column.samples.is_empty()) {
         return Err(RecordingError::Content {
             path: path.into(),
@@ -43,12 +44,14 @@ fn columns(
     mut text: impl Read,
     length: u64,
     piece: usize,
+    finite: bool,
 ) -> Result<Vec<RawColumn>, RecordingError> {
     let mut table = Table {
         path,
         line: 0,
         columns: Vec::new(),
         bytes: length,
+        finite,
     };
     // What has been read and is not yet a whole line stays at the front.
     let mut buffer = vec![0; piece.max(1)];
@@ -99,7 +102,12 @@ struct Table<'a> {
     columns: Vec<RawColumn>,
     /// Bytes of the whole text.
     bytes: u64,
+    /// NaN and infinity are refused.
+    finite: bool,
 }
+
+/// The remedy for a row with NaN or infinity.
+const LEAVE_OUT: &str = "a number is needed; repair the row, or leave it out by --from-s or --until-s";
 
 impl Table<'_> {
     /// Takes whole lines; the last one may lack its end.
@@ -184,7 +192,7 @@ impl Table<'_> {
         for index in 0..self.columns.len() {
             let is_last = index + 1 == self.columns.len();
             let parsed = number(rest).filter(|&(value, _, end)| {
-                value.is_finite() && end == if is_last { End::Line } else { End::Field }
+                (value.is_finite() || !self.finite) && end == if is_last { End::Line } else { End::Field }
             });
             let Some((value, length, _)) = parsed else {
                 return Err(self.row_error(text));
@@ -224,10 +232,12 @@ impl Table<'_> {
                 self.columns.len()
             ));
         }
-        let is_number = |field: &str| {
+        let parsed = |field: &str| {
             number(field.as_bytes())
-                .is_some_and(|(value, length, _)| value.is_finite() && length == field.len())
+                .filter(|&(_, length, _)| length == field.len())
+                .map(|(value, ..)| value)
         };
+        let is_number = |field: &str| parsed(field).is_some_and(|value| value.is_finite() || !self.finite);
         let wrong = fields
             .iter()
             .zip(&self.columns)
@@ -236,7 +246,12 @@ impl Table<'_> {
             Some((field, column)) => {
                 // A damaged file may have a long line without commas.
                 let shown: String = field.chars().take(40).collect();
-                format!("\"{shown}\" in column \"{}\": a number is needed", column.name)
+                let needed = if parsed(field).is_some() {
+                    LEAVE_OUT
+                } else {
+                    "a number is needed"
+                };
+                format!("\"{shown}\" in column \"{}\": {needed}", column.name)
             }
             None => "a number for each column is needed, with commas between".into(),
         })
@@ -347,7 +362,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &[u8], piece: usize) -> Result<Vec<Vec<f64>>, String> {
-        columns(Path::new("a.csv"), text, text.len() as u64, piece)
+        columns(Path::new("a.csv"), text, text.len() as u64, piece, true)
             .map(|columns| columns.into_iter().map(|column| column.samples).collect())
             .map_err(|error| error.to_string())
     }

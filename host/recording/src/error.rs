@@ -67,6 +67,28 @@ pub enum RecordingError {
         /// What the name says.
         expected: Quantity,
     },
+    /// A sample is NaN or infinite.
+    #[error(
+        "{}, channel \"{channel}\": sample {sample} at {time_s} s is {value} ({count} such samples, the last at {last_s} s); a number is needed: \
+         repair the channel, or use the part before or after by --until-s or --from-s",
+        path.display()
+    )]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        channel: String,
+        /// The first such sample, from 1.
+        sample: usize,
+        /// Its time, s.
+        time_s: f64,
+        /// Its value.
+        value: f64,
+        /// Number of such samples.
+        count: usize,
+        /// Time of the last one, s.
+        last_s: f64,
+    },
     /// Nothing says how fast it was sampled.
     #[error("{}: nothing says how fast it was sampled; a column \"t [s]\" or sample_rate_hz in {} is needed", path.display(), sidecar.display())]
     NoSampleRate {

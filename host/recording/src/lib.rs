@@ -8,6 +8,7 @@ mod csv;
 mod error;
 pub mod file;
 mod mat;
+mod segment;
 mod sidecar;
 mod spindle_angle;
 pub mod uff;
@@ -19,6 +20,7 @@ use std::path::{Path, PathBuf};
 
 pub use blocks::{Sensed, Speed};
 pub use error::RecordingError;
+pub use segment::Segment;
 pub use sidecar::{Kind, RecordedChannel, RecordedCut, RecordedPosture, Sidecar};
 pub use spindle_angle::SpindleAngle;
 pub use uff::UffForm;
@@ -77,15 +79,23 @@ impl Recording {
     /// Reads a recording, with the sidecar beside it.
     ///
     /// # Errors
-    /// Missing or malformed file, unknown or contradicting units, uneven time, no sample rate.
+    /// Missing or malformed file, unknown or contradicting units, uneven time, no sample rate, a sample that is no finite number.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
+        Self::read_segment(path, Segment::default())
+    }
+
+    /// Reads a segment of a recording. Samples outside of it may be NaN or infinite.
+    ///
+    /// # Errors
+    /// As [`Recording::read`]; a segment that lies outside of the recording.
+    pub fn read_segment(path: impl AsRef<Path>, segment: Segment) -> Result<Self, RecordingError> {
         let path = path.as_ref();
         let ending = crate::file::ending(path);
         let raw = match ending.as_str() {
-            "csv" => csv::read(path)?,
+            "csv" => csv::read(path, segment.is_whole())?,
             "wav" => wav::read(path)?,
             "mat" => mat::read(path)?,
-            "uff" | "unv" | "bunv" => uff::read(path)?,
+            "uff" | "unv" | "bunv" => uff::read(path, segment.is_whole())?,
             _ => {
                 // A file that is not there is the first thing to mend.
                 crate::file::read(path)?;
@@ -95,7 +105,7 @@ impl Recording {
                 });
             }
         };
-        assemble::recording(path, raw, Sidecar::beside(path)?)
+        segment.of(assemble::recording(path, raw, Sidecar::beside(path)?)?)
     }
 
     /// Writes it to `path`, with its sidecar, in the form that the ending says: both whole, or as they were before.

@@ -189,6 +189,63 @@ fn blocks_and_edges_are_those_of_the_recording() {
     assert_eq!(spread, 9);
 }
 
+#[test]
+fn a_stated_speed_goes_before_the_tachometer() {
+    let folder = Folder::new();
+    let mut text = String::from("t [s],ax [m/s^2],tacho [1]\n");
+    for index in 0..1000 {
+        text += &format!("{},1,{}\n", f64::from(index) * 1e-3, u8::from(index % 100 < 20));
+    }
+    let recording = Recording::read(folder.file("a.csv", &text)).unwrap();
+    let sensed = |rpm| Sensed::new(&recording, Speed { rpm, teeth: Some(2) }).unwrap();
+    let stated = sensed(Some(900.0));
+    assert_eq!(stated.settings.assumed_speed.map(|speed| speed.0), Some(900.0));
+    assert!(stated.settings.wheel.is_none() && stated.edges.is_empty());
+    let recorded = sensed(None);
+    assert!(recorded.settings.assumed_speed.is_none() && recorded.settings.wheel.is_some());
+}
+
+#[test]
+fn numbers_that_are_none_are_refused_with_channel_and_time_or_left_out() {
+    let folder = Folder::new();
+    let path = folder.0.path().join("a.wav");
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: 10,
+        bits_per_sample: 32,
+        sample_format: hound::SampleFormat::Float,
+    };
+    let mut writer = hound::WavWriter::create(&path, spec).unwrap();
+    for sample in [0.5_f32, 0.1, 0.25, 0.2, 0.0, f32::NAN, 0.75, 0.4] {
+        writer.write_sample(sample).unwrap();
+    }
+    writer.finalize().unwrap();
+    let csv = "t [s],ch1 [V],ch2 [V]\n0,0.5,0.1\n0.1,0.25,0.2\n0.2,0,nan\n0.3,0.75,0.4\n";
+    let csv = folder.file("b.csv", csv);
+    for (path, place) in [
+        (&path, "\"ch2\": sample 3 at 0.2 s is NaN"),
+        (&csv, "line 4: \"nan\" in column \"ch2\""),
+    ] {
+        let said = Recording::read(path).unwrap_err().to_string();
+        assert!(said.contains(place) && said.contains("--until-s"), "{said}");
+        let before = Segment {
+            from_s: None,
+            until_s: Some(0.2),
+        };
+        let read = Recording::read_segment(path, before).unwrap();
+        assert_eq!(read.channel("ch1").unwrap().samples, [0.5, 0.25]);
+        let whole = Segment {
+            from_s: Some(0.0),
+            until_s: None,
+        };
+        let said = Recording::read_segment(path, whole).unwrap_err().to_string();
+        assert!(said.contains("sample 3"), "{said}");
+    }
+    // Stamps that are no numbers say nothing of the rate.
+    let said = folder.refusal("c.csv", "t [s],ax [m/s^2]\n0,1\n0.1,2\nnan,3\n0.3,4\n");
+    assert!(said.contains("line 4"), "{said}");
+}
+
 /// m/s² per count at ±2 g.
 const COUNT_2G: f64 = 0.061e-3 * 9.806_65;
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::segment::RecordedSegment;
 use super::{Error, Output};
 use crate::case::Case;
 use crate::diagnose::answer::Outcome;
@@ -38,6 +39,8 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
+    segment: RecordedSegment,
+    #[command(flatten)]
     output: Output,
 }
 
@@ -48,11 +51,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         Some(path) => trial_cuts::read(path)?,
         None => Vec::new(),
     };
-    let recordings = args
-        .recordings
-        .iter()
-        .map(Recording::read)
-        .collect::<Result<Vec<_>, _>>()?;
+    let recordings = args.segment.read(&args.recordings)?;
     let bar = progress_bar();
     let options = Options { seed: args.seed };
     let mut diagnosis = diagnose_watched(&case, &recordings, &options, &|stage| {

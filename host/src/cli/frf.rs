@@ -6,13 +6,14 @@ use std::path::PathBuf;
 use maud::html;
 use serde::Serialize;
 
+use super::segment::RecordedSegment;
 use super::{Error, Output, finite, positive};
 use crate::file;
 use crate::frf::{
     Estimator, Excitation, FrfError, FrfTable, HammerWindows, Measurement, MeasurementSettings, ModeRatio,
     Part, Window, calibrate, measure,
 };
-use crate::recording::{Recording, UffForm};
+use crate::recording::UffForm;
 use crate::report::frf_chart::frf_chart;
 use crate::report::page::{figure, page};
 
@@ -68,6 +69,8 @@ pub struct Args {
     /// Write uff files as binary (58b).
     #[arg(long)]
     uff_binary: bool,
+    #[command(flatten)]
+    segment: RecordedSegment,
     #[command(flatten)]
     output: Output,
 }
@@ -188,11 +191,7 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let recordings = args
-        .recordings
-        .iter()
-        .map(Recording::read)
-        .collect::<Result<Vec<_>, _>>()?;
+    let recordings = args.segment.read(&args.recordings)?;
     let measurement = measure(&recordings, &args.settings())?;
     let (table, calibration) = match (&args.housing, &args.tip) {
         (Some(housing), Some(tip)) => calibrate(

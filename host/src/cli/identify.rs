@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
+use super::segment::RecordedSegment;
 use super::{Error, Output, finite, non_negative, positive};
 use crate::case::Case;
 use crate::identify::law::Extra;
-use crate::recording::Recording;
 use answer::Answer;
 
 /// A model of the structure from recordings: parameters with 90 % intervals, and what does not fit.
@@ -104,6 +104,8 @@ pub struct Args {
     #[command(flatten)]
     modes: modes::Options,
     #[command(flatten)]
+    segment: RecordedSegment,
+    #[command(flatten)]
     output: Output,
 }
 
@@ -155,11 +157,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let other = others.map(sections).transpose()?;
     let recordings = match args.method {
         Method::InverseStability | Method::Modes => Vec::new(),
-        _ => args
-            .recordings
-            .iter()
-            .map(Recording::read)
-            .collect::<Result<Vec<_>, _>>()?,
+        _ => args.segment.read(&args.recordings)?,
     };
     let mut answer = match args.method {
         Method::HarmonicBalance => methods::harmonic_balance(&args, &recordings)?,

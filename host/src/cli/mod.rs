@@ -21,6 +21,7 @@ pub mod plan;
 pub mod port;
 mod range;
 pub mod replay;
+mod segment;
 pub mod simulate;
 pub mod table;
 pub mod upload;

@@ -9,9 +9,10 @@ use quietcut_core::monitor::{Monitor, State};
 use quietcut_core::protocol::{Reports, Subscription};
 use quietcut_core::units::Degrees;
 
+use super::segment::RecordedSegment;
 use super::{Error, Output, angle, count, positive};
 use crate::device::{self, Client, Event};
-use crate::recording::{Recording, RecordingError, Sensed, Speed};
+use crate::recording::{RecordingError, Sensed, Speed};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
 
@@ -30,7 +31,7 @@ pub struct Args {
     /// Run it on the device at this serial port, or `simulated`, instead of here.
     #[arg(long, value_name = "PORT")]
     port: Option<String>,
-    /// Spindle speed in rev/min where the recording has no tachometer.
+    /// Spindle speed in rev/min; goes before what the recording says, and a recorded tachometer is then left out.
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     rpm: Option<f64>,
     /// Number of teeth where the recording does not say.
@@ -39,6 +40,8 @@ pub struct Args {
     /// Feed direction in degrees from the machine's x towards its y, for tables with layers for several.
     #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     feed_direction_deg: Option<f64>,
+    #[command(flatten)]
+    segment: RecordedSegment,
     #[command(flatten)]
     output: Output,
 }
@@ -51,12 +54,23 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
-    let recording = Recording::read(&args.recording)?;
+    let recordings = args.segment.read(std::slice::from_ref(&args.recording))?;
+    let [recording] = recordings.as_slice() else {
+        return Err(Error::input("a recording is needed"));
+    };
     let speed = Speed {
         rpm: args.rpm,
         teeth: args.teeth.map(NonZeroU8::get),
     };
-    let sensed = Sensed::new(&recording, speed)?;
+    let sensed = Sensed::new(recording, speed)?;
+    if let Some(rpm) = args.rpm
+        && recording.channel("tacho").is_some()
+    {
+        tracing::warn!(
+            "{}: the recorded tachometer is left out, because --rpm {rpm} states the speed; leave --rpm out to use the tachometer",
+            args.recording.display()
+        );
+    }
     if !sensed.is_calibrated {
         tracing::warn!(
             "{}: the unit of the channel is not known, so amplitudes are relative to the largest sample",

@@ -244,8 +244,8 @@ fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result
     })
 }
 
-/// Reads the records over time of a file.
-pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
+/// Reads the records over time of a file; `finite` refuses NaN and infinity with the line of their data set.
+pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let mut sets = data_sets(path)?;
     let functions: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
     sets.retain(DataSet::is_over_time);
@@ -285,9 +285,15 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
                 "complex samples; those of a record over time are real".into(),
             ));
         };
-        if let Some(at) = samples.iter().position(|sample| !sample.is_finite()) {
+        let wrong_sample = samples.iter().position(|sample| finite && !sample.is_finite());
+        if let Some(at) = wrong_sample {
+            let time_s = match (even, &uneven) {
+                (Some((first, step)), _) => first + step * at as f64,
+                (None, times) => times.as_ref().map_or(f64::NAN, |times| times[at]),
+            };
             return Err(wrong(format!(
-                "sample {} is {}; a number is needed",
+                "sample {} is {} at {time_s} s; a number is needed: repair the channel, or use the part before or after by \
+                 --until-s or --from-s",
                 at + 1,
                 samples[at]
             )));

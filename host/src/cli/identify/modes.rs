@@ -9,7 +9,6 @@ use super::answer::{Answer, ComplexMode, Figure, Parts};
 use super::{Args, Error, positive};
 use crate::frf::{Estimator, FrfTable, MeasurementSettings, RecordSpectra, measure, record_spectra};
 use crate::identify::modes::{self, ChannelNoise, IdentifiedMode, ModalModel, Receptances};
-use crate::recording::Recording;
 use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
@@ -96,8 +95,7 @@ fn source(args: &Args) -> Result<Source, Error> {
             records: None,
         });
     }
-    let read = args.recordings.iter().map(Recording::read);
-    let recordings = read.collect::<Result<Vec<_>, _>>()?;
+    let recordings = args.segment.read(&args.recordings)?;
     let settings = MeasurementSettings {
         resolution_hz: args.modes.resolution_hz,
         estimator: if args.modes.pseudo_inverse {
