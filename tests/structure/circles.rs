@@ -1,0 +1,148 @@
+//! No file imports, through others, itself.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::crates::all;
+use crate::graph::{Arrows, arrows};
+
+/// Circles that are still there: the crate, and a file of the circle. The test asks for the removal of an entry that is not needed.
+const STILL_THERE: [(&str, &str); 18] = [
+    ("quietcut-core", "advice.rs"),
+    ("quietcut-core", "detector/growth.rs"),
+    ("quietcut-core", "lobes.rs"),
+    ("quietcut-core", "monitor.rs"),
+    ("quietcut-core", "stroboscope/exponential.rs"),
+    ("quietcut-firmware", "storage.rs"),
+    ("quietcut", "cli/identify.rs"),
+    ("quietcut", "report/answer.rs"),
+    ("quietcut-recording", "lib.rs"),
+    ("quietcut-model", "case/mod.rs"),
+    ("quietcut-model", "effects/mod.rs"),
+    ("quietcut-simulate", "lib.rs"),
+    ("quietcut-identify", "modes/mod.rs"),
+    ("quietcut-identify", "modes/record_fit/mod.rs"),
+    ("quietcut-identify", "plan/mod.rs"),
+    ("quietcut-diagnose", "candidates/process.rs"),
+    ("quietcut-diagnose", "candidates/restoring.rs"),
+    ("quietcut-diagnose", "candidates/sensor.rs"),
+];
+
+/// Groups of files that import each other in a loop.
+fn circles(arrows: &Arrows) -> Vec<Vec<PathBuf>> {
+    let files: BTreeSet<&PathBuf> = arrows.keys().flat_map(|(from, to)| [from, to]).collect();
+    let reach = |start: &PathBuf| {
+        let mut reached = BTreeSet::new();
+        let mut open = vec![start.clone()];
+        while let Some(file) = open.pop() {
+            for (_, to) in arrows.keys().filter(|(from, _)| *from == file) {
+                if reached.insert(to.clone()) {
+                    open.push(to.clone());
+                }
+            }
+        }
+        reached
+    };
+    let reached: Vec<(&PathBuf, BTreeSet<PathBuf>)> = files.iter().map(|file| (*file, reach(file))).collect();
+    let mut circles: Vec<Vec<PathBuf>> = Vec::new();
+    for (file, own) in &reached {
+        if !own.contains(*file) || circles.iter().flatten().any(|known| known == *file) {
+            continue;
+        }
+        let circle = reached
+            .iter()
+            .filter(|(other, theirs)| own.contains(*other) && theirs.contains(*file));
+        circles.push(circle.map(|(other, _)| (*other).clone()).collect());
+    }
+    circles
+}
+
+fn described(circle: &[PathBuf], arrows: &Arrows) -> String {
+    let mut text = String::new();
+    for ((from, to), names) in arrows {
+        if circle.contains(from) && circle.contains(to) {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            text += &format!("  {} -> {}: {}\n", from.display(), to.display(), names.join(", "));
+        }
+    }
+    text
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let mut found = String::new();
+    let mut excused = Vec::new();
+    for member in all() {
+        for root in member.roots() {
+            let arrows = arrows(&root);
+            for circle in circles(&arrows) {
+                let excuse = STILL_THERE
+                    .iter()
+                    .find(|(name, file)| *name == member.name && circle.contains(&PathBuf::from(file)));
+                match excuse {
+                    Some(excuse) => excused.push(*excuse),
+                    None => found += &format!("{}\n{}", member.name, described(&circle, &arrows)),
+                }
+            }
+        }
+    }
+    assert!(found.is_empty(), "import circles:\n{found}");
+    let not_needed: Vec<_> = STILL_THERE
+        .iter()
+        .filter(|excuse| !excused.contains(excuse))
+        .collect();
+    assert!(
+        not_needed.is_empty(),
+        "no circle any more, remove: {not_needed:?}"
+    );
+}
+
+/// A crate in a folder: files by name.
+fn small_crate(files: &[(&str, &str)]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+    let root = folder.path().join("lib.rs");
+    (folder, root)
+}
+
+#[test]
+fn a_circle_is_found_through_a_parent_that_hands_names_on() {
+    let (_folder, root) = small_crate(&[
+        ("lib.rs", "mod a; mod b; pub use a::A;"),
+        ("a.rs", "use crate::b::B; pub struct A(B);"),
+        ("b.rs", "pub struct B; fn f() { let _ = vec![crate::A::new()]; }"),
+    ]);
+    let found = circles(&arrows(&root));
+    assert_eq!(found, [[PathBuf::from("a.rs"), PathBuf::from("b.rs")]]);
+}
+
+#[test]
+fn a_parent_that_uses_its_child_and_is_used_by_it_is_a_circle() {
+    let (_folder, root) = small_crate(&[
+        ("lib.rs", "mod a;"),
+        ("a/mod.rs", "mod b; use b::B; pub struct A(B);"),
+        ("a/b.rs", "use super::A; pub struct B; fn f(_: A) {}"),
+    ]);
+    assert_eq!(circles(&arrows(&root)).len(), 1);
+}
+
+#[test]
+fn re_exports_and_tests_are_no_circle() {
+    let (_folder, root) = small_crate(&[
+        ("lib.rs", "mod a; pub use a::{A, B};"),
+        ("a/mod.rs", "mod b; mod c; pub use b::B; pub use c::A;"),
+        (
+            "a/b.rs",
+            "pub struct B; #[cfg(test)] mod tests { use super::super::A; fn f(_: A) {} }",
+        ),
+        ("a/c.rs", "use super::B; pub struct A(B);"),
+    ]);
+    let arrows = arrows(&root);
+    assert!(circles(&arrows).is_empty(), "{arrows:?}");
+    let arrow = (Path::new("a/c.rs").to_owned(), Path::new("a/b.rs").to_owned());
+    assert!(arrows.contains_key(&arrow), "{arrows:?}");
+}

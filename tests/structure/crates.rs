@@ -1,0 +1,175 @@
+//! The crates of the workspace, and which may know which.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Each crate with those of the workspace that it may use.
+const LAYERS: [(&str, &[&str]); 13] = [
+    ("quietcut-core", &[]),
+    ("quietcut-firmware", &["quietcut-core"]),
+    ("quietcut-numerics", &[]),
+    ("quietcut-recording", &["quietcut-core", "quietcut-numerics"]),
+    (
+        "quietcut-model",
+        &["quietcut-core", "quietcut-numerics", "quietcut-recording"],
+    ),
+    (
+        "quietcut-frf",
+        &["quietcut-numerics", "quietcut-recording", "quietcut-model"],
+    ),
+    (
+        "quietcut-simulate",
+        &[
+            "quietcut-core",
+            "quietcut-numerics",
+            "quietcut-recording",
+            "quietcut-model",
+        ],
+    ),
+    (
+        "quietcut-stability",
+        &[
+            "quietcut-core",
+            "quietcut-numerics",
+            "quietcut-recording",
+            "quietcut-model",
+            "quietcut-frf",
+        ],
+    ),
+    (
+        "quietcut-identify",
+        &[
+            "quietcut-numerics",
+            "quietcut-recording",
+            "quietcut-model",
+            "quietcut-frf",
+            "quietcut-simulate",
+            "quietcut-stability",
+        ],
+    ),
+    (
+        "quietcut-diagnose",
+        &[
+            "quietcut-core",
+            "quietcut-numerics",
+            "quietcut-recording",
+            "quietcut-model",
+            "quietcut-frf",
+            "quietcut-simulate",
+            "quietcut-stability",
+        ],
+    ),
+    (
+        "quietcut",
+        &[
+            "quietcut-core",
+            "quietcut-firmware",
+            "quietcut-numerics",
+            "quietcut-recording",
+            "quietcut-model",
+            "quietcut-frf",
+            "quietcut-simulate",
+            "quietcut-stability",
+            "quietcut-identify",
+            "quietcut-diagnose",
+        ],
+    ),
+    ("quietcut-testkit", &["quietcut-model"]),
+    (
+        "quietcut-tests",
+        &["quietcut", "quietcut-core", "quietcut-firmware"],
+    ),
+];
+
+/// A crate of the workspace.
+pub(crate) struct Member {
+    pub(crate) name: String,
+    pub(crate) folder: PathBuf,
+    manifest: toml::Table,
+}
+
+impl Member {
+    fn read(folder: PathBuf) -> Self {
+        let text = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        let manifest: toml::Table = text.parse().unwrap();
+        let name = manifest["package"]["name"].as_str().unwrap().to_owned();
+        Self {
+            name,
+            folder,
+            manifest,
+        }
+    }
+
+    /// The root files of the library and of its programs.
+    pub(crate) fn roots(&self) -> Vec<PathBuf> {
+        let source = self.folder.join("src");
+        ["lib.rs", "main.rs"]
+            .into_iter()
+            .map(|name| source.join(name))
+            .filter(|path| path.exists())
+            .collect()
+    }
+
+    /// The crates of the workspace that it depends on, tests aside.
+    fn uses(&self) -> Vec<String> {
+        let Some(table) = self.manifest.get("dependencies").and_then(toml::Value::as_table) else {
+            return Vec::new();
+        };
+        table
+            .keys()
+            .filter(|name| name.starts_with("quietcut"))
+            .cloned()
+            .collect()
+    }
+}
+
+/// The root of the workspace.
+pub(crate) fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("..")
+        .canonicalize()
+        .unwrap()
+}
+
+/// All crates of the workspace.
+pub(crate) fn all() -> Vec<Member> {
+    let text = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = text.parse().unwrap();
+    let members = manifest["workspace"]["members"].as_array().unwrap();
+    members
+        .iter()
+        .map(|member| Member::read(root().join(member.as_str().unwrap())))
+        .collect()
+}
+
+#[test]
+fn crates_know_only_the_layers_below_them() {
+    let layers: BTreeMap<&str, &[&str]> = LAYERS.into_iter().collect();
+    for member in all() {
+        let allowed = layers
+            .get(member.name.as_str())
+            .unwrap_or_else(|| panic!("{} has no layer: add it to the table", member.name));
+        for other in member.uses() {
+            assert!(
+                allowed.contains(&other.as_str()),
+                "{} must not know {other}",
+                member.name
+            );
+        }
+    }
+}
+
+/// The model and the lobes are to run where there are no files, in a browser for one.
+#[test]
+fn model_and_stability_open_no_file() {
+    for member in all() {
+        if !["quietcut-stability", "quietcut-model"].contains(&member.name.as_str()) {
+            continue;
+        }
+        for path in crate::size::sources(&member.folder.join("src")) {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let code = text.split("#[cfg(test)]").next().unwrap();
+            assert!(!code.contains("std::fs"), "{} opens files", path.display());
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! A file holds one noun: above 500 lines its head says why.
+
+use std::path::{Path, PathBuf};
+
+use crate::crates::all;
+
+/// The longest file that needs no reason.
+const LONGEST: usize = 500;
+
+/// Where a reason is looked for.
+const HEAD: usize = 15;
+
+/// All sources below a folder that are no tests.
+pub(crate) fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let stem = path.file_stem().unwrap().to_str().unwrap();
+        if stem == "tests" || stem.ends_with("_tests") {
+            continue;
+        }
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Files that are still too long. The test asks for the removal of an entry that is not needed.
+const STILL_LONG: [&str; 6] = [
+    "frf/src/measurement.rs",
+    "identify/src/cutting/force_coefficients.rs",
+    "identify/src/robot/cubic_joints.rs",
+    "identify/src/robot/joints.rs",
+    "shared/src/monitor.rs",
+    "simulate/src/integrator.rs",
+];
+
+#[test]
+fn long_files_say_why_they_are_one_noun() {
+    let (mut long, mut excused) = (Vec::new(), Vec::new());
+    for member in all()
+        .into_iter()
+        .filter(|member| member.folder.join("src").exists())
+    {
+        for path in sources(&member.folder.join("src")) {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let says_why = text.lines().take(HEAD).any(|line| line.contains("one noun"));
+            if text.lines().count() <= LONGEST || says_why {
+                continue;
+            }
+            match STILL_LONG.iter().find(|file| path.ends_with(file)) {
+                Some(excuse) => excused.push(*excuse),
+                None => long.push(format!("{}: {} lines", path.display(), text.lines().count())),
+            }
+        }
+    }
+    assert!(long.is_empty(), "{}", long.join("\n"));
+    let not_needed: Vec<_> = STILL_LONG
+        .iter()
+        .filter(|excuse| !excused.contains(excuse))
+        .collect();
+    assert!(not_needed.is_empty(), "short enough, remove: {not_needed:?}");
+}
