@@ -123,12 +123,10 @@ impl Member {
     }
 }
 
-/// The root of the workspace.
+/// The root of the workspace. Cargo names the folder of the tests also when they run: so a built test serves for another checkout.
 pub(crate) fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("..")
-        .canonicalize()
-        .unwrap()
+    let tests = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_else(|_| env!("CARGO_MANIFEST_DIR").to_owned());
+    Path::new(&tests).join("..").canonicalize().unwrap()
 }
 
 /// All crates of the workspace.

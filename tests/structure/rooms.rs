@@ -6,10 +6,11 @@ use crate::crates::all;
 use crate::graph::arrows;
 
 /// Crates with their rooms, the ground first. A room is a file or folder beside `lib.rs`.
-const ROOMS: [(&str, &[&str]); 2] = [
+const ROOMS: &[(&str, &[&str])] = &[
     (
         "quietcut-diagnose",
         &[
+            "criteria",
             "error",
             "progress",
             "signal",
