@@ -10,10 +10,30 @@ use super::layers::{Family, Span};
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
 
-/// Where in a gap it is checked, in turn: refinement has looked at the middle.
-const SHARES: [f64; 2] = [0.38, 0.62];
+/// Offset of the speeds checked within the parts of a gap, in turn from gap to gap: not the middle, which is where refinement has looked,
+/// and not symmetric, so that lobes symmetric about the gap are seen.
+const OFFSETS: [f64; 2] = [0.38, 0.62];
 
-/// What is stated over what is found at the places checked.
+/// The fewest speeds checked in a gap. With the offsets above one of two lies where the error of a straight line between the
+/// entries, 4 s (1 − s) of the largest, is at least 85 %.
+const LEAST_CHECKS: f64 = 2.0;
+
+/// The largest distance between speeds checked, relative to the speed: a third of the narrowest flip lobe of the cases at hand.
+const CHECK_STEP: f64 = 0.01;
+
+/// Gaps in which the table is off by more than this share of the tolerance are checked at more speeds: limits have a corner there, or
+/// kinds change, and a few speeds do not show the worst. A smooth limit that passed refinement is off by a quarter at most.
+const SUSPECT: f64 = 0.5;
+
+/// How often the speeds checked in such a gap are doubled: from two to five, eleven, 23.
+const ROUNDS: usize = 3;
+
+/// A gap is checked no further where twice as many speeds find no more than this factor of what was found before: the room below
+/// covers as much.
+const GROWTH: f64 = 1.2;
+
+/// Factor of the stated depth on the worst at the speeds checked. Two checks of a smooth limit see 85 % of the worst, and repeated
+/// doubling stops within a factor of 1.2.
 const ROOM: f64 = 1.5;
 
 /// Depths at which a table differs from the method, by their distance from the nearest limit of the method, mm.
@@ -61,35 +81,117 @@ impl Miss {
     }
 }
 
-/// The method's own lines in every gap between speeds, in every layer and half way between layers.
+impl Miss {
+    /// The larger of both, each side by itself.
+    fn max(self, other: Self) -> Self {
+        Self {
+            unsafe_mm: self.unsafe_mm.max(other.unsafe_mm),
+            cautious_mm: self.cautious_mm.max(other.cautious_mm),
+        }
+    }
+
+    /// True where one side is larger than a factor of the other miss's.
+    fn exceeds(self, other: Self, factor: f64) -> bool {
+        self.unsafe_mm > factor * other.unsafe_mm || self.cautious_mm > factor * other.cautious_mm
+    }
+}
+
+/// The method's own lines at several speeds inside every gap between the speeds of a table, in every layer and half way between
+/// layers.
 pub(super) struct Checks<'a> {
     spans: &'a [Span],
     speeds: &'a [f64],
     depth_mm: f64,
-    /// By span and gap.
-    lines: Vec<Vec<SpeedLine>>,
+    /// By span and gap, by ascending speed.
+    lines: Vec<Vec<Vec<SpeedLine>>>,
 }
 
 impl<'a> Checks<'a> {
+    /// Checks at two speeds per gap, or more where the gap is wide.
     pub(super) fn new(spans: &'a [Span], speeds: &'a [f64], depth_mm: f64) -> Result<Self, StabilityError> {
-        let between: Vec<f64> = speeds
+        let places: Vec<Vec<f64>> = speeds
             .windows(2)
-            .zip(SHARES.iter().cycle())
-            .map(|(pair, share)| pair[0] + (pair[1] - pair[0]) * share)
+            .zip(OFFSETS.iter().cycle())
+            .map(|(pair, offset)| {
+                let width = pair[1] - pair[0];
+                let count = (width / (CHECK_STEP * pair[0])).ceil().max(LEAST_CHECKS);
+                // A table covers a few decades of speed at most: the count is small.
+                (0..count as usize)
+                    .map(|index| pair[0] + width * (index as f64 + offset) / count)
+                    .collect()
+            })
             .collect();
-        let lines = spans.iter().map(|span| span.family.lines(&between, depth_mm));
-        Ok(Self {
+        let mut checks = Self {
             spans,
             speeds,
             depth_mm,
-            lines: lines.collect::<Result<_, _>>()?,
-        })
+            lines: vec![vec![Vec::new(); places.len()]; spans.len()],
+        };
+        for span in 0..spans.len() {
+            checks.add(span, &places)?;
+        }
+        Ok(checks)
     }
 
-    /// By span and gap.
-    fn misses(&self, table: &LobeTable<'_>) -> Vec<Vec<Miss>> {
-        let miss = |span: &Span, line: &SpeedLine| {
-            let told: Vec<[f64; 2]> = told(table, &span.family, line.rpm).map_or(Vec::new(), |column| {
+    /// Adds the lines of a span at speeds by gap.
+    fn add(&mut self, span: usize, places: &[Vec<f64>]) -> Result<(), StabilityError> {
+        let all: Vec<f64> = places.iter().flatten().copied().collect();
+        let lines = self.spans[span].family.lines(&all, self.depth_mm)?;
+        let mut lines = lines.into_iter();
+        for (own, places) in self.lines[span].iter_mut().zip(places) {
+            own.extend(lines.by_ref().take(places.len()));
+            own.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+        }
+        Ok(())
+    }
+
+    /// Checks suspect gaps at more speeds, until the worst that is found grows no further.
+    ///
+    /// # Errors
+    /// Those of the method.
+    pub(super) fn resolve(&mut self, table: &LobeTable<'_>, tolerance_mm: f64) -> Result<(), StabilityError> {
+        let least = Miss {
+            unsafe_mm: SUSPECT * tolerance_mm,
+            cautious_mm: SUSPECT * tolerance_mm,
+        };
+        let misses = |checks: &Self| -> Vec<Vec<Miss>> {
+            (0..checks.spans.len())
+                .map(|span| checks.misses(table, span))
+                .collect()
+        };
+        let mut worst = misses(self);
+        let mut open: Vec<Vec<bool>> = worst
+            .iter()
+            .map(|gaps| gaps.iter().map(|miss| miss.exceeds(least, 1.0)).collect())
+            .collect();
+        for _ in 0..ROUNDS {
+            if !open.iter().flatten().any(|&open| open) {
+                break;
+            }
+            self.check_again(&open)?;
+            let next = misses(self);
+            let pairs = next.iter().flatten().zip(worst.iter().flatten());
+            for (open, (next, worst)) in open.iter_mut().flatten().zip(pairs) {
+                *open &= next.exceeds(worst.max(least), GROWTH);
+            }
+            worst = next;
+        }
+        Ok(())
+    }
+
+    /// The middles between the speeds of a gap that are known, both ends included.
+    fn middles(&self, span: usize, gap: usize) -> Vec<f64> {
+        let mut known = vec![self.speeds[gap]];
+        known.extend(self.lines[span][gap].iter().map(|line| line.rpm));
+        known.push(self.speeds[gap + 1]);
+        known.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
+    }
+
+    /// The worst in every gap of a span.
+    fn misses(&self, table: &LobeTable<'_>, span: usize) -> Vec<Miss> {
+        let family = &self.spans[span].family;
+        let miss = |line: &SpeedLine| {
+            let told: Vec<[f64; 2]> = told(table, family, line.rpm).map_or(Vec::new(), |column| {
                 let stable = column.stable();
                 stable
                     .map(|(from, to)| [f64::from(from.0), f64::from(to.0)])
@@ -97,23 +199,30 @@ impl<'a> Checks<'a> {
             });
             Miss::between(&surely_stable(line, self.depth_mm), &told, self.depth_mm)
         };
-        let spans = self.spans.iter().zip(&self.lines);
-        spans
-            .map(|(span, lines)| lines.iter().map(|line| miss(span, line)).collect())
-            .collect()
+        let worst = |lines: &Vec<SpeedLine>| lines.iter().map(miss).fold(Miss::default(), Miss::max);
+        self.lines[span].iter().map(worst).collect()
     }
 
     /// Makes the entries around every gap in which `table` calls something stable that is unstable, by more than
     /// `tolerance_mm`, unstable wherever one of them or the method in the gap is: steep flanks, and islands between entries.
     ///
-    /// Lookups in such a gap, and in those beside it, then err to the safe side. `entries` are by layer and speed.
-    pub(super) fn guard(&self, table: &LobeTable<'_>, entries: &mut [Vec<Vec<Entry>>], tolerance_mm: f64) {
+    /// Lookups in such a gap, and in those beside it, then err to the safe side. `entries` are by layer and speed. Returns the gaps
+    /// by span: lines that have shaped entries bear no witness to them, and [`check_again`](Self::check_again) adds others.
+    pub(super) fn guard(
+        &self,
+        table: &LobeTable<'_>,
+        entries: &mut [Vec<Vec<Entry>>],
+        tolerance_mm: f64,
+    ) -> Vec<Vec<bool>> {
         let before = entries.to_vec();
-        for ((span, lines), misses) in self.spans.iter().zip(&self.lines).zip(self.misses(table)) {
-            for (gap, (line, miss)) in lines.iter().zip(misses).enumerate() {
-                if miss.unsafe_mm <= tolerance_mm {
-                    continue;
-                }
+        let mut guarded = Vec::with_capacity(self.spans.len());
+        for (index, span) in self.spans.iter().enumerate() {
+            let misses = self.misses(table, index);
+            for (gap, _) in misses
+                .iter()
+                .enumerate()
+                .filter(|(_, miss)| miss.unsafe_mm > tolerance_mm)
+            {
                 let corners = || {
                     span.layers
                         .iter()
@@ -124,21 +233,46 @@ impl<'a> Checks<'a> {
                     for (layer, speed) in corners() {
                         *entry = with_all_of(entry, &before[layer][speed]);
                     }
-                    *entry = with_all_of(entry, &unstable(line, self.depth_mm));
+                    for line in &self.lines[index][gap] {
+                        *entry = with_all_of(entry, &unstable(line, self.depth_mm));
+                    }
                 }
             }
+            guarded.push(misses.iter().map(|miss| miss.unsafe_mm > tolerance_mm).collect());
         }
+        guarded
     }
 
-    /// What is stated.
+    /// Checks gaps, by span, at more speeds: half way between those that are known.
+    ///
+    /// # Errors
+    /// Those of the method.
+    pub(super) fn check_again(&mut self, gaps: &[Vec<bool>]) -> Result<(), StabilityError> {
+        for (span, gaps) in gaps.iter().enumerate() {
+            let places = gaps.iter().enumerate();
+            let places: Vec<Vec<f64>> = places
+                .map(|(gap, again)| {
+                    if *again {
+                        self.middles(span, gap)
+                    } else {
+                        Vec::new()
+                    }
+                })
+                .collect();
+            self.add(span, &places)?;
+        }
+        Ok(())
+    }
+
+    /// The error that the table states.
     ///
     /// In depth: the largest distance of a stable depth of the table from the method's, and in gaps where both have the same limits
     /// also of the method's from the table's, times 1.5, with the rounding of the entries. In speed: how far a gap reaches, with those
     /// beside it, in which a layer gives up more than twice the tolerance.
     pub(super) fn stated(&self, table: &LobeTable<'_>, tolerance_mm: f64) -> InterpolationError {
         let (mut depth, mut speed) = (0.0_f64, 0.0_f64);
-        for (span, misses) in self.spans.iter().zip(self.misses(table)) {
-            for (gap, miss) in misses.into_iter().enumerate() {
+        for (index, span) in self.spans.iter().enumerate() {
+            for (gap, miss) in self.misses(table, index).into_iter().enumerate() {
                 depth = depth.max(miss.unsafe_mm);
                 if miss.cautious_mm <= 2.0 * tolerance_mm {
                     depth = depth.max(miss.cautious_mm);

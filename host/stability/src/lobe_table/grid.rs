@@ -3,6 +3,7 @@
 use super::layers::Family;
 use crate::error::StabilityError;
 use crate::limits::chart::{Refinement, chart};
+use crate::limits::speed_line::SpeedLine;
 use crate::limits::speeds::spaced;
 
 /// Four times the lowest limit, found by doubling: deep enough for every pocket that is worth while.
@@ -28,21 +29,29 @@ pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> 
     Ok(DEEPEST_MM)
 }
 
-/// The speeds that any of the layers needs, ascending.
-pub(super) fn speeds_of_all(
+/// The speeds that any of the layers needs, ascending, and the lines of every layer at all of them.
+pub(super) fn lines_of_all(
     families: &[Family],
     coarse: &[f64],
     depth_mm: f64,
     refinement: Refinement,
-) -> Result<Vec<f64>, StabilityError> {
-    let mut speeds = Vec::new();
+) -> Result<(Vec<f64>, Vec<Vec<SpeedLine>>), StabilityError> {
+    let mut known = Vec::with_capacity(families.len());
     for family in families {
         let method = family.method.as_ref();
-        let refined = chart(method, coarse, depth_mm, 0)?.refined(method, depth_mm, refinement)?;
-        speeds.extend(refined.speeds.iter().map(|line| line.rpm));
+        known.push(
+            chart(method, coarse, depth_mm, 0)?
+                .refined(method, depth_mm, refinement)?
+                .speeds,
+        );
     }
+    let mut speeds: Vec<f64> = known.iter().flatten().map(|line| line.rpm).collect();
     speeds.sort_by(f64::total_cmp);
     // The table holds single precision: speeds that it cannot tell apart are one.
     speeds.dedup_by_key(|rpm| *rpm as f32);
-    Ok(speeds)
+    let lines = families.iter().zip(known);
+    let lines = lines
+        .map(|(family, known)| family.lines_beside(known, &speeds, depth_mm))
+        .collect::<Result<_, _>>()?;
+    Ok((speeds, lines))
 }

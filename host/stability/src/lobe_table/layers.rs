@@ -117,7 +117,22 @@ impl Family {
 
     /// The lines at these speeds; where a percentile was asked for, what it leaves of them.
     pub(super) fn lines(&self, speeds_rpm: &[f64], depth_mm: f64) -> Result<Vec<SpeedLine>, StabilityError> {
-        let lines = chart(self.method.as_ref(), speeds_rpm, depth_mm, 0)?.speeds;
+        self.lines_beside(Vec::new(), speeds_rpm, depth_mm)
+    }
+
+    /// The same, where the method's lines at some of the speeds are known.
+    pub(super) fn lines_beside(
+        &self,
+        known: Vec<SpeedLine>,
+        speeds_rpm: &[f64],
+        depth_mm: f64,
+    ) -> Result<Vec<SpeedLine>, StabilityError> {
+        let is_known = |rpm: &&f64| known.iter().any(|line| line.rpm == **rpm);
+        let (own, missing): (Vec<f64>, Vec<f64>) = speeds_rpm.iter().partition(is_known);
+        let mut lines = chart(self.method.as_ref(), &missing, depth_mm, 0)?.speeds;
+        lines.extend(known.into_iter().filter(|line| own.contains(&line.rpm)));
+        let place = |line: &SpeedLine| speeds_rpm.iter().position(|rpm| *rpm == line.rpm);
+        lines.sort_by_key(place);
         let Some(percent) = self.percentile else {
             return Ok(lines);
         };

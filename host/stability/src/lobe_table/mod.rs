@@ -15,4 +15,6 @@ pub use error::BuildError;
 pub use request::TableRequest;
 
 #[cfg(test)]
+mod accuracy_tests;
+#[cfg(test)]
 mod tests;
