@@ -32,7 +32,7 @@ pub enum DiagnoseError {
         what: String,
     },
     /// No recording is given.
-    #[error("a recording is needed")]
+    #[error("at least one recording is required")]
     NoRecording,
 }
 

@@ -73,7 +73,7 @@ fn answer(
     };
     if missed.nrmse_whole > UNLIKE_SEGMENTS * missed.nrmse_heldout {
         diagnosis.warnings.push(format!(
-            "the parts of the records that are held out miss {:.2} %, the whole records {:.2} %: most of what is wrong lies in what is fitted, and held-out parts tell little of the gain",
+            "prediction error (NRMSE): {:.2} % on held-out segments, {:.2} % overall: most of the residual lies in the fitted segments, so that the held-out gain is of little value",
             100.0 * missed.nrmse_heldout,
             100.0 * missed.nrmse_whole
         ));
@@ -134,7 +134,7 @@ fn answer(
         if let Some(unit) = checks::unit_of_gain(gain) {
             let channel = cause.channel.as_deref().unwrap_or("every channel of motion");
             diagnosis.warnings.push(format!(
-                "{channel} reads {gain:.4} times the truth, and that is about {unit}: are its unit and that of the force right?"
+                "{channel} reads {gain:.4} times the true value, which is about {unit}: check its unit and that of the force"
             ));
         }
     }

@@ -106,7 +106,7 @@ pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<St
         let _ = write!(formula, " {sign} {:.3e}·{}", coefficient.abs(), words(term, name));
     }
     Some(format!(
-        "a guess, no cause: a restoring force of{formula} N (x and v in SI) takes {:.0} % of the residual that it was not fitted to",
+        "a guess and no cause: a restoring force of{formula} N (x and v in SI) explains {:.0} % of the held-out residual energy",
         100.0 * taken
     ))
 }

@@ -70,7 +70,7 @@ pub(crate) fn concluded(
         .iter()
         .map(|record| record.len() as f64 / record.sample_rate_hz);
     diagnosis.warnings.push(format!(
-        "causes were sought in {:.1} s near the start of each record, and what was found was held against the rest",
+        "causes were searched in {:.1} s near the start of each record, and validated on the rest",
         searched_s.fold(0.0, f64::max)
     ));
     let extended = match diagnosis.outcome {

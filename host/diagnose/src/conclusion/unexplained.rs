@@ -40,7 +40,7 @@ fn of_channel(view: &ResidualView) -> String {
         size / view.deviation.max(f64::MIN_POSITIVE)
     );
     if let Some((hz, share)) = peak(view, left) {
-        said += &format!("; most at {hz:.3} Hz");
+        said += &format!("; largest at {hz:.3} Hz");
         if let Some(spindle_motion) = &view.spindle_motion {
             said += &format!(", spindle order {:.2}", 60.0 * hz / spindle_motion.rpm);
         }
@@ -50,10 +50,10 @@ fn of_channel(view: &ResidualView) -> String {
     let loudest = (0..by_stretch.len()).max_by(|a, b| by_stretch[*a].total_cmp(&by_stretch[*b]));
     if let Some(loudest) = loudest {
         let middle = (loudest as f64 + 0.5) * stretch(left) as f64 / view.rate_hz;
-        said += &format!(", loudest at {middle:.2} s");
+        said += &format!(", largest at {middle:.2} s");
     }
     said + &format!(
-        "; {:.0} % of the energy in the quarter of the record that moves most",
+        "; {:.0} % of the energy in the quarter of the record with the largest amplitude",
         100.0 * where_it_moves_most(&by_stretch, &stretches(&view.measured))
     )
 }

@@ -59,13 +59,13 @@ impl RecordedCut {
         let (tool, material, cut) = (case.tool()?, case.material()?, cut_of(case, recording)?);
         let said = recording.sidecar.cut.unwrap_or_default();
         let depth_mm = said.axial_depth_mm.ok_or_else(|| {
-            recording.lacks("axial_depth_mm under [cut] in the .toml beside it, the depth that was cut")
+            recording.lacks("axial_depth_mm under [cut] in its sidecar (.toml), the axial depth of the cut")
         })?;
         if let Some(teeth) = said.teeth.filter(|teeth| *teeth as usize != tool.teeth) {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
-                    "[cut] says {teeth} teeth, the case {}: they are not of the same tool",
+                    "[cut] in the sidecar gives {teeth} teeth, but the case {}: they describe different tools",
                     tool.teeth
                 ),
             ));
@@ -81,7 +81,7 @@ impl RecordedCut {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
-                    "tacho says {:.1} rev/min, the .toml beside it {rpm}: is pulses_per_rev of the tachometer right?",
+                    "the tachometer gives {:.1} rev/min, but the sidecar {rpm}: check pulses_per_rev of the tachometer",
                     spindle_motion.rpm()
                 ),
             ));

@@ -34,7 +34,7 @@ impl SpindleMotion {
     ) -> Result<Self, DiagnoseError> {
         let level = recording.channel("tacho").ok_or_else(|| {
             recording
-                .lacks("tacho, whose rising edges say where the teeth are (a cut cannot be judged without)")
+                .lacks("channel tacho, whose rising edges give the angle of the teeth (a cut cannot be diagnosed without it)")
         })?;
         let tacho = recording.sidecar.channels.get("tacho");
         let per_turn = tacho.and_then(|tacho| tacho.pulses_per_rev).unwrap_or(1);
@@ -45,7 +45,7 @@ impl SpindleMotion {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
-                    "tacho tells of {} whole turns; at least {LEAST_TACHOMETER_EDGES} are needed",
+                    "the tachometer shows {} revolutions; at least {LEAST_TACHOMETER_EDGES} are required",
                     edges_s.len()
                 ),
             ));

@@ -111,11 +111,11 @@ impl Proposal<'_> {
         let distance = squared.sqrt();
         if *squared >= SEPARATING_DISTANCE {
             format!(
-                "separates {one} from {other}: {channel} would differ by {times_noise:.2} times its noise, whatever their parameters are; over the record a distance of {distance:.0} deviations"
+                "separates {one} from {other}: {channel} would differ by {times_noise:.2} times its noise for any of their parameters; over the record this is a distance of {distance:.0} standard deviations"
             )
         } else {
             format!(
-                "of the tests that were thought of none separates {one} from {other} plainly; this one comes nearest, with a distance of {distance:.1} deviations where {:.1} are needed",
+                "no available test separates {one} from {other} reliably; this one comes nearest, with a distance of {distance:.1} standard deviations of the required {:.1}",
                 SEPARATING_DISTANCE.sqrt()
             )
         }

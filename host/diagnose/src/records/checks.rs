@@ -29,20 +29,20 @@ pub(crate) fn record(
             .map(ToString::to_string)
             .collect();
         return wrong(format!(
-            "no channel belongs to a direction of the case ({}): x, vx, ax and the like are needed",
+            "no channel lies in a direction of the case ({}): a channel such as x, vx or ax is required",
             directions.join(", ")
         ));
     }
     let needed_s = baseline.lowest_hz().map_or(0.0, |hertz| LEAST_PERIODS / hertz);
     if count < LEAST_SAMPLES || seconds < needed_s {
         return wrong(format!(
-            "too short: {count} samples, {seconds:.3} s; at least {LEAST_SAMPLES} samples and {needed_s:.3} s ({LEAST_PERIODS} periods of the slowest mode) are needed"
+            "too short: {count} samples, {seconds:.3} s; at least {LEAST_SAMPLES} samples and {needed_s:.3} s ({LEAST_PERIODS} periods of the slowest mode) are required"
         ));
     }
     for channel in &recording.channels {
         if let Some(at) = channel.samples.iter().position(|sample| !sample.is_finite()) {
             return wrong(format!(
-                "{} is no number at {:.6} s; every sample must be one",
+                "{} is not a finite number at {:.6} s; every sample must be finite",
                 channel.name,
                 recording.time_s(at)
             ));
@@ -113,7 +113,7 @@ pub(crate) fn unit(
     Err(DiagnoseError::record(
         path,
         format!(
-            "{name} is {factor:.4e} times what the case predicts, though of the same shape: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
+            "{name} is {factor:.4e} times the prediction of the case, with the same waveform: its unit, that of the force, or the case is wrong; give units in the header as name [unit].{}",
             said(likely)
         ),
     ))
@@ -150,7 +150,7 @@ pub(crate) fn far_off(
     Err(DiagnoseError::record(
         path,
         format!(
-            "{name} is {factor:.1e} times as large as what the case predicts: no machine is that far from its model; its unit, that of what drives it, or the case is wrong; give units in the header as name [unit].{}",
+            "{name} is {factor:.1e} times the prediction of the case, more than any machine differs from its model: its unit, that of its excitation, or the case is wrong; give units in the header as name [unit].{}",
             said(likely(factor))
         ),
     ))

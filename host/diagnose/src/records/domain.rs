@@ -52,25 +52,25 @@ impl Domain {
             if !has(Quantity::Force) {
                 return Err(recording
                     .lacks(
-                        "channel of force, such as fx [N]: driven by motion, that is what the case predicts",
+                        "channel of force, such as fx [N]: under an imposed motion, the case predicts the force",
                     )
                     .into());
             }
             return Ok(Self::Force);
         }
         match kind {
-        Some(Kind::Idle) => Err(DiagnoseError::record(
-            &recording.path,
-            "an idle record has nothing that drives the structure as far as the case knows: shaker, step-sine, sweep, \
+            Some(Kind::Idle) => Err(DiagnoseError::record(
+                &recording.path,
+                "an idle record has nothing that drives the structure as far as the case knows: shaker, step-sine, sweep, \
              hammer, free-decay and cutting are diagnosed",
-        )),
-        Some(Kind::FreeDecay) => Ok(Self::Response),
-        _ if has(Quantity::Force) => Ok(Self::Response),
-        _ => Err(recording
-            .lacks(
-                "channel of the force that drove it, such as fx [N] (only kind = \"free-decay\" needs none)",
-            )
-            .into()),
-    }
+            )),
+            Some(Kind::FreeDecay) => Ok(Self::Response),
+            _ if has(Quantity::Force) => Ok(Self::Response),
+            _ => Err(recording
+                .lacks(
+                    "channel of the exciting force, such as fx [N] (only kind = \"free-decay\" needs none)",
+                )
+                .into()),
+        }
     }
 }

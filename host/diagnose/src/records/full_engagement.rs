@@ -55,13 +55,13 @@ pub(crate) fn in_full_engagement<'a>(
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
-                    "is in air, or the tool on its way in or out, but for {turns:.1} turns from {from_s:.3} s on; at least \
-                     {LEAST_ENGAGED_REVOLUTIONS} turns in full cut are needed"
+                    "contains only {turns:.1} revolutions of full engagement (from {from_s:.3} s); at least \
+                     {LEAST_ENGAGED_REVOLUTIONS} are required"
                 ),
             ));
         }
         said.push(format!(
-            "{}: in full cut from {from_s:.3} to {to_s:.3} s, and diagnosed there; the rest is air, or the tool on its way in or out",
+            "{}: full engagement from {from_s:.3} to {to_s:.3} s is diagnosed; the rest is air, entry or exit of the tool",
             recording.path.display()
         ));
         shortened.to_mut()[index] = recording.part(range);
@@ -374,7 +374,7 @@ mod tests {
             let recordings = std::slice::from_ref(&recording);
             let diagnosis = diagnose(case, recordings, &Options::default()).unwrap();
             let said = &diagnosis.warnings[0];
-            assert!(said.starts_with("cut.csv: in full cut from 1.9"), "{said}");
+            assert!(said.starts_with("cut.csv: full engagement from 1.9"), "{said}");
             diagnosis
         };
         assert_eq!(asked(&cut).outcome, Outcome::None);
@@ -396,9 +396,6 @@ mod tests {
         let recording = recorded(&case, short, &[Quantity::Displacement], 0.005);
         let error = diagnose(&case, &[recording], &Options::default()).unwrap_err();
         let said = error.to_string();
-        assert!(
-            said.ends_with("at least 8 turns in full cut are needed"),
-            "{said}"
-        );
+        assert!(said.ends_with("at least 8 are required"), "{said}");
     }
 }

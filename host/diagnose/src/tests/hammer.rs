@@ -42,7 +42,7 @@ fn a_right_case_is_right() {
     let diagnosis = asked(&[]);
     assert_eq!(diagnosis.outcome, Outcome::None, "{:?}", diagnosis.causes);
     let said = diagnosis.warnings.last().unwrap();
-    assert!(said.starts_with("causes were sought in 16.0 s"), "{said}");
+    assert!(said.starts_with("causes were searched in 16.0 s"), "{said}");
 }
 
 #[test]

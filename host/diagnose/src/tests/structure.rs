@@ -211,7 +211,7 @@ fn of_what_no_cause_explains_a_formula_is_guessed() {
     let answer = diagnose(&believed(), &records, &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Unexplained, "{:?}", answer.causes);
     let guess = answer.unexplained.guess.unwrap();
-    assert!(guess.starts_with("a guess, no cause: "), "{guess}");
+    assert!(guess.starts_with("a guess and no cause: "), "{guess}");
     // The first term is the largest: its number and its words.
     let (number, words) = guess
         .split_once("force of + ")
