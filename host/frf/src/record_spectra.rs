@@ -8,7 +8,8 @@ use realfft::RealFftPlanner;
 
 use super::FrfError;
 use super::driven::Driven;
-use super::measurement::{Excitation, MeasurementSettings};
+use super::excitation::Excitation;
+use super::measurement_settings::MeasurementSettings;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Recording};
 

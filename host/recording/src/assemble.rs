@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{Channel, Quantity, Raw, RawColumn, Recording, RecordingError, Sensitivity, Sidecar, Unit};
+use super::raw::{Raw, RawColumn};
+use super::{Channel, Quantity, Recording, RecordingError, Sensitivity, Sidecar, Unit};
 
 /// How far a time stamp may be from even sampling, in sample intervals: stamps are often printed with few digits.
 const UNEVEN: f64 = 0.25;

@@ -7,7 +7,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::{Quantity, Raw, RawColumn, Recording, RecordingError};
+use super::raw::{Raw, RawColumn};
+use super::{Quantity, Recording, RecordingError};
 use crate::file::FileError;
 
 /// Significant digits of written numbers: what a 32-bit float holds, and more than any 16-bit sensor.

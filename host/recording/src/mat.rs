@@ -15,7 +15,8 @@ use std::path::Path;
 
 use flate2::bufread::ZlibDecoder;
 
-use super::{Raw, RawColumn, RecordingError};
+use super::RecordingError;
+use super::raw::{Raw, RawColumn};
 use crate::file::FileError;
 
 /// Bytes of the file header.

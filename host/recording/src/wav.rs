@@ -6,7 +6,8 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use super::{Raw, RawColumn, RecordingError};
+use super::RecordingError;
+use super::raw::{Raw, RawColumn};
 use crate::file::FileError;
 
 pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
+use super::cutting::{Cutting, Regeneration};
 use super::passage::Spans;
 use super::surface::{Surface, TAKEN_AT};
-use super::{Cutting, Regeneration};
 use quietcut_model::cutter::{Immersion, Tooth};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{Quartic, at};

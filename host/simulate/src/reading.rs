@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::effect::Pickup;
-use super::integrator::{Motion, Room, Segment};
+use super::segment::{Motion, Room, Segment};
 use quietcut_recording::Quantity;
 
 /// The samples of one channel, as a motion is computed.

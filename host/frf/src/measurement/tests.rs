@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::true_damping;
-use quietcut_recording::{Channel, Quantity, Sidecar};
+use crate::{HammerWindows, Window, true_damping};
+use quietcut_recording::{Channel, Kind, Quantity, Sidecar};
 
 const RATE: f64 = 512.0;
 

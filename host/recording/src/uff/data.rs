@@ -4,10 +4,10 @@ use std::io::BufRead;
 
 use num_complex::Complex;
 
+use super::fault::{Fault, fault};
 use super::header::{Binary, Header};
 use super::number;
 use super::source::{Source, SourceError};
-use super::{Fault, fault};
 
 /// Values to make room for before any has been read: what a damaged count may cost at most.
 const TRUSTED: usize = 1 << 16;

@@ -5,6 +5,7 @@
 //! several data sets in a file, units by data set 164, a missing last mark. Other data sets are passed over.
 
 mod data;
+mod fault;
 mod header;
 mod number;
 mod source;
@@ -21,12 +22,14 @@ pub use units::unit;
 pub use write::UffForm;
 pub use write::{Values, axis_of, write_set, write_units};
 
+use fault::{Fault, fault};
 use header::{Binary, RECORDS};
-use source::{Line, Source, SourceError};
+use source::{Line, Source};
 use units::FileUnits;
 use write::{exponential, header_of};
 
-use super::{Quantity, Raw, RawColumn, Recording, RecordingError};
+use super::raw::{Raw, RawColumn};
+use super::{Quantity, Recording, RecordingError};
 use crate::file::FileError;
 
 /// A data set 58.
@@ -42,45 +45,6 @@ pub struct DataSet {
     pub ordinate: Ordinate,
     /// The units of the file.
     pub units: FileUnits,
-}
-
-/// What is wrong with a file.
-#[derive(Debug)]
-enum Fault {
-    Io(std::io::Error),
-    Line { line: u64, what: String },
-}
-
-fn fault(line: u64, what: String) -> Fault {
-    Fault::Line { line, what }
-}
-
-impl From<SourceError> for Fault {
-    fn from(error: SourceError) -> Self {
-        match error {
-            SourceError::Io(error) => Self::Io(error),
-            SourceError::Ends { found } => Self::Io(std::io::Error::new(
-                std::io::ErrorKind::UnexpectedEof,
-                format!("the file ends {found} bytes after the last line"),
-            )),
-        }
-    }
-}
-
-impl Fault {
-    fn of_file(self, path: &Path) -> RecordingError {
-        match self {
-            Self::Io(cause) => RecordingError::File(FileError::Read {
-                path: path.into(),
-                cause,
-            }),
-            Self::Line { line, what } => RecordingError::Line {
-                path: path.into(),
-                line,
-                what,
-            },
-        }
-    }
 }
 
 /// All data sets 58 of a file, in order; there is at least one.

@@ -1,0 +1,72 @@
+//! Spectra of a record that goes on: noise, cuts and sweeps.
+
+use crate::cross_spectra::{CrossSpectra, Segments, averaged, smoothed};
+use crate::driven::Driven;
+use crate::error::FrfError;
+use crate::excitation::Excitation;
+use crate::measurement_settings::{MeasurementSettings, band};
+use crate::window::fast_length;
+
+/// Spectra of a record that goes on, at the lines of the band.
+pub(super) fn steady(
+    excitation: Excitation,
+    driven: &Driven<'_>,
+    members: &[Driven<'_>],
+    settings: &MeasurementSettings,
+) -> Result<CrossSpectra, FrfError> {
+    let rate = driven.recording.sample_rate_hz;
+    let samples = members
+        .iter()
+        .map(|member| member.recording.len())
+        .min()
+        .unwrap_or(0);
+    let forces = driven.forces.len();
+    let too_short = |needed: usize| FrfError::Content {
+        path: driven.recording.path.clone(),
+        what: format!(
+            "{samples} samples ({:.3} s), but a resolution of {} Hz needs {needed}",
+            samples as f64 / rate,
+            settings.resolution_hz.unwrap_or_default()
+        ),
+    };
+    if excitation == Excitation::Sweep {
+        let length = fast_length(driven.recording.len());
+        let width = match settings.resolution_hz {
+            Some(hertz) => (hertz * length as f64 / rate).round() as usize,
+            None => LINES_PER_FORCE * forces,
+        };
+        if width == 0 {
+            return Err(too_short((rate / settings.resolution_hz.unwrap_or(1.0)) as usize));
+        }
+        let band = band(settings, rate, length);
+        return Ok(smoothed(&driven.signals(), rate, TAPER, width, band));
+    }
+    let length = match settings.resolution_hz {
+        Some(hertz) => (rate / hertz).round() as usize,
+        None => 2 * samples / (SEGMENTS_PER_FORCE * forces + 1),
+    };
+    let length = fast_length(length);
+    if length > samples || length < 16 {
+        return Err(too_short(length));
+    }
+    let segments = Segments::overlapping(
+        settings.window.weights(length),
+        settings.overlap,
+        driven.recording.len(),
+    );
+    Ok(averaged(
+        &driven.signals(),
+        rate,
+        &segments,
+        band(settings, rate, length),
+    ))
+}
+
+/// Segments for each force where nothing is asked for.
+const SEGMENTS_PER_FORCE: usize = 8;
+
+/// Lines of a whole record that are averaged for each force where nothing is asked for.
+const LINES_PER_FORCE: usize = 8;
+
+/// Part of a swept record over which its ends are tapered: what rings on at the ends leaks less.
+const TAPER: f64 = 0.01;

@@ -1,0 +1,100 @@
+//! Receptances of a step-sine test: one phasor for each step.
+
+use super::part::{Measured, Part, receptances};
+use crate::driven::Driven;
+use crate::error::FrfError;
+use crate::estimate::Line;
+use crate::measurement_settings::MeasurementSettings;
+use crate::step_sine::{self, Level};
+
+/// One phasor for each step.
+pub(super) fn stepped(
+    mut part: Part,
+    members: &[Driven<'_>],
+    settings: &MeasurementSettings,
+    mut warnings: Vec<String>,
+) -> Result<Measured, FrfError> {
+    let first = &members[0];
+    if let [_, second, ..] = members {
+        return Err(FrfError::Content {
+            path: second.recording.path.clone(),
+            what:
+                "two step-sine tests of the same force; measure them one by one, as their frequencies differ"
+                    .into(),
+        });
+    }
+    let steps = level(first, settings.force_n)?.steps;
+    let unsettled: Vec<String> = steps
+        .iter()
+        .filter(|step| !step.is_settled)
+        .map(|step| format!("{:.3}", step.frequency_hz))
+        .collect();
+    if !unsettled.is_empty() {
+        warnings.push(format!(
+            "the response had not settled at {} Hz; stay longer at each frequency",
+            unsettled.join(", ")
+        ));
+    }
+    let (least, most) = steps
+        .iter()
+        .fold((f64::INFINITY, 0.0_f64), |(least, most), step| {
+            (least.min(step.force_n), most.max(step.force_n))
+        });
+    if most > SAME_FORCE * least {
+        warnings.push(format!(
+            "the force goes from {least:.3} to {most:.3} N: the FRF of a nonlinear structure is another for each"
+        ));
+    }
+    let (low, high) = settings.band_hz.unwrap_or((0.0, f64::INFINITY));
+    let lines: Vec<Line> = steps
+        .iter()
+        .filter(|step| (low..=high).contains(&step.frequency_hz))
+        .map(|step| {
+            let mut line = Line {
+                frequency_hz: step.frequency_hz,
+                h: crate::small_matrix::ZERO,
+                coherence: [0.0; 3],
+                deviation: [[0.0; 3]; 3],
+                singular: (1.0, 1.0),
+            };
+            for p in 0..step.h.len() {
+                line.h[p][0] = step.h[p];
+                line.coherence[p] = step.coherence[p];
+                line.deviation[p][0] = step.deviation[p];
+            }
+            line
+        })
+        .collect();
+    part.averages = 1.0;
+    Ok(receptances(part, &lines, first, warnings))
+}
+
+/// The level of a step-sine test that is meant.
+fn level(driven: &Driven<'_>, force_n: Option<f64>) -> Result<Level, FrfError> {
+    let mut levels = step_sine::levels(driven)?;
+    let all: Vec<String> = levels
+        .iter()
+        .map(|level| format!("{:.4}", level.force_n))
+        .collect();
+    let off = |level: &Level, wanted: f64| (level.force_n / wanted).ln().abs();
+    let found = match force_n {
+        None if levels.len() == 1 => Some(0),
+        None => None,
+        Some(wanted) => (0..levels.len())
+            .min_by(|&a, &b| off(&levels[a], wanted).total_cmp(&off(&levels[b], wanted)))
+            .filter(|&index| off(&levels[index], wanted) < SAME_FORCE.ln()),
+    };
+    match found {
+        Some(index) => Ok(levels.swap_remove(index)),
+        None => Err(FrfError::Content {
+            path: driven.recording.path.clone(),
+            what: format!(
+                "a step-sine test at {} N; say by --force-n which of these is meant",
+                all.join(", ")
+            ),
+        }),
+    }
+}
+
+/// Ratio of forces that count as one level.
+const SAME_FORCE: f64 = 1.2;

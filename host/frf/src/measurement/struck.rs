@@ -1,0 +1,81 @@
+//! Spectra of the blows of a hammer.
+
+use super::part::Part;
+use crate::cross_spectra::{CrossSpectra, Segments, averaged};
+use crate::driven::Driven;
+use crate::error::FrfError;
+use crate::hammer::{self, Blow};
+use crate::measurement_settings::{MeasurementSettings, band};
+
+/// Spectra of blows.
+pub(super) fn struck(
+    part: &mut Part,
+    members: &[Driven<'_>],
+    settings: &MeasurementSettings,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<CrossSpectra>, FrfError> {
+    let mut windows = settings.hammer;
+    if windows.segment_s.is_none() {
+        windows.segment_s = settings.resolution_hz.map(|hertz| 1.0 / hertz);
+    }
+    let mut cuts = members
+        .iter()
+        .map(|driven| hammer::segments(driven, windows))
+        .collect::<Result<Vec<_>, _>>()?;
+    let rate = members[0].recording.sample_rate_hz;
+    let length = cuts.iter().map(|cut| cut.length).min().unwrap_or(0);
+    if cuts.iter().any(|cut| cut.length != length) {
+        // All records at the lines of the one with the shortest segments.
+        windows.segment_s = Some(length as f64 / rate);
+        cuts = members
+            .iter()
+            .map(|driven| hammer::segments(driven, windows))
+            .collect::<Result<Vec<_>, _>>()?;
+    }
+    let (mut used, mut double) = (Vec::new(), Vec::new());
+    let mut left_over = 0.0_f64;
+    let spectra = cuts
+        .into_iter()
+        .map(|cut| {
+            let segments = Segments {
+                weights: vec![1.0; cut.length],
+                starts: (0..cut.used.len()).map(|blow| blow * cut.length).collect(),
+                without_mean: false,
+                averages: cut.used.len() as f64,
+            };
+            let signals: Vec<&[f64]> = cut.signals.iter().map(Vec::as_slice).collect();
+            let spectra = averaged(&signals, rate, &segments, band(settings, rate, cut.length));
+            used.extend(cut.used);
+            double.extend(cut.double);
+            left_over = left_over.max(cut.left_over);
+            spectra
+        })
+        .collect();
+    if !double.is_empty() {
+        let times: Vec<String> = double
+            .iter()
+            .map(|blow: &Blow| format!("{:.3}", blow.time_s))
+            .collect();
+        warnings.push(format!("double blows are left out: at {} s", times.join(", ")));
+    }
+    if used.len() < 3 {
+        warnings.push(format!("{} blows: coherence and errors say little", used.len()));
+    }
+    if left_over > LEFT_OVER {
+        warnings.push(format!(
+            "the response still is {:.0} % of its peak where segments end, which biases resonances; longer segments or an exponential window help",
+            100.0 * left_over
+        ));
+    }
+    if let Some(tau) = windows.exponential_s {
+        warnings.push(format!(
+            "the exponential window adds {:.4} 1/s to the decay of every mode: take 1/(τω) off identified damping ratios",
+            1.0 / tau
+        ));
+    }
+    part.blows = Some((used, double));
+    Ok(spectra)
+}
+
+/// Part of the peak that may be left where segments end: twice as much, as a part of a resonance, is its bias.
+const LEFT_OVER: f64 = 0.02;

@@ -1,0 +1,67 @@
+//! Lines at which the forces drove, and drove independently.
+
+use super::part::Part;
+use crate::cross_spectra::CrossSpectra;
+use crate::estimate::{DEPENDENT, Line, Shape};
+
+/// Leaves out the lines at which a sweep did not drive.
+pub(super) fn keep_driven(lines: &mut Vec<Line>, spectra: &[CrossSpectra], shape: Shape) {
+    let power = |line: usize| -> f64 {
+        let forces = (0..shape.forces).map(|force| {
+            spectra
+                .iter()
+                .map(|test| test.at(line, force, force).re)
+                .sum::<f64>()
+        });
+        forces.sum()
+    };
+    let frequency_hz = spectra.first().map_or(&[][..], |test| &test.frequency_hz);
+    let largest = (0..frequency_hz.len()).map(power).fold(0.0, f64::max);
+    let is_driven = |line: &Line| {
+        let at = frequency_hz.partition_point(|&hertz| hertz < line.frequency_hz);
+        at < frequency_hz.len() && power(at) > DRIVEN * largest
+    };
+    lines.retain(is_driven);
+}
+
+/// Part of the largest power of the force below which a sweep is not there: shakers lose up to a hundredth of it at
+/// resonances.
+const DRIVEN: f64 = 1e-3;
+
+/// Leaves out the lines at which the forces depend on each other.
+pub(super) fn independent(lines: &mut Vec<Line>, part: &mut Part, shape: Shape) -> Result<(), String> {
+    let count = lines.len();
+    let dependent: Vec<Line> = lines
+        .iter()
+        .filter(|line| line.singular.0 < DEPENDENT)
+        .copied()
+        .collect();
+    let names: Vec<String> = part
+        .forces
+        .iter()
+        .map(|direction| format!("f{direction}"))
+        .collect();
+    if count == 0 || dependent.len() * 2 > count {
+        let example = dependent.first().map_or_else(String::new, |line| {
+            format!(
+                " At {:.2} Hz the smallest singular value of the forces is {:.1e}; {DEPENDENT} is needed.",
+                line.frequency_hz, line.singular.0
+            )
+        });
+        return Err(format!(
+            "{} drive no independent motion at {} of {count} frequencies.{example} Take porous material, tests of other \
+             immersions as well, or drive one direction at a time",
+            names.join(", "),
+            dependent.len()
+        ));
+    }
+    lines.retain(|line| line.singular.0 >= DEPENDENT);
+    part.left_out_hz = dependent.iter().map(|line| line.frequency_hz).collect();
+    if shape.forces > 1 {
+        part.least_singular = lines
+            .iter()
+            .map(|line| line.singular.0)
+            .fold(f64::INFINITY, f64::min);
+    }
+    Ok(())
+}
