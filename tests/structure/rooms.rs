@@ -42,6 +42,22 @@ const ROOMS: &[(&str, &[&str])] = &[
             "lib",
         ],
     ),
+    (
+        "quietcut-identify",
+        &[
+            "least_squares",
+            "student",
+            "modes",
+            "dwells",
+            "nonlinear",
+            "cutting",
+            "robot",
+            "ambient",
+            "case_file",
+            "plan",
+            "lib",
+        ],
+    ),
 ];
 
 /// The room of a file: its first folder, or its own name.
