@@ -13,7 +13,7 @@ use crate::file;
 use crate::report::lobe_chart::{Column, lobe_chart};
 use crate::report::marks::Mark;
 use crate::report::page::{figure, page};
-use crate::stability::{Chart, Label, LimitSpread, Method, Point, SpeedLine, Uncertainty, chart};
+use crate::stability::{Chart, CutStability, Label, LimitSpread, Method, SpeedLine, Uncertainty, chart};
 use crate::trial_cuts::{self, Calls, TestCut};
 
 /// Stability limits over speed, or the dominant multiplier at points.
@@ -65,7 +65,7 @@ pub struct Args {
 struct Points {
     #[serde(flatten)]
     label: Label,
-    points: Vec<Point>,
+    points: Vec<CutStability>,
 }
 
 /// Runs the verb.

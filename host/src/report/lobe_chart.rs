@@ -6,7 +6,7 @@ use plotters::style::{Color, RGBColor};
 use quietcut_core::lobes::{self, LobeTable};
 use quietcut_core::units::{Millimeters, Rpm};
 
-pub use crate::stability::Kind as LimitKind;
+pub use crate::stability::StabilityLoss as LimitKind;
 
 use super::marks::{Mark, draw_marks};
 use super::picture::{Axes, BLUE, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, text};

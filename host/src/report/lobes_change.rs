@@ -90,14 +90,14 @@ fn limits(lobes: &Lobes) -> Vec<String> {
 
 fn limit(
     depth_mm: Option<f64>,
-    kind: Option<crate::stability::Kind>,
+    kind: Option<crate::stability::StabilityLoss>,
     chatter_hz: Option<f64>,
     lobes: &Lobes,
 ) -> String {
     let Some(depth_mm) = depth_mm else {
         return format!("beyond {:.3} mm", lobes.searched_mm);
     };
-    let kind = kind.map_or("", crate::stability::Kind::name);
+    let kind = kind.map_or("", crate::stability::StabilityLoss::name);
     match chatter_hz {
         Some(hertz) => format!("{depth_mm:.3} mm ({kind}, {hertz:.2} Hz)"),
         None => format!("{depth_mm:.3} mm ({kind})"),

@@ -28,7 +28,7 @@ pub use limits::chart::{Chart, Refinement, chart};
 pub use limits::line::line;
 pub use limits::method::{Label, Method};
 pub use limits::plane::{Linearized, Plane};
-pub use limits::point::{Point, point};
+pub use limits::point::{CutStability, point};
 pub use limits::sampling::{Basis, Variable};
 pub use limits::sensitivity::{Sensitivity, Slope, Tangent};
 pub use limits::speed_line::{Limit, SpeedLine, Switch};
@@ -47,7 +47,7 @@ pub use problem::linear::{CubicTerms, Problem};
 pub use problem::pitched::Pitched;
 pub use process::treatment::needs_orbit;
 pub use process::wear_and_drift::after;
-pub use spectrum::stability_loss::Kind;
+pub use spectrum::stability_loss::StabilityLoss;
 pub use spectrum::verdict::Verdict;
 
 #[cfg(test)]

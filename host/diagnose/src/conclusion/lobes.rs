@@ -9,8 +9,8 @@ use quietcut_recording::{Kind as RecordKind, Recording};
 use quietcut_stability::orbit::{ForcedProblem, collocation_of};
 use quietcut_stability::trial_cuts::{Call, Calls, TestCut, call, calls};
 use quietcut_stability::{
-    CubicTerms, Kind, Limit, Method, Pitched, SpeedLine, StabilityError, after, chart, default_speeds,
-    needs_orbit, spaced,
+    CubicTerms, Limit, Method, Pitched, SpeedLine, StabilityError, StabilityLoss, after, chart,
+    default_speeds, needs_orbit, spaced,
 };
 
 /// Number of speeds of a chart.
@@ -46,9 +46,9 @@ pub struct Change {
     /// Spindle speed, rev/min.
     pub at_rpm: f64,
     /// Type of the stability loss of the case.
-    pub kind_before: Option<Kind>,
+    pub kind_before: Option<StabilityLoss>,
     /// Type of the stability loss of the extended case.
-    pub kind_after: Option<Kind>,
+    pub kind_after: Option<StabilityLoss>,
     /// Chatter frequency of the case, Hz.
     pub chatter_before_hz: Option<f64>,
     /// Chatter frequency of the extended case, Hz.

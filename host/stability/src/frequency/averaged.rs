@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::FrequencyProblem;
 use crate::error::StabilityError;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_numerics::complex_eigenvalues;
 
 /// u = H (κ α₀ − β₀) u with the averages α₀ (times K_tc) and β₀ = β_e + β_f over a tooth period.
@@ -131,7 +131,7 @@ impl OpenLoop for AveragedLoop<'_> {
         Some(RealEnd {
             omega: 0.0,
             loci: real.map(|locus| locus.re).collect(),
-            kind: Kind::Fold,
+            kind: StabilityLoss::Fold,
         })
     }
 

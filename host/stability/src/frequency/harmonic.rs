@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
 
-use super::limits::{Limit, limits};
+use super::limits::{AxisCrossing, limits};
 use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::{FrequencyProblem, Resonance};
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::Harmonic;
 use quietcut_numerics::complex_eigenvalues;
 use quietcut_numerics::eigenvalues;
@@ -73,7 +73,7 @@ impl<'a> HarmonicLoop<'a> {
     }
 
     /// The limits with every second line of a table, none where they cannot be had; `None` without a table.
-    pub(crate) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<Limit>> {
+    pub(crate) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<AxisCrossing>> {
         let problem = self.problem.thinned()?;
         let thinned = HarmonicLoop {
             problem: &problem,
@@ -213,7 +213,7 @@ impl<'a> HarmonicLoop<'a> {
 
 impl HarmonicLoop<'_> {
     /// The frequency, Hz, of the largest displacement in the vibration at a limit.
-    pub(crate) fn chatter_hz(&self, limit: &Limit) -> Option<f64> {
+    pub(crate) fn chatter_hz(&self, limit: &AxisCrossing) -> Option<f64> {
         let s = Complex64::new(0.0, limit.omega);
         self.vibration_hz(s, limit.depth_m)
     }
@@ -278,7 +278,7 @@ impl OpenLoop for HarmonicLoop<'_> {
             omega: 0.5 * self.passing,
             // κ/w is 2 there.
             loci: self.flips()?.into_iter().map(|value| 2.0 * value).collect(),
-            kind: Kind::Flip,
+            kind: StabilityLoss::Flip,
         })
     }
 

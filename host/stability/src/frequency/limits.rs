@@ -9,20 +9,20 @@ use super::open_loop::OpenLoop;
 use crate::criteria::LEAST_ERROR;
 use crate::error::StabilityError;
 use crate::limits::speed_line::{SpeedLine, Switch};
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Distance from an end where loci are real, as a share of the frequency beside it, at which their direction is read.
 const BESIDE: f64 = 1e-5;
 
 /// A root on the imaginary axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Limit {
+pub(crate) struct AxisCrossing {
     /// Depth, m.
     pub(crate) depth_m: f64,
     /// The root is iω; rad/s.
     pub(crate) omega: f64,
     /// How it crosses.
-    pub(crate) kind: Kind,
+    pub(crate) kind: StabilityLoss,
     /// True where it becomes unstable with growing depth.
     pub(crate) outward: bool,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Limit {
 /// All crossings up to a depth, m, by depth.
 ///
 /// `None` where receptances are infinite or nothing finite comes out.
-pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Limit>> {
+pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<AxisCrossing>> {
     let floor = depth_m.recip();
     let mut grid = open_loop.grid(floor)?;
     let real_end = open_loop.real_end();
@@ -53,7 +53,7 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Limi
             let near = loci
                 .iter()
                 .min_by(|p, q| (*p - value).norm().total_cmp(&(*q - value).norm()))?;
-            limits.push(Limit {
+            limits.push(AxisCrossing {
                 depth_m: value.recip(),
                 omega: end.omega,
                 kind: end.kind,
@@ -67,10 +67,10 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Limi
     limits.extend(
         crossings(&loci, &samples, floor)?
             .into_iter()
-            .map(|crossing| Limit {
+            .map(|crossing| AxisCrossing {
                 depth_m: crossing.value.recip(),
                 omega: crossing.omega,
-                kind: Kind::Hopf,
+                kind: StabilityLoss::Hopf,
                 // 1 − wλκ/w turns the other way round than the locus.
                 outward: !crossing.rises,
             }),
@@ -106,7 +106,7 @@ const SAME: f64 = 0.1;
 
 /// An estimate of the error of a limit, m: what other computations change (with every second line of a table, with another number
 /// of harmonics), and what has been checked against other methods. `None` where one of them has no such limit.
-fn error_m(limit: &Limit, others: &[Vec<Limit>]) -> Option<f64> {
+fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
     others.iter().try_fold(LEAST_ERROR * limit.depth_m, |sum, other| {
         let changes = other
             .iter()
@@ -126,9 +126,9 @@ pub(crate) fn speed_line(
     open_loop: &impl OpenLoop,
     rpm: f64,
     depth_mm: f64,
-    limits: &[Limit],
-    others: &[Vec<Limit>],
-    chatter_hz: impl Fn(&Limit) -> Option<f64>,
+    limits: &[AxisCrossing],
+    others: &[Vec<AxisCrossing>],
+    chatter_hz: impl Fn(&AxisCrossing) -> Option<f64>,
 ) -> Result<SpeedLine, StabilityError> {
     let outside = outside_at_no_depth(open_loop).ok_or(StabilityError::BrokeDown {
         rpm,
@@ -164,6 +164,6 @@ pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
 }
 
 /// ω as Hz.
-pub(crate) fn hertz(limit: &Limit) -> Option<f64> {
+pub(crate) fn hertz(limit: &AxisCrossing) -> Option<f64> {
     Some(limit.omega / TAU)
 }

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::problem::{FrequencyProblem, Resonance};
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Where all loci are real or in conjugate pairs: multipliers cross there alone.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub(crate) struct RealEnd {
     /// The real loci there, 1/m.
     pub(crate) loci: Vec<f64>,
     /// What crosses: fold at 0, flip at the other.
-    pub(crate) kind: Kind,
+    pub(crate) kind: StabilityLoss,
 }
 
 /// The loop that the cut closes around the structure, opened at the regenerative force.

@@ -9,8 +9,8 @@ use super::open_loop::OpenLoop;
 use super::problem::FrequencyProblem;
 use crate::criteria::LEAST_ERROR;
 use crate::error::StabilityError;
-use crate::limits::point::Point;
-use crate::spectrum::stability_loss::Kind;
+use crate::limits::point::CutStability;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Where the lines are laid along which roots are looked for: real parts as multiples of the slowest decay of a resonance.
 const LINES: [f64; 14] = [
@@ -176,7 +176,7 @@ pub(crate) fn averaged_point(
     rpm: f64,
     depth_mm: f64,
     open_loop: impl Fn(&FrequencyProblem) -> AveragedLoop<'_>,
-) -> Result<Point, StabilityError> {
+) -> Result<CutStability, StabilityError> {
     let at = |problem: &FrequencyProblem| rightmost(&open_loop(problem), depth_mm * 1e-3);
     let root = at(problem).ok_or(StabilityError::BrokeDown {
         rpm,
@@ -192,7 +192,11 @@ pub(crate) fn averaged_point(
     };
     let chatter_hz = root.im.abs() / std::f64::consts::TAU;
     problem.check_band(Some(chatter_hz), rpm, depth_mm)?;
-    let kind = if root.im == 0.0 { Kind::Fold } else { Kind::Hopf };
+    let kind = if root.im == 0.0 {
+        StabilityLoss::Fold
+    } else {
+        StabilityLoss::Hopf
+    };
     Ok(point_of(
         rpm,
         depth_mm,
@@ -209,10 +213,10 @@ pub(crate) fn point_of(
     depth_mm: f64,
     multiplier: Complex64,
     error: f64,
-    kind: Kind,
+    kind: StabilityLoss,
     chatter_hz: Option<f64>,
-) -> Point {
+) -> CutStability {
     let error = error + LEAST_ERROR * multiplier.norm().max(1.0);
-    let point = Point::new(rpm, depth_mm, multiplier, error, chatter_hz);
-    Point { kind, ..point }
+    let point = CutStability::new(rpm, depth_mm, multiplier, error, chatter_hz);
+    CutStability { kind, ..point }
 }

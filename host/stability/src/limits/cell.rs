@@ -1,6 +1,6 @@
 //! The dominant multiplier of one cell of a chart.
 
-use super::point::Point;
+use super::point::CutStability;
 use crate::criteria::LEAST_ERROR;
 use crate::spectrum::verdict::Verdict;
 
@@ -30,8 +30,8 @@ impl Cell {
     }
 }
 
-impl From<&Point> for Cell {
-    fn from(point: &Point) -> Self {
+impl From<&CutStability> for Cell {
+    fn from(point: &CutStability) -> Self {
         Self {
             multiplier_abs: point.multiplier_abs,
             error: point.error,

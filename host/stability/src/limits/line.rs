@@ -11,7 +11,7 @@ use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::collocated::Collocated;
 use crate::spectrum::crossing::Crossing;
 use crate::spectrum::root::Root;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// How often an interval of depths is halved where its multipliers cannot be followed from end to end.
 const LEVELS: u32 = 12;
@@ -101,13 +101,13 @@ impl Sample {
         self.roots
             .iter()
             .filter(|root| root.excess() > 0.0)
-            .map(|root| Kind::of(root.multiplier).count())
+            .map(|root| StabilityLoss::of(root.multiplier).count())
             .sum()
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Found {
+struct DirectedCrossing {
     crossing: Crossing,
     outward: bool,
 }
@@ -115,7 +115,7 @@ struct Found {
 struct Scan<S> {
     rpm: f64,
     spectrum: S,
-    crossings: Vec<Found>,
+    crossings: Vec<DirectedCrossing>,
 }
 
 impl<S: Spectrum> Scan<S> {
@@ -163,7 +163,12 @@ impl<S: Spectrum> Scan<S> {
     }
 
     /// The crossings between two samples, by depth.
-    fn between(&mut self, low: &Sample, high: &Sample, level: u32) -> Result<Vec<Found>, StabilityError> {
+    fn between(
+        &mut self,
+        low: &Sample,
+        high: &Sample,
+        level: u32,
+    ) -> Result<Vec<DirectedCrossing>, StabilityError> {
         if let Some(found) = self.follow(low, high)
             && balance(&found) == high.outside() - low.outside()
         {
@@ -180,7 +185,7 @@ impl<S: Spectrum> Scan<S> {
 
     /// Follows each multiplier near the circle from end to end; `None` where one cannot be followed or may touch the
     /// circle in between.
-    fn follow(&mut self, low: &Sample, high: &Sample) -> Option<Vec<Found>> {
+    fn follow(&mut self, low: &Sample, high: &Sample) -> Option<Vec<DirectedCrossing>> {
         let step_m = high.depth_m - low.depth_m;
         let mut free: Vec<Root> = high.roots.clone();
         let mut found = Vec::new();
@@ -200,7 +205,7 @@ impl<S: Spectrum> Scan<S> {
         Some(found)
     }
 
-    fn cross(&mut self, low: &Sample, high: &Sample, from: &Root, to: &Root) -> Option<Found> {
+    fn cross(&mut self, low: &Sample, high: &Sample, from: &Root, to: &Root) -> Option<DirectedCrossing> {
         let share = from.excess() / (from.excess() - to.excess());
         let guess = Crossing {
             depth_m: low.depth_m + share * (high.depth_m - low.depth_m),
@@ -209,14 +214,14 @@ impl<S: Spectrum> Scan<S> {
         let crossing = self.spectrum.crossing_near(guess, low.depth_m, high.depth_m)?;
         // The multiplier found must lie on this branch, not on another that crosses nearby.
         let distance = (crossing.multiplier - guess.multiplier).norm();
-        (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(Found {
+        (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(DirectedCrossing {
             crossing,
             outward: to.excess() > 0.0,
         })
     }
 
     /// Halves on the number outside: for an interval so short that nothing else is worth while.
-    fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<Found>, StabilityError> {
+    fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<DirectedCrossing>, StabilityError> {
         let (mut low, mut high) = (low.clone(), high.clone());
         if low.outside() == high.outside() {
             return Ok(Vec::new());
@@ -237,7 +242,7 @@ impl<S: Spectrum> Scan<S> {
             .filter(|root| root.excess() > 0.0)
             .min_by(|a, b| a.excess().total_cmp(&b.excess()))
             .ok_or_else(|| self.broke_down(high.depth_m, "a multiplier was lost while halving"))?;
-        Ok(vec![Found {
+        Ok(vec![DirectedCrossing {
             crossing: Crossing {
                 depth_m: 0.5 * (low.depth_m + high.depth_m),
                 multiplier: crossed.multiplier / crossed.multiplier.norm(),
@@ -250,10 +255,10 @@ impl<S: Spectrum> Scan<S> {
         let crossings = std::mem::take(&mut self.crossings);
         let switches = crossings
             .iter()
-            .map(|Found { crossing, outward }| Switch {
+            .map(|DirectedCrossing { crossing, outward }| Switch {
                 depth_mm: crossing.depth_m * 1e3,
                 error_mm: Some(1e3 * self.error_m(crossing, *outward, depth_mm * 1e-3)),
-                kind: Kind::of(crossing.multiplier),
+                kind: StabilityLoss::of(crossing.multiplier),
                 gain: !outward,
                 chatter_hz: self.spectrum.chatter_hz(crossing),
             })
@@ -299,11 +304,11 @@ impl<S: Spectrum> Scan<S> {
 }
 
 /// By how many the number outside changes.
-fn balance(found: &[Found]) -> i32 {
+fn balance(found: &[DirectedCrossing]) -> i32 {
     found
         .iter()
         .map(|found| {
-            let count = Kind::of(found.crossing.multiplier).count();
+            let count = StabilityLoss::of(found.crossing.multiplier).count();
             if found.outward { count } else { -count }
         })
         .sum()

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cell::Cell;
-use super::point::Point;
+use super::point::CutStability;
 use super::speed_line::SpeedLine;
 use crate::error::StabilityError;
 
@@ -33,7 +33,7 @@ pub trait Method: Sync {
     ///
     /// # Errors
     /// Speed not positive, depth negative, or a computation that leaves the range of numbers.
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError>;
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError>;
 
     /// All crossings of the unit circle from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where
     /// needed.

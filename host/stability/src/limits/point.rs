@@ -11,7 +11,7 @@ use crate::problem::period::{Period, Resolution, check_length};
 use crate::spectrum::characteristic::Characteristic;
 use crate::spectrum::chatter_frequency::chatter_hz;
 use crate::spectrum::period_map;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 use crate::spectrum::verdict::Verdict;
 use crate::spectrum::winding::{self, Search};
 
@@ -23,7 +23,7 @@ const KAPPA_MAX: f64 = 20.0;
 
 /// What is known of one working point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Point {
+pub struct CutStability {
     /// Spindle speed, rev/min.
     pub rpm: f64,
     /// Axial depth, mm.
@@ -39,12 +39,12 @@ pub struct Point {
     /// What follows; unstable also where it is certain that this multiplier lies outside and a larger one is not excluded.
     pub verdict: Verdict,
     /// How the dominant multiplier leaves, or would leave, the unit circle.
-    pub kind: Kind,
+    pub kind: StabilityLoss,
     /// Frequency of the motion that belongs to the dominant multiplier, Hz.
     pub chatter_hz: Option<f64>,
 }
 
-impl Point {
+impl CutStability {
     /// A point from its dominant multiplier, either one of a pair, and the error of it: size, verdict and kind follow.
     pub(crate) fn new(
         rpm: f64,
@@ -62,7 +62,7 @@ impl Point {
             multiplier_abs,
             error,
             verdict: Verdict::of(multiplier_abs, error),
-            kind: Kind::of(multiplier),
+            kind: StabilityLoss::of(multiplier),
             chatter_hz,
         }
     }
@@ -76,7 +76,7 @@ fn as_pair<S: serde::Serializer>(value: &Complex64, serializer: S) -> Result<S::
 ///
 /// # Errors
 /// Speed not positive, depth negative, or a computation that leaves the range of numbers.
-pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
     check_speed(rpm)?;
     check_depth(depth_mm)?;
     check_length(problem, rpm, depth_mm)?;
@@ -104,8 +104,8 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<Point, Stabil
         })?;
     let multiplier = Complex64::new(found.multiplier.re, found.multiplier.im.abs());
     let chatter_hz = chatter_hz(problem, rpm, &found.period, multiplier, depth_m);
-    let point = Point::new(rpm, depth_mm, multiplier, found.error, chatter_hz);
-    Ok(Point {
+    let point = CutStability::new(rpm, depth_mm, multiplier, found.error, chatter_hz);
+    Ok(CutStability {
         verdict: found.verdict.unwrap_or(point.verdict),
         ..point
     })

@@ -5,7 +5,7 @@
 //!   lᵀΦ_κ r [(1 − 1/μ) dw + (w/μ) i dθ] + lᵀΦ_p r dp − iμ lᵀr dθ = 0,
 //!
 //! two real equations for dw and dθ; at a flip μ stays −1 and the first alone is left. lᵀ dΦ r = ∫ yᵀ dG x dt is a
-//! quadrature over the motion and its adjoint, [`Eigenmotion`].
+//! quadrature over the motion and its adjoint, [`FloquetMode`].
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -13,8 +13,8 @@ use num_complex::Complex64;
 use super::speed_line::Switch;
 use crate::error::StabilityError;
 use crate::problem::linear::Problem;
-use crate::spectrum::floquet_mode::{Eigenmotion, Node};
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::floquet_mode::{FloquetMode, Node};
+use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::{ToothForce, TurningVector};
 use quietcut_model::structure::{FirstOrder, ModalPart};
 
@@ -125,7 +125,7 @@ pub struct Sensitivity<'a> {
     kappa: Complex64,
     depth_m: f64,
     multiplier: Complex64,
-    motion: Eigenmotion,
+    motion: FloquetMode,
     /// lᵀΦ_κ r, 1/m.
     by_kappa: Complex64,
 }
@@ -142,9 +142,9 @@ impl<'a> Sensitivity<'a> {
             what: "no motion belongs to this limit",
         };
         let multiplier = match (switch.kind, switch.chatter_hz) {
-            (Kind::Flip, _) => -Complex64::ONE,
+            (StabilityLoss::Flip, _) => -Complex64::ONE,
             // ω τ is the angle of the multiplier, up to whole turns.
-            (Kind::Hopf, Some(hz)) => {
+            (StabilityLoss::Hopf, Some(hz)) => {
                 let angle = std::f64::consts::TAU * (hz * problem.tooth_period_s(rpm)).fract();
                 Complex64::new(angle.cos(), angle.sin().abs())
             }
@@ -155,7 +155,7 @@ impl<'a> Sensitivity<'a> {
     }
 
     fn of_crossing(problem: &'a Problem, rpm: f64, depth_m: f64, multiplier: Complex64) -> Option<Self> {
-        let motion = Eigenmotion::new(problem, rpm, depth_m, multiplier)?;
+        let motion = FloquetMode::new(problem, rpm, depth_m, multiplier)?;
         let mut sensitivity = Self {
             problem,
             seconds_per_radian: problem.tooth_period_s(rpm) / problem.process.engagement.pitch,

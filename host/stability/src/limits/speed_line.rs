@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::spread::LimitSpread;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// A crossing of the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -14,7 +14,7 @@ pub struct Switch {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
     /// How the multiplier crosses.
-    pub kind: Kind,
+    pub kind: StabilityLoss,
     /// True where it goes inside: stability is gained (if no other is outside).
     pub gain: bool,
     /// Frequency of the vibration that is born or dies there, Hz.
@@ -30,7 +30,7 @@ pub struct Limit {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
     /// How.
-    pub kind: Kind,
+    pub kind: StabilityLoss,
     /// Chatter frequency, Hz.
     pub chatter_hz: Option<f64>,
 }

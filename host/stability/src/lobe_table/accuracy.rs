@@ -6,7 +6,7 @@ use quietcut_core::working_point::WorkingPoint;
 
 use super::encoding::towards;
 use super::entries::{Entry, surely_stable, unstable, with_all_of};
-use super::layers::{Family, Span};
+use super::layers::{CheckedLayers, Family};
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
 
@@ -99,7 +99,7 @@ impl Miss {
 /// The method's own lines at several speeds inside every gap between the speeds of a table, in every layer and half way between
 /// layers.
 pub(super) struct Checks<'a> {
-    spans: &'a [Span],
+    spans: &'a [CheckedLayers],
     speeds: &'a [f64],
     depth_mm: f64,
     /// By span and gap, by ascending speed.
@@ -108,7 +108,11 @@ pub(super) struct Checks<'a> {
 
 impl<'a> Checks<'a> {
     /// Checks at two speeds per gap, or more where the gap is wide.
-    pub(super) fn new(spans: &'a [Span], speeds: &'a [f64], depth_mm: f64) -> Result<Self, StabilityError> {
+    pub(super) fn new(
+        spans: &'a [CheckedLayers],
+        speeds: &'a [f64],
+        depth_mm: f64,
+    ) -> Result<Self, StabilityError> {
         let places: Vec<Vec<f64>> = speeds
             .windows(2)
             .zip(OFFSETS.iter().cycle())

@@ -4,7 +4,7 @@ use quietcut_core::lobes::{Interval, Kind as TableKind, format::MAX_INTERVALS};
 use quietcut_core::units::{Hertz, Millimeters};
 
 use crate::limits::speed_line::SpeedLine;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Depths that are not stable, with their ends in full precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,10 +111,10 @@ fn limited(mut entries: Vec<Entry>) -> Vec<Entry> {
     entries
 }
 
-fn table_kind(kind: Kind) -> TableKind {
+fn table_kind(kind: StabilityLoss) -> TableKind {
     match kind {
-        Kind::Hopf => TableKind::Hopf,
-        Kind::Flip => TableKind::Flip,
-        Kind::Fold => TableKind::Fold,
+        StabilityLoss::Hopf => TableKind::Hopf,
+        StabilityLoss::Flip => TableKind::Flip,
+        StabilityLoss::Fold => TableKind::Fold,
     }
 }

@@ -206,23 +206,23 @@ fn depends_on_feed(case: &Case) -> bool {
 }
 
 /// A place where a table is checked: a layer, or half way between two that lookups interpolate between.
-pub(super) struct Span {
+pub(super) struct CheckedLayers {
     pub(super) family: Family,
     /// Index of the layer, or of both.
     pub(super) layers: Vec<usize>,
 }
 
 /// All layers, and the middles of all pairs of neighbours in feed or in feed direction.
-pub(super) fn spans(families: &[Family]) -> Result<Vec<Span>, BuildError> {
+pub(super) fn spans(families: &[Family]) -> Result<Vec<CheckedLayers>, BuildError> {
     let mut spans = Vec::new();
     for (index, family) in families.iter().enumerate() {
-        spans.push(Span {
+        spans.push(CheckedLayers {
             family: family.at(family.feed_mm(), family.direction_deg)?,
             layers: vec![index],
         });
         if let Some(next) = nearest(families, index, |other| other.feeds_beyond(family)) {
             let feed_mm = 0.5 * (family.feed_mm() + families[next].feed_mm());
-            spans.push(Span {
+            spans.push(CheckedLayers {
                 family: family.at(feed_mm, family.direction_deg)?,
                 layers: vec![index, next],
             });
@@ -230,7 +230,7 @@ pub(super) fn spans(families: &[Family]) -> Result<Vec<Span>, BuildError> {
         if let Some(next) = nearest(families, index, |other| other.turned_from(family)) {
             let turn = families[next].turned_from(family).unwrap_or(0.0);
             let degrees = family.direction_deg.map(|degrees| degrees + 0.5 * turn);
-            spans.push(Span {
+            spans.push(CheckedLayers {
                 family: family.at(family.feed_mm(), degrees)?,
                 layers: vec![index, next],
             });

@@ -5,7 +5,7 @@ use crate::limits::cell::Cell;
 use crate::limits::cells::cells_of;
 use crate::limits::line::line;
 use crate::limits::method::Method;
-use crate::limits::point::{Point, point};
+use crate::limits::point::{CutStability, point};
 use crate::limits::speed_line::SpeedLine;
 use crate::problem::linear::Problem;
 use crate::problem::period::check_length;
@@ -23,7 +23,7 @@ impl Method for Collocation {
         "collocation"
     }
 
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         point(&self.problem, rpm, depth_mm)
     }
 

@@ -8,7 +8,7 @@ use crate::error::StabilityError;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::line::line_of;
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::problem::pitched::Pitched;
 use crate::spectrum::krylov::Dominant;
@@ -105,7 +105,7 @@ impl<D: Discretization> Method for Discretized<D> {
     }
 
     /// The multiplier is that of the steps asked for; its error is told from twice and four times as many.
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         let (multiplier, chatter_hz) = with_dominant(self, rpm, depth_mm, self.steps, |dominant, map| {
@@ -116,7 +116,7 @@ impl<D: Discretization> Method for Discretized<D> {
             Some((multiplier, chatter_hz))
         })?;
         let error = self.error(rpm, depth_mm, multiplier)?;
-        Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
+        Ok(CutStability::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
     /// Limits are those of the steps asked for, their errors those of the multipliers there.

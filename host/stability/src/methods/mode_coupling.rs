@@ -7,7 +7,7 @@ use crate::frequency::problem::FrequencyProblem;
 use crate::frequency::root;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 
 /// Mode coupling by the eigenvalues of the equations of motion, with the cut as a constant stiffness.
@@ -54,7 +54,7 @@ impl Method for ModeCoupling {
         Some("regeneration and flips: mode coupling alone, no delay, averaged coefficients")
     }
 
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, depth_mm)?;

@@ -5,14 +5,14 @@ use num_complex::Complex64;
 use crate::error::StabilityError;
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::harmonic::HarmonicLoop;
-use crate::frequency::limits::{Limit, limits, speed_line};
+use crate::frequency::limits::{AxisCrossing, limits, speed_line};
 use crate::frequency::problem::FrequencyProblem;
 use crate::frequency::root::{point_of, polish, rightmost};
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// Largest relative change of a limit with twice the harmonics at which they are enough. What is left out then falls by
 /// four or more with each doubling: the limits with twice the harmonics are right to a third of it.
@@ -75,12 +75,12 @@ impl MultiFrequency {
     }
 }
 
-type Settled<'a> = (HarmonicLoop<'a>, Vec<Limit>, Vec<Limit>);
+type Settled<'a> = (HarmonicLoop<'a>, Vec<AxisCrossing>, Vec<AxisCrossing>);
 
 /// The largest relative change from one list of limits to another; `None` where they are not the same limits.
-fn largest_change(coarse: &[Limit], fine: &[Limit], depth_m: f64) -> Option<f64> {
+fn largest_change(coarse: &[AxisCrossing], fine: &[AxisCrossing], depth_m: f64) -> Option<f64> {
     // Near the last depth a limit may come or go.
-    let inside = |limits: &[Limit]| -> Vec<Limit> {
+    let inside = |limits: &[AxisCrossing]| -> Vec<AxisCrossing> {
         let within = limits
             .iter()
             .filter(|limit| limit.depth_m < (1.0 - LIMIT_SETTLED) * depth_m);
@@ -93,7 +93,7 @@ fn largest_change(coarse: &[Limit], fine: &[Limit], depth_m: f64) -> Option<f64>
     let mut free = fine;
     let mut largest = 0.0_f64;
     for limit in coarse {
-        let change = |other: &Limit| (other.depth_m / limit.depth_m - 1.0).abs();
+        let change = |other: &AxisCrossing| (other.depth_m / limit.depth_m - 1.0).abs();
         let (index, nearest) = free
             .iter()
             .enumerate()
@@ -115,7 +115,7 @@ impl Method for MultiFrequency {
     }
 
     /// The error is what changes with twice the harmonics; the multiplier is that with twice the harmonics.
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, depth_mm)?;
@@ -164,7 +164,7 @@ impl MultiFrequency {
         depth_mm: f64,
         root: Complex64,
         change: f64,
-    ) -> Result<Point, StabilityError> {
+    ) -> Result<CutStability, StabilityError> {
         let delay_s = self.problem.tooth_period_s(rpm);
         let depth_m = depth_mm * 1e-3;
         let multiplier = (root * delay_s).exp();
@@ -186,7 +186,7 @@ impl MultiFrequency {
         };
         let chatter_hz = open_loop.vibration_hz(root, depth_m);
         self.problem.check_band(chatter_hz, rpm, depth_mm)?;
-        let kind = Kind::of(multiplier);
+        let kind = StabilityLoss::of(multiplier);
         Ok(point_of(
             rpm,
             depth_mm,

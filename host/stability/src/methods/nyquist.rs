@@ -4,13 +4,15 @@ use super::multi_frequency::MultiFrequency;
 use crate::error::StabilityError;
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::harmonic::HarmonicLoop;
-use crate::frequency::limits::{Limit, hertz, limits, outside_at_no_depth, speed_line, unstable_roots};
+use crate::frequency::limits::{
+    AxisCrossing, hertz, limits, outside_at_no_depth, speed_line, unstable_roots,
+};
 use crate::frequency::open_loop::OpenLoop;
 use crate::frequency::problem::FrequencyProblem;
 use crate::frequency::root;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 
 /// The generalized Nyquist criterion (MacFarlane & Postlethwaite) on modelled or measured receptances.
@@ -59,7 +61,11 @@ impl Nyquist {
 }
 
 /// The limits, with the number of unstable roots between them counted.
-fn confirmed(open_loop: &impl OpenLoop, rpm: f64, depth_mm: f64) -> Result<Vec<Limit>, StabilityError> {
+fn confirmed(
+    open_loop: &impl OpenLoop,
+    rpm: f64,
+    depth_mm: f64,
+) -> Result<Vec<AxisCrossing>, StabilityError> {
     let broke_down = |depth_m: f64, what| StabilityError::BrokeDown {
         rpm,
         depth_mm: depth_m * 1e3,
@@ -97,7 +103,7 @@ impl Method for Nyquist {
         (self.harmonics == 0).then_some("flips: averaged coefficients")
     }
 
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, depth_mm)?;
@@ -124,7 +130,7 @@ impl Method for Nyquist {
             let thinned = thinned
                 .iter()
                 .map(|problem| limits(&AveragedLoop::new(problem, Some(rpm)), depth_mm * 1e-3));
-            let others: Vec<Vec<Limit>> = thinned.map(Option::unwrap_or_default).collect();
+            let others: Vec<Vec<AxisCrossing>> = thinned.map(Option::unwrap_or_default).collect();
             return speed_line(&open_loop, rpm, depth_mm, &found, &others, hertz);
         }
         let open_loop = self.periodic(rpm);

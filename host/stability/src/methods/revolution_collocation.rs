@@ -9,7 +9,7 @@ use crate::error::StabilityError;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::line::line_of;
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::problem::pitched::Pitched;
 use crate::problem::revolution::Revolution;
@@ -33,7 +33,7 @@ impl Method for RevolutionCollocation {
         "collocation over the revolution"
     }
 
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         let depth_m = depth_mm * 1e-3;
@@ -60,7 +60,7 @@ impl Method for RevolutionCollocation {
             .vector(multiplier)
             .and_then(|vector| fine.chatter_hz(multiplier, &vector));
         let error = error(coarse, multiplier);
-        Ok(Point::new(rpm, depth_mm, multiplier, error, chatter_hz))
+        Ok(CutStability::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {

@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use num_complex::Complex64;
 
 use crate::problem::exponential::Exponential;
-use crate::problem::passages::{Coefficients, Passages};
 use crate::problem::pitched::Pitched;
-use crate::spectrum::chatter_frequency::loudest_hz;
+use crate::problem::tooth_passages::{Coefficients, ToothPassages};
+use crate::spectrum::chatter_frequency::dominant_frequency_hz;
 use crate::spectrum::krylov::LinearMap;
 use crate::spectrum::map_spectrum::PeriodMap;
 
@@ -29,13 +29,13 @@ const GAUSS: [(f64, f64); 3] = [
 pub(crate) struct Mesh {
     /// From 0 to the period, s.
     pub(crate) times_s: Vec<f64>,
-    pub(crate) passages: Passages,
+    pub(crate) passages: ToothPassages,
 }
 
 impl Mesh {
     /// About `steps` steps in each tooth period, at least one between two switches.
     pub(crate) fn new(pitched: &Pitched, rpm: f64, steps: usize) -> Self {
-        let passages = Passages::new(pitched, rpm);
+        let passages = ToothPassages::new(pitched, rpm);
         let shortest_s = passages
             .list
             .iter()
@@ -238,7 +238,7 @@ impl PeriodMap for Stepped<'_> {
             },
         );
         let (_, trace) = self.trace(&parts);
-        loudest_hz(
+        dominant_frequency_hz(
             &self.pitched.problem,
             self.depth_m,
             self.mesh.passages.period_s,

@@ -7,16 +7,16 @@ use rayon::prelude::*;
 
 use crate::error::StabilityError;
 use crate::frequency::averaged::AveragedLoop;
-use crate::frequency::limits::{Limit, hertz, speed_line};
+use crate::frequency::limits::{AxisCrossing, hertz, speed_line};
 use crate::frequency::loci::{Mark, Sample, Step, solve_steps, trace, zero};
 use crate::frequency::open_loop::OpenLoop;
 use crate::frequency::problem::FrequencyProblem;
 use crate::frequency::root;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// How straight loci must be between two frequencies: a tenth of what following them needs, so that the phase between two is
 /// monotone but for touching lobes.
@@ -78,7 +78,7 @@ impl Zoa {
                     what: "receptances are not finite",
                 })
         };
-        let others: Vec<Vec<Limit>> = others
+        let others: Vec<Vec<AxisCrossing>> = others
             .iter()
             .map(|(zoa, samples)| find(zoa, samples))
             .collect::<Result<_, _>>()?;
@@ -87,7 +87,7 @@ impl Zoa {
     }
 
     /// All limits at a delay, s, up to a depth, m.
-    fn limits(&self, samples: &[Sample], delay_s: f64, depth_m: f64) -> Option<Vec<Limit>> {
+    fn limits(&self, samples: &[Sample], delay_s: f64, depth_m: f64) -> Option<Vec<AxisCrossing>> {
         let open_loop = AveragedLoop::new(&self.problem, None);
         let loci = |omega: f64| open_loop.eigenvalues(Complex64::new(0.0, omega), 0.0);
         let mut limits = solve_steps(&loci, samples, &|[(low, from), (high, to)]: Step| {
@@ -118,10 +118,10 @@ impl Zoa {
                 let inverse = value.inv();
                 let limit_m = inverse.norm_sqr() / (2.0 * inverse.re);
                 if inverse.re > 0.0 && limit_m <= depth_m {
-                    limits.push(Limit {
+                    limits.push(AxisCrossing {
                         depth_m: limit_m,
                         omega,
-                        kind: Kind::Hopf,
+                        kind: StabilityLoss::Hopf,
                         outward: end > start,
                     });
                 }
@@ -147,7 +147,7 @@ impl Method for Zoa {
         Some("flips: averaged coefficients")
     }
 
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         AveragedLoop::check_reach(&self.problem, depth_mm)?;

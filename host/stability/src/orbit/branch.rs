@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use crate::limits::speed_line::{Limit, SpeedLine, Switch, union};
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// A point on a branch.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -27,7 +27,7 @@ pub struct Event {
     /// An estimate of its error, mm: within it |μ| is as near to 1 as the error of the multiplier.
     pub error_mm: f64,
     /// How it crosses; a fold is where the branch turns back in depth. With unequal teeth with respect to the revolution.
-    pub kind: Kind,
+    pub kind: StabilityLoss,
     /// True where the number outside falls along the branch.
     pub gain: bool,
     /// The multiplier there.

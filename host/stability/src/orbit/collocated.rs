@@ -1,10 +1,10 @@
-//! A piece of a period without a switch, collocated about the states at its nodes.
+//! A subinterval of a period without a switch, collocated about the states at its nodes.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::problem::gauss::Gauss;
 
-/// A piece after a step of Newton from its start.
+/// A subinterval after a step of Newton from its start.
 pub(super) struct Advanced {
     /// The states at the nodes, n × m.
     pub(super) states: DMatrix<f64>,
@@ -18,7 +18,7 @@ pub(super) struct Advanced {
     pub(super) moved: f64,
 }
 
-/// A piece linearized about the states at its nodes.
+/// A subinterval linearized about the states at its nodes.
 pub(super) struct Linearized<'a> {
     gauss: &'a Gauss,
     duration_s: f64,
@@ -53,7 +53,7 @@ impl<'a> Linearized<'a> {
         self.jacobians[0].nrows()
     }
 
-    /// The values at the nodes that a right-hand side makes, (n m) × anything; `None` where the piece is singular.
+    /// The values at the nodes that a right-hand side makes, (n m) × anything; `None` where the subinterval is singular.
     pub(super) fn solve(&self, right: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         self.factored.solve(right)
     }
@@ -69,10 +69,10 @@ impl<'a> Linearized<'a> {
         sum
     }
 
-    /// Newton's step from a start with its derivatives `by`, for the states at the nodes that the piece is linearized about,
+    /// Newton's step from a start with its derivatives `by`, for the states at the nodes that the subinterval is linearized about,
     /// their rates, and what acts on them: the derivatives of the rates beside those through the states, n × anything each.
     ///
-    /// `None` where the piece is singular or the numbers are no longer finite.
+    /// `None` where the subinterval is singular or the numbers are no longer finite.
     pub(super) fn advance(
         &self,
         start: &DVector<f64>,
@@ -118,7 +118,7 @@ impl<'a> Linearized<'a> {
         })
     }
 
-    /// The values at the nodes and the end of the piece, both by its start.
+    /// The values at the nodes and the end of the subinterval, both by its start.
     pub(super) fn flow(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (order, nodes) = (self.order(), self.gauss.nodes.len());
         let start = DMatrix::from_fn(order * nodes, order, |row, column| {

@@ -25,11 +25,11 @@ use crate::criteria::LEAST_ERROR;
 use crate::error::StabilityError;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::process::extension::not_smooth;
 use crate::process::treatment::NOT_SMOOTH;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::Term;
 use quietcut_model::case::Case;
 
@@ -95,7 +95,7 @@ impl Sample {
 
     fn outside(&self) -> i32 {
         let outside = self.roots.iter().filter(|root| root.norm() > 1.0);
-        outside.map(|root| Kind::of(*root).count()).sum()
+        outside.map(|root| StabilityLoss::of(*root).count()).sum()
     }
 
     /// The largest |μ|, less one.
@@ -347,8 +347,8 @@ impl<'a> Follower<'a> {
             .min_by(|a, b| a.norm().total_cmp(&b.norm()))
             .copied()
             .ok_or_else(|| self.broke_down(high.depth_m(), "a multiplier was lost while halving"))?;
-        let chatter_hz = match Kind::of(crossed) {
-            Kind::Fold => None,
+        let chatter_hz = match StabilityLoss::of(crossed) {
+            StabilityLoss::Fold => None,
             _ => self.chatter_hz(outer, crossed),
         };
         let error = self.error(outer, crossed, chatter_hz)?;
@@ -371,7 +371,7 @@ impl<'a> Follower<'a> {
         Ok(Switch {
             depth_mm: 0.5e3 * (low.depth_m() + high.depth_m()),
             error_mm: Some(1e3 * error_m),
-            kind: Kind::of(crossed),
+            kind: StabilityLoss::of(crossed),
             gain,
             chatter_hz,
         })
@@ -421,7 +421,7 @@ impl Method for EquivalentProblem {
 
     /// On the branch of orbits that is reached when the depth grows from 0. The error is the distance to the multiplier with what
     /// a small disturbance feels in place of the equivalent stiffness and damping.
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         let follower = Follower::new(self, rpm);
@@ -438,7 +438,7 @@ impl Method for EquivalentProblem {
         let root = sample.roots.first().copied().unwrap_or_default();
         let chatter_hz = follower.chatter_hz(&sample, root);
         let error = follower.error(&sample, root, chatter_hz)?;
-        Ok(Point::new(rpm, depth_mm, root, error, chatter_hz))
+        Ok(CutStability::new(rpm, depth_mm, root, error, chatter_hz))
     }
 
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {

@@ -13,7 +13,7 @@ use super::periodic_orbit::{Orbit, OrbitError, PeriodMap, Scale, Tangent};
 use super::revolution_period::RevolutionPeriod;
 use super::tooth_period::ToothPeriod;
 use crate::criteria::LEAST_ERROR;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// The longest step, as a share of the last depth (or of the size of the orbit there).
 const STEP_MAX: f64 = 1.0 / 30.0;
@@ -110,10 +110,12 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
 /// How large the state at the start of the period is at a depth, if cubic terms are left out.
 pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
     let rest = Orbit::rest(map);
-    let linear = map.pass(&rest.start, 0.0, &rest.states).and_then(|passage| {
-        let by_depth = passage.by.column(map.size()) * depth_m;
-        passage.periodic().lu().solve(&by_depth)
-    });
+    let linear = map
+        .integrate(&rest.start, 0.0, &rest.states)
+        .and_then(|integration| {
+            let by_depth = integration.by.column(map.size()) * depth_m;
+            integration.periodic().lu().solve(&by_depth)
+        });
     // Without a force the orbit is rest, and any length will do.
     linear
         .map(|state| state.norm())
@@ -142,7 +144,7 @@ impl Sample {
         self.roots
             .iter()
             .filter(|root| root.norm() > 1.0)
-            .map(|root| Kind::of(*root).count())
+            .map(|root| StabilityLoss::of(*root).count())
             .sum()
     }
 }
@@ -304,7 +306,7 @@ impl<M: PeriodMap> Follower<M> {
             (*new, *new_root) = ((middle, excess), root);
         }
         let on_circle = root / root.norm();
-        let kind = Kind::of(root);
+        let kind = StabilityLoss::of(root);
         let event = Event {
             depth_mm: sample.orbit.depth_m * 1e3,
             error_mm: 1e3 * self.error_m(&sample, root).unwrap_or(self.scale.depth_m),
@@ -313,7 +315,7 @@ impl<M: PeriodMap> Follower<M> {
             multiplier: on_circle,
             chatter_hz: match kind {
                 // The orbit jumps to another of the same period.
-                Kind::Fold => None,
+                StabilityLoss::Fold => None,
                 _ => self.map.chatter_hz(&sample.orbit, on_circle),
             },
         };

@@ -3,7 +3,7 @@ use super::follower::*;
 use super::forced::ForcedProblem;
 use super::periodic_orbit::PeriodMap;
 use super::tooth_period::ToothPeriod;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// rev/min of a tooth period of τ in the units of chapter 6.
 fn rpm(tau: f64) -> f64 {
@@ -17,7 +17,7 @@ fn problem(name: &str) -> ForcedProblem {
     ForcedProblem::new(&quietcut_testkit::case(name)).unwrap()
 }
 
-fn first_limit_w(problem: &ForcedProblem, tau: f64) -> (f64, Kind) {
+fn first_limit_w(problem: &ForcedProblem, tau: f64) -> (f64, StabilityLoss) {
     let line = follow_depth(problem, rpm(tau), 15.0, Extent::FirstLoss)
         .unwrap()
         .speed_line();
@@ -29,12 +29,12 @@ fn first_limit_w(problem: &ForcedProblem, tau: f64) -> (f64, Kind) {
 fn limits_of_the_nonlinear_robot_are_those_of_two_other_programs() {
     let full = problem("kuka-kr90-full-cubic");
     for (tau, w, kind) in [
-        (3.13, 0.031_391_631, Kind::Flip),
-        (4.0, 0.059_111_115, Kind::Hopf),
-        (6.0, 0.272_46, Kind::Hopf),
-        (6.4, 0.377_340_698, Kind::Hopf),
-        (6.6, 0.405_89, Kind::Hopf),
-        (6.667, 0.335, Kind::Hopf),
+        (3.13, 0.031_391_631, StabilityLoss::Flip),
+        (4.0, 0.059_111_115, StabilityLoss::Hopf),
+        (6.0, 0.272_46, StabilityLoss::Hopf),
+        (6.4, 0.377_340_698, StabilityLoss::Hopf),
+        (6.6, 0.405_89, StabilityLoss::Hopf),
+        (6.667, 0.335, StabilityLoss::Hopf),
     ] {
         let (ours, our_kind) = first_limit_w(&full, tau);
         // The references hold for tables rounded to four digits, and W_PER_MM has five: 2e-5. The last is printed
@@ -49,7 +49,11 @@ fn limits_of_the_nonlinear_robot_are_those_of_two_other_programs() {
 fn the_first_loss_is_a_fold_of_the_orbit_where_it_turns_back() {
     let full = problem("kuka-kr90-full-cubic");
     for inverse in [0.161, 0.163, 0.165] {
-        assert_eq!(first_limit_w(&full, 1.0 / inverse).1, Kind::Fold, "{inverse}");
+        assert_eq!(
+            first_limit_w(&full, 1.0 / inverse).1,
+            StabilityLoss::Fold,
+            "{inverse}"
+        );
     }
     // There the branch turns back twice, and two stable orbits coexist.
     let branch = follow_depth(&full, rpm(1.0 / 0.165), 15.0, Extent::Whole).unwrap();
@@ -62,10 +66,10 @@ fn the_first_loss_is_a_fold_of_the_orbit_where_it_turns_back() {
 fn stated_errors_of_limits_hold_what_a_mesh_four_times_as_fine_changes() {
     let full = problem("kuka-kr90-full-cubic");
     for (tau, kind) in [
-        (3.13, Kind::Flip),
-        (4.0, Kind::Hopf),
-        (6.4, Kind::Hopf),
-        (1.0 / 0.163, Kind::Fold),
+        (3.13, StabilityLoss::Flip),
+        (4.0, StabilityLoss::Hopf),
+        (6.4, StabilityLoss::Hopf),
+        (1.0 / 0.163, StabilityLoss::Fold),
     ] {
         let first = |map: ToothPeriod<'_>| {
             let follower = Follower::new(map, rpm(tau), 15e-3);

@@ -7,7 +7,7 @@ use super::periodic_orbit::OrbitError;
 use crate::criteria::LEAST_ERROR;
 use crate::error::StabilityError;
 use crate::limits::method::Method;
-use crate::limits::point::Point;
+use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 
 /// Multipliers about the forced orbit at the feed of the case, followed from depth 0.
@@ -26,14 +26,20 @@ impl Method for ForcedProblem {
     }
 
     /// About the orbit that is reached when the depth grows from 0; the error is that of a mesh twice as fine.
-    fn point(&self, rpm: f64, depth_mm: f64) -> Result<Point, StabilityError> {
+    fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         let fail = |cause| broke_down(rpm, depth_mm, cause);
         let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;
         let multiplier = fine.multiplier;
         // The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
         let error =
             (10.0 * (coarse.multiplier - multiplier).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
-        Ok(Point::new(rpm, depth_mm, multiplier, error, fine.chatter_hz))
+        Ok(CutStability::new(
+            rpm,
+            depth_mm,
+            multiplier,
+            error,
+            fine.chatter_hz,
+        ))
     }
 
     /// The branch of orbits is followed with steps of its own; `samples` is not needed.

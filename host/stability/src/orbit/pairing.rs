@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 
 /// How far a multiplier near the circle may move in one step.
 const MOVE_MAX: f64 = 0.12;
@@ -32,7 +32,8 @@ pub(super) fn pair(
             Some((index, &next))
                 if anyhow
                     || ((next - root).norm() < MOVE_MAX * root.norm().max(1.0)
-                        && (Kind::of(root) == Kind::of(next) || is_far(root) && is_far(next))) =>
+                        && (StabilityLoss::of(root) == StabilityLoss::of(next)
+                            || is_far(root) && is_far(next))) =>
             {
                 pairs.push((root, next));
                 free.swap_remove(index);

@@ -37,25 +37,25 @@ pub struct Orbit {
     pub depth_m: f64,
     /// What the map over the period takes: the states of the structure, and behind them what else of the past acts.
     pub start: DVector<f64>,
-    /// For each piece the states at its nodes, n × m.
+    /// For each subinterval the states at its nodes, n × m.
     pub(super) states: Vec<DMatrix<f64>>,
 }
 
 /// Newton's step over the period at a start and a depth: what the equations linearized about the states at the nodes make of it.
-pub(super) struct Passage {
+pub(super) struct PeriodIntegration {
     pub(super) end: DVector<f64>,
     /// ∂end/∂(start, depth); the last column is that of the depth, 1/m.
     pub(super) by: DMatrix<f64>,
-    /// For each piece the states at its nodes.
+    /// For each subinterval the states at its nodes.
     pub(super) states: Vec<DMatrix<f64>>,
-    /// For each piece the derivatives of the states at its nodes, (n m) × those of the end.
+    /// For each subinterval the derivatives of the states at its nodes, (n m) × those of the end.
     pub(super) values: Vec<DMatrix<f64>>,
-    /// The largest change of a state at a node, as a share of the largest in its piece: what the states before were off.
+    /// The largest change of a state at a node, as a share of the largest in its subinterval: what the states before were off.
     pub(super) moved: f64,
 }
 
-impl Passage {
-    /// Before the first piece: a state with `columns` derivatives, the first of them in its own numbers.
+impl PeriodIntegration {
+    /// Before the first subinterval: a state with `columns` derivatives, the first of them in its own numbers.
     pub(super) fn from(start: DVector<f64>, columns: usize) -> Self {
         Self {
             by: DMatrix::identity(start.len(), columns),
@@ -66,13 +66,13 @@ impl Passage {
         }
     }
 
-    /// Goes over a piece.
-    pub(super) fn take(&mut self, piece: Advanced) {
-        self.end = piece.end;
-        self.by = piece.end_by;
-        self.states.push(piece.states);
-        self.values.push(piece.values);
-        self.moved = self.moved.max(piece.moved);
+    /// Goes over a subinterval.
+    pub(super) fn take(&mut self, subinterval: Advanced) {
+        self.end = subinterval.end;
+        self.by = subinterval.end_by;
+        self.states.push(subinterval.states);
+        self.values.push(subinterval.values);
+        self.moved = self.moved.max(subinterval.moved);
     }
 
     /// I − ∂end/∂start: what a periodic start is solved with.
@@ -91,13 +91,13 @@ impl Passage {
 pub(super) struct Tangent {
     /// The unit vector along (start/size, depth/depth size).
     pub(super) along: DVector<f64>,
-    /// For each piece the change of the states at its nodes over a unit of length, n × m.
+    /// For each subinterval the change of the states at its nodes over a unit of length, n × m.
     states: Vec<DMatrix<f64>>,
 }
 
 /// A part of the period without a switch: when, and where its nodes are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Span<'a> {
+pub(super) struct SubintervalNodes<'a> {
     pub(super) start_s: f64,
     pub(super) duration_s: f64,
     pub(super) gauss: &'a Gauss,
@@ -119,12 +119,17 @@ pub(super) trait PeriodMap: Sized {
     /// How many numbers it maps; the first are the states of the structure.
     fn size(&self) -> usize;
 
-    /// The pieces of the period, in order.
-    fn spans(&self) -> Vec<Span<'_>>;
+    /// The subintervals of the period, in order.
+    fn spans(&self) -> Vec<SubintervalNodes<'_>>;
 
     /// The map, with derivatives, linearized about states at the nodes: exact where `guess` holds those of the motion from the start.
-    /// `None` where a piece is singular.
-    fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage>;
+    /// `None` where a subinterval is singular.
+    fn integrate(
+        &self,
+        start: &DVector<f64>,
+        depth_m: f64,
+        guess: &[DMatrix<f64>],
+    ) -> Option<PeriodIntegration>;
 
     /// What the map takes of a motion with a state at the start and with states at the nodes.
     fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64>;
@@ -185,10 +190,12 @@ impl Orbit {
         let depth_mm = depth_m * 1e3;
         let singular = OrbitError::Singular { depth_mm };
         let rest = Self::rest(map);
-        let from_rest = map.pass(&rest.start, depth_m, &rest.states).ok_or(singular)?;
+        let from_rest = map
+            .integrate(&rest.start, depth_m, &rest.states)
+            .ok_or(singular)?;
         let periodic = from_rest.periodic();
         let start = periodic.lu().solve(&from_rest.end).ok_or(singular)?;
-        let around = map.pass(&start, depth_m, &rest.states).ok_or(singular)?;
+        let around = map.integrate(&start, depth_m, &rest.states).ok_or(singular)?;
         Ok(Self {
             depth_m,
             start,
@@ -223,33 +230,33 @@ impl Orbit {
         let mut last = f64::INFINITY;
         for iteration in 0..25 {
             let depth_mm = orbit.depth_m * 1e3;
-            let passage = map
-                .pass(&orbit.start, orbit.depth_m, &orbit.states)
+            let integration = map
+                .integrate(&orbit.start, orbit.depth_m, &orbit.states)
                 .ok_or(OrbitError::NoConvergence { depth_mm })?;
             let mut matrix = DMatrix::zeros(order + 1, order + 1);
             matrix
                 .view_mut((0, 0), (order, order))
-                .copy_from(&passage.periodic());
+                .copy_from(&integration.periodic());
             matrix
                 .view_mut((0, order), (order, 1))
-                .copy_from(&(passage.by.column(order) * (-scale.depth_m / scale.state)));
+                .copy_from(&(integration.by.column(order) * (-scale.depth_m / scale.state)));
             matrix.row_mut(order).copy_from(&normal.transpose());
             let lu = matrix.lu();
             let mut residual = DVector::zeros(order + 1);
             residual
                 .rows_mut(0, order)
-                .copy_from(&((&passage.end - &orbit.start) / scale.state));
+                .copy_from(&((&integration.end - &orbit.start) / scale.state));
             residual[order] = -distance;
             let step = lu.solve(&residual).ok_or(OrbitError::Singular { depth_mm })?;
             let change = scale.unscaled(&step);
             orbit.start += change.rows(0, order);
             orbit.depth_m += change[order];
             distance += normal.dot(&step);
-            orbit.states = passage.states;
-            for (states, values) in orbit.states.iter_mut().zip(&passage.values) {
+            orbit.states = integration.states;
+            for (states, values) in orbit.states.iter_mut().zip(&integration.values) {
                 *states += shaped(values * &change, states.nrows());
             }
-            let size = step.norm().max(passage.moved);
+            let size = step.norm().max(integration.moved);
             if !size.is_finite() || (iteration > 4 && size > 2.0 * last) {
                 return Err(OrbitError::NoConvergence { depth_mm });
             }
@@ -259,7 +266,7 @@ impl Orbit {
                 let tangent = lu.solve(&unit).ok_or(OrbitError::Singular { depth_mm })?;
                 let along = tangent.normalize();
                 let change = scale.unscaled(&along);
-                let states = passage.values.iter().zip(&orbit.states);
+                let states = integration.values.iter().zip(&orbit.states);
                 let states = states.map(|(values, states)| shaped(values * &change, states.nrows()));
                 let states = states.collect();
                 return Ok((orbit, Tangent { along, states }));

@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 
-use super::periodic_orbit::{Orbit, Span};
+use super::periodic_orbit::{Orbit, SubintervalNodes};
 use quietcut_model::Term;
 use quietcut_model::path::{Motion, restoring_along, restoring_from};
 
-/// Samples of a piece of the mesh, over which nothing turns by more than a few radians.
+/// Samples of a subinterval of the mesh, over which nothing turns by more than a few radians.
 const PER_PIECE: usize = 128;
 
 /// The least samples of a period.
@@ -45,8 +45,13 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// From the states at the nodes of the pieces of a period; `seen` gives displacement and velocity by states.
-    pub(super) fn new(spans: &[Span<'_>], orbit: &Orbit, period_s: f64, seen: [&DMatrix<f64>; 2]) -> Self {
+    /// From the states at the nodes of the subintervals of a period; `seen` gives displacement and velocity by states.
+    pub(super) fn new(
+        spans: &[SubintervalNodes<'_>],
+        orbit: &Orbit,
+        period_s: f64,
+        seen: [&DMatrix<f64>; 2],
+    ) -> Self {
         let count = (PER_PIECE * spans.len()).max(LEAST);
         let step_s = period_s / count as f64;
         let (mut x, mut v) = ([(); 3].map(|()| Vec::new()), [(); 3].map(|()| Vec::new()));

@@ -14,9 +14,9 @@ use num_complex::Complex64;
 
 use super::collocated::Linearized;
 use super::forced::{ForcedProblem, Uneven};
-use super::periodic_orbit::{Orbit, Passage, PeriodMap, Span};
-use crate::problem::revolution_mesh::{Fineness, Flight, RevolutionMesh, Source, Stretch};
-use crate::spectrum::chatter_frequency::loudest_hz;
+use super::periodic_orbit::{Orbit, PeriodIntegration, PeriodMap, SubintervalNodes};
+use crate::problem::revolution_mesh::{Fineness, Flight, RevolutionMesh, Source, Subinterval};
+use crate::spectrum::chatter_frequency::dominant_frequency_hz;
 use crate::spectrum::eigenvector::eigenvector;
 use crate::spectrum::period_map;
 
@@ -32,7 +32,7 @@ struct Tooth {
     chip_m: f64,
 }
 
-/// What acts in a stretch.
+/// What acts in a subinterval.
 struct Forces {
     /// Of all nodes, those of one node together.
     teeth: Vec<Tooth>,
@@ -47,7 +47,7 @@ pub(super) struct RevolutionPeriod<'a> {
     rpm: f64,
     depth_m: f64,
     mesh: RevolutionMesh,
-    /// Of each stretch.
+    /// Of each subinterval.
     forces: Vec<Forces>,
 }
 
@@ -69,10 +69,10 @@ impl<'a> RevolutionPeriod<'a> {
         fineness: Fineness,
     ) -> Option<Self> {
         let mesh = RevolutionMesh::new(&uneven.pitched, rpm, depth_m, fineness, Flight::Cut)?;
-        let forces = mesh.stretches.iter();
+        let forces = mesh.subintervals.iter();
         Some(Self {
             forces: forces
-                .map(|stretch| Forces::new(problem, uneven, &mesh, stretch))
+                .map(|subinterval| Forces::new(problem, uneven, &mesh, subinterval))
                 .collect(),
             problem,
             uneven,
@@ -82,17 +82,17 @@ impl<'a> RevolutionPeriod<'a> {
         })
     }
 
-    /// What every port of a stretch sees of the past, ports × 1 and its derivatives, ports × (size + 1).
+    /// What every port of a subinterval sees of the past, ports × 1 and its derivatives, ports × (size + 1).
     fn past(
         &self,
-        stretch: &Stretch,
+        subinterval: &Subinterval,
         start: &DVector<f64>,
         seen: &[(DVector<f64>, DMatrix<f64>)],
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let ports = stretch.pasts.len();
+        let ports = subinterval.pasts.len();
         let mut past = DVector::zeros(ports);
         let mut by = DMatrix::zeros(ports, self.mesh.size + 1);
-        for (port, of) in stretch.pasts.iter().enumerate() {
+        for (port, of) in subinterval.pasts.iter().enumerate() {
             for (node, weight) in of.weights.iter().enumerate() {
                 match of.source {
                     Source::Earlier(first) => {
@@ -100,9 +100,9 @@ impl<'a> RevolutionPeriod<'a> {
                         by[(port, first + node)] += weight;
                     }
                     Source::Own(series) => {
-                        // A delay shorter than a stretch would end in the stretch itself.
-                        let (values, derivatives) = seen.get(series.stretch)?;
-                        let teeth = self.mesh.stretches[series.stretch].cutting.len();
+                        // A delay shorter than a subinterval would end in the subinterval itself.
+                        let (values, derivatives) = seen.get(series.subinterval)?;
+                        let teeth = self.mesh.subintervals[series.subinterval].cutting.len();
                         let row = node * teeth + series.tooth;
                         past[port] += weight * values[row];
                         let mut sum = by.row_mut(port);
@@ -116,15 +116,20 @@ impl<'a> RevolutionPeriod<'a> {
 }
 
 impl Forces {
-    fn new(problem: &ForcedProblem, uneven: &Uneven, mesh: &RevolutionMesh, stretch: &Stretch) -> Self {
+    fn new(
+        problem: &ForcedProblem,
+        uneven: &Uneven,
+        mesh: &RevolutionMesh,
+        subinterval: &Subinterval,
+    ) -> Self {
         let process = &problem.linear.process;
         let passages = &mesh.passages;
-        let mut teeth = Vec::with_capacity(stretch.cutting.len() * stretch.gauss.nodes.len());
+        let mut teeth = Vec::with_capacity(subinterval.cutting.len() * subinterval.gauss.nodes.len());
         let mut damping = Vec::new();
-        for node in &stretch.gauss.nodes {
-            let time_s = stretch.start_s + stretch.duration_s * node;
+        for node in &subinterval.gauss.nodes {
+            let time_s = subinterval.start_s + subinterval.duration_s * node;
             let angle = |passage| passages.angle(&uneven.pitched, passage, time_s);
-            for passage in &stretch.cutting {
+            for passage in &subinterval.cutting {
                 let angle = angle(passage);
                 let normal = process.force.normal.at(angle);
                 teeth.push(Tooth {
@@ -136,7 +141,7 @@ impl Forces {
                     chip_m: normal.x * passage.feed_m + uneven.runout_m[passage.tooth],
                 });
             }
-            let angles = stretch.cutting.iter().map(angle);
+            let angles = subinterval.cutting.iter().map(angle);
             let of_flank = problem.damping_per_depth(angles, passages.rad_per_s);
             damping.extend(of_flank.map(|damping| problem.damped(&damping)));
         }
@@ -264,52 +269,57 @@ impl PeriodMap for RevolutionPeriod<'_> {
         self.mesh.size
     }
 
-    fn spans(&self) -> Vec<Span<'_>> {
-        let stretches = self.mesh.stretches.iter();
-        stretches
-            .map(|stretch| Span {
-                start_s: stretch.start_s,
-                duration_s: stretch.duration_s,
-                gauss: stretch.gauss,
+    fn spans(&self) -> Vec<SubintervalNodes<'_>> {
+        let subintervals = self.mesh.subintervals.iter();
+        subintervals
+            .map(|subinterval| SubintervalNodes {
+                start_s: subinterval.start_s,
+                duration_s: subinterval.duration_s,
+                gauss: subinterval.gauss,
             })
             .collect()
     }
 
-    fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage> {
+    fn integrate(
+        &self,
+        start: &DVector<f64>,
+        depth_m: f64,
+        guess: &[DMatrix<f64>],
+    ) -> Option<PeriodIntegration> {
         let (order, size) = (self.problem.order(), self.mesh.size);
-        let mut passage = Passage::from(start.rows(0, order).into_owned(), size + 1);
+        let mut integration = PeriodIntegration::from(start.rows(0, order).into_owned(), size + 1);
         let mut seen: Vec<(DVector<f64>, DMatrix<f64>)> = Vec::with_capacity(self.forces.len());
-        for ((stretch, forces), states) in self.mesh.stretches.iter().zip(&self.forces).zip(guess) {
-            let (past, past_by) = self.past(stretch, start, &seen)?;
+        for ((subinterval, forces), states) in self.mesh.subintervals.iter().zip(&self.forces).zip(guess) {
+            let (past, past_by) = self.past(subinterval, start, &seen)?;
             let pushes = forces.pushes(self.problem, &past, &past_by, states, depth_m);
             let rates = forces.rates(self.problem, &past, states, depth_m);
             let jacobians = forces.jacobians(self.problem, &past, states, depth_m);
-            let linearized = Linearized::new(stretch.gauss, stretch.duration_s, jacobians);
-            let advanced = linearized.advance(&passage.end, &passage.by, states, &rates, &pushes)?;
+            let linearized = Linearized::new(subinterval.gauss, subinterval.duration_s, jacobians);
+            let advanced = linearized.advance(&integration.end, &integration.by, states, &rates, &pushes)?;
             seen.push(forces.seen(&advanced.states, &advanced.values));
-            passage.take(advanced);
+            integration.take(advanced);
         }
         let mut image = DVector::zeros(size);
         let mut image_by = DMatrix::zeros(size, size + 1);
-        image.rows_mut(0, order).copy_from(&passage.end);
-        image_by.rows_mut(0, order).copy_from(&passage.by);
+        image.rows_mut(0, order).copy_from(&integration.end);
+        image_by.rows_mut(0, order).copy_from(&integration.by);
         for (series, first) in &self.mesh.kept {
-            let stretch = &self.mesh.stretches[series.stretch];
-            let (values, derivatives) = &seen[series.stretch];
-            for node in 0..stretch.gauss.nodes.len() {
-                let row = node * stretch.cutting.len() + series.tooth;
+            let subinterval = &self.mesh.subintervals[series.subinterval];
+            let (values, derivatives) = &seen[series.subinterval];
+            for node in 0..subinterval.gauss.nodes.len() {
+                let row = node * subinterval.cutting.len() + series.tooth;
                 image[first + node] = values[row];
                 image_by.row_mut(first + node).copy_from(&derivatives.row(row));
             }
         }
-        (passage.end, passage.by) = (image, image_by);
-        Some(passage)
+        (integration.end, integration.by) = (image, image_by);
+        Some(integration)
     }
 
     fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64> {
         let mut start = state.resize_vertically(self.mesh.size, 0.0);
         for (series, first) in &self.mesh.kept {
-            let (states, forces) = (&states[series.stretch], &self.forces[series.stretch]);
+            let (states, forces) = (&states[series.subinterval], &self.forces[series.subinterval]);
             for node in 0..states.ncols() {
                 let mut teeth = forces.teeth_at(node, states.ncols());
                 let tooth = teeth.nth(series.tooth);
@@ -321,33 +331,38 @@ impl PeriodMap for RevolutionPeriod<'_> {
     }
 
     fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>> {
-        let passage = self.pass(&orbit.start, orbit.depth_m, &orbit.states)?;
-        period_map::of_matrix(passage.by.columns(0, self.mesh.size).into_owned())
+        let integration = self.integrate(&orbit.start, orbit.depth_m, &orbit.states)?;
+        period_map::of_matrix(integration.by.columns(0, self.mesh.size).into_owned())
     }
 
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64> {
-        let passage = self.pass(&orbit.start, orbit.depth_m, &orbit.states)?;
+        let integration = self.integrate(&orbit.start, orbit.depth_m, &orbit.states)?;
         let (size, order) = (self.mesh.size, self.problem.order());
-        let by_start = passage.by.columns(0, size);
+        let by_start = integration.by.columns(0, size);
         let vector = eigenvector(&by_start.map(Complex64::from), multiplier)?;
         let c = self.problem.linear.structure.c.map(Complex64::from);
         // The displacement at every node, with its time and its weight.
         let mut motion: Vec<(f64, Vector3<Complex64>)> = Vec::new();
-        for (stretch, values) in self.mesh.stretches.iter().zip(&passage.values) {
+        for (subinterval, values) in self.mesh.subintervals.iter().zip(&integration.values) {
             let states = values.columns(0, size).map(Complex64::from) * &vector;
-            for (node, (place, weight)) in stretch.gauss.nodes.iter().zip(&stretch.gauss.weights).enumerate()
+            for (node, (place, weight)) in subinterval
+                .gauss
+                .nodes
+                .iter()
+                .zip(&subinterval.gauss.weights)
+                .enumerate()
             {
                 let displacement = &c * states.rows(node * order, order);
-                let weight = Complex64::from(weight * stretch.duration_s);
+                let weight = Complex64::from(weight * subinterval.duration_s);
                 motion.push((
-                    stretch.start_s + stretch.duration_s * place,
+                    subinterval.start_s + subinterval.duration_s * place,
                     displacement * weight,
                 ));
             }
         }
         let period_s = self.mesh.passages.period_s;
         let linear = &self.problem.linear;
-        loudest_hz(linear, orbit.depth_m, period_s, multiplier, |s| {
+        dominant_frequency_hz(linear, orbit.depth_m, period_s, multiplier, |s| {
             let mut harmonic = Vector3::<Complex64>::zeros();
             for (time_s, displacement) in &motion {
                 harmonic += displacement * (-s * *time_s).exp();

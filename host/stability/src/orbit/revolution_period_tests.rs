@@ -12,7 +12,7 @@ use crate::limits::speed_line::SpeedLine;
 use crate::methods::revolution_collocation::RevolutionCollocation;
 use crate::problem::linear::CubicTerms;
 use crate::problem::pitched::Pitched;
-use crate::spectrum::stability_loss::Kind;
+use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::case::Case;
 use quietcut_simulate::{Regeneration, Settings, VirtualCut};
 use quietcut_testkit::case;
@@ -61,7 +61,9 @@ fn limits_of_equal_teeth_over_the_revolution_are_those_over_the_tooth_period() {
         assert_eq!(tooth.kind, turn.kind);
         match (tooth.chatter_hz, turn.chatter_hz) {
             (Some(tooth_hz), Some(turn_hz)) => assert!((tooth_hz / turn_hz - 1.0).abs() < 1e-6),
-            (tooth_hz, turn_hz) => assert_eq!((tooth_hz, turn_hz, tooth.kind), (None, None, Kind::Fold)),
+            (tooth_hz, turn_hz) => {
+                assert_eq!((tooth_hz, turn_hz, tooth.kind), (None, None, StabilityLoss::Fold))
+            }
         }
     }
     let per_tooth = ForcedProblem::new(&case("kuka-kr90-half-cubic")).unwrap();
@@ -184,11 +186,11 @@ fn linear_structures_with_unequal_pitch_and_chip_laws_with_runout_are_refused() 
 fn image(map: &RevolutionPeriod<'_>, start: &DVector<f64>, depth_m: f64, orbit: &Orbit) -> DVector<f64> {
     let mut states = orbit.states.clone();
     loop {
-        let passage = map.pass(start, depth_m, &states).unwrap();
-        if passage.moved < 1e-13 {
-            return passage.end;
+        let integration = map.integrate(start, depth_m, &states).unwrap();
+        if integration.moved < 1e-13 {
+            return integration.end;
         }
-        states = passage.states;
+        states = integration.states;
     }
 }
 
@@ -200,7 +202,7 @@ fn derivatives_of_the_map_are_those_of_differences() {
     let depth_m = 6e-3;
     let map = RevolutionPeriod::new(&problem, uneven, 550.0, depth_m).unwrap();
     let orbit = orbit_at(&problem, 550.0, 6.0).unwrap();
-    let at = map.pass(&orbit.start, depth_m, &orbit.states).unwrap();
+    let at = map.integrate(&orbit.start, depth_m, &orbit.states).unwrap();
     let size = orbit.start.amax();
     for column in [0, 1, 3, map.size() / 2, map.size() - 1] {
         let step = 1e-5 * size;

@@ -1,13 +1,13 @@
 //! The forced orbit of teeth at equal pitch, over one tooth period: Gauss collocation, Newton with an exact Jacobian.
 //!
-//! On a piece of the period with Gauss nodes c_i, integrals a_ij and weights b_j, of duration h,
+//! On a subinterval of the period with Gauss nodes c_i, integrals a_ij and weights b_j, of duration h,
 //!
 //!   Y_i = x₀ + h Σ_j a_ij f(t_j, Y_j),   x₁ = x₀ + h Σ_j b_j f(t_j, Y_j),
 //!
-//! which has order 2m at the ends. Linearized about values Y, a piece gives Newton's step of its own values and of x₁ in x₀ and in
-//! depth; piece after piece what remains is the map x(0) → x(T) over the period with its exact derivatives. A periodic orbit is
+//! which has order 2m at the ends. Linearized about values Y, a subinterval gives Newton's step of its own values and of x₁ in x₀ and in
+//! depth; subinterval after subinterval what remains is the map x(0) → x(T) over the period with its exact derivatives. A periodic orbit is
 //! its fixed point: on it u = u_τ, and the surface that was cut before does not act.
-//! Pieces end where teeth enter and leave the cut: no switch lies inside one.
+//! Subintervals end where teeth enter and leave the cut: no switch lies inside one.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -16,16 +16,16 @@ use super::forced::ForcedProblem;
 use crate::problem::gauss::Gauss;
 use quietcut_model::structure::FirstOrder;
 
-/// The largest angle, rad, by which the fastest pole turns within a piece.
-const PIECE_ANGLE: f64 = 4.0;
+/// The largest angle, rad, by which the fastest pole turns within a subinterval.
+const SUBINTERVAL_ANGLE: f64 = 4.0;
 
-/// Nodes per piece. With the angle above the local error (m!)² z^{2m+1}/((2m)!(2m+1)!) is 5e-11; halving the angle
+/// Nodes per subinterval. With the angle above the local error (m!)² z^{2m+1}/((2m)!(2m+1)!) is 5e-11; halving the angle
 /// moves the limits of the robot of chapter 6, with cubic terms, by less than 1e-10.
 const NODES: usize = 9;
 
 /// A part of the tooth period without a switch.
 #[derive(Clone, Debug)]
-pub(super) struct Piece {
+pub(super) struct Subinterval {
     /// Phase where it begins, rad.
     pub(super) phase: f64,
     /// Angle by which the tool turns, rad.
@@ -40,35 +40,35 @@ pub(super) struct Piece {
     pub(super) damping: Vec<DMatrix<f64>>,
 }
 
-/// The tooth period at one speed, cut into pieces.
+/// The tooth period at one speed, cut into subintervals.
 #[derive(Clone, Debug)]
 pub(super) struct ToothPeriod<'a> {
     pub(super) problem: &'a ForcedProblem,
     pub(super) rpm: f64,
-    pub(super) piece_angle: f64,
+    pub(super) subinterval_angle: f64,
     pub(super) gauss: Gauss,
-    pub(super) pieces: Vec<Piece>,
+    pub(super) subintervals: Vec<Subinterval>,
 }
 
 impl<'a> ToothPeriod<'a> {
     /// The tooth period of a problem at a speed.
     pub(super) fn new(problem: &'a ForcedProblem, rpm: f64) -> Self {
-        Self::with_pieces(problem, rpm, PIECE_ANGLE)
+        Self::with_subintervals(problem, rpm, SUBINTERVAL_ANGLE)
     }
 
-    /// Another problem of the same cut on the same pieces.
+    /// Another problem of the same cut on the same subintervals.
     pub(super) fn of<'b>(&self, problem: &'b ForcedProblem) -> ToothPeriod<'b> {
         ToothPeriod {
             problem,
             rpm: self.rpm,
-            piece_angle: self.piece_angle,
+            subinterval_angle: self.subinterval_angle,
             gauss: self.gauss.clone(),
-            pieces: self.pieces.clone(),
+            subintervals: self.subintervals.clone(),
         }
     }
 
-    /// In pieces over which nothing turns by more than an angle, rad.
-    pub(super) fn with_pieces(problem: &'a ForcedProblem, rpm: f64, piece_angle: f64) -> Self {
+    /// In subintervals over which nothing turns by more than an angle, rad.
+    pub(super) fn with_subintervals(problem: &'a ForcedProblem, rpm: f64, subinterval_angle: f64) -> Self {
         let linear = &problem.linear;
         let engagement = &linear.process.engagement;
         let seconds_per_radian = linear.tooth_period_s(rpm) / engagement.pitch;
@@ -80,16 +80,16 @@ impl<'a> ToothPeriod<'a> {
             .fold(0.0, f64::max);
         let gauss = Gauss::new(NODES);
         let speed_rad_per_s = problem.speed_rad_per_s(linear.tooth_period_s(rpm));
-        let mut pieces = Vec::new();
+        let mut subintervals = Vec::new();
         for interval in engagement.intervals() {
             let length = interval.to - interval.from;
             // Coefficients turn with twice the angle of the tool.
             let angle = fastest * length * seconds_per_radian + 2.0 * length;
-            let count = (angle / piece_angle).ceil().max(1.0);
+            let count = (angle / subinterval_angle).ceil().max(1.0);
             let turn = length / count;
             for index in 0..count as usize {
                 let phase = interval.from + turn * index as f64;
-                pieces.push(Piece {
+                subintervals.push(Subinterval {
                     phase,
                     turn,
                     duration: turn * seconds_per_radian,
@@ -115,23 +115,23 @@ impl<'a> ToothPeriod<'a> {
         Self {
             problem,
             rpm,
-            piece_angle,
+            subinterval_angle,
             gauss,
-            pieces,
+            subintervals,
         }
     }
 }
 
-/// f(t_j, Y_j) at the nodes of a piece.
+/// f(t_j, Y_j) at the nodes of a subinterval.
 pub(super) fn rates(
     problem: &ForcedProblem,
-    piece: &Piece,
+    subinterval: &Subinterval,
     states: &DMatrix<f64>,
     depth_m: f64,
 ) -> Vec<DVector<f64>> {
     let structure = &problem.linear.structure;
     let modulated = problem.linear.process.axial_depth_modulation;
-    piece
+    subinterval
         .forces
         .iter()
         .enumerate()
@@ -144,7 +144,7 @@ pub(super) fn rates(
             };
             let mut rate = &structure.a * state + &structure.b * (force * (depth_m - axial));
             problem.subtract_smooth(state.as_slice(), &mut rate);
-            if let Some(damping) = piece.damping.get(j) {
+            if let Some(damping) = subinterval.damping.get(j) {
                 rate -= damping * state * depth_m;
             }
             rate
@@ -155,29 +155,29 @@ pub(super) fn rates(
 /// What a meter more of depth adds to the rate at a node.
 pub(super) fn per_depth(
     structure: &FirstOrder,
-    piece: &Piece,
+    subinterval: &Subinterval,
     states: &DMatrix<f64>,
     node: usize,
 ) -> DVector<f64> {
-    let push: DVector<f64> = &structure.b * piece.forces[node];
-    match piece.damping.get(node) {
+    let push: DVector<f64> = &structure.b * subinterval.forces[node];
+    match subinterval.damping.get(node) {
         Some(damping) => push - damping * states.column(node),
         None => push,
     }
 }
 
-/// The Jacobians at the nodes of a piece.
+/// The Jacobians at the nodes of a subinterval.
 fn jacobians(
     problem: &ForcedProblem,
-    piece: &Piece,
+    subinterval: &Subinterval,
     states: &DMatrix<f64>,
     depth_m: f64,
 ) -> Vec<DMatrix<f64>> {
-    let nodes = states.column_iter().zip(&piece.forces).enumerate();
+    let nodes = states.column_iter().zip(&subinterval.forces).enumerate();
     nodes
         .map(|(j, (state, force))| {
             let jacobian = problem.jacobian(state.as_slice(), force);
-            match piece.damping.get(j) {
+            match subinterval.damping.get(j) {
                 Some(damping) => jacobian - damping * depth_m,
                 None => jacobian,
             }
@@ -186,9 +186,14 @@ fn jacobians(
 }
 
 impl ToothPeriod<'_> {
-    /// A piece linearized about the states at its nodes.
-    pub(super) fn linearized(&self, piece: &Piece, states: &DMatrix<f64>, depth_m: f64) -> Linearized<'_> {
-        let jacobians = jacobians(self.problem, piece, states, depth_m);
-        Linearized::new(&self.gauss, piece.duration, jacobians)
+    /// A subinterval linearized about the states at its nodes.
+    pub(super) fn linearized(
+        &self,
+        subinterval: &Subinterval,
+        states: &DMatrix<f64>,
+        depth_m: f64,
+    ) -> Linearized<'_> {
+        let jacobians = jacobians(self.problem, subinterval, states, depth_m);
+        Linearized::new(&self.gauss, subinterval.duration, jacobians)
     }
 }

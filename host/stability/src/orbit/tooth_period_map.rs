@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::forced::ForcedProblem;
-use super::periodic_orbit::{Orbit, Passage, PeriodMap, Span};
+use super::periodic_orbit::{Orbit, PeriodIntegration, PeriodMap, SubintervalNodes};
 use super::tooth_period::{ToothPeriod, per_depth, rates};
 use super::variation;
 use crate::spectrum::chatter_frequency::chatter_hz;
@@ -19,37 +19,48 @@ impl PeriodMap for ToothPeriod<'_> {
         self.problem.order()
     }
 
-    fn spans(&self) -> Vec<Span<'_>> {
+    fn spans(&self) -> Vec<SubintervalNodes<'_>> {
         let mut start_s = 0.0;
-        let spans = self.pieces.iter().map(|piece| {
-            let span = Span {
+        let spans = self.subintervals.iter().map(|subinterval| {
+            let span = SubintervalNodes {
                 start_s,
-                duration_s: piece.duration,
+                duration_s: subinterval.duration,
                 gauss: &self.gauss,
             };
-            start_s += piece.duration;
+            start_s += subinterval.duration;
             span
         });
         spans.collect()
     }
 
-    fn pass(&self, start: &DVector<f64>, depth_m: f64, guess: &[DMatrix<f64>]) -> Option<Passage> {
+    fn integrate(
+        &self,
+        start: &DVector<f64>,
+        depth_m: f64,
+        guess: &[DMatrix<f64>],
+    ) -> Option<PeriodIntegration> {
         let order = self.size();
         let structure = &self.problem.linear.structure;
-        let mut passage = Passage::from(start.clone(), order + 1);
-        for (piece, guess) in self.pieces.iter().zip(guess) {
+        let mut integration = PeriodIntegration::from(start.clone(), order + 1);
+        for (subinterval, guess) in self.subintervals.iter().zip(guess) {
             let forces: Vec<DMatrix<f64>> = (0..guess.ncols())
                 .map(|node| {
                     let mut force = DMatrix::zeros(order, order + 1);
-                    force.set_column(order, &per_depth(structure, piece, guess, node));
+                    force.set_column(order, &per_depth(structure, subinterval, guess, node));
                     force
                 })
                 .collect();
-            let rates = rates(self.problem, piece, guess, depth_m);
-            let linearized = self.linearized(piece, guess, depth_m);
-            passage.take(linearized.advance(&passage.end, &passage.by, guess, &rates, &forces)?);
+            let rates = rates(self.problem, subinterval, guess, depth_m);
+            let linearized = self.linearized(subinterval, guess, depth_m);
+            integration.take(linearized.advance(
+                &integration.end,
+                &integration.by,
+                guess,
+                &rates,
+                &forces,
+            )?);
         }
-        Some(passage)
+        Some(integration)
     }
 
     fn start_of(&self, state: DVector<f64>, _states: &[DMatrix<f64>]) -> DVector<f64> {
@@ -66,6 +77,10 @@ impl PeriodMap for ToothPeriod<'_> {
     }
 
     fn finer(&self) -> Option<Self> {
-        Some(Self::with_pieces(self.problem, self.rpm, 0.5 * self.piece_angle))
+        Some(Self::with_subintervals(
+            self.problem,
+            self.rpm,
+            0.5 * self.subinterval_angle,
+        ))
     }
 }

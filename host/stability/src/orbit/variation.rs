@@ -8,20 +8,20 @@ use nalgebra::DMatrix;
 
 use super::collocated::Linearized;
 use super::periodic_orbit::Orbit;
-use super::tooth_period::{Piece, ToothPeriod};
+use super::tooth_period::{Subinterval, ToothPeriod};
 use crate::problem::period::{Element, Period, Port};
 
-/// The tooth period linearized about an orbit; `None` where a piece is singular.
+/// The tooth period linearized about an orbit; `None` where a subinterval is singular.
 pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
     let order = map.problem.order();
     let mut elements = Vec::new();
     let mut flight = DMatrix::identity(order, order);
-    for (piece, states) in map.pieces.iter().zip(&orbit.states) {
-        let linearized = map.linearized(piece, states, orbit.depth_m);
-        if piece.teeth == 0 {
+    for (subinterval, states) in map.subintervals.iter().zip(&orbit.states) {
+        let linearized = map.linearized(subinterval, states, orbit.depth_m);
+        if subinterval.teeth == 0 {
             flight = linearized.flow()?.1 * flight;
         } else {
-            elements.push(element(map, piece, states, orbit.depth_m, &linearized)?);
+            elements.push(element(map, subinterval, states, orbit.depth_m, &linearized)?);
         }
     }
     Some(Period { elements, flight })
@@ -29,7 +29,7 @@ pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
 
 fn element(
     map: &ToothPeriod<'_>,
-    piece: &Piece,
+    subinterval: &Subinterval,
     states: &DMatrix<f64>,
     depth_m: f64,
     linearized: &Linearized<'_>,
@@ -37,13 +37,13 @@ fn element(
     let (problem, gauss) = (map.problem, &map.gauss);
     let structure = &problem.linear.structure;
     let process = &problem.linear.process;
-    let (order, nodes, teeth) = (problem.order(), gauss.nodes.len(), piece.teeth);
-    let seconds_per_radian = piece.duration / piece.turn;
+    let (order, nodes, teeth) = (problem.order(), gauss.nodes.len(), subinterval.teeth);
+    let seconds_per_radian = subinterval.duration / subinterval.turn;
     let mut seen = DMatrix::zeros(nodes * teeth, order);
     let mut push = DMatrix::zeros(order, nodes * teeth);
     let mut ports = Vec::with_capacity(nodes * teeth);
     for (j, node) in gauss.nodes.iter().enumerate() {
-        let phase = piece.phase + piece.turn * node;
+        let phase = subinterval.phase + subinterval.turn * node;
         let modulation = if process.axial_depth_modulation && depth_m > 0.0 {
             1.0 - (structure.c.row(2) * states.column(j))[0] / depth_m
         } else {
@@ -58,7 +58,7 @@ fn element(
             push.column_mut(port).copy_from(&(&structure.b * force));
             ports.push(Port {
                 time_s: phase * seconds_per_radian,
-                weight_s: gauss.weights[j] * piece.duration,
+                weight_s: gauss.weights[j] * subinterval.duration,
                 force,
             });
         }
@@ -66,14 +66,14 @@ fn element(
     let (by_start, flow) = linearized.flow()?;
     let right = DMatrix::from_fn(order * nodes, nodes * teeth, |row, port| {
         let (i, state) = (row / order, row % order);
-        piece.duration * gauss.integrals[(i, port / teeth)] * push[(state, port)]
+        subinterval.duration * gauss.integrals[(i, port / teeth)] * push[(state, port)]
     });
     let by_port = linearized.solve(&right)?;
     let mut drive = linearized.gather(&by_port);
     for port in 0..nodes * teeth {
         let mut column = drive.column_mut(port);
         column.axpy(
-            piece.duration * gauss.weights[port / teeth],
+            subinterval.duration * gauss.weights[port / teeth],
             &push.column(port),
             1.0,
         );

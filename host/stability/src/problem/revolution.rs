@@ -1,6 +1,6 @@
 //! One revolution of a tool with variable pitch, collocated: several delays that end between the nodes.
 //!
-//! The state of the delay equation is x at the start of the revolution, and p of the stretches of the revolution before
+//! The state of the delay equation is x at the start of the revolution, and p of the subintervals of the revolution before
 //! that are still to be cut again.
 
 use nalgebra::DMatrix;
@@ -8,13 +8,13 @@ use nalgebra::DMatrix;
 use super::element::{CuttingTooth, Element, Step};
 use super::exponential::Exponential;
 use super::pitched::Pitched;
-use super::revolution_mesh::{Fineness, Flight, RevolutionMesh, Stretch};
+use super::revolution_mesh::{Fineness, Flight, RevolutionMesh, Subinterval};
 
 /// One revolution at one speed.
 pub(crate) struct Revolution<'a> {
     pub(crate) pitched: &'a Pitched,
     pub(crate) mesh: RevolutionMesh,
-    /// Of each stretch.
+    /// Of each subinterval.
     pub(crate) elements: Vec<Element>,
 }
 
@@ -23,23 +23,23 @@ impl<'a> Revolution<'a> {
     pub(crate) fn new(pitched: &'a Pitched, rpm: f64, depth_m: f64, fineness: Fineness) -> Option<Self> {
         let mesh = RevolutionMesh::new(pitched, rpm, depth_m, fineness, Flight::Whole)?;
         let exponential = Exponential::new(&pitched.problem.structure.a);
-        let mut elements: Vec<Element> = Vec::with_capacity(mesh.stretches.len());
-        // Stretches between the same two kinks are equally long.
+        let mut elements: Vec<Element> = Vec::with_capacity(mesh.subintervals.len());
+        // Subintervals between the same two kinks are equally long.
         let mut step: Option<(usize, f64, Step<'_>)> = None;
-        for stretch in &mesh.stretches {
-            if stretch.cutting.is_empty() {
-                elements.push(free_flight(&exponential, stretch.duration_s));
+        for subinterval in &mesh.subintervals {
+            if subinterval.cutting.is_empty() {
+                elements.push(free_flight(&exponential, subinterval.duration_s));
                 continue;
             }
-            let (nodes, duration_s) = (stretch.gauss.nodes.len(), stretch.duration_s);
+            let (nodes, duration_s) = (subinterval.gauss.nodes.len(), subinterval.duration_s);
             let step = match &mut step {
                 Some((of_nodes, of_s, step)) if (*of_nodes, *of_s) == (nodes, duration_s) => &*step,
                 other => {
-                    let made = Step::new(&pitched.problem, &exponential, stretch.gauss, duration_s);
+                    let made = Step::new(&pitched.problem, &exponential, subinterval.gauss, duration_s);
                     &other.insert((nodes, duration_s, made)).2
                 }
             };
-            elements.push(element(pitched, mesh.passages.rad_per_s, step, stretch));
+            elements.push(element(pitched, mesh.passages.rad_per_s, step, subinterval));
         }
         Some(Self {
             pitched,
@@ -62,9 +62,9 @@ fn free_flight(exponential: &Exponential, duration_s: f64) -> Element {
     }
 }
 
-fn element(pitched: &Pitched, rad_per_s: f64, step: &Step<'_>, stretch: &Stretch) -> Element {
+fn element(pitched: &Pitched, rad_per_s: f64, step: &Step<'_>, subinterval: &Subinterval) -> Element {
     let start = pitched.problem.process.engagement.start;
-    let teeth: Vec<CuttingTooth> = stretch
+    let teeth: Vec<CuttingTooth> = subinterval
         .cutting
         .iter()
         .map(|passage| CuttingTooth {
@@ -72,6 +72,9 @@ fn element(pitched: &Pitched, rad_per_s: f64, step: &Step<'_>, stretch: &Stretch
             feed_m: passage.feed_m,
         })
         .collect();
-    let (phase, turn) = (stretch.start_s * rad_per_s, stretch.duration_s * rad_per_s);
+    let (phase, turn) = (
+        subinterval.start_s * rad_per_s,
+        subinterval.duration_s * rad_per_s,
+    );
     step.element_of(&pitched.problem, &teeth, phase, turn)
 }

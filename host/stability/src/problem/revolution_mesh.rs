@@ -1,24 +1,24 @@
-//! One revolution of a tool with several delays, cut into stretches, and where every chip finds the surface before it.
+//! One revolution of a tool with several delays, cut into subintervals, and where every chip finds the surface before it.
 //!
 //! Tooth j at an immersion angle sees p_j = nᵀ u, and the tooth before it saw p_{j−1} at the same angle, one pitch
-//! earlier: a number of another stretch, between its nodes, in this revolution or the one before. It is interpolated by
-//! the polynomial through the nodes of that stretch, for which p must be smooth there. Displacement has a kink of some
+//! earlier: a number of another subinterval, between its nodes, in this revolution or the one before. It is interpolated by
+//! the polynomial through the nodes of that subinterval, for which p must be smooth there. Displacement has a kink of some
 //! order wherever a tooth enters or leaves; the surface hands it on to the next tooth, one delay later and smoother by
-//! what the structure smooths. So stretches end at all of these times, for several generations.
+//! what the structure smooths. So subintervals end at all of these times, for several generations.
 
 use super::gauss::Gauss;
-use super::passages::{Passage, Passages, distinct};
 use super::period::{DECAY_MAX, Rates};
 use super::pitched::Pitched;
+use super::tooth_passages::{ToothPassage, ToothPassages, distinct};
 
 /// How finely a revolution is cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fineness {
-    /// The largest angle, rad, by which the fastest motion turns within a stretch.
+    /// The largest angle, rad, by which the fastest motion turns within a subinterval.
     pub(crate) angle: f64,
-    /// Error of interpolation within a stretch, relative to the motion at the fastest rate, that is aimed at.
+    /// Error of interpolation within a subinterval, relative to the motion at the fastest rate, that is aimed at.
     pub(crate) tolerance: f64,
-    /// Generations of kinks at which stretches end.
+    /// Generations of kinks at which subintervals end.
     pub(crate) generations: u32,
 }
 
@@ -40,20 +40,20 @@ impl Fineness {
 /// What becomes of the times at which no tooth cuts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flight {
-    /// Each is one stretch without nodes of use: the structure's own motion is known in closed form.
+    /// Each is one subinterval without nodes of use: the structure's own motion is known in closed form.
     Whole,
     /// Cut as finely as the others.
     Cut,
 }
 
-/// No further generation of kinks is added to so many: stretches are then short, and kinks of later generations small.
+/// No further generation of kinks is added to so many: subintervals are then short, and kinks of later generations small.
 const KINKS_MAX: usize = 300;
 
-/// The values of one tooth in a stretch, at all of its nodes.
+/// The values of one tooth in a subinterval, at all of its nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Series {
-    /// Number of the stretch.
-    pub(crate) stretch: usize,
+    /// Number of the subinterval.
+    pub(crate) subinterval: usize,
     /// Which of the teeth that cut there.
     pub(crate) tooth: usize,
 }
@@ -77,14 +77,14 @@ pub(crate) struct Past {
 
 /// A part of the revolution without a kink.
 #[derive(Clone, Debug)]
-pub(crate) struct Stretch {
+pub(crate) struct Subinterval {
     /// When it begins, s.
     pub(crate) start_s: f64,
     /// How long it takes, s.
     pub(crate) duration_s: f64,
     pub(crate) gauss: &'static Gauss,
     /// The teeth that cut, in the order of the ports of a node.
-    pub(crate) cutting: Vec<Passage>,
+    pub(crate) cutting: Vec<ToothPassage>,
     /// Of each port, node by node.
     pub(crate) pasts: Vec<Past>,
 }
@@ -92,8 +92,8 @@ pub(crate) struct Stretch {
 /// One revolution at one speed.
 #[derive(Clone, Debug)]
 pub(crate) struct RevolutionMesh {
-    pub(crate) passages: Passages,
-    pub(crate) stretches: Vec<Stretch>,
+    pub(crate) passages: ToothPassages,
+    pub(crate) subintervals: Vec<Subinterval>,
     /// What of the revolution before acts in this one, with the first row in the state.
     pub(crate) kept: Vec<(Series, usize)>,
     /// Number of rows of the state: those of the structure, then those of what is kept.
@@ -109,14 +109,15 @@ impl RevolutionMesh {
         fineness: Fineness,
         flight: Flight,
     ) -> Option<Self> {
-        let passages = Passages::new(pitched, rpm);
+        let passages = ToothPassages::new(pitched, rpm);
         // At the unit circle |w (1 − 1/μ)| ≤ 2 w. Coefficients turn as products of two sines: twice the angle of the tool.
         let rate = Rates::new(&pitched.problem).at(2.0 * depth_m) + 2.0 * passages.rad_per_s;
         let decay = pitched.problem.fastest_decay();
-        let mut stretches = Vec::new();
+        let mut subintervals = Vec::new();
         for ends in kinks(&passages, fineness.generations).windows(2) {
             let length_s = ends[1] - ends[0];
-            let cutting: Vec<Passage> = passages.cutting_at(0.5 * (ends[0] + ends[1])).copied().collect();
+            let cutting: Vec<ToothPassage> =
+                passages.cutting_at(0.5 * (ends[0] + ends[1])).copied().collect();
             let angle = rate * length_s;
             let (count, nodes) = if cutting.is_empty() && flight == Flight::Whole {
                 (1.0, 1)
@@ -128,8 +129,8 @@ impl RevolutionMesh {
                 (count, nodes_for(angle / count, fineness.tolerance))
             };
             let duration_s = length_s / count;
-            // The count is small: a few stretches for each vibration in the revolution.
-            stretches.extend((0..count as usize).map(|index| Stretch {
+            // The count is small: a few subintervals for each vibration in the revolution.
+            subintervals.extend((0..count as usize).map(|index| Subinterval {
                 start_s: ends[0] + duration_s * index as f64,
                 duration_s,
                 gauss: Gauss::shared(nodes),
@@ -139,7 +140,7 @@ impl RevolutionMesh {
         }
         let mut mesh = Self {
             passages,
-            stretches,
+            subintervals,
             kept: Vec::new(),
             size: pitched.problem.structure.order(),
         };
@@ -150,22 +151,26 @@ impl RevolutionMesh {
     /// Finds what every port sees of the past.
     fn link(&mut self) -> Option<()> {
         let period_s = self.passages.period_s;
-        let starts_s: Vec<f64> = self.stretches.iter().map(|stretch| stretch.start_s).collect();
-        for index in 0..self.stretches.len() {
-            let here = self.stretches[index].clone();
+        let starts_s: Vec<f64> = self
+            .subintervals
+            .iter()
+            .map(|subinterval| subinterval.start_s)
+            .collect();
+        for index in 0..self.subintervals.len() {
+            let here = self.subintervals[index].clone();
             let mut pasts = Vec::with_capacity(here.gauss.nodes.len() * here.cutting.len());
             for node in &here.gauss.nodes {
                 for passage in &here.cutting {
                     let then_s = here.start_s + here.duration_s * node - passage.delay_s;
                     let is_earlier = then_s < 0.0;
                     let then_s = if is_earlier { then_s + period_s } else { then_s };
-                    let stretch = starts_s
+                    let subinterval = starts_s
                         .partition_point(|&start_s| start_s <= then_s)
                         .saturating_sub(1);
-                    let there = &self.stretches[stretch];
+                    let there = &self.subintervals[subinterval];
                     let mut teeth = there.cutting.iter();
                     let tooth = teeth.position(|other| other.tooth == passage.before)?;
-                    let series = Series { stretch, tooth };
+                    let series = Series { subinterval, tooth };
                     let weights = there.gauss.lagrange((then_s - there.start_s) / there.duration_s);
                     let source = if is_earlier {
                         Source::Earlier(self.keep(series))
@@ -175,7 +180,7 @@ impl RevolutionMesh {
                     pasts.push(Past { source, weights });
                 }
             }
-            self.stretches[index].pasts = pasts;
+            self.subintervals[index].pasts = pasts;
         }
         Some(())
     }
@@ -187,13 +192,13 @@ impl RevolutionMesh {
         }
         let first = self.size;
         self.kept.push((series, first));
-        self.size += self.stretches[series.stretch].gauss.nodes.len();
+        self.size += self.subintervals[series.subinterval].gauss.nodes.len();
         first
     }
 }
 
 /// All times at which displacement may have a kink, s, ascending, with both ends of the period.
-fn kinks(passages: &Passages, generations: u32) -> Vec<f64> {
+fn kinks(passages: &ToothPassages, generations: u32) -> Vec<f64> {
     let mut all = passages.switches_s();
     let mut youngest = all.clone();
     for _ in 0..generations {

@@ -35,7 +35,7 @@ pub(crate) fn chatter_hz(
     }
     // e^{−s t} at every time, and what the next exponent multiplies it by: exponentials of all would take seconds.
     let mut factors: Vec<(Complex64, Complex64)> = Vec::new();
-    loudest_hz(problem, depth_m, period_s, multiplier, |s| {
+    dominant_frequency_hz(problem, depth_m, period_s, multiplier, |s| {
         let mut harmonic = Vector3::<Complex64>::zeros();
         if factors.is_empty() {
             let times = forces.iter().map(|(time_s, _)| *time_s);
@@ -60,7 +60,7 @@ fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f6
 
 /// The frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest; `size` gives its size at an exponent
 /// s with e^{sT} = μ, and is asked for one after the other, each 2πi/T above the one before.
-pub(crate) fn loudest_hz(
+pub(crate) fn dominant_frequency_hz(
     problem: &Problem,
     depth_m: f64,
     period_s: f64,

@@ -4,7 +4,7 @@
 //! ẏ = −Gᵀ y with y(τ) = l, lᵀΦ = μ lᵀ. Then lᵀ dΦ r = ∫ yᵀ dG x dt for any change of G: one pair of motions gives
 //! the derivatives with respect to all parameters.
 //!
-//! Both are computed on pieces of the period with Gauss nodes, as in [`period`](super::period): the structure's own motion by
+//! Both are computed on subintervals of the period with Gauss nodes, as in [`period`](super::period): the structure's own motion by
 //! matrix exponentials, the force by collocation. The adjoint is the motion of the transposed structure in reversed time,
 //! with what is seen and what is pushed exchanged.
 
@@ -17,10 +17,10 @@ use crate::problem::linear::Problem;
 use crate::problem::period::{DECAY_MAX, Rates, degree};
 use quietcut_model::structure::FirstOrder;
 
-/// Angle of the fastest motion over a piece, rad.
+/// Angle of the fastest motion over a subinterval, rad.
 const ANGLE: f64 = 3.0;
 
-/// Error of a piece that is aimed at. States within a piece are good to about its root only; that root times the length is what
+/// Error of a subinterval that is aimed at. States within a subinterval are good to about its root only; that root times the length is what
 /// the quadrature of yᵀ dG x keeps.
 const TOLERANCE: f64 = 1e-16;
 
@@ -43,7 +43,7 @@ pub(crate) struct Node {
 
 /// Both motions.
 #[derive(Clone, Debug)]
-pub(crate) struct Eigenmotion {
+pub(crate) struct FloquetMode {
     /// At the nodes, in order of time.
     pub(crate) nodes: Vec<Node>,
     /// Where a tooth enters: the start of the period.
@@ -54,15 +54,15 @@ pub(crate) struct Eigenmotion {
     pub(crate) overlap: Complex64,
 }
 
-/// A piece of the period.
-struct Piece {
+/// A subinterval of the period.
+struct Subinterval {
     basis: usize,
     teeth: usize,
     phase: f64,
     turn: f64,
 }
 
-/// What pieces of one duration share.
+/// What subintervals of one duration share.
 struct Basis {
     gauss: Gauss,
     duration: f64,
@@ -76,16 +76,23 @@ struct Basis {
 /// At one node: what ports see of the displacement, and what force they make of it.
 type Ports = Vec<(Vector3<Complex64>, Vector3<Complex64>)>;
 
-impl Eigenmotion {
+impl FloquetMode {
     /// The motions of a multiplier at a depth; `None` where it is none, or the numbers leave their range.
     pub(crate) fn new(problem: &Problem, rpm: f64, depth_m: f64, multiplier: Complex64) -> Option<Self> {
         let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
-        let (bases, pieces) = pieces(problem, rpm, kappa.norm());
-        let ports: Vec<Vec<Ports>> = pieces
+        let (bases, subintervals) = subintervals(problem, rpm, kappa.norm());
+        let ports: Vec<Vec<Ports>> = subintervals
             .iter()
-            .map(|piece| {
-                let nodes = &bases[piece.basis].gauss.nodes;
-                let at = |node: &f64| ports(problem, kappa, piece.teeth, piece.phase + piece.turn * node);
+            .map(|subinterval| {
+                let nodes = &bases[subinterval.basis].gauss.nodes;
+                let at = |node: &f64| {
+                    ports(
+                        problem,
+                        kappa,
+                        subinterval.teeth,
+                        subinterval.phase + subinterval.turn * node,
+                    )
+                };
                 nodes.iter().map(at).collect()
             })
             .collect();
@@ -95,17 +102,21 @@ impl Eigenmotion {
             b: structure.c.transpose(),
             c: structure.b.transpose(),
         };
-        let mut forward = Vec::with_capacity(pieces.len());
-        let mut adjoint = Vec::with_capacity(pieces.len());
+        let mut forward = Vec::with_capacity(subintervals.len());
+        let mut adjoint = Vec::with_capacity(subintervals.len());
         let reversed: Vec<Basis> = bases.iter().map(Basis::transposed).collect();
-        for (piece, ports) in pieces.iter().zip(&ports) {
-            forward.push(Passage::new(structure, &bases[piece.basis], ports)?);
+        for (subinterval, ports) in subintervals.iter().zip(&ports) {
+            forward.push(MapFactor::new(structure, &bases[subinterval.basis], ports)?);
             let exchanged: Vec<Ports> = ports
                 .iter()
                 .rev()
                 .map(|ports| ports.iter().map(|&(seen, force)| (force, seen)).collect())
                 .collect();
-            adjoint.push(Passage::new(&transposed, &reversed[piece.basis], &exchanged)?);
+            adjoint.push(MapFactor::new(
+                &transposed,
+                &reversed[subinterval.basis],
+                &exchanged,
+            )?);
         }
         let order = problem.structure.order();
         let mut transition = Matrix::identity(order, order);
@@ -127,27 +138,30 @@ impl Eigenmotion {
         }
         lefts.reverse();
         let mut nodes = Vec::new();
-        for (index, piece) in pieces.iter().enumerate() {
-            let basis = &bases[piece.basis];
+        for (index, subinterval) in subintervals.iter().enumerate() {
+            let basis = &bases[subinterval.basis];
             let count = basis.gauss.nodes.len();
             for i in 0..count {
                 nodes.push(Node {
                     weight_s: basis.gauss.weights[i] * basis.duration,
-                    phase: piece.phase + piece.turn * basis.gauss.nodes[i],
-                    teeth: piece.teeth,
+                    phase: subinterval.phase + subinterval.turn * basis.gauss.nodes[i],
+                    teeth: subinterval.teeth,
                     right: &forward[index].states[i] * &rights[index],
                     left: &adjoint[index].states[count - 1 - i] * &lefts[index + 1],
                 });
             }
         }
         // The first interval has a tooth more than the second; where there is only one, teeth leave at its end.
-        let most = pieces.first().map_or(0, |piece| piece.teeth);
-        let leaving = pieces.iter().take_while(|piece| piece.teeth == most).count();
+        let most = subintervals.first().map_or(0, |subinterval| subinterval.teeth);
+        let leaving = subintervals
+            .iter()
+            .take_while(|subinterval| subinterval.teeth == most)
+            .count();
         let end = |at: usize| Node {
             weight_s: 0.0,
-            phase: pieces
+            phase: subintervals
                 .get(at)
-                .map_or(problem.process.engagement.pitch, |piece| piece.phase),
+                .map_or(problem.process.engagement.pitch, |subinterval| subinterval.phase),
             teeth: most,
             right: rights[at].clone(),
             left: lefts[at].clone(),
@@ -161,21 +175,21 @@ impl Eigenmotion {
     }
 }
 
-/// The period in pieces over which nothing turns by more than [`ANGLE`].
-fn pieces(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<Piece>) {
+/// The period in subintervals over which nothing turns by more than [`ANGLE`].
+fn subintervals(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<Subinterval>) {
     let engagement = &problem.process.engagement;
     let seconds_per_radian = problem.tooth_period_s(rpm) / engagement.pitch;
     let rates = Rates::new(problem);
-    let (mut bases, mut pieces) = (Vec::new(), Vec::new());
+    let (mut bases, mut subintervals) = (Vec::new(), Vec::new());
     for interval in engagement.intervals() {
         let length = interval.to - interval.from;
         let duration = length * seconds_per_radian;
-        // In free flight as well: the quadrature of yᵀ dG x wants short pieces.
+        // In free flight as well: the quadrature of yᵀ dG x wants short subintervals.
         let angle = rates.at(if interval.teeth == 0 { 0.0 } else { kappa_m }) * duration + 2.0 * length;
         let decay = problem.fastest_decay() * duration;
         let count = (angle / ANGLE).max(decay / DECAY_MAX).ceil().max(1.0);
         for index in 0..count as usize {
-            pieces.push(Piece {
+            subintervals.push(Subinterval {
                 basis: bases.len(),
                 teeth: interval.teeth,
                 phase: interval.from + length * index as f64 / count,
@@ -185,7 +199,7 @@ fn pieces(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<Piece>)
         let gauss = Gauss::new(degree(angle / count, TOLERANCE));
         bases.push(Basis::new(&problem.structure.a, gauss, duration / count));
     }
-    (bases, pieces)
+    (bases, subintervals)
 }
 
 fn ports(problem: &Problem, kappa: Complex64, teeth: usize, phase: f64) -> Ports {
@@ -235,15 +249,15 @@ impl Basis {
     }
 }
 
-/// How a piece carries the state from its start to its nodes and to its end.
-struct Passage {
+/// How a subinterval carries the state from its start to its nodes and to its end.
+struct MapFactor {
     /// n × n.
     transition: Matrix,
     /// n × n, one for each node.
     states: Vec<Matrix>,
 }
 
-impl Passage {
+impl MapFactor {
     /// From x(t) = e^{At}(x₀ + ∫ e^{−As} B f ds) with f = force·seenᵀ C x collocated at the nodes.
     fn new(structure: &FirstOrder, basis: &Basis, ports: &[Ports]) -> Option<Self> {
         let order = structure.order();

@@ -160,7 +160,7 @@ pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Optio
 }
 
 /// What block Arnoldi arrived at.
-struct Found {
+struct ArnoldiResult {
     dominant: Dominant,
     is_settled: bool,
 }
@@ -172,7 +172,7 @@ fn arnoldi(
     most: usize,
     residual: f64,
     keep: &dyn Fn(&mut Vec<Complex64>),
-) -> Option<Found> {
+) -> Option<ArnoldiResult> {
     let size = map.size();
     // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
     let mut room = most.min(4 * LOOK * BLOCK);
@@ -220,7 +220,7 @@ fn arnoldi(
                     basis: Some(basis.columns(0, end).into_owned()),
                     projected: within,
                 };
-                return Some(Found { dominant, is_settled });
+                return Some(ArnoldiResult { dominant, is_settled });
             }
         }
         (done, width) = (end, next.ncols());

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use super::along_depth::Spectrum;
 use super::crossing::Crossing;
 use super::krylov::{Dominant, LinearMap};
-use super::stability_loss::Kind;
+use super::stability_loss::StabilityLoss;
 
 /// Multipliers below this size do not matter: lines follow only larger ones.
 const LEAST: f64 = 0.25;
@@ -111,13 +111,13 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
                 return None;
             }
             if step_m.abs() < 1e-9 * high_m {
-                let kind = Kind::of(multiplier);
+                let kind = StabilityLoss::of(multiplier);
                 let on_circle = multiplier / multiplier.norm();
                 return (low_m..=high_m).contains(&depth_m).then_some(Crossing {
                     depth_m,
                     multiplier: match kind {
-                        Kind::Hopf => Complex64::new(on_circle.re, on_circle.im.abs()),
-                        Kind::Flip | Kind::Fold => Complex64::from(on_circle.re.signum()),
+                        StabilityLoss::Hopf => Complex64::new(on_circle.re, on_circle.im.abs()),
+                        StabilityLoss::Flip | StabilityLoss::Fold => Complex64::from(on_circle.re.signum()),
                     },
                 });
             }

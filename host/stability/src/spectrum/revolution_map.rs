@@ -5,7 +5,7 @@ use std::rc::Rc;
 use nalgebra::{DMatrix, DVector, Dyn, LU, Vector3};
 use num_complex::Complex64;
 
-use super::chatter_frequency::loudest_hz;
+use super::chatter_frequency::dominant_frequency_hz;
 use super::krylov::LinearMap;
 use super::map_spectrum::PeriodMap;
 use crate::problem::revolution::Revolution;
@@ -56,20 +56,20 @@ impl<'a> RevolutionMap<'a> {
             chips: Vec::with_capacity(revolution.elements.len()),
         };
         let before = columns.transpose();
-        let stretches = &revolution.mesh.stretches;
-        let parts = stretches.iter().zip(&revolution.elements).zip(&self.factors);
-        for ((stretch, element), factor) in parts {
-            let ports = stretch.pasts.len();
+        let subintervals = &revolution.mesh.subintervals;
+        let parts = subintervals.iter().zip(&revolution.elements).zip(&self.factors);
+        for ((subinterval, element), factor) in parts {
+            let ports = subinterval.pasts.len();
             let mut past = DMatrix::zeros(width, ports);
-            for (port, of) in stretch.pasts.iter().enumerate() {
+            for (port, of) in subinterval.pasts.iter().enumerate() {
                 let mut sum = past.column_mut(port);
                 for (node, weight) in of.weights.iter().enumerate() {
                     let seen = match of.source {
                         Source::Earlier(first) => before.column(first + node),
-                        Source::Own(Series { stretch, tooth }) => {
-                            // A delay shorter than a stretch would end in the stretch itself.
-                            let values = trace.seen.get(stretch)?;
-                            values.column(node * stretches[stretch].cutting.len() + tooth)
+                        Source::Own(Series { subinterval, tooth }) => {
+                            // A delay shorter than a subinterval would end in the subinterval itself.
+                            let values = trace.seen.get(subinterval)?;
+                            values.column(node * subintervals[subinterval].cutting.len() + tooth)
                         }
                     };
                     sum.axpy(*weight, &seen, 1.0);
@@ -103,10 +103,10 @@ impl LinearMap for RevolutionMap<'_> {
         let mut image = DMatrix::zeros(self.size(), columns.ncols());
         image.rows_mut(0, trace.state.nrows()).copy_from(&trace.state);
         for (series, first) in &self.revolution.mesh.kept {
-            let stretch = &self.revolution.mesh.stretches[series.stretch];
-            let values = &trace.seen[series.stretch];
-            for node in 0..stretch.gauss.nodes.len() {
-                let column = values.column(node * stretch.cutting.len() + series.tooth);
+            let subinterval = &self.revolution.mesh.subintervals[series.subinterval];
+            let values = &trace.seen[series.subinterval];
+            for node in 0..subinterval.gauss.nodes.len() {
+                let column = values.column(node * subinterval.cutting.len() + series.tooth);
                 image.row_mut(first + node).tr_copy_from(&column);
             }
         }
@@ -126,7 +126,7 @@ impl PeriodMap for RevolutionMap<'_> {
         let trace = self.trace(&parts)?;
         let problem = &self.revolution.pitched.problem;
         let period_s = self.revolution.mesh.passages.period_s;
-        loudest_hz(problem, self.depth_m, period_s, multiplier, |s| {
+        dominant_frequency_hz(problem, self.depth_m, period_s, multiplier, |s| {
             let mut harmonic = Vector3::<Complex64>::zeros();
             for (element, chips) in self.revolution.elements.iter().zip(&trace.chips) {
                 for (port, chip) in element.ports.iter().zip(chips.row_iter()) {

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::stability_loss::Kind;
+use super::stability_loss::StabilityLoss;
 
 /// One multiplier at one depth, in the upper half plane or on the real axis.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,9 @@ impl Root {
             .enumerate()
             .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))?;
         let travel = 0.5 * step_m * (self.slope.norm() + to.slope.norm());
-        if miss(&to) > 0.25 * travel + 1e-6 || Kind::of(self.multiplier) != Kind::of(to.multiplier) {
+        if miss(&to) > 0.25 * travel + 1e-6
+            || StabilityLoss::of(self.multiplier) != StabilityLoss::of(to.multiplier)
+        {
             return None;
         }
         free.swap_remove(index);

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// How a multiplier leaves the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum StabilityLoss {
     /// As a complex pair: chatter with a frequency of its own (secondary Hopf, torus).
     Hopf,
     /// Through −1: period doubling.
@@ -15,7 +15,7 @@ pub enum Kind {
     Fold,
 }
 
-impl Kind {
+impl StabilityLoss {
     /// The kind of a multiplier. Real multipliers must be real to the last bit.
     pub fn of(multiplier: Complex64) -> Self {
         if multiplier.im != 0.0 {

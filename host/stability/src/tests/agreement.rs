@@ -8,7 +8,7 @@ use crate::spectrum::krylov::Dominant;
 use crate::*;
 use quietcut_testkit::case;
 
-fn default_point(name: &str, rpm: f64, depth_mm: f64) -> Point {
+fn default_point(name: &str, rpm: f64, depth_mm: f64) -> CutStability {
     let problem = Problem::new(&case(name), CubicTerms::Refuse).unwrap();
     point(&problem, rpm, depth_mm).unwrap()
 }

@@ -10,7 +10,7 @@ fn problem(name: &str) -> FrequencyProblem {
     FrequencyProblem::new(&case(name), CubicTerms::LeaveOut).unwrap()
 }
 
-fn first(method: &impl Method, rpm: f64, depth_mm: f64) -> (f64, Kind) {
+fn first(method: &impl Method, rpm: f64, depth_mm: f64) -> (f64, StabilityLoss) {
     let limit = method.line(rpm, depth_mm, 40).unwrap().first_limit.unwrap();
     (limit.depth_mm, limit.kind)
 }
@@ -45,7 +45,7 @@ fn averaged_limits_of_chapter_7() {
         let other = first(&nyquist, rpm, 6.0).0;
         // Half a unit of the last printed digit, and what that digit was rounded from.
         assert!((depth_mm - expected).abs() <= 0.0006, "{rpm}: {depth_mm}");
-        assert_eq!(kind, Kind::Hopf);
+        assert_eq!(kind, StabilityLoss::Hopf);
         assert!(
             (other - depth_mm).abs() < 1e-9 * depth_mm,
             "{rpm}: {other} {depth_mm}"
@@ -223,7 +223,7 @@ fn the_flip_notch_its_upper_branch_and_the_window_are_found_by_harmonics() {
         problem: problem("kuka-kr90-acetal"),
         harmonics: None,
     };
-    let near = |found: &[Switch], expected: &[(f64, Kind, bool)]| {
+    let near = |found: &[Switch], expected: &[(f64, StabilityLoss, bool)]| {
         assert_eq!(found.len(), expected.len(), "{found:?}");
         for (found, (depth_mm, kind, gain)) in found.iter().zip(expected) {
             // Half a unit of the last printed digit and the 4e-5 of the method.
@@ -234,12 +234,15 @@ fn the_flip_notch_its_upper_branch_and_the_window_are_found_by_harmonics() {
     let at = |rpm| switches(&method, rpm, 4.5);
     near(
         &at(1045.0),
-        &[(1.327, Kind::Flip, false), (3.344, Kind::Flip, false)],
+        &[
+            (1.327, StabilityLoss::Flip, false),
+            (3.344, StabilityLoss::Flip, false),
+        ],
     );
     let window = [
-        (1.575, Kind::Flip, false),
-        (2.334, Kind::Flip, true),
-        (2.712, Kind::Hopf, false),
+        (1.575, StabilityLoss::Flip, false),
+        (2.334, StabilityLoss::Flip, true),
+        (2.712, StabilityLoss::Hopf, false),
     ];
     near(&at(1036.0), &window);
     assert!((at(1064.0)[1].depth_mm - 4.023).abs() < 0.0007);
@@ -307,7 +310,7 @@ fn averaged_coefficients_know_no_flip_and_are_three_times_too_high_at_3_13() {
         .first_limit
         .unwrap();
     let (depth_mm, kind) = first(&Zoa { problem }, rpm, 8.0);
-    assert_eq!((exact.kind, kind), (Kind::Flip, Kind::Hopf));
+    assert_eq!((exact.kind, kind), (StabilityLoss::Flip, StabilityLoss::Hopf));
     assert!(
         (2.5..3.5).contains(&(depth_mm / exact.depth_mm)),
         "{depth_mm} {exact:?}"

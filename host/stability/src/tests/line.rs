@@ -60,7 +60,10 @@ fn the_flip_island_of_half_immersion_is_found_and_closed() {
     let half = problem("kuka-kr90-half");
     let flips_mm = |tau: f64| -> Vec<f64> {
         let found = line(&half, rpm_of(tau), 12.0, 40).unwrap();
-        let flips = found.switches.iter().filter(|switch| switch.kind == Kind::Flip);
+        let flips = found
+            .switches
+            .iter()
+            .filter(|switch| switch.kind == StabilityLoss::Flip);
         flips.map(|switch| switch.depth_mm).collect()
     };
     let reaches: Vec<(f64, [f64; 2])> = (0..60)
@@ -93,7 +96,10 @@ fn the_flip_island_of_half_immersion_is_found_and_closed() {
     };
     assert!((from * PER_MM - 0.14861).abs() < 1e-5 && from < 0.16 / PER_MM && 0.16 / PER_MM < to);
     let inside = point(&half, rpm_of(8.7), 0.16 / PER_MM).unwrap();
-    assert_eq!((inside.verdict, inside.kind), (Verdict::Unstable, Kind::Flip));
+    assert_eq!(
+        (inside.verdict, inside.kind),
+        (Verdict::Unstable, StabilityLoss::Flip)
+    );
 }
 
 #[test]
@@ -167,11 +173,11 @@ fn an_error_stands_in_undecided_depths_only_where_the_side_depends_on_it() {
         chatter_hz: None,
     };
     let switches = vec![
-        switch(0.1, Kind::Flip, false),
-        switch(1.0, Kind::Hopf, false),
-        switch(2.0, Kind::Hopf, true),
-        switch(3.0, Kind::Flip, true),
-        switch(3.3, Kind::Hopf, false),
+        switch(0.1, StabilityLoss::Flip, false),
+        switch(1.0, StabilityLoss::Hopf, false),
+        switch(2.0, StabilityLoss::Hopf, true),
+        switch(3.0, StabilityLoss::Flip, true),
+        switch(3.3, StabilityLoss::Hopf, false),
     ];
     let line = SpeedLine::of_switches(1000.0, 4.0, 0, switches);
     assert_eq!(line.stable_mm, [[0.0, 0.1], [3.0, 3.3]]);

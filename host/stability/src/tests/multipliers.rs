@@ -39,15 +39,15 @@ fn every_reference_multiplier_is_met_and_its_error_is_below_the_one_stated() {
 fn limits_of_chapter_7_are_met_to_four_digits() {
     let problem = problem("kuka-kr90-acetal");
     let limits = [
-        (600.0, 3.174, Kind::Hopf),
-        (800.0, 1.664, Kind::Hopf),
-        (900.0, 1.723, Kind::Hopf),
-        (1050.0, 1.356, Kind::Flip),
-        (1100.0, 2.223, Kind::Hopf),
-        (1200.0, 2.041, Kind::Hopf),
-        (1600.0, 2.953, Kind::Hopf),
-        (2000.0, 4.105, Kind::Hopf),
-        (2400.0, 5.443, Kind::Hopf),
+        (600.0, 3.174, StabilityLoss::Hopf),
+        (800.0, 1.664, StabilityLoss::Hopf),
+        (900.0, 1.723, StabilityLoss::Hopf),
+        (1050.0, 1.356, StabilityLoss::Flip),
+        (1100.0, 2.223, StabilityLoss::Hopf),
+        (1200.0, 2.041, StabilityLoss::Hopf),
+        (1600.0, 2.953, StabilityLoss::Hopf),
+        (2000.0, 4.105, StabilityLoss::Hopf),
+        (2400.0, 5.443, StabilityLoss::Hopf),
     ];
     for (rpm, depth_mm, kind) in limits {
         let limit = line(&problem, rpm, 6.0, 40).unwrap().first_limit.unwrap();
@@ -70,7 +70,7 @@ fn notch_window_and_upper_flip_of_chapter_7_are_found() {
         notch
             .switches
             .iter()
-            .all(|switch| switch.kind == Kind::Flip && !switch.gain)
+            .all(|switch| switch.kind == StabilityLoss::Flip && !switch.gain)
     );
     assert_eq!(notch.stable_mm.len(), 1);
 
@@ -91,14 +91,14 @@ fn notch_window_and_upper_flip_of_chapter_7_are_found() {
 fn limits_of_chapter_6_are_met_to_four_digits() {
     let full = problem("kuka-kr90-full");
     let limits = [
-        (1.34, 0.18291, Kind::Hopf),
-        (2.0, 0.13573, Kind::Hopf),
-        (2.7, 0.06241, Kind::Flip),
-        (2.9, 0.04519, Kind::Hopf),
-        (3.13, 0.03136, Kind::Flip),
-        (4.0, 0.05901, Kind::Hopf),
-        (6.0, 0.34715, Kind::Hopf),
-        (6.4, 0.24992, Kind::Hopf),
+        (1.34, 0.18291, StabilityLoss::Hopf),
+        (2.0, 0.13573, StabilityLoss::Hopf),
+        (2.7, 0.06241, StabilityLoss::Flip),
+        (2.9, 0.04519, StabilityLoss::Hopf),
+        (3.13, 0.03136, StabilityLoss::Flip),
+        (4.0, 0.05901, StabilityLoss::Hopf),
+        (6.0, 0.34715, StabilityLoss::Hopf),
+        (6.4, 0.24992, StabilityLoss::Hopf),
     ];
     for (tau, w, kind) in limits {
         let limit = line(&full, rpm_of(tau), 12.0, 40).unwrap().first_limit.unwrap();
@@ -112,7 +112,7 @@ fn limits_of_chapter_6_are_met_to_four_digits() {
     let half = line(&problem("kuka-kr90-half"), rpm_of(8.7), 12.0, 40).unwrap();
     let limit = half.first_limit.unwrap();
     assert!((limit.depth_mm * W_PER_MM - 0.14861).abs() < 1.5e-5, "{limit:?}");
-    assert_eq!(limit.kind, Kind::Flip);
+    assert_eq!(limit.kind, StabilityLoss::Flip);
 }
 
 #[test]
@@ -134,11 +134,17 @@ fn limits_of_chapter_3_are_met_with_and_without_edge_and_feed_terms() {
 fn chatter_of_the_acetal_robot_is_near_17_4_hz() {
     let problem = problem("kuka-kr90-acetal");
     let hopf = point(&problem, 900.0, 2.0).unwrap();
-    assert_eq!((hopf.kind, hopf.verdict), (Kind::Hopf, Verdict::Unstable));
+    assert_eq!(
+        (hopf.kind, hopf.verdict),
+        (StabilityLoss::Hopf, Verdict::Unstable)
+    );
     assert!((hopf.chatter_hz.unwrap() - 17.4).abs() < 0.1, "{hopf:?}");
     // A flip vibrates at half the tooth-passing frequency, 1045·2/60/2 Hz, or an odd multiple of it.
     let flip = point(&problem, 1045.0, 2.0).unwrap();
-    assert_eq!((flip.kind, flip.verdict), (Kind::Flip, Verdict::Unstable));
+    assert_eq!(
+        (flip.kind, flip.verdict),
+        (StabilityLoss::Flip, Verdict::Unstable)
+    );
     assert!((flip.chatter_hz.unwrap() - 1045.0 / 60.0).abs() < 1e-9);
 }
 

@@ -147,7 +147,7 @@ impl Machine {
     }
 }
 
-fn depths(problem: &Problem, rpm: f64, depth_mm: f64) -> Vec<(f64, Kind, bool)> {
+fn depths(problem: &Problem, rpm: f64, depth_mm: f64) -> Vec<(f64, StabilityLoss, bool)> {
     let switches = line(problem, rpm, depth_mm, 40).unwrap().switches;
     switches
         .iter()
@@ -156,7 +156,13 @@ fn depths(problem: &Problem, rpm: f64, depth_mm: f64) -> Vec<(f64, Kind, bool)> 
 }
 
 /// Depths times a factor are the same as others, but for what lies at the last depth.
-fn same(a: &[(f64, Kind, bool)], factor: f64, b: &[(f64, Kind, bool)], last_mm: f64, tolerance: f64) -> bool {
+fn same(
+    a: &[(f64, StabilityLoss, bool)],
+    factor: f64,
+    b: &[(f64, StabilityLoss, bool)],
+    last_mm: f64,
+    tolerance: f64,
+) -> bool {
     let inside = |depth: f64| depth < last_mm * (1.0 - 1e-6);
     let a: Vec<_> = a
         .iter()

@@ -108,7 +108,7 @@ impl Reference {
 
     /// Fine series are for multipliers that coarse ones leave near 1, and counting for what series do not tell or miss by more than
     /// half of both errors.
-    fn new(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&Point>) -> Option<Self> {
+    fn new(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&CutStability>) -> Option<Self> {
         let is_near = |reference: &Self| reference.miss(found) < 0.5;
         let by_series = || {
             // Where coarse series do not settle fine ones do not either.
@@ -135,7 +135,7 @@ impl Reference {
 
     /// By the numbers of multipliers beyond what was found and its error, and within: there is to be none, and one. Where nothing
     /// was found, or these numbers do not tell a verdict, by that outside the unit circle.
-    fn by_counting(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&Point>) -> Option<Self> {
+    fn by_counting(problem: &Problem, rpm: f64, depth_m: f64, found: Option<&CutStability>) -> Option<Self> {
         /// Smaller multipliers are not counted.
         const LEAST: f64 = 0.2;
         let count_beyond = |radius: f64| taylor::count_beyond(problem, rpm, depth_m, radius);
@@ -163,7 +163,7 @@ impl Reference {
     }
 
     /// Distance from what was found, over the sum of both errors.
-    fn miss(&self, found: Option<&Point>) -> f64 {
+    fn miss(&self, found: Option<&CutStability>) -> f64 {
         found.map_or(0.0, |found| {
             (found.multiplier_abs - self.multiplier_abs).abs() / (found.error + self.error)
         })

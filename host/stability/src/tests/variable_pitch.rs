@@ -69,8 +69,8 @@ fn limits_of_equal_pitches_over_the_revolution_are_those_over_the_tooth_period()
         );
         assert!((found.chatter_hz.unwrap() / exact.chatter_hz.unwrap() - 1.0).abs() < 1e-6);
         // Two flips over a tooth period are a fold over a revolution of two teeth.
-        let expected = if exact.kind == Kind::Flip {
-            Kind::Fold
+        let expected = if exact.kind == StabilityLoss::Flip {
+            StabilityLoss::Fold
         } else {
             exact.kind
         };

@@ -8,7 +8,7 @@ use super::pitched::Pitched;
 
 /// One tooth on its way through the cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Passage {
+pub(crate) struct ToothPassage {
     /// When it enters, s; may lie before the period.
     pub(crate) entry_s: f64,
     /// When it leaves, s; may lie after the period.
@@ -27,16 +27,16 @@ pub(crate) struct Passage {
 ///
 /// The period is the tooth period where the teeth stand evenly, else the revolution. It starts when a tooth enters.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Passages {
+pub(crate) struct ToothPassages {
     /// Period T, s.
     pub(crate) period_s: f64,
     /// Spindle speed, rad/s.
     pub(crate) rad_per_s: f64,
     /// By entry, the latest first.
-    pub(crate) list: Vec<Passage>,
+    pub(crate) list: Vec<ToothPassage>,
 }
 
-impl Passages {
+impl ToothPassages {
     /// The passages of a problem at a speed.
     pub(crate) fn new(pitched: &Pitched, rpm: f64) -> Self {
         let rad_per_s = rpm * TAU / 60.0;
@@ -54,7 +54,7 @@ impl Passages {
         let count = (width_s / period_s - 1e-9).ceil().max(1.0) as usize;
         let list = (0..count).map(|index| {
             let entry_s = -(index as f64) * period_s;
-            Passage {
+            ToothPassage {
                 entry_s,
                 exit_s: entry_s + width_s,
                 delay_s: period_s,
@@ -89,7 +89,7 @@ impl Passages {
                 period_s - ahead_rad / rad_per_s
             };
             for entry_s in [enters_s, enters_s - period_s] {
-                list.push(Passage {
+                list.push(ToothPassage {
                     entry_s,
                     exit_s: entry_s + width_s,
                     delay_s: pitch_rad[before] / rad_per_s,
@@ -118,14 +118,14 @@ impl Passages {
     }
 
     /// The passages that cut at a time, s, which is not that of a switch.
-    pub(crate) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &Passage> {
+    pub(crate) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &ToothPassage> {
         self.list
             .iter()
             .filter(move |passage| passage.entry_s < time_s && time_s < passage.exit_s)
     }
 
     /// Immersion angle of a passage at a time, rad.
-    pub(crate) fn angle(&self, pitched: &Pitched, passage: &Passage, time_s: f64) -> f64 {
+    pub(crate) fn angle(&self, pitched: &Pitched, passage: &ToothPassage, time_s: f64) -> f64 {
         pitched.problem.process.engagement.start + (time_s - passage.entry_s) * self.rad_per_s
     }
 }
@@ -160,7 +160,7 @@ impl Coefficients {
     /// The mean of the passages that cut at `inside_s` over Gauss nodes (time, share of the whole).
     pub(crate) fn mean(
         pitched: &Pitched,
-        passages: &Passages,
+        passages: &ToothPassages,
         inside_s: f64,
         nodes: impl Iterator<Item = (f64, f64)> + Clone,
     ) -> Self {
