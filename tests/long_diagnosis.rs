@@ -5,6 +5,7 @@
 use std::path::Path;
 use std::time::Instant;
 
+use quietcut_testkit::results::Campaign;
 use quietcut_tests::command::{folder, quietcut};
 
 /// Longer than anyone waits, on two cores that do nothing else.
@@ -35,7 +36,7 @@ feed_per_tooth_mm = 0.1
 ";
 
 /// Makes four records by `simulate`, one for each of `differing`, and diagnoses them; the answer must be `cause`.
-fn diagnose(common: &[&str], differing: [&[&str]; 4], cause: &str) {
+fn diagnose(test: &str, common: &[&str], differing: [&[&str]; 4], cause: &str) {
     let folder = folder();
     let folder: &Path = folder.path();
     std::fs::write(folder.join("case.toml"), MACHINE).expect("written");
@@ -70,6 +71,16 @@ fn diagnose(common: &[&str], differing: [&[&str]; 4], cause: &str) {
         .filter_map(|cause| cause["name"].as_str())
         .collect();
     println!("{cause}: {seconds:.1} s for four records of 60 s at 2 kHz: {named:?}");
+    Campaign {
+        name: &format!("long-diagnosis-{test}"),
+        title: &format!("Long diagnosis, {test}"),
+        command: "cargo test --release -p quietcut-tests --test long_diagnosis -- --ignored --nocapture --test-threads 1",
+        seeds: "none",
+    }
+    .record(&[(
+        format!("time for four records of 60 s at 2 kHz with {cause}"),
+        format!("{seconds:.1} s"),
+    )]);
     assert_eq!(named, [cause]);
     assert!(seconds < LONGEST_S, "{seconds}");
 }
@@ -94,7 +105,7 @@ fn of_cuts() {
         &["--rpm", "700"],
         &["--rpm", "810"],
     ];
-    diagnose(&common, rpm, "runout");
+    diagnose("cuts", &common, rpm, "runout");
 }
 
 const LEVELS_N: [&[&str]; 4] = [
@@ -130,18 +141,33 @@ const CUBIC: [&str; 4] = [
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
 fn of_a_shaker() {
-    diagnose(&[&TONES[..], &CUBIC].concat(), LEVELS_N, "cubic-stiffness");
+    diagnose(
+        "tones",
+        &[&TONES[..], &CUBIC].concat(),
+        LEVELS_N,
+        "cubic-stiffness",
+    );
 }
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
 fn of_a_shaker_while_the_machine_drifts() {
     let drift = ["--effect", "drift.relative_rate_per_s=5e-4"];
-    diagnose(&[&TONES[..], &drift].concat(), LEVELS_N, "drift");
+    diagnose(
+        "tones-and-drift",
+        &[&TONES[..], &drift].concat(),
+        LEVELS_N,
+        "drift",
+    );
 }
 
 #[test]
 #[ignore = "a measurement on a machine that does nothing else"]
 fn of_sweeps() {
-    diagnose(&[&SWEEP[..], &CUBIC].concat(), LEVELS_N, "cubic-stiffness");
+    diagnose(
+        "sweeps",
+        &[&SWEEP[..], &CUBIC].concat(),
+        LEVELS_N,
+        "cubic-stiffness",
+    );
 }

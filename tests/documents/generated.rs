@@ -126,3 +126,95 @@ fn the_wiring_table_is_that_of_the_board() {
     assert!(board.len() >= 8, "{board:?}");
     assert_eq!(rows(&text("firmware/README.md")), board);
 }
+
+/// The members of the workspace with the crates of the project that each uses, in the order of the layers.
+#[test]
+fn the_page_of_architecture_has_the_crates_as_they_are() {
+    let layers = [
+        "shared",
+        "firmware",
+        "host/numerics",
+        "host/recording",
+        "host/model",
+        "host/frf",
+        "host/simulate",
+        "host/stability",
+        "host/identify",
+        "host/diagnose",
+        "host",
+        "host/testkit",
+        "tests",
+    ];
+    let workspace = text("Cargo.toml");
+    let members = workspace
+        .lines()
+        .find(|line| line.starts_with("members"))
+        .expect("members");
+    let members: BTreeSet<_> = members.split('"').skip(1).step_by(2).collect();
+    assert_eq!(
+        members,
+        layers.into_iter().collect(),
+        "a crate is missing in the list of layers"
+    );
+
+    let mut list = String::from("| folder | crate | uses |\n|---|---|---|\n");
+    let mut above = BTreeSet::new();
+    for folder in layers {
+        let manifest = text(&format!("{folder}/Cargo.toml"));
+        let name = manifest
+            .lines()
+            .find_map(|line| line.strip_prefix("name = \""))
+            .expect("a crate has a name")
+            .trim_end_matches('"');
+        let used: Vec<_> = manifest
+            .lines()
+            .skip_while(|line| *line != "[dependencies]")
+            .skip(1)
+            .take_while(|line| !line.starts_with('['))
+            .filter(|line| line.starts_with("quietcut"))
+            .filter_map(|line| line.split(['.', ' ', '=']).next())
+            .collect();
+        for crate_used in &used {
+            assert!(
+                above.contains(*crate_used),
+                "{name} uses {crate_used}, which does not stand above it"
+            );
+        }
+        let short: Vec<_> = used
+            .iter()
+            .map(|name| name.trim_start_matches("quietcut-"))
+            .collect();
+        writeln!(list, "| `{folder}` | `{name}` | {} |", short.join(", ")).expect("a string grows");
+        above.insert(name.to_owned());
+    }
+    assert_generated("host/ARCHITECTURE.md", Some("crates"), &list);
+}
+
+/// Every room of the crates that have rooms stands on the page.
+#[test]
+fn the_page_of_architecture_has_every_room() {
+    let page = text("host/ARCHITECTURE.md");
+    let mut missing = Vec::new();
+    for folder in ["host/stability/src", "host/identify/src", "host/diagnose/src"] {
+        for entry in fs::read_dir(root().join(folder)).expect("a folder").flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if entry.path().is_dir() && name != "tests" && !page.contains(&format!("\n| `{name}` |")) {
+                missing.push(format!("{folder}/{name}"));
+            }
+        }
+    }
+    assert!(
+        missing.is_empty(),
+        "host/ARCHITECTURE.md has no row for {missing:?}"
+    );
+}
+
+/// The version to cite is that of the crates.
+#[test]
+fn the_version_to_cite_is_that_of_the_crates() {
+    let version = format!("version: {}\n", env!("CARGO_PKG_VERSION"));
+    assert!(
+        text("CITATION.cff").contains(&version),
+        "CITATION.cff has another version"
+    );
+}
