@@ -62,7 +62,9 @@ fn table() {
     Campaign {
         name: "detector-rates",
         title: "Detector",
-        command: "QUIETCUT_SEEDS=20 cargo test --release -p quietcut-tests --test detector_rates -- --ignored --nocapture",
+        command: &format!(
+            "QUIETCUT_SEEDS={seeds} cargo test --release -p quietcut-tests --test detector_rates -- --ignored --nocapture"
+        ),
         seeds: &format!("{seeds} per line"),
     }
     .record(&figures);
