@@ -14,8 +14,6 @@ const STILL_THERE: &[(&str, &str)] = &[
     ("quietcut-core", "monitor.rs"),
     ("quietcut-core", "stroboscope/exponential.rs"),
     ("quietcut-firmware", "storage.rs"),
-    ("quietcut", "cli/identify.rs"),
-    ("quietcut", "report/answer.rs"),
     ("quietcut-model", "case/mod.rs"),
     ("quietcut-model", "effects/mod.rs"),
     ("quietcut-diagnose", "candidates/process.rs"),

@@ -15,7 +15,8 @@ use crate::demo::{Bench, BenchError, Story, Trial, page};
 use crate::device::VirtualCell;
 use crate::file;
 use crate::lobe_table::{TableRequest, build_table};
-use crate::report::answer::{VerdictAnswer, seconds};
+use crate::report::answer::VerdictAnswer;
+use crate::report::time::seconds;
 use crate::report::words;
 
 /// The whole chain on a virtual robot cell, no hardware: lobes, upload, cut, chatter, advice, quiet.

@@ -120,5 +120,5 @@ impl Trial {
 
 /// The time of a report in seconds.
 pub(super) fn seconds(report: &Report) -> f64 {
-    crate::report::answer::seconds(report)
+    crate::report::time::seconds(report)
 }

@@ -6,6 +6,7 @@ use quietcut_core::advice::Advice;
 use quietcut_core::monitor::Report;
 use serde::Serialize;
 
+use super::time::seconds;
 use super::words;
 
 /// One verdict.
@@ -156,11 +157,6 @@ fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
         }
         _ => false,
     }
-}
-
-/// The time of a report in seconds: whole nanoseconds of the first 104 days are exact in an `f64`.
-pub fn seconds(report: &Report) -> f64 {
-    report.time.0 as f64 / 1e9
 }
 
 /// The shortest decimal number that is this `f32`: 900.1, not 900.0999755859375.

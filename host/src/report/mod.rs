@@ -15,6 +15,7 @@ mod residual_pictures;
 pub mod spectrum;
 pub mod stabilization_chart;
 pub mod stroboscope;
+pub mod time;
 pub mod time_signal;
 pub mod words;
 

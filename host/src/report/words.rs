@@ -7,6 +7,8 @@ use quietcut_core::monitor::Report;
 use quietcut_core::units::Rpm;
 use quietcut_core::working_point::WorkingPoint;
 
+use super::time::seconds;
+
 /// The word for a verdict in JSON and CSV.
 pub fn verdict_key(verdict: Verdict) -> &'static str {
     match verdict {
@@ -91,7 +93,7 @@ pub fn state(report: &Report) -> String {
         || "      speed ?".into(),
         |speed| format!("{:6.0} rev/min", speed.0),
     );
-    let seconds = super::answer::seconds(report);
+    let seconds = seconds(report);
     format!("{seconds:9.2} s  {speed}  {}", verdict(&report.judgement))
 }
 

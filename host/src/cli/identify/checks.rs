@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use super::Error;
 use super::answer::{Answer, Linearity, OfSweeps, OfTones};
+use super::args::Args;
 use super::methods::settling;
 use super::records::along;
-use super::{Args, Error};
 use crate::identify::dwell::Dwell;
 use crate::identify::homogeneity::regions;
 use crate::identify::linearity::judge;

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::Error;
 use super::answer::{Answer, Cutting, Figure};
-use super::{Args, Error};
+use super::args::Args;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
 use crate::identify::force_test::{CuttingTest, Setup};

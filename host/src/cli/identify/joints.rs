@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use clap::ValueEnum;
 
+use super::Error;
 use super::answer::{Answer, Figure, OfJoint};
+use super::args::{Args, band};
 use super::methods::settling;
-use super::{Args, Error};
 use crate::case::Case;
 use crate::frf::{MeasurementSettings, measure};
 use crate::identify::case_file;
@@ -192,7 +193,7 @@ fn slowest_decay(robot: &Robot, postures: &[AtPosture]) -> Result<f64, Error> {
 /// Stiffness and damping from receptances.
 fn by_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<Found, Error> {
     let settings = MeasurementSettings {
-        band_hz: super::band(args)?.map(|[low, high]| (low, high)),
+        band_hz: band(args)?.map(|[low, high]| (low, high)),
         ..MeasurementSettings::default()
     };
     let mut warnings = Vec::new();

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 
 use super::answer::{Answer, Coefficients, Maps};
-use super::{Args, Error, records};
+use super::args::Args;
+use super::{Error, records};
 use crate::identify::case_file::Estimate;
 use crate::identify::dwell::Dwell;
 use crate::identify::harmonic_balance::Grid;

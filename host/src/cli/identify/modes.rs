@@ -1,38 +1,18 @@
 //! `--method modes`: complex modes of receptances.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use maud::html;
 
+use super::Error;
 use super::answer::{Answer, ComplexMode, Figure, Parts};
-use super::{Args, Error, positive};
+use super::args::{Args, band};
 use crate::frf::{Estimator, FrfTable, MeasurementSettings, RecordSpectra, measure, record_spectra};
 use crate::identify::modes::{self, ChannelNoise, IdentifiedMode, ModalModel, Receptances};
 use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
-
-/// The options of the method.
-#[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Modes")]
-pub(super) struct Options {
-    /// The number of modes; without it all poles that are stable.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    modes: Option<u16>,
-    /// The highest order of the models whose poles are compared.
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u16).range(5..=80))]
-    order: u16,
-    /// The stabilization diagram to draw, svg or html by its ending.
-    #[arg(long, value_name = "FILE")]
-    stabilization: Option<PathBuf>,
-    /// Distance of the frequencies in Hz where recordings are given; as that of frf.
-    #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
-    resolution_hz: Option<f64>,
-    /// The recordings are several cuts whose forces are dependent each by itself: pseudo-inverse, as that of frf.
-    #[arg(long)]
-    pseudo_inverse: bool,
-}
 
 /// Identifies modes.
 pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
@@ -41,7 +21,7 @@ pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
         ending(path)?;
     }
     let source = source(args)?;
-    let band_hz = super::band(args)?;
+    let band_hz = band(args)?;
     let refused =
         |error: modes::ModesError| Error::input(format!("{}: {error}", source.table.path().display()));
     let data = Receptances::new(&source.table, source.deviation.as_deref(), band_hz).map_err(refused)?;
@@ -103,7 +83,7 @@ fn source(args: &Args) -> Result<Source, Error> {
         } else {
             Estimator::H1
         },
-        band_hz: super::band(args)?.map(|[low, high]| (low, high)),
+        band_hz: band(args)?.map(|[low, high]| (low, high)),
         ..MeasurementSettings::default()
     };
     let measurement = measure(&recordings, &settings)?;

@@ -1,7 +1,8 @@
 //! Answers from any record of force and motion, without steady tones.
 
+use super::Error;
 use super::answer::{Answer, Figure, Slices};
-use super::{Args, Error, SurfaceTerm};
+use super::args::{Args, SurfaceTerm, band};
 use crate::identify::case_file::Estimate;
 use crate::identify::law::Extra;
 use crate::identify::periodic_fit::{self, Period};
@@ -98,7 +99,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<A
         motion,
         quantity,
     } = along(recording)?;
-    let band_hz = super::band(args)?;
+    let band_hz = band(args)?;
     let options = Options {
         terms: args.surface.iter().map(|term| term.term()).collect(),
         mass_kg: args.mass_kg,

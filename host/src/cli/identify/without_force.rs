@@ -1,7 +1,8 @@
 //! `--method output-only` and `--method inverse-stability`: modes where no force was measured.
 
+use super::Error;
 use super::answer::{Answer, Figure, OfMode};
-use super::{Args, Error};
+use super::args::Args;
 use crate::case::Case;
 use crate::identify::ambient::Ambient;
 use crate::identify::inverse_stability::{Before, Errors, InverseMode, Spread, identified_modes, modes};
