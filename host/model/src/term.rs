@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use nalgebra::{Matrix3, Vector3};
+use num_complex::Complex64;
 
 use super::Dynamics;
 
@@ -57,6 +58,12 @@ pub trait Term: Debug + Send + Sync {
 
     /// Slopes of f_r; `None` for a term that has no slope everywhere, or states of its own.
     fn slopes(&self, _at: &At) -> Option<Slopes> {
+        None
+    }
+
+    /// Describing function N(X, ω), N/m: under x = X·sin ωt along its axis the fundamental of f_r is N·x, its real part in phase
+    /// with x and its imaginary part in phase with the velocity. `None` where there is no closed form.
+    fn describing_function(&self, _amplitude_m: f64, _omega: f64) -> Option<Complex64> {
         None
     }
 

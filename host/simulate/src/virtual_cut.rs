@@ -4,7 +4,7 @@ use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 
 use super::Statistics;
-use super::effect::{EffectError, Effects};
+use super::effect::{EffectError, EffectName, Effects};
 use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{
     Cutter, Cutting, Model, ModelError, Passage, Pores, Regeneration, Settings, SimulateError, Spindle,
@@ -157,7 +157,7 @@ impl VirtualCut {
         let (dynamics, terms) = effects.dynamics(case.structure()?)?;
         if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !terms.is_empty() {
             return Err(EffectError::Cut {
-                name: "process-damping",
+                name: EffectName::ProcessDamping.name(),
                 what: "the modes of this structure add up to no mass, so that its velocity jumps with the force; the \
                        force of the flank is then not known beside added terms such as drift or cubic stiffness; use \
                        mass, damping and stiffness matrices",

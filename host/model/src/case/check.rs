@@ -1,17 +1,17 @@
 //! From the shape of a case file to a case: every value is judged here.
 
+mod extensions;
 mod job;
 mod joints;
 mod structure;
 mod tool;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use toml::Spanned;
 
 use super::file::{CaseFile, Number};
-use super::{Case, CaseError, Deviation, Parameter, Posture, extension};
+use super::{Case, CaseError, Deviation, Parameter, Posture};
 
 pub(super) fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
     let file: CaseFile = toml::from_str(text).map_err(|error| syntax(path, text, &error))?;
@@ -84,11 +84,15 @@ impl Check<'_> {
     ) -> CaseError {
         CaseError::Value {
             path: self.path.into(),
-            line: line_of(self.text, at.span().start),
+            line: self.line(at),
             key: key.into(),
             found: found.to_string(),
             expected: expected.into(),
         }
+    }
+
+    fn line<T>(&self, at: &Spanned<T>) -> usize {
+        line_of(self.text, at.span().start)
     }
 
     fn number(
@@ -136,38 +140,6 @@ impl Check<'_> {
     fn push_deviation(&mut self, parameter: Parameter, std: f64) {
         if std > 0.0 {
             self.deviations.push(Deviation { parameter, std });
-        }
-    }
-
-    fn extensions(
-        &self,
-        file: BTreeMap<Spanned<String>, toml::Table>,
-    ) -> Result<BTreeMap<String, toml::Table>, CaseError> {
-        let mut extensions = BTreeMap::new();
-        for (name, table) in file {
-            if !extension::NAMES.contains(&name.get_ref().as_str()) {
-                let expected = format!("one of {}", extension::NAMES.join(", "));
-                return Err(self.wrong(&name, "extension", format!("\"{}\"", name.get_ref()), expected));
-            }
-            if name.get_ref() == extension::AXIAL_DEPTH_MODULATION {
-                self.axial_depth_modulation(&name, &table)?;
-            }
-            extensions.insert(name.into_inner(), table);
-        }
-        Ok(extensions)
-    }
-
-    fn axial_depth_modulation(&self, at: &Spanned<String>, table: &toml::Table) -> Result<(), CaseError> {
-        let key = "extension.axial-depth-modulation";
-        if let Some(stranger) = table.keys().find(|key| *key != "on") {
-            return Err(self.wrong(at, key, format!("the key {stranger}"), "the key on, alone"));
-        }
-        match table.get("on") {
-            Some(toml::Value::Boolean(_)) => Ok(()),
-            other => {
-                let found = other.map_or_else(|| "nothing".into(), |value| format!("on = {value}"));
-                Err(self.wrong(at, key, found, "on = true or on = false"))
-            }
         }
     }
 }

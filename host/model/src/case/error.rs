@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use quietcut_recording::file::FileError;
 
+use crate::effects::EffectError;
+
 /// A case file that cannot be used. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
@@ -35,6 +37,16 @@ pub enum CaseError {
         found: String,
         /// What would be right.
         expected: String,
+    },
+    /// Values of extensions that are not possible beside each other, or a key that is missing.
+    #[error("{}: line {line}: {error}", path.display())]
+    Effect {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// The fault.
+        error: EffectError,
     },
     /// A table that is needed for what is asked of the case.
     #[error("{}: there is no [{section}]; {what_for}", path.display())]

@@ -10,6 +10,9 @@ pub(super) type Number = Spanned<f64>;
 /// A matrix by rows, with its place in the file.
 pub(super) type Rows = Spanned<Vec<Vec<f64>>>;
 
+/// Tables `[extension.NAME]` by name, with the line of each key.
+pub(super) type ExtensionsFile = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Spanned<toml::Value>>>;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CaseFile {
@@ -21,7 +24,7 @@ pub(super) struct CaseFile {
     pub(super) limits: Option<LimitsFile>,
     pub(super) posture: Option<PostureFile>,
     #[serde(default)]
-    pub(super) extension: BTreeMap<Spanned<String>, toml::Table>,
+    pub(super) extension: ExtensionsFile,
 }
 
 /// Both kinds of structure in one: the kind decides which keys may be there.

@@ -7,7 +7,6 @@
 mod check;
 mod deviation;
 mod error;
-mod extension;
 mod file;
 mod limits;
 mod posture;
@@ -17,10 +16,10 @@ use std::path::{Path, PathBuf};
 
 pub use deviation::{Deviation, Parameter};
 pub use error::CaseError;
-pub use extension::{AXIAL_DEPTH_MODULATION, NAMES as EXTENSION_NAMES, OF_SENSORS as EXTENSIONS_OF_SENSORS};
 pub use limits::MachineLimits;
 pub use posture::Posture;
 
+use crate::effects::{EffectName, EffectSpec};
 use crate::milling::{Cut, Material, Tool};
 use crate::structure::Structure;
 
@@ -46,8 +45,8 @@ pub struct Case {
     pub posture: Posture,
     /// How well parameters are known.
     pub deviations: Vec<Deviation>,
-    /// Extensions of the model by name, as they stand in the file. Names are checked, values are not, but for
-    /// axial-depth-modulation.
+    /// Extensions of the model by name, as they stand in the file. Names, keys and values are those of the
+    /// [`EffectSpec`]s; whether the structure has the direction is checked where the effect is used.
     pub extensions: BTreeMap<String, toml::Table>,
 }
 
@@ -115,28 +114,42 @@ impl Case {
         })
     }
 
+    /// True where the case has this effect as an extension.
+    pub fn has(&self, effect: EffectName) -> bool {
+        self.extensions.contains_key(effect.name())
+    }
+
+    /// The specifications of its extensions, in the order of their names.
+    pub fn effects(&self) -> impl Iterator<Item = &'static EffectSpec> + '_ {
+        let known = self.extensions.keys().filter_map(|name| name.parse().ok());
+        known.map(EffectName::spec)
+    }
+
     /// True where the depth of cut follows the axial vibration: edge and feed terms of eq. 3.7 act then.
     pub fn axial_depth_modulation(&self) -> bool {
         self.extensions
-            .get(AXIAL_DEPTH_MODULATION)
+            .get(EffectName::AxialDepthModulation.name())
             .and_then(|table| table.get("on"))
             .and_then(toml::Value::as_bool)
             .unwrap_or(false)
     }
 
-    /// Refuses every extension that is not among `treated` and is not one of the sensors.
+    /// Refuses the extensions for which `reason` has a reason.
     ///
     /// # Errors
-    /// The first such extension, with `reason`.
-    pub fn refuse_extensions_but(&self, treated: &[&str], reason: &str) -> Result<(), CaseError> {
-        let stranger = self.extensions.keys().find(|name| {
-            !treated.contains(&name.as_str()) && !EXTENSIONS_OF_SENSORS.contains(&name.as_str())
-        });
-        match stranger {
+    /// The first such extension, with its reason.
+    pub fn refuse_extensions(
+        &self,
+        reason: impl Fn(&EffectSpec) -> Option<&'static str>,
+    ) -> Result<(), CaseError> {
+        let refused = self
+            .effects()
+            .find_map(|spec| reason(spec).map(|reason| (spec, reason)));
+        match refused {
             None => Ok(()),
-            Some(name) => Err(CaseError::Extension {
+            Some((spec, reason)) => Err(CaseError::Extension {
                 path: self.path.clone(),
-                name: name.clone(),
+                name: spec.name.into(),
                 reason: reason.into(),
             }),
         }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::Treatment;
 use crate::structure::{Direction, Form};
 
 const GOOD: &str = r#"name = "good"
@@ -159,12 +160,21 @@ const WRONG: [(&str, &str, usize, &[&str]); 18] = [
         3,
         &["structure.kind", "\"matrix\"", "\"modes\""],
     ),
-    ("on = true", "on = 1", 21, &["axial-depth-modulation", "on = 1"]),
+    (
+        "on = true",
+        "on = 1",
+        22,
+        &["axial-depth-modulation.on", "found 1", "on = true"],
+    ),
     (
         "extension.axial-depth-modulation",
         "extension.axial-depth",
         21,
-        &["axial-depth", "one of mass"],
+        &[
+            "axial-depth",
+            "axial-depth-modulation (the closest)",
+            "one of mass",
+        ],
     ),
 ];
 
@@ -202,18 +212,13 @@ fn pitches_must_be_one_per_tooth_and_close_the_turn() {
 #[test]
 fn an_extension_that_is_not_treated_is_refused_and_one_of_the_sensors_is_not() {
     let text = format!("{GOOD}[extension.sensor-gain]\ngain = 1.1\n");
-    let treated = [AXIAL_DEPTH_MODULATION];
-    assert!(
-        parse(&text)
-            .unwrap()
-            .refuse_extensions_but(&treated, "no")
-            .is_ok()
-    );
+    let reason = |spec: &EffectSpec| match spec.treatment {
+        Treatment::LinearProcess | Treatment::Sensor => None,
+        _ => Some("no"),
+    };
+    assert!(parse(&text).unwrap().refuse_extensions(reason).is_ok());
     let text = format!("{GOOD}[extension.backlash]\ngap_mm = 0.1\n");
-    let error = parse(&text)
-        .unwrap()
-        .refuse_extensions_but(&treated, "no")
-        .unwrap_err();
+    let error = parse(&text).unwrap().refuse_extensions(reason).unwrap_err();
     assert!(error.to_string().contains("[extension.backlash]"), "{error}");
 }
 
@@ -252,4 +257,138 @@ fn the_cases_of_the_project_are_read() {
         count += 1;
     }
     assert!(count >= 20, "{count}");
+}
+
+/// Faults of extensions: the table, the line of the fault, and words of the message.
+const WRONG_EXTENSIONS: &[(&str, usize, &[&str])] = &[
+    (
+        "[extension.cubic-stifness]\nk3_n_per_m3 = 1.0\n",
+        23,
+        &["cubic-stiffness (the closest)"],
+    ),
+    // A key that no effect has, and one that is misspelt.
+    (
+        "[extension.backlash]\ngap_mm = 0.1\nspring = 2.0\n",
+        25,
+        &["backlash.spring", "an unknown key", "gap_mm"],
+    ),
+    (
+        "[extension.hysteresis]\nhysteretic_stiffness_n_per_m = 1.0\nyeild_m = 1e-5\n",
+        25,
+        &["yield_m (the closest)"],
+    ),
+    // The key of the right name in another unit.
+    (
+        "[extension.backlash]\ngap_um = 50.0\n",
+        24,
+        &["backlash.gap_um", "another unit", "gap_mm, in mm"],
+    ),
+    (
+        "[extension.sensor-delay]\ndelay_ms = 0.1\n",
+        24,
+        &["another unit", "delay_s, in s"],
+    ),
+    (
+        "[extension.cubic-stiffness]\nk3 = 1e12\n",
+        24,
+        &["k3_n_per_m3, in N/m³"],
+    ),
+    // The wrong type.
+    (
+        "[extension.coulomb-friction]\nfc_n = \"3\"\n",
+        24,
+        &["fc_n", "a force of 0 or more, in N"],
+    ),
+    (
+        "[extension.coulomb-friction]\nfc_n = 3\ndirection = 1\n",
+        25,
+        &["direction", "\"x\", \"y\" or \"z\""],
+    ),
+    (
+        "[extension.mode-coupling]\nkxyy_n_per_m3 = 1e12\ndirections = \"x\"\n",
+        25,
+        &["a list of two"],
+    ),
+    ("[extension.runout]\nrunout_um = true\n", 24, &["a number, in µm"]),
+    // Out of bounds.
+    (
+        "[extension.backlash]\ngap_mm = -0.1\n",
+        24,
+        &["found -0.1", "a gap of 0 or more"],
+    ),
+    (
+        "[extension.backlash]\ngap_mm = 0.1\nstiffness_fraction = 1.2\n",
+        25,
+        &["a share above 0 and up to 1"],
+    ),
+    (
+        "[extension.force-exponent]\nexponent = 0.0\n",
+        24,
+        &["a number greater than 0"],
+    ),
+    (
+        "[extension.hysteresis]\nhysteretic_stiffness_n_per_m = 1.0\nyield_m = 1e-5\nexponent = 0.5\n",
+        26,
+        &["a number of 1 or more"],
+    ),
+    (
+        "[extension.speed-fluctuation]\ndelta = 1.0\nfrequency_hz = 1.0\n",
+        24,
+        &["between -1 and 1"],
+    ),
+    ("[extension.mass]\nrelative_change = -1.5\n", 24, &["above −1"]),
+    (
+        "[extension.wear]\nrelative_rate_per_s = inf\n",
+        24,
+        &["found inf", "a number"],
+    ),
+    (
+        "[extension.cubic-stiffness]\nk3_n_per_m3 = [1.0, nan]\ndirection = [\"x\", \"y\"]\n",
+        24,
+        &["a number"],
+    ),
+    (
+        "[extension.wear]\nrelative_rate_per_s = 0.1\nrelative_rate_per_s_std = -0.1\n",
+        25,
+        &["a standard deviation of 0 or more"],
+    ),
+    // A key that is missing, and values that do not go together.
+    ("[extension.backlash]\ndirection = \"x\"\n", 23, &["needs gap_mm"]),
+    (
+        "[extension.backlash]\ngap_mm = 0.1\nbefore = \"coulomb-friction\"\n",
+        25,
+        &["and that effect too"],
+    ),
+    (
+        "[extension.coulomb-friction]\nfc_n = 3\ncontact_mm = 0.1\n",
+        25,
+        &["play_mm above 0"],
+    ),
+    (
+        "[extension.cubic-stiffness]\nk3_n_per_m3 = [1.0]\ndirection = [\"x\", \"y\"]\n",
+        24,
+        &["one for each location"],
+    ),
+];
+
+#[test]
+fn a_wrong_value_of_an_extension_is_named_with_its_line_and_the_right_word() {
+    for (table, line, words) in WRONG_EXTENSIONS {
+        let message = parse(&format!("{GOOD}{table}")).expect_err(table).to_string();
+        let place = format!("machine.toml: line {line}");
+        assert!(message.starts_with(&place), "{table}: {message}");
+        for word in *words {
+            assert!(message.contains(word), "{table}: {word} is not in: {message}");
+        }
+    }
+}
+
+#[test]
+fn a_deviation_stands_beside_the_number_that_it_belongs_to() {
+    let table =
+        "[extension.coulomb-friction]\nfc_n = [3, 4.5]\nfc_n_std = [0.1, 0.2]\ndirection = [\"x\", \"y\"]\n";
+    let case = parse(&format!("{GOOD}{table}")).unwrap();
+    assert!(case.has(EffectName::CoulombFriction) && !case.has(EffectName::Backlash));
+    let stray = "[extension.coulomb-friction]\nfc_n = 3\nfriction_std = 0.1\n";
+    assert!(parse(&format!("{GOOD}{stray}")).is_err());
 }

@@ -2,25 +2,38 @@
 
 use std::sync::Arc;
 
-use super::{Effect, Kind};
-use crate::case::AXIAL_DEPTH_MODULATION;
+use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Treatment, ValueKind};
 use crate::{Cutter, ModelError};
 
-pub(super) const KIND: Kind = Kind {
-    name: AXIAL_DEPTH_MODULATION,
-    keys: "none but on = true in a case",
-    build: |parameters| {
-        let on = parameters.number("", |value| value == 0.0 || value == 1.0, "0 or 1")?;
-        Ok(Arc::new(AxialDepthModulation(on == Some(1.0))))
-    },
+/// The specification.
+pub(super) const AXIAL_DEPTH_MODULATION: EffectSpec = EffectSpec {
+    id: EffectName::AxialDepthModulation,
+    name: "axial-depth-modulation",
+    class: Class::Geometry,
+    locations: Locations::Cut,
+    parameters: &[
+        Parameter::number("on", "", "true where the depth follows the axial vibration")
+            .of_kind(ValueKind::Switch)
+            .main(),
+    ],
+    treatment: Treatment::LinearProcess,
+    candidates: &["present or absent: the coefficient of the change must come out near 1"],
+    shares_term_with: &[],
+    summary: "the depth of cut follows the axial vibration",
+    equation: "b = b₀ − z",
+    shows: "forces in the rhythm of z, with edge angles below 90°",
+    hidden_by: "an edge angle of 90°, or a structure that is stiff along z",
+    source: "thesis, eq. 3.5",
+    example: "on = true",
+    build: |values| Ok(Arc::new(AxialDepthModulation(values.switch("on")?))),
 };
 
 #[derive(Clone, Copy, Debug)]
 struct AxialDepthModulation(bool);
 
 impl Effect for AxialDepthModulation {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::AxialDepthModulation
     }
 
     fn alter_cutter(&self, cutter: &mut Cutter) -> Result<(), ModelError> {

@@ -1,37 +1,78 @@
-//! Play: a share s of the spring does not act within a gap of total width g,
+//! Backlash: a share s of the spring does not act within a gap of total width g,
 //! f_r += s·k·(d(x) − x) with d(x) = 0 for |x| ≤ g/2 and x ∓ g/2 beyond; k is the stiffness along the direction.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
+use num_complex::Complex64;
+
 use super::place::{along, axis_of, static_stiffness};
-use super::{Effect, EffectError, Kind};
+use super::{
+    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
+};
 use crate::structure::{Direction, Structure};
 use crate::{At, Branch, Term};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const BACKLASH: EffectSpec = EffectSpec {
+    id: EffectName::Backlash,
     name: "backlash",
-    keys: "gap_mm, stiffness_fraction and direction, or gap_mm, contact_mm and before",
-    build: |parameters| {
-        let gap_mm = parameters.main("gap_mm")?;
-        if gap_mm < 0.0 {
-            return Err(EffectError::Value {
-                effect: "backlash".into(),
-                found: gap_mm.to_string(),
-                needed: "a gap of 0 or more",
-            });
-        }
-        let fraction = parameters.number(
+    class: Class::RestoringForce(Argument::Displacement),
+    locations: Locations::EachDirection,
+    parameters: &[
+        Parameter::number("gap_mm", "mm", "total width of the gap")
+            .main()
+            .within(Prior::not_negative("a gap of 0 or more")),
+        Parameter::number(
             "stiffness_fraction",
-            |share| share > 0.0 && share <= 1.0,
-            "a share above 0 and up to 1",
-        )?;
+            "",
+            "fraction of the stiffness that does not act within the gap; 1 without the key",
+        )
+        .linear()
+        .within(SHARE),
+        Parameter::word(
+            "before",
+            "\"coulomb-friction\" where the gap stands in series before that friction",
+        ),
+        Parameter::number(
+            "contact_mm",
+            "mm",
+            "depth of a soft contact at the ends of the gap, with `before`",
+        )
+        .within(Prior::not_negative("a length of 0 or more")),
+    ],
+    treatment: Treatment::Equivalent,
+    candidates: &["a fraction of the spring does not act within the gap"],
+    shares_term_with: &[],
+    summary: "a spring has no force, or less, within a gap",
+    equation: "f_r += s·k·(d(x) − x), d the dead zone of total width g",
+    shows: "stiffness that grows with amplitude towards that of the case, once the amplitude exceeds the gap; odd harmonics",
+    hidden_by: "amplitudes within the gap, where it is less stiffness; it changes no damping",
+    source: "Nordin and Gutman, Automatica 38 (2002)",
+    example: "gap_mm = 0.05\nstiffness_fraction = 0.3\ndirection = \"x\"",
+    build: |values| {
         Ok(Arc::new(Backlash {
-            half_gap_m: 0.5e-3 * gap_mm,
-            fraction: fraction.unwrap_or(1.0),
-            direction: parameters.direction("direction")?,
+            half_gap_m: 0.5e-3 * values.main("gap_mm")?,
+            fraction: values.number("stiffness_fraction")?.unwrap_or(1.0),
+            direction: values.direction()?,
         }))
     },
 };
+
+const SHARE: Prior = Prior {
+    closed: [false, true],
+    ..Prior::open(0.0, 1.0, "a share above 0 and up to 1")
+};
+
+/// The describing function for a stiffness of 1 that does not act within ±`half_gap`, less the spring itself.
+pub fn describing_function(amplitude: f64, half_gap: f64) -> Complex64 {
+    if amplitude <= half_gap {
+        return Complex64::new(-1.0, 0.0);
+    }
+    let share = half_gap / amplitude;
+    let missing = 2.0 / PI * (share.asin() + share * (1.0 - share * share).sqrt());
+    Complex64::new(-missing, 0.0)
+}
 
 #[derive(Clone, Copy, Debug)]
 struct Backlash {
@@ -52,13 +93,13 @@ const ABOVE: Branch = 1;
 const BELOW: Branch = 2;
 
 impl Effect for Backlash {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::Backlash
     }
 
     fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
-        let axis = axis_of(structure, self.direction, KIND.name)?;
-        let stiffness = static_stiffness(structure, KIND.name)?[(axis, axis)];
+        let axis = axis_of(structure, self.direction, self.name())?;
+        let stiffness = static_stiffness(structure, self.name())?[(axis, axis)];
         Ok(vec![Box::new(Play {
             half_gap_m: self.half_gap_m,
             stiffness: self.fraction * stiffness,
@@ -75,6 +116,10 @@ impl Term for Play {
             _ => at.x[self.axis],
         };
         along(self.axis, -self.stiffness * missing)
+    }
+
+    fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
+        Some(self.stiffness * describing_function(amplitude_m, self.half_gap_m))
     }
 
     fn margin(&self, branch: Branch, at: &At, _: &[f64], _: f64) -> f64 {

@@ -7,69 +7,111 @@
 //! that are not conforming (Lankarani & Nikravesh, J. Mech. Design 112, 1990; without their damping),
 //! f_r = fc·((|x − w| − g/2)/δ)^1.5 towards w, and w moves where |x − w| = g/2 + δ.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
+use num_complex::Complex64;
+
 use super::place::{along, axis_of};
-use super::{Effect, EffectError, Kind, Parameters, Value};
+use super::{
+    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
+    Value, Values,
+};
 use crate::structure::{Direction, Structure};
 use crate::{At, Branch, Term};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const COULOMB_FRICTION: EffectSpec = EffectSpec {
+    id: EffectName::CoulombFriction,
     name: "coulomb-friction",
-    keys: "fc_n, fc_minus_n (against negative velocity, where it differs), play_mm, contact_mm (of the play) and direction",
-    build: |parameters| {
-        let plus_n = parameters.main("fc_n")?;
-        let minus_n = parameters.finite("fc_minus_n")?.unwrap_or(plus_n);
-        if plus_n < 0.0 || minus_n < 0.0 {
-            return Err(EffectError::Value {
-                effect: "coulomb-friction".into(),
-                found: plus_n.min(minus_n).to_string(),
-                needed: "a force of 0 or more",
-            });
-        }
-        let mut length = |key| parameters.number(key, |length| length >= 0.0, "a length of 0 or more");
-        let play_mm = length("play_mm")?.unwrap_or(0.0);
-        let contact_mm = length("contact_mm")?.unwrap_or(0.0);
+    class: Class::RestoringForce(Argument::Velocity),
+    locations: Locations::EachDirection,
+    parameters: &[
+        Parameter::number("fc_n", "N", "friction force")
+            .main()
+            .linear()
+            .within(FORCE),
+        Parameter::number(
+            "fc_minus_n",
+            "N",
+            "friction force against negative velocity, where it differs",
+        )
+        .linear()
+        .within(FORCE),
+        Parameter::number("play_mm", "mm", "total width of a backlash in series").within(LENGTH),
+        Parameter::number(
+            "contact_mm",
+            "mm",
+            "depth of a soft contact at the ends of that backlash",
+        )
+        .within(LENGTH),
+    ],
+    treatment: Treatment::Equivalent,
+    candidates: &[
+        "alike in both directions of motion",
+        "another force in each direction of motion",
+        "behind a backlash",
+        "behind a clearance whose contact is soft",
+    ],
+    shares_term_with: &[],
+    summary: "dry friction, sticking included",
+    equation: "f_r += fc·sign(v); at rest any force within ±fc",
+    shows: "damping that falls as 1/amplitude, sticking between moves at low levels, odd harmonics that fall slowly with their order",
+    hidden_by: "large amplitudes; a hysteresis loop with very stiff pre-slip is the same; it moves no frequency while it slips",
+    source: "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
+    example: "fc_n = 3.0\ndirection = \"x\"",
+    build: |values| {
+        let plus_n = values.main("fc_n")?;
+        let minus_n = values.number("fc_minus_n")?.unwrap_or(plus_n);
+        let play_mm = values.number("play_mm")?.unwrap_or(0.0);
+        let contact_mm = values.number("contact_mm")?.unwrap_or(0.0);
         if contact_mm > 0.0 && play_mm == 0.0 {
-            return Err(EffectError::Value {
-                effect: "coulomb-friction.contact_mm".into(),
-                found: contact_mm.to_string(),
-                needed: "play_mm above 0: it is the contact at the ends of a play that",
-            });
+            let needed = "play_mm above 0: it is the contact at the ends of a play that";
+            return Err(values.clash("contact_mm", contact_mm, needed));
         }
         Ok(Arc::new(CoulombFriction {
             plus_n,
             minus_n,
             half_play_m: 0.5e-3 * play_mm,
             contact_m: 1e-3 * contact_mm,
-            direction: parameters.direction("direction")?,
+            direction: values.direction()?,
         }))
     },
 };
 
-/// A backlash that stands before the friction (`[extension.backlash]` with `before = "coulomb-friction"`) is a play of it.
+const FORCE: Prior = Prior::not_negative("a force of 0 or more");
+const LENGTH: Prior = Prior::not_negative("a length of 0 or more");
+
+/// The describing function for fc = 1: 4/(πX) in quadrature.
+pub fn describing_function(amplitude: f64) -> Complex64 {
+    Complex64::new(0.0, 4.0 / (PI * amplitude))
+}
+
+/// A backlash before the friction (`[extension.backlash]` with `before = "coulomb-friction"`) is a backlash in series with it.
 ///
 /// # Errors
 /// It stands before something else, or there is no friction.
-pub(super) fn take_play(all: &mut Vec<Parameters>) -> Result<(), EffectError> {
-    let Some(index) = all.iter().position(|known| known.effect() == "backlash") else {
+pub(super) fn take_play(all: &mut Vec<Values>) -> Result<(), EffectError> {
+    let Some(index) = all
+        .iter()
+        .position(|known| known.effect() == EffectName::Backlash)
+    else {
         return Ok(());
     };
     let Some(before) = all[index].text("before")? else {
         return Ok(());
     };
-    let friction = all.iter().position(|known| known.effect() == KIND.name);
-    let Some(friction) = friction.filter(|_| before == KIND.name) else {
-        return Err(EffectError::Value {
-            effect: "backlash.before".into(),
-            found: before,
-            needed: "\"coulomb-friction\", and that effect too,",
-        });
+    let friction = all
+        .iter()
+        .position(|known| known.effect() == EffectName::CoulombFriction);
+    let Some(friction) = friction.filter(|_| before == EffectName::CoulombFriction.name()) else {
+        let needed = "\"coulomb-friction\", and that effect too,";
+        return Err(all[index].clash("before", before, needed));
     };
     let mut play = all[index].clone();
     let gap_mm = play.main("gap_mm")?;
     all[friction].put("play_mm", Value::Number(gap_mm));
-    if let Some(contact_mm) = play.finite("contact_mm")? {
+    if let Some(contact_mm) = play.number("contact_mm")? {
         all[friction].put("contact_mm", Value::Number(contact_mm));
     }
     all.remove(index);
@@ -124,12 +166,12 @@ const STICKS_AHEAD: Branch = 3;
 const STICKS_BEHIND: Branch = 4;
 
 impl Effect for CoulombFriction {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::CoulombFriction
     }
 
     fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
-        let axis = axis_of(structure, self.direction, KIND.name)?;
+        let axis = axis_of(structure, self.direction, self.name())?;
         let friction = Friction {
             plus_n: self.plus_n,
             minus_n: self.minus_n,
@@ -167,6 +209,11 @@ impl Friction {
 impl Term for Friction {
     fn restoring_n(&self, branch: Branch, _: &At, _: &[f64]) -> [f64; 3] {
         self.sliding(branch)
+    }
+
+    /// Of friction that differs with direction the mean acts at the fundamental.
+    fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
+        Some(0.5 * (self.plus_n + self.minus_n) * describing_function(amplitude_m))
     }
 
     fn holds(&self) -> Option<usize> {

@@ -3,20 +3,36 @@
 use std::sync::Arc;
 
 use super::sensor_gain::meant;
-use super::{Effect, EffectError, Kind, Pickup};
+use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Pickup, Treatment};
 use crate::structure::Direction;
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const CROSS_AXIS: EffectSpec = EffectSpec {
+    id: EffectName::CrossAxis,
     name: "cross-axis",
-    keys: "fraction, direction (the other one) and channel",
-    build: |parameters| {
+    class: Class::Sensor,
+    locations: Locations::ChannelsFromDirection,
+    parameters: &[
+        Parameter::number("fraction", "", "fraction of the other direction in the reading")
+            .linear()
+            .main(),
+    ],
+    treatment: Treatment::Sensor,
+    candidates: &["one channel, from another direction"],
+    shares_term_with: &[],
+    summary: "a channel reads a fraction of another direction too",
+    equation: "y = y_t + p·(the other direction)",
+    shows: "the motion of the other direction, in phase, also where only that direction is driven",
+    hidden_by: "another direction at rest; a cross receptance is reciprocal and not the same",
+    source: "McConnell and Varoto, Vibration Testing (2008)",
+    example: "fraction = 0.04\ndirection = \"y\"\nchannel = \"x\"",
+    build: |values| {
         Ok(Arc::new(CrossAxis {
-            fraction: parameters.main("fraction")?,
-            direction: parameters.direction("direction")?.ok_or(EffectError::Missing {
-                name: "cross-axis".into(),
-                key: "direction, the other one",
-            })?,
-            channel: parameters.text("channel")?,
+            fraction: values.main("fraction")?,
+            direction: values
+                .direction()?
+                .ok_or_else(|| values.missing("direction, the other one"))?,
+            channel: values.channel()?,
         }))
     },
 };
@@ -29,8 +45,8 @@ struct CrossAxis {
 }
 
 impl Effect for CrossAxis {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::CrossAxis
     }
 
     fn alter_channel(&self, channel: &mut Pickup) {

@@ -1,20 +1,43 @@
-//! Damping that grows with velocity: f_r += c3·v³.
+//! A damping force that grows with the cube of the velocity: f_r += c3·v³.
 
 use std::sync::Arc;
 
-use super::Kind;
-use super::local_force::LocalForce;
+use num_complex::Complex64;
 
-pub(super) const KIND: Kind = Kind {
+use super::local_force::LocalForce;
+use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Treatment};
+
+/// The specification.
+pub(super) const CUBIC_DAMPING: EffectSpec = EffectSpec {
+    id: EffectName::CubicDamping,
     name: "cubic-damping",
-    keys: "c3_ns3_per_m3 and direction",
-    build: |parameters| {
+    class: Class::RestoringForce(Argument::Velocity),
+    locations: Locations::EachDirection,
+    parameters: &[Parameter::number("c3_ns3_per_m3", "N s³/m³", "cubic damping")
+        .linear()
+        .main()],
+    treatment: Treatment::Smooth,
+    candidates: &["one law along one direction, or a law along each"],
+    shares_term_with: &[],
+    summary: "a damping force grows with the cube of the velocity",
+    equation: "f_r += c3·v³",
+    shows: "damping that grows with the velocity squared, and a third harmonic in phase with the velocity, at two levels or in a free decay",
+    hidden_by: "recordings at one level, where it is damping; it moves no frequency",
+    source: "Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2",
+    example: "c3_ns3_per_m3 = 4e6\ndirection = \"y\"",
+    build: |values| {
         Ok(Arc::new(LocalForce {
-            name: KIND.name,
-            coefficients: [parameters.main("c3_ns3_per_m3")?, 0.0],
+            id: EffectName::CubicDamping,
+            coefficients: [values.main("c3_ns3_per_m3")?, 0.0],
             law: |[c3, _], _, v| c3 * v.powi(3),
             slopes: |[c3, _], _, v| [0.0, 3.0 * c3 * v.powi(2)],
-            direction: parameters.direction("direction")?,
+            describing_function: |[c3, _], amplitude, omega| c3 * describing_function(amplitude, omega),
+            direction: values.direction()?,
         }))
     },
 };
+
+/// The describing function for c3 = 1: ¾ω³X² in quadrature.
+pub fn describing_function(amplitude: f64, omega: f64) -> Complex64 {
+    Complex64::new(0.0, 0.75 * omega.powi(3) * amplitude * amplitude)
+}

@@ -1,36 +1,63 @@
-//! Stiffness that moves with time: K → K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))).
+//! Stiffness that changes with time: K → K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))).
 
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::place::{axis_of, static_stiffness};
-use super::{Effect, EffectError, Kind};
+use super::{
+    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
+};
 use crate::structure::{Direction, Structure};
 use crate::{At, Branch, Term};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const DRIFT: EffectSpec = EffectSpec {
+    id: EffectName::Drift,
     name: "drift",
-    keys: "relative_rate_per_s, or relative_change and time_constant_s, and direction (without it all of K)",
-    build: |parameters| {
-        let direction = parameters.direction("direction")?;
-        let time_constant = parameters.positive("time_constant_s")?;
-        let law = match (time_constant, parameters.finite("relative_change")?) {
+    class: Class::RestoringForce(Argument::Displacement),
+    locations: Locations::WholeOrDirection,
+    parameters: &[
+        Parameter::number("", "", "relative change of the stiffness over the record").main(),
+        Parameter::number("relative_rate_per_s", "1/s", "relative change per second").linear(),
+        Parameter::number(
+            "relative_change",
+            "",
+            "relative change in the end, with time_constant_s",
+        )
+        .linear(),
+        Parameter::number("time_constant_s", "s", "time constant of an exponential change")
+            .within(Prior::POSITIVE),
+    ],
+    treatment: Treatment::OfMoment(
+        "stiffness that moves with time has limits for one moment only; give the stiffness of that moment in \
+         [extension.stiffness] instead, or say after how long (--after-s 0 and --after-s T: between, limits lie between)",
+    ),
+    candidates: &[
+        "a change at a constant rate",
+        "a change that settles with a time constant",
+    ],
+    shares_term_with: &[],
+    summary: "the stiffness changes with time",
+    equation: "K → K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T)))",
+    shows: "frequencies that move along the record at one amplitude, all by the same share",
+    hidden_by: "levels that only rise or fall with time; wear and speed fluctuation, unless motion and tachometer are separate",
+    source: "Poulimenos and Fassois, MSSP 20 (2006)",
+    example: "relative_change = -0.05\ntime_constant_s = 30.0\ndirection = \"x\"",
+    build: |values| {
+        let direction = values.direction()?;
+        let time_constant = values.number("time_constant_s")?;
+        let law = match (time_constant, values.number("relative_change")?) {
             (Some(time_constant_s), Some(change)) => Law::Settles {
                 change,
                 time_constant_s,
             },
             (Some(time_constant_s), None) => Law::Settles {
-                change: parameters.main("relative_change")?,
+                change: values.main("relative_change")?,
                 time_constant_s,
             },
-            (None, Some(_)) => {
-                return Err(EffectError::Missing {
-                    name: "drift".into(),
-                    key: "time_constant_s beside relative_change",
-                });
-            }
-            (None, None) => Law::Rate(parameters.rate("relative_rate_per_s")?),
+            (None, Some(_)) => return Err(values.missing("time_constant_s beside relative_change")),
+            (None, None) => Law::Rate(values.rate("relative_rate_per_s")?),
         };
         Ok(Arc::new(Drift { law, direction }))
     },
@@ -67,14 +94,14 @@ struct Spring {
 }
 
 impl Effect for Drift {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::Drift
     }
 
     fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
-        let mut stiffness = static_stiffness(structure, KIND.name)?;
+        let mut stiffness = static_stiffness(structure, self.name())?;
         if self.direction.is_some() {
-            let axis = axis_of(structure, self.direction, KIND.name)?;
+            let axis = axis_of(structure, self.direction, self.name())?;
             let own = stiffness[(axis, axis)];
             stiffness.fill(0.0);
             stiffness[(axis, axis)] = own;

@@ -1,60 +1,60 @@
-//! An effect that cannot be.
+//! An effect that is not possible.
 
-use super::KINDS;
+use super::{EffectName, nearest};
 
-/// What is wrong with an effect.
+/// The fault of an effect.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EffectError {
     /// Not `NAME=VALUE`.
-    #[error("effect `{0}`: NAME=VALUE or NAME.KEY=VALUE is needed, as in runout=20")]
+    #[error("effect `{0}`: NAME=VALUE or NAME.KEY=VALUE is needed, as in {example}=20", example = EffectName::Runout.name())]
     Form(String),
-    /// A name that is not known.
-    #[error("effect `{0}` is not known; there are {list}", list = names())]
+    /// An unknown name.
+    #[error("effect `{0}` is not known; {names} is needed", names = nearest::expected(.0, EffectName::ALL.into_iter().map(EffectName::name)))]
     Unknown(String),
     /// A key that the effect does not have.
-    #[error("effect `{name}` has no key `{key}`; it has {known}")]
+    #[error("effect `{name}` has no key `{key}`; it has {known}", name = .effect.name(), known = .effect.spec().keys_in_words())]
     Key {
         /// The effect.
-        name: String,
+        effect: EffectName,
         /// The key.
         key: String,
-        /// What it has.
-        known: &'static str,
     },
-    /// A key that is not there.
+    /// A key that must be given.
     #[error("effect `{name}` needs {key}")]
     Missing {
         /// The effect.
-        name: String,
-        /// What is needed.
+        name: &'static str,
+        /// The key.
         key: &'static str,
     },
-    /// A change over a record whose length is not known.
-    #[error("effect `{name}`: how long the record is, is not known here; give {name}.{key} instead")]
+    /// A change over a record of unknown length.
+    #[error("effect `{name}`: the length of the record is not known here; give {name}.{key} instead")]
     NoDuration {
         /// The effect.
-        name: String,
+        name: &'static str,
         /// The key to give.
         key: &'static str,
     },
-    /// A value that cannot be.
-    #[error("effect `{effect}`: `{found}` is not possible; {needed} is needed")]
+    /// A value that is not possible.
+    #[error("effect `{name}{dot}{key}`: `{found}` is not possible; {needed} is needed", dot = if .key.is_empty() { "" } else { "." })]
     Value {
-        /// The effect, with its key.
-        effect: String,
-        /// What was found.
+        /// The effect.
+        name: &'static str,
+        /// The key; empty for the VALUE of the command line.
+        key: String,
+        /// The value as given.
         found: String,
         /// What would be right.
         needed: &'static str,
     },
-    /// A direction that the structure does not have, or one that must be said.
+    /// A direction that the structure does not have, or one that must be given.
     #[error("effect `{name}`: {what}; the structure has the directions {directions}")]
     Direction {
         /// The effect.
         name: &'static str,
-        /// What is wrong.
+        /// The fault.
         what: String,
-        /// What there is.
+        /// The directions of the structure.
         directions: String,
     },
     /// A parameter that this kind of structure does not have.
@@ -62,7 +62,7 @@ pub enum EffectError {
     Structure {
         /// The effect.
         name: &'static str,
-        /// What is wrong, and what would be right.
+        /// The fault, and what would be right.
         what: String,
     },
     /// Something that the cut of the case does not allow.
@@ -70,16 +70,31 @@ pub enum EffectError {
     Cut {
         /// The effect.
         name: &'static str,
-        /// What is wrong, and what would be right.
+        /// The fault, and what would be right.
         what: &'static str,
     },
-    /// Friction that holds a tool without inertia.
+    /// Friction on a tool without inertia.
     #[error(
-        "coulomb-friction: the modes of this structure add up to no mass (their residues do not sum to zero), so that no friction can hold it; use mass, damping and stiffness matrices"
+        "{name}: the modes of this structure add up to no mass (their residues do not sum to zero), so that no friction can hold it; use mass, damping and stiffness matrices",
+        name = EffectName::CoulombFriction.name()
     )]
     NoInertia,
 }
 
-fn names() -> String {
-    KINDS.map(|kind| kind.name).join(", ")
+impl EffectError {
+    /// The effect and the key that are at fault, where they are known.
+    pub fn location(&self) -> Option<(&str, &str)> {
+        match self {
+            Self::Form(_) => None,
+            Self::Unknown(name) => Some((name, "")),
+            Self::Key { effect, key } => Some((effect.name(), key)),
+            Self::Missing { name, .. }
+            | Self::NoDuration { name, .. }
+            | Self::Direction { name, .. }
+            | Self::Structure { name, .. }
+            | Self::Cut { name, .. } => Some((name, "")),
+            Self::Value { name, key, .. } => Some((name, key)),
+            Self::NoInertia => Some((EffectName::CoulombFriction.name(), "")),
+        }
+    }
 }

@@ -1,24 +1,40 @@
-//! The cutting force is not in proportion to the chip: F = K·b·h₀·(h/h₀)^p.
+//! The cutting force is not proportional to the chip thickness: F = K·b·h₀·(h/h₀)^p.
 
 use std::sync::Arc;
 
-use super::{Effect, Kind};
+use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment};
 use crate::{ChipLaw, Cutter, ModelError};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const FORCE_EXPONENT: EffectSpec = EffectSpec {
+    id: EffectName::ForceExponent,
     name: "force-exponent",
-    keys: "exponent and reference_chip_mm (without it the feed per tooth)",
-    build: |parameters| {
-        let exponent = match parameters.positive("")? {
-            Some(exponent) => exponent,
-            None => match parameters.positive("exponent")? {
-                Some(exponent) => exponent,
-                None => parameters.needed("exponent")?,
-            },
-        };
+    class: Class::CuttingForce,
+    locations: Locations::Cut,
+    parameters: &[
+        Parameter::number("exponent", "", "exponent of the chip thickness")
+            .main()
+            .within(Prior::POSITIVE),
+        Parameter::number(
+            "reference_chip_mm",
+            "mm",
+            "chip thickness h₀; the feed per tooth without the key",
+        )
+        .within(Prior::POSITIVE),
+    ],
+    treatment: Treatment::ChipLaw,
+    candidates: &["one exponent about one reference chip"],
+    shares_term_with: &[],
+    summary: "the cutting force grows with a power of the chip thickness",
+    equation: "F = K·b·h₀·(h/h₀)^p",
+    shows: "a force that grows less than the chip, at two feeds or over the chips of one tooth passing",
+    hidden_by: "recordings at one chip thickness, where it is other coefficients",
+    source: "Kienzle, VDI-Z 94 (1952)",
+    example: "exponent = 0.8\nreference_chip_mm = 0.05",
+    build: |values| {
         Ok(Arc::new(ForceExponent {
-            exponent,
-            reference_m: parameters.positive("reference_chip_mm")?.map(|mm| 1e-3 * mm),
+            exponent: values.main("exponent")?,
+            reference_m: values.number("reference_chip_mm")?.map(|mm| 1e-3 * mm),
         }))
     },
 };
@@ -30,8 +46,8 @@ struct ForceExponent {
 }
 
 impl Effect for ForceExponent {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::ForceExponent
     }
 
     fn alter_cutter(&self, cutter: &mut Cutter) -> Result<(), ModelError> {

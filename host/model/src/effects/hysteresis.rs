@@ -2,33 +2,104 @@
 //!
 //! γ and β are shape numbers with γ + β = 1, so that z saturates at ±z_y; at small motion z = x and nothing is added.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
+use num_complex::Complex64;
+
 use super::place::{along, axis_of};
-use super::{Effect, EffectError, Kind};
+use super::{
+    Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment,
+};
 use crate::structure::{Direction, Structure};
 use crate::{At, Branch, Term};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const HYSTERESIS: EffectSpec = EffectSpec {
+    id: EffectName::Hysteresis,
     name: "hysteresis",
-    keys: "hysteretic_stiffness_n_per_m, yield_m, exponent, gamma (beta is 1 − gamma) and direction",
-    build: |parameters| {
-        let stiffness = parameters.main("hysteretic_stiffness_n_per_m")?;
-        let yield_m = parameters.positive("yield_m")?.ok_or(EffectError::Missing {
-            name: "hysteresis".into(),
-            key: "yield_m",
-        })?;
-        let exponent = parameters.number("exponent", |n| n >= 1.0, "a number of 1 or more")?;
-        let gamma = parameters.number("gamma", |g| (0.0..=1.0).contains(&g), "a number from 0 to 1")?;
+    class: Class::RestoringForce(Argument::Velocity),
+    locations: Locations::EachDirection,
+    parameters: &[
+        Parameter::number(
+            "hysteretic_stiffness_n_per_m",
+            "N/m",
+            "stiffness of the loop before it yields, k_h",
+        )
+        .linear()
+        .main(),
+        Parameter::number("yield_m", "m", "largest elastic deflection, z_y").within(Prior::POSITIVE),
+        Parameter::number(
+            "exponent",
+            "",
+            "sharpness of the transition, n; 1 without the key",
+        )
+        .within(EXPONENT),
+        Parameter::number(
+            "gamma",
+            "",
+            "shape of the loop, γ, with β = 1 − γ; 0.5 without the key",
+        )
+        .within(ZERO_TO_ONE),
+    ],
+    treatment: Treatment::Equivalent,
+    candidates: &["a Bouc–Wen loop"],
+    shares_term_with: &[],
+    summary: "a Bouc–Wen hysteresis loop",
+    equation: "f_r += k_h·(z − x), ż = v·(1 − |z/z_y|ⁿ·(γ·sgn(v·z) + β))",
+    shows: "loops of force over displacement that do not depend on speed; stiffness that falls, damping that rises and falls again with amplitude",
+    hidden_by: "large slip, where it is friction and less stiffness; it has no even harmonics",
+    source: "Wen, J. Eng. Mech. Div. ASCE 102 (1976)",
+    example: "hysteretic_stiffness_n_per_m = 2e5\nyield_m = 1e-5\nexponent = 1.5\ngamma = 0.6\ndirection = \"x\"",
+    build: |values| {
         Ok(Arc::new(Hysteresis {
-            stiffness,
-            yield_m,
-            exponent: exponent.unwrap_or(1.0),
-            gamma: gamma.unwrap_or(0.5),
-            direction: parameters.direction("direction")?,
+            stiffness: values.main("hysteretic_stiffness_n_per_m")?,
+            yield_m: values.needed("yield_m")?,
+            exponent: values.number("exponent")?.unwrap_or(1.0),
+            gamma: values.number("gamma")?.unwrap_or(0.5),
+            direction: values.direction()?,
         }))
     },
 };
+
+const EXPONENT: Prior = Prior::from(1.0, "a number of 1 or more");
+const ZERO_TO_ONE: Prior = Prior {
+    closed: [true; 2],
+    ..Prior::open(0.0, 1.0, "a number from 0 to 1")
+};
+
+/// The describing function of a Bouc–Wen element of stiffness 1, n = 1 and γ = β = ½, less the spring: (z − x) at the fundamental.
+///
+/// With n = 1 and γ = β the element is linear while it unloads and saturates exponentially while it loads.
+pub fn describing_function(amplitude: f64, yield_m: f64) -> Complex64 {
+    // From peak to peak: unloading from +z₀ with slope 1 to z = 0, then loading z = −z_y(1 − e^{−s/z_y}) over what is
+    // left, to −z₀. z₀ is the fixed point of that.
+    let stroke = 2.0 * amplitude;
+    let mut low = 0.0;
+    let mut high = yield_m.min(stroke);
+    for _ in 0..60 {
+        let z = 0.5 * (low + high);
+        let reached = -yield_m * (-(stroke - z) / yield_m).exp_m1();
+        if reached > z { low = z } else { high = z }
+    }
+    let top = 0.5 * (low + high);
+    let count = 256;
+    let mut sum = Complex64::ZERO;
+    // Half a period from the upper peak down: x = X·cos p; the other half is the same turned around.
+    for k in 0..count {
+        let p = PI * (f64::from(k) + 0.5) / f64::from(count);
+        let gone = amplitude * (1.0 - p.cos());
+        let z = if gone <= top {
+            top - gone
+        } else {
+            yield_m * (-(gone - top) / yield_m).exp_m1()
+        };
+        let rest = z - amplitude * p.cos();
+        // Against cos p in phase, and against −sin p, the velocity, in quadrature.
+        sum += Complex64::new(rest * p.cos(), -rest * p.sin());
+    }
+    sum * (2.0 / (f64::from(count) * amplitude))
+}
 
 #[derive(Clone, Copy, Debug)]
 struct Hysteresis {
@@ -50,12 +121,12 @@ const BACKWARD: Branch = 1;
 const NEGATIVE: Branch = 2;
 
 impl Effect for Hysteresis {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::Hysteresis
     }
 
     fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
-        let axis = axis_of(structure, self.direction, KIND.name)?;
+        let axis = axis_of(structure, self.direction, self.name())?;
         Ok(vec![Box::new(BoucWen { effect: *self, axis })])
     }
 }
@@ -74,6 +145,11 @@ impl Term for BoucWen {
 
     fn restoring_n(&self, _: Branch, at: &At, own: &[f64]) -> [f64; 3] {
         along(self.axis, self.effect.stiffness * (own[0] - at.x[self.axis]))
+    }
+
+    fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
+        let has_closed_form = self.effect.exponent == 1.0 && self.effect.gamma == 0.5;
+        has_closed_form.then(|| self.effect.stiffness * describing_function(amplitude_m, self.effect.yield_m))
     }
 
     fn rate(&self, branch: Branch, at: &At, own: &[f64], rate: &mut [f64]) {

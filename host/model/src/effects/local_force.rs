@@ -1,24 +1,31 @@
-//! A spring or damper along one direction whose force follows a law of its own: f_r += law(x, v).
+//! A spring or damper along one direction with a force law: f_r += law(x, v).
+
+use num_complex::Complex64;
 
 use super::place::{along, axis_of};
-use super::{Effect, EffectError};
+use super::{Effect, EffectError, EffectName};
 use crate::structure::{Direction, Structure};
 use crate::{At, Branch, Slopes, Term};
 
 /// f_r, N, from up to two coefficients, the displacement x, m, and the velocity v, m/s.
 pub(super) type Law = fn([f64; 2], f64, f64) -> f64;
 
+/// N(X, ω), N/m, from the coefficients, the amplitude X, m, and ω, rad/s.
+pub(super) type DescribingFunction = fn([f64; 2], f64, f64) -> Complex64;
+
 /// A force that depends on displacement and velocity along one direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LocalForce {
-    /// The effect's name.
-    pub(super) name: &'static str,
-    /// What the law takes; a law of one coefficient leaves the second at 0.
+    /// The effect.
+    pub(super) id: EffectName,
+    /// The coefficients of the law; the second is 0 where it has one.
     pub(super) coefficients: [f64; 2],
     pub(super) law: Law,
     /// ∂f_r/∂x and ∂f_r/∂v of the law.
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
-    /// Where it acts; `None` for the only direction of a structure.
+    /// N(X, ω) of the law: see [`Term::describing_function`].
+    pub(super) describing_function: DescribingFunction,
+    /// The direction; `None` for the only one of a structure.
     pub(super) direction: Option<Direction>,
 }
 
@@ -27,12 +34,13 @@ struct Force {
     coefficients: [f64; 2],
     law: Law,
     slopes: fn([f64; 2], f64, f64) -> [f64; 2],
+    describing_function: DescribingFunction,
     axis: usize,
 }
 
 impl Effect for LocalForce {
-    fn name(&self) -> &'static str {
-        self.name
+    fn id(&self) -> EffectName {
+        self.id
     }
 
     fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
@@ -40,7 +48,8 @@ impl Effect for LocalForce {
             coefficients: self.coefficients,
             law: self.law,
             slopes: self.slopes,
-            axis: axis_of(structure, self.direction, self.name)?,
+            describing_function: self.describing_function,
+            axis: axis_of(structure, self.direction, self.id.name())?,
         })])
     }
 }
@@ -57,5 +66,8 @@ impl Term for Force {
         slopes.stiffness[self.axis][self.axis] = by_x;
         slopes.damping[self.axis][self.axis] = by_v;
         Some(slopes)
+    }
+    fn describing_function(&self, amplitude_m: f64, omega: f64) -> Option<Complex64> {
+        Some((self.describing_function)(self.coefficients, amplitude_m, omega))
     }
 }

@@ -3,40 +3,46 @@
 use std::sync::Arc;
 
 use super::place::axis_of;
-use super::{Effect, EffectError, Kind};
+use super::{Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment};
 use crate::Dynamics;
 use crate::structure::{Direction, Structure};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const MISSING_MODE: EffectSpec = EffectSpec {
+    id: EffectName::MissingMode,
     name: "missing-mode",
-    keys: "frequency_hz, damping_ratio, modal_mass_kg and direction",
-    build: |parameters| {
-        let frequency_hz = parameters.main("frequency_hz")?;
-        let damping_ratio = parameters.number(
-            "damping_ratio",
-            |zeta| (0.0..1.0).contains(&zeta),
-            "a ratio from 0 to below 1",
-        )?;
-        let missing = |key| EffectError::Missing {
-            name: "missing-mode".into(),
-            key,
-        };
-        if frequency_hz <= 0.0 {
-            return Err(EffectError::Value {
-                effect: "missing-mode".into(),
-                found: frequency_hz.to_string(),
-                needed: "a frequency greater than 0",
-            });
-        }
+    class: Class::Inertia,
+    locations: Locations::EachDirection,
+    parameters: &[
+        Parameter::number("frequency_hz", "Hz", "natural frequency")
+            .main()
+            .within(FREQUENCY),
+        Parameter::number("damping_ratio", "", "damping ratio; 0.02 without the key").within(RATIO),
+        Parameter::number("modal_mass_kg", "kg", "modal mass").within(Prior::POSITIVE),
+    ],
+    treatment: Treatment::LinearStructure,
+    candidates: &["one mode along one direction"],
+    shares_term_with: &[],
+    summary: "the receptance of a direction has one more mode",
+    equation: "H += 1/(m·(ω_m² − ω² + 2iζω_m·ω))",
+    shows: "a resonance where the case has none, with its own phase, alike at all levels",
+    hidden_by: "frequencies far outside the band, where it is a little stiffness or mass",
+    source: "Ewins, Modal Testing (2000), ch. 4",
+    example: "frequency_hz = 85.0\ndamping_ratio = 0.03\nmodal_mass_kg = 40.0\ndirection = \"x\"",
+    build: |values| {
         Ok(Arc::new(MissingMode {
-            frequency_hz,
-            damping_ratio: damping_ratio.unwrap_or(0.02),
-            modal_mass_kg: parameters
-                .positive("modal_mass_kg")?
-                .ok_or_else(|| missing("modal_mass_kg"))?,
-            direction: parameters.direction("direction")?,
+            frequency_hz: values.main("frequency_hz")?,
+            damping_ratio: values.number("damping_ratio")?.unwrap_or(0.02),
+            modal_mass_kg: values.needed("modal_mass_kg")?,
+            direction: values.direction()?,
         }))
     },
+};
+
+const FREQUENCY: Prior = Prior::open(0.0, f64::INFINITY, "a frequency greater than 0");
+const RATIO: Prior = Prior {
+    closed: [true, false],
+    ..Prior::open(0.0, 1.0, "a ratio from 0 to below 1")
 };
 
 #[derive(Clone, Copy, Debug)]
@@ -48,12 +54,12 @@ struct MissingMode {
 }
 
 impl Effect for MissingMode {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::MissingMode
     }
 
     fn alter_dynamics(&self, structure: &Structure, dynamics: &mut Dynamics) -> Result<(), EffectError> {
-        let axis = axis_of(structure, self.direction, KIND.name)?;
+        let axis = axis_of(structure, self.direction, self.name())?;
         dynamics.add_mode(axis, self.frequency_hz, self.damping_ratio, self.modal_mass_kg);
         Ok(())
     }

@@ -1,6 +1,7 @@
-//! What a simulation can have that the plain model has not: the causes that `diagnose` looks for, one file each.
+//! Effects: what a machine, a cut or a sensor may have beyond the plain model. One file each, with its [`EffectSpec`] and its physics.
 //!
-//! To add one: write its file with its equation and a [`Kind`], and name it in [`KINDS`].
+//! [`EffectName`] is the only list. Names, keys, help, the table of the documentation, the checks of cases, simulation and the treatment
+//! in stability follow from it. To add an effect: write its file and name it twice below, as a module and in the list.
 
 mod axial_depth_modulation;
 mod backlash;
@@ -8,28 +9,37 @@ mod coulomb_friction;
 mod cross_axis;
 mod cubic_damping;
 mod cubic_stiffness;
+mod damping;
 mod drift;
 mod edge_force;
 mod error;
 mod force_coefficients;
 mod force_exponent;
 mod hysteresis;
-mod linear;
+mod linear_change;
+mod list;
 mod local_force;
+mod mass;
 mod missing_mode;
 mod mode_coupling;
-mod parameters;
+pub(crate) mod nearest;
+mod pickup;
 mod place;
 mod process_damping;
 mod quadratic_stiffness;
 mod runout;
 mod sensor_delay;
 mod sensor_gain;
-mod sensor_offset;
+mod sensor_offset_from_tool_tip;
 mod softening_hardening;
+mod spec;
 mod speed_fluctuation;
+mod stiffness;
+mod values;
 mod wear;
 
+#[cfg(test)]
+mod round_trip_tests;
 #[cfg(test)]
 mod tests;
 
@@ -37,17 +47,67 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 pub use error::EffectError;
-pub use parameters::{Parameters, Value};
+use list::list;
+pub use pickup::Pickup;
+pub use spec::{Argument, Class, EffectSpec, Locations, Parameter, Prior, Treatment, ValueKind};
+pub use values::{Value, Values};
 
 use crate::case::Case;
 use crate::structure::Structure;
 use crate::{Cutter, Dynamics, ModelError, Spindle, Term};
-use quietcut_recording::Quantity;
 
-/// One effect with its parameters. It does what it does by one of these; the others leave things as they are.
+/// Describing functions of laws with a coefficient of 1: see [`Term::describing_function`](crate::Term::describing_function).
+pub mod describing_functions {
+    pub use super::backlash::describing_function as backlash;
+    pub use super::coulomb_friction::describing_function as coulomb_friction;
+    pub use super::cubic_damping::describing_function as cubic_damping;
+    pub use super::cubic_stiffness::describing_function as cubic_stiffness;
+    pub use super::hysteresis::describing_function as hysteresis;
+    pub use super::softening_hardening::quintic_describing_function as quintic_stiffness;
+}
+
+list! {
+    Mass => mass::MASS,
+    Stiffness => stiffness::STIFFNESS,
+    Damping => damping::DAMPING,
+    MissingMode => missing_mode::MISSING_MODE,
+    CubicStiffness => cubic_stiffness::CUBIC_STIFFNESS,
+    QuadraticStiffness => quadratic_stiffness::QUADRATIC_STIFFNESS,
+    CubicDamping => cubic_damping::CUBIC_DAMPING,
+    SofteningHardening => softening_hardening::SOFTENING_HARDENING,
+    CoulombFriction => coulomb_friction::COULOMB_FRICTION,
+    Backlash => backlash::BACKLASH,
+    Hysteresis => hysteresis::HYSTERESIS,
+    ModeCoupling => mode_coupling::MODE_COUPLING,
+    Drift => drift::DRIFT,
+    ForceCoefficients => force_coefficients::FORCE_COEFFICIENTS,
+    EdgeForce => edge_force::EDGE_FORCE,
+    ForceExponent => force_exponent::FORCE_EXPONENT,
+    Runout => runout::RUNOUT,
+    ProcessDamping => process_damping::PROCESS_DAMPING,
+    AxialDepthModulation => axial_depth_modulation::AXIAL_DEPTH_MODULATION,
+    SpeedFluctuation => speed_fluctuation::SPEED_FLUCTUATION,
+    Wear => wear::WEAR,
+    SensorGain => sensor_gain::SENSOR_GAIN,
+    SensorDelay => sensor_delay::SENSOR_DELAY,
+    CrossAxis => cross_axis::CROSS_AXIS,
+    SensorOffsetFromToolTip => sensor_offset_from_tool_tip::SENSOR_OFFSET_FROM_TOOL_TIP,
+}
+
+/// An effect with values. It acts by one of these methods; the others change nothing.
 pub trait Effect: Debug + Send + Sync {
-    /// Its name, as in `CAUSES`: one of [`EXTENSION_NAMES`](crate::case::EXTENSION_NAMES).
-    fn name(&self) -> &'static str;
+    /// Its entry in the list.
+    fn id(&self) -> EffectName;
+
+    /// Its specification.
+    fn spec(&self) -> &'static EffectSpec {
+        self.id().spec()
+    }
+
+    /// Its name in cases, answers and on the command line.
+    fn name(&self) -> &'static str {
+        self.id().name()
+    }
 
     /// Changes a parameter of the structure.
     ///
@@ -81,98 +141,12 @@ pub trait Effect: Debug + Send + Sync {
         Ok(())
     }
 
-    /// Changes how the spindle turns.
+    /// Changes the rotation of the spindle.
     fn alter_spindle(&self, _spindle: &mut Spindle) {}
 
     /// Changes what a channel reads.
     fn alter_channel(&self, _channel: &mut Pickup) {}
 }
-
-/// What a channel reads: a mix of axes, scaled, late.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Pickup {
-    /// Its name: `ax`, `y`, `fx` …
-    pub name: String,
-    /// What it measures: force, displacement, velocity or acceleration.
-    pub quantity: Quantity,
-    /// How much of the machine's x, y and z it reads.
-    pub weights: [f64; 3],
-    /// By mode of a structure of modes: how many times what the mode moves the tool it moves the sensor. Empty where the sensor moves
-    /// as the tool.
-    pub modes: Vec<f64>,
-    /// How late it is, s.
-    pub delay_s: f64,
-}
-
-impl Pickup {
-    /// A channel of one axis (0, 1, 2), without a fault.
-    pub fn of_axis(quantity: Quantity, axis: usize) -> Self {
-        let prefix = match quantity {
-            Quantity::Force => "f",
-            Quantity::Velocity => "v",
-            Quantity::Acceleration => "a",
-            _ => "",
-        };
-        let mut weights = [0.0; 3];
-        weights[axis] = 1.0;
-        Self {
-            name: format!("{prefix}{}", ["x", "y", "z"][axis]),
-            quantity,
-            weights,
-            modes: Vec::new(),
-            delay_s: 0.0,
-        }
-    }
-
-    /// What it reads of a quantity along x, y and z.
-    pub fn read(&self, value: [f64; 3]) -> f64 {
-        self.weights
-            .iter()
-            .zip(value)
-            .map(|(weight, value)| weight * value)
-            .sum()
-    }
-}
-
-/// A kind of effect, before it has parameters.
-#[derive(Clone, Copy)]
-pub struct Kind {
-    /// Its name.
-    pub name: &'static str,
-    /// The keys that it has, as people read them.
-    pub keys: &'static str,
-    /// Makes one; what it does not take of the parameters is a key that it does not have.
-    pub build: fn(&mut Parameters) -> Result<Arc<dyn Effect>, EffectError>,
-}
-
-/// All effects that can be simulated.
-pub const KINDS: [Kind; 25] = [
-    linear::MASS,
-    linear::STIFFNESS,
-    linear::DAMPING,
-    missing_mode::KIND,
-    cubic_stiffness::KIND,
-    quadratic_stiffness::KIND,
-    cubic_damping::KIND,
-    softening_hardening::KIND,
-    coulomb_friction::KIND,
-    backlash::KIND,
-    hysteresis::KIND,
-    mode_coupling::KIND,
-    drift::KIND,
-    force_coefficients::KIND,
-    edge_force::KIND,
-    force_exponent::KIND,
-    runout::KIND,
-    process_damping::KIND,
-    axial_depth_modulation::KIND,
-    speed_fluctuation::KIND,
-    wear::KIND,
-    sensor_gain::KIND,
-    sensor_delay::KIND,
-    cross_axis::KIND,
-    sensor_offset::KIND,
-];
 
 /// The effects of one simulation, in the order in which they act.
 #[derive(Clone, Debug, Default)]
@@ -196,27 +170,27 @@ impl Effects {
         texts: impl IntoIterator<Item = &'a str>,
         record_s: Option<f64>,
     ) -> Result<Self, EffectError> {
-        let mut all: Vec<Parameters> = Vec::new();
+        let mut all: Vec<Values> = Vec::new();
         for text in texts {
             let (path, value) = text
                 .split_once('=')
                 .ok_or_else(|| EffectError::Form(text.into()))?;
             let (name, key) = path.trim().split_once('.').unwrap_or((path.trim(), ""));
-            kind(name)?;
-            let parameters = match all.iter().position(|known| known.effect() == name) {
+            let effect: EffectName = name.parse()?;
+            let values = match all.iter().position(|known| known.effect() == effect) {
                 Some(index) => &mut all[index],
                 None => {
-                    all.push(Parameters::new(name).over(record_s));
+                    all.push(Values::new(effect).over(record_s));
                     let last = all.len() - 1;
                     &mut all[last]
                 }
             };
-            parameters.put(key, Value::of_text(value));
+            values.put(key, Value::of_text(value));
         }
         Self::build(all)
     }
 
-    /// The effects that a case has as extensions: one for each place where `direction`, or else `channel`, is a list. A tool's runout is part of the tool and not among them.
+    /// The effects that a case has as extensions: one for each location where `direction`, or else `channel`, is a list. A tool's runout is part of the tool and not among them.
     ///
     /// # Errors
     /// An extension that cannot be simulated, or a key or value that it cannot have.
@@ -250,19 +224,18 @@ impl Effects {
             .and_then(Self::build)
     }
 
-    fn build(mut all: Vec<Parameters>) -> Result<Self, EffectError> {
+    fn build(mut all: Vec<Values>) -> Result<Self, EffectError> {
         coulomb_friction::take_play(&mut all)?;
-        let by_place: Vec<Vec<Parameters>> = all
+        let by_location: Vec<Vec<Values>> = all
             .into_iter()
-            .map(Parameters::by_place)
+            .map(Values::by_location)
             .collect::<Result<_, _>>()?;
-        by_place
+        by_location
             .into_iter()
             .flatten()
-            .map(|mut parameters| {
-                let kind = kind(parameters.effect())?;
-                let effect = (kind.build)(&mut parameters)?;
-                parameters.finish(kind.keys)?;
+            .map(|mut values| {
+                let effect = (values.effect().spec().build)(&mut values)?;
+                values.finish()?;
                 Ok(effect)
             })
             .collect::<Result<Vec<_>, EffectError>>()
@@ -333,24 +306,18 @@ impl Effects {
     }
 }
 
-fn extension(name: &str, table: &toml::Table) -> Result<Parameters, EffectError> {
-    kind(name)?;
-    let mut parameters = Parameters::new(name);
-    // How well a parameter is known changes nothing here.
+fn extension(name: &str, table: &toml::Table) -> Result<Values, EffectError> {
+    let effect: EffectName = name.parse()?;
+    let mut values = Values::new(effect);
+    // The standard deviation of a parameter changes no equation.
     for (key, value) in table.iter().filter(|(key, _)| !key.ends_with("_std")) {
         let value = Value::of_toml(value).ok_or_else(|| EffectError::Value {
-            effect: format!("{name}.{key}"),
+            name: effect.name(),
+            key: key.clone(),
             found: value.to_string(),
             needed: "a number, a text, true or false, or a list of one kind of these",
         })?;
-        parameters.put(if key == "on" { "" } else { key }, value);
+        values.put(key, value);
     }
-    Ok(parameters)
-}
-
-fn kind(name: &str) -> Result<&'static Kind, EffectError> {
-    KINDS
-        .iter()
-        .find(|kind| kind.name == name)
-        .ok_or_else(|| EffectError::Unknown(name.into()))
+    Ok(values)
 }

@@ -5,26 +5,44 @@
 use std::sync::Arc;
 
 use super::place::axis_of;
-use super::{Effect, EffectError, Kind};
+use super::{Argument, Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Treatment};
 use crate::structure::{Direction, Structure};
 use crate::{At, Branch, Slopes, Term};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const MODE_COUPLING: EffectSpec = EffectSpec {
+    id: EffectName::ModeCoupling,
     name: "mode-coupling",
-    keys: "kxyy_n_per_m3 or kxxy_n_per_m2, and directions",
-    build: |parameters| {
-        let quadratic = parameters.finite("kxxy_n_per_m2")?;
-        let quartic = match quadratic {
-            Some(_) => match parameters.finite("")? {
+    class: Class::RestoringForce(Argument::TwoDisplacements),
+    locations: Locations::TwoDirections,
+    parameters: &[
+        Parameter::number("kxyy_n_per_m3", "N/m³", "quartic potential ½·k_xxyy·x²y²")
+            .linear()
+            .main(),
+        Parameter::number("kxxy_n_per_m2", "N/m²", "cubic potential k_xxy·x²y").linear(),
+    ],
+    treatment: Treatment::Smooth,
+    candidates: &["the quartic potential", "the cubic potential"],
+    shares_term_with: &[],
+    summary: "two directions share a nonlinear potential",
+    equation: "f_r += ∂V/∂x and ∂V/∂y, V = ½·k_xxyy·x²y² or k_xxy·x²y",
+    shows: "sums and differences of the frequencies of both directions; a stiffness of one that moves with the amplitude of the other",
+    hidden_by: "recordings in which one of the directions rests",
+    source: "Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 6",
+    example: "kxyy_n_per_m3 = 1e12\ndirections = [\"x\", \"y\"]",
+    build: |values| {
+        let cubic = values.number("kxxy_n_per_m2")?;
+        let quartic = match cubic {
+            Some(_) => match values.number("")? {
                 Some(quartic) => quartic,
-                None => parameters.finite("kxyy_n_per_m3")?.unwrap_or(0.0),
+                None => values.number("kxyy_n_per_m3")?.unwrap_or(0.0),
             },
-            None => parameters.main("kxyy_n_per_m3")?,
+            None => values.main("kxyy_n_per_m3")?,
         };
         Ok(Arc::new(ModeCoupling {
             quartic,
-            cubic: quadratic.unwrap_or(0.0),
-            directions: parameters.pair("directions")?,
+            cubic: cubic.unwrap_or(0.0),
+            directions: values.directions()?,
         }))
     },
 };
@@ -46,15 +64,15 @@ struct Shared {
 }
 
 impl Effect for ModeCoupling {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::ModeCoupling
     }
 
     fn terms(&self, structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
         let axes = match self.directions {
             Some([a, b]) => [
-                axis_of(structure, Some(a), KIND.name)?,
-                axis_of(structure, Some(b), KIND.name)?,
+                axis_of(structure, Some(a), self.name())?,
+                axis_of(structure, Some(b), self.name())?,
             ],
             None => {
                 let axes: Vec<usize> = structure.directions.iter().filter_map(|d| d.axis()).collect();
@@ -62,7 +80,7 @@ impl Effect for ModeCoupling {
                     [a, b] => [a, b],
                     _ => {
                         return Err(EffectError::Direction {
-                            name: KIND.name,
+                            name: self.name(),
                             what: "it must say its two directions (directions = [\"x\", \"y\"])".into(),
                             directions: axes.len().to_string(),
                         });

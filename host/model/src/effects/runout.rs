@@ -2,17 +2,39 @@
 
 use std::sync::Arc;
 
-use super::{Effect, Kind};
+use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Treatment};
 use crate::milling::Runout;
 use crate::{Cutter, ModelError};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const RUNOUT: EffectSpec = EffectSpec {
+    id: EffectName::Runout,
     name: "runout",
-    keys: "runout_um and angle_deg",
-    build: |parameters| {
+    class: Class::Geometry,
+    locations: Locations::Cut,
+    parameters: &[
+        Parameter::number("runout_um", "µm", "offset of the tool axis, e")
+            .linear()
+            .main(),
+        Parameter::number(
+            "angle_deg",
+            "°",
+            "angle of the offset from the first tooth, ψ; 0 without the key",
+        ),
+    ],
+    treatment: Treatment::LinearProcess,
+    candidates: &["one offset in the plane"],
+    shares_term_with: &[],
+    summary: "the tool rotates about an axis beside its own",
+    equation: "R_j = R + e·cos(ψ + 2πj/N)",
+    shows: "lines at the spindle frequency and its multiples between those of the teeth, from the first tooth on",
+    hidden_by: "a flip of an even number of teeth once it no longer grows",
+    source: "Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983)",
+    example: "runout_um = 12.0\nangle_deg = 30.0",
+    build: |values| {
         Ok(Arc::new(OfTool(Runout {
-            offset_um: parameters.main("runout_um")?,
-            angle_deg: parameters.finite("angle_deg")?.unwrap_or(0.0),
+            offset_um: values.main("runout_um")?,
+            angle_deg: values.number("angle_deg")?.unwrap_or(0.0),
         })))
     },
 };
@@ -21,8 +43,8 @@ pub(super) const KIND: Kind = Kind {
 struct OfTool(Runout);
 
 impl Effect for OfTool {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::Runout
     }
 
     fn alter_cutter(&self, cutter: &mut Cutter) -> Result<(), ModelError> {

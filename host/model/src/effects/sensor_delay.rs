@@ -1,17 +1,30 @@
-//! A channel, or with no channel named every channel of motion, is late by τ.
+//! A channel, or without a name every channel of motion, is late by τ: y(t) = y_t(t − τ).
 
 use std::sync::Arc;
 
 use super::sensor_gain::meant;
-use super::{Effect, Kind, Pickup};
+use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Pickup, Treatment};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const SENSOR_DELAY: EffectSpec = EffectSpec {
+    id: EffectName::SensorDelay,
     name: "sensor-delay",
-    keys: "delay_s and channel",
-    build: |parameters| {
+    class: Class::Sensor,
+    locations: Locations::Channels,
+    parameters: &[Parameter::number("delay_s", "s", "delay").main()],
+    treatment: Treatment::Sensor,
+    candidates: &["one channel, or all channels of motion"],
+    shares_term_with: &[],
+    summary: "a channel is late",
+    equation: "y(t) = y_t(t − τ)",
+    shows: "a phase in proportion to frequency over a band, with a measured force or another channel as reference",
+    hidden_by: "narrow bands, where it is damping; it changes no amplitude",
+    source: "McConnell and Varoto, Vibration Testing (2008)",
+    example: "delay_s = 1e-4\nchannel = \"x\"",
+    build: |values| {
         Ok(Arc::new(SensorDelay {
-            delay_s: parameters.main("delay_s")?,
-            channel: parameters.text("channel")?,
+            delay_s: values.main("delay_s")?,
+            channel: values.channel()?,
         }))
     },
 };
@@ -23,8 +36,8 @@ struct SensorDelay {
 }
 
 impl Effect for SensorDelay {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::SensorDelay
     }
 
     fn alter_channel(&self, channel: &mut Pickup) {

@@ -1,17 +1,37 @@
-//! A channel, or with no channel named every channel of motion, is g times the truth.
+//! A channel, or without a name every channel of motion, reads g times the true value: y = g·y_t.
 
 use std::sync::Arc;
 
-use super::{Effect, Kind, Pickup};
+use super::{Class, Effect, EffectName, EffectSpec, Locations, Parameter, Pickup, Treatment};
 use quietcut_recording::Quantity;
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const SENSOR_GAIN: EffectSpec = EffectSpec {
+    id: EffectName::SensorGain,
     name: "sensor-gain",
-    keys: "gain and channel",
-    build: |parameters| {
+    class: Class::Sensor,
+    locations: Locations::Channels,
+    parameters: &[
+        Parameter::number("gain", "", "ratio of the reading to the true value")
+            .linear()
+            .main(),
+    ],
+    treatment: Treatment::Sensor,
+    candidates: &[
+        "one channel, or all channels of motion",
+        "measured forces of a cut",
+    ],
+    shares_term_with: &[EffectName::SensorOffsetFromToolTip],
+    summary: "a channel reads a multiple of the true value",
+    equation: "y = g·y_t",
+    shows: "one factor at all frequencies and amplitudes, of one channel",
+    hidden_by: "the only channel under a measured force: mass, damping and stiffness by one factor; all channels of a steady cut without measured force: a factor of the cutting force",
+    source: "the calibration factor of ISO 16063",
+    example: "gain = 1.1\nchannel = \"x\"",
+    build: |values| {
         Ok(Arc::new(SensorGain {
-            gain: parameters.main("gain")?,
-            channel: parameters.text("channel")?,
+            gain: values.main("gain")?,
+            channel: values.channel()?,
         }))
     },
 };
@@ -23,8 +43,8 @@ struct SensorGain {
 }
 
 impl Effect for SensorGain {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::SensorGain
     }
 
     fn alter_channel(&self, channel: &mut Pickup) {

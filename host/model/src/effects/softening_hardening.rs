@@ -2,19 +2,49 @@
 
 use std::sync::Arc;
 
-use super::Kind;
-use super::local_force::LocalForce;
+use num_complex::Complex64;
 
-pub(super) const KIND: Kind = Kind {
+use super::cubic_stiffness;
+use super::local_force::LocalForce;
+use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Treatment};
+
+/// The specification.
+pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
+    id: EffectName::SofteningHardening,
     name: "softening-hardening",
-    keys: "k3_n_per_m3, k5_n_per_m5 and direction",
-    build: |parameters| {
+    class: Class::RestoringForce(Argument::Displacement),
+    locations: Locations::EachDirection,
+    parameters: &[
+        Parameter::number("k3_n_per_m3", "N/m³", "cubic stiffness, below 0")
+            .linear()
+            .main(),
+        Parameter::number("k5_n_per_m5", "N/m⁵", "quintic stiffness, above 0").linear(),
+    ],
+    treatment: Treatment::Smooth,
+    candidates: &["one law along one direction"],
+    shares_term_with: &[EffectName::CubicStiffness],
+    summary: "a spring softens at small and hardens at large displacement",
+    equation: "f_r += k3·x³ + k5·x⁵, k3 < 0 < k5",
+    shows: "a natural frequency that falls with amplitude and rises again beyond x² = −k3/(2·k5); odd harmonics up to the fifth",
+    hidden_by: "levels below the turn, where it is cubic stiffness; two regimes with an edge between them are backlash",
+    source: "Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 4",
+    example: "k3_n_per_m3 = -5e12\nk5_n_per_m5 = 2e21\ndirection = \"x\"",
+    build: |values| {
         Ok(Arc::new(LocalForce {
-            name: KIND.name,
-            coefficients: [parameters.main("k3_n_per_m3")?, parameters.needed("k5_n_per_m5")?],
+            id: EffectName::SofteningHardening,
+            coefficients: [values.main("k3_n_per_m3")?, values.needed("k5_n_per_m5")?],
             law: |[k3, k5], x, _| x * x * x * (k3 + k5 * x * x),
             slopes: |[k3, k5], x, _| [x * x * (3.0 * k3 + 5.0 * k5 * x * x), 0.0],
-            direction: parameters.direction("direction")?,
+            describing_function: |[k3, k5], amplitude, _| {
+                k3 * cubic_stiffness::describing_function(amplitude)
+                    + k5 * quintic_describing_function(amplitude)
+            },
+            direction: values.direction()?,
         }))
     },
 };
+
+/// The describing function of the quintic term for k5 = 1: ⅝X⁴.
+pub fn quintic_describing_function(amplitude: f64) -> Complex64 {
+    Complex64::new(0.625 * amplitude.powi(4), 0.0)
+}

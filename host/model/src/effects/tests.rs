@@ -1,7 +1,6 @@
 //! Effects by name, and each term against the closed form of its motion.
 
 use super::*;
-use crate::case::EXTENSION_NAMES;
 
 #[test]
 fn a_value_and_its_keys_are_one_effect() {
@@ -57,6 +56,20 @@ fn what_cannot_be_is_told_apart() {
 }
 
 #[test]
-fn the_kinds_are_the_names_of_a_case() {
-    assert_eq!(KINDS.map(|kind| kind.name), EXTENSION_NAMES);
+fn the_list_is_whole_and_each_specification_names_its_own_entry() {
+    for (place, id) in EffectName::ALL.into_iter().enumerate() {
+        let spec = id.spec();
+        assert_eq!(spec.id, id, "{}", spec.name);
+        assert_eq!(ALL[place].name, spec.name);
+        assert_eq!(spec.name.parse(), Ok(id));
+        assert!(
+            spec.main().is_some() && !spec.candidates.is_empty(),
+            "{}",
+            spec.name
+        );
+        // A term is shared both ways.
+        for other in spec.shares_term_with {
+            assert!(other.spec().shares_term_with.contains(&id), "{}", spec.name);
+        }
+    }
 }

@@ -28,10 +28,10 @@ use crate::limits::method::Method;
 use crate::limits::point::CutStability;
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::process::extension::not_smooth;
-use crate::process::treatment::NOT_SMOOTH;
 use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::Term;
 use quietcut_model::case::Case;
+use quietcut_model::effects::{ALL, Treatment};
 
 /// Steps in depth, at least, at which multipliers are counted.
 const SAMPLES: usize = 32;
@@ -111,8 +111,11 @@ impl EquivalentProblem {
     /// As [`ForcedProblem::new`]; a structure without a mass at the tool.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         let mut rest = case.clone();
-        for name in NOT_SMOOTH {
-            rest.extensions.remove(name);
+        for spec in ALL
+            .into_iter()
+            .filter(|spec| spec.treatment == Treatment::Equivalent)
+        {
+            rest.extensions.remove(spec.name);
         }
         let smooth = ForcedProblem::new(&rest)?;
         if !smooth.is_inertial() {

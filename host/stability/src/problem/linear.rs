@@ -4,6 +4,7 @@ use crate::error::StabilityError;
 use crate::process::extension;
 use crate::process::treatment::{self, Treated};
 use quietcut_model::case::Case;
+use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Process;
 use quietcut_model::structure::FirstOrder;
 
@@ -116,9 +117,7 @@ fn cutting_with_mean_pitch(case: &Case, treated: Treated) -> Result<(Process, us
         what,
     };
     let modulated = case.axial_depth_modulation();
-    if modulated
-        && (tool.runout.is_some_and(|runout| runout.offset_um > 0.0)
-            || case.extensions.contains_key("runout"))
+    if modulated && (tool.runout.is_some_and(|runout| runout.offset_um > 0.0) || case.has(EffectName::Runout))
     {
         return Err(not_covered(
             "tool.runout_um: with axial-depth-modulation the feed force would differ from tooth to tooth; \

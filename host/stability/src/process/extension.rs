@@ -2,21 +2,18 @@
 
 use std::sync::Arc;
 
-use super::treatment::{ABOUT_FORCED_CHIP, NOT_SMOOTH, OF_LINEAR_STRUCTURE, SMOOTH};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
+use quietcut_model::effects::{Class, EffectSpec, Treatment};
 use quietcut_model::milling::Material;
 use quietcut_model::structure::FirstOrder;
 use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, Term};
 
-/// The effects of a case with these names.
-fn effects(case: &Case, names: &[&str]) -> Result<Effects, StabilityError> {
+/// The effects of a case that are wanted.
+fn effects(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Effects, StabilityError> {
     let all = Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
     Ok(Effects(
-        all.0
-            .into_iter()
-            .filter(|effect| names.contains(&effect.name()))
-            .collect(),
+        all.0.into_iter().filter(|effect| wanted(effect.spec())).collect(),
     ))
 }
 
@@ -33,7 +30,7 @@ pub(super) fn wrong(case: &Case, cause: ModelError) -> StabilityError {
 /// The case has none, it is indefinite, or it cannot have an extension.
 pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
     let structure = case.structure()?;
-    let effects = effects(case, &OF_LINEAR_STRUCTURE)?;
+    let effects = effects(case, |spec| spec.treatment == Treatment::LinearStructure)?;
     let whole = if effects.0.is_empty() {
         structure.first_order().map_err(ModelError::from)
     } else {
@@ -55,23 +52,24 @@ pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
 /// # Errors
 /// The case has none.
 pub(crate) fn material(case: &Case) -> Result<Material, StabilityError> {
-    let names = ["force-coefficients", "edge-force"];
-    if !case.extensions.keys().any(|name| names.contains(&name.as_str())) {
+    let has_own =
+        |spec: &EffectSpec| spec.treatment == Treatment::LinearProcess && spec.class == Class::CuttingForce;
+    if !case.effects().any(has_own) {
         return Ok(*case.material()?);
     }
-    Ok(law(case, &names)?.material())
+    Ok(law(case, has_own)?.material())
 }
 
 /// The force law with these extensions.
-fn law(case: &Case, names: &[&str]) -> Result<ForceLaw, StabilityError> {
-    Ok(cutter(case, names)?.force)
+fn law(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<ForceLaw, StabilityError> {
+    Ok(cutter(case, wanted)?.force)
 }
 
 /// The tool with these extensions.
-fn cutter(case: &Case, names: &[&str]) -> Result<Cutter, StabilityError> {
+fn cutter(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Cutter, StabilityError> {
     // The depth is no part of what is asked.
     let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3);
-    let effects = effects(case, names)?;
+    let effects = effects(case, wanted)?;
     let cutter = cutter.and_then(|cutter| effects.cutter(cutter));
     cutter.map_err(|cause| wrong(case, cause))
 }
@@ -81,7 +79,10 @@ fn cutter(case: &Case, names: &[&str]) -> Result<Cutter, StabilityError> {
 /// # Errors
 /// A section is missing, or an extension that the case cannot have.
 pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
-    let teeth = cutter(case, &["runout"])?.teeth;
+    let teeth = cutter(case, |spec| {
+        spec.treatment == Treatment::LinearProcess && spec.class == Class::Geometry
+    })?
+    .teeth;
     Ok(teeth.iter().map(|tooth| tooth.radial_m).collect())
 }
 
@@ -92,7 +93,7 @@ pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
 pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
     let structure = case.structure()?;
     let mut terms = Vec::new();
-    for effect in &effects(case, &SMOOTH)?.0 {
+    for effect in &effects(case, |spec| spec.treatment == Treatment::Smooth)?.0 {
         let found = effect
             .terms(structure)
             .map_err(|cause| wrong(case, cause.into()))?;
@@ -100,7 +101,7 @@ pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
     }
     Ok(AboutOrbit {
         terms,
-        law: law(case, &ABOUT_FORCED_CHIP)?,
+        law: law(case, |spec| spec.treatment == Treatment::ChipLaw)?,
     })
 }
 
@@ -110,8 +111,9 @@ pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
 /// An extension that the case cannot have.
 pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn Term>>, StabilityError> {
     let structure = case.structure()?;
-    let names: Vec<&str> = OF_LINEAR_STRUCTURE.into_iter().chain(NOT_SMOOTH).collect();
-    match effects(case, &names)?.dynamics(structure) {
+    let wanted =
+        |spec: &EffectSpec| matches!(spec.treatment, Treatment::LinearStructure | Treatment::Equivalent);
+    match effects(case, wanted)?.dynamics(structure) {
         Ok((_, terms)) => Ok(terms),
         Err(ModelError::Structure(cause)) => Err(StabilityError::Structure {
             path: case.path.clone(),

@@ -1,34 +1,8 @@
-//! Which extensions of a case a method treats, and what it says of the others.
+//! The extensions of a case that a method treats, and the reasons against the others.
 
 use crate::error::StabilityError;
-use quietcut_model::case::{AXIAL_DEPTH_MODULATION, Case, EXTENSIONS_OF_SENSORS};
-
-/// Extensions that change the linear structure: its matrices, its modes.
-pub(super) const OF_LINEAR_STRUCTURE: [&str; 4] = ["mass", "stiffness", "damping", "missing-mode"];
-
-/// Smooth terms of the equation of motion: about a forced orbit they have slopes.
-pub(super) const SMOOTH: [&str; 5] = [
-    "cubic-stiffness",
-    "quadratic-stiffness",
-    "cubic-damping",
-    "softening-hardening",
-    "mode-coupling",
-];
-
-/// Extensions of the process that the linear problem has: coefficients, and runout, which on a linear structure moves the
-/// forced motion and not its stability.
-const OF_LINEAR_PROCESS: [&str; 4] = [
-    AXIAL_DEPTH_MODULATION,
-    "force-coefficients",
-    "edge-force",
-    "runout",
-];
-
-/// Extensions of the process that act through the depth or about the forced chip.
-pub(super) const ABOUT_FORCED_CHIP: [&str; 2] = ["process-damping", "force-exponent"];
-
-/// Terms that are not smooth: they act by an equivalent stiffness and damping at the amplitude of the forced orbit.
-pub(crate) const NOT_SMOOTH: [&str; 3] = ["coulomb-friction", "backlash", "hysteresis"];
+use quietcut_model::case::Case;
+use quietcut_model::effects::{EffectSpec, Treatment};
 
 /// How much of the extensions a method treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +13,7 @@ pub(crate) enum Treated {
     Linear,
     /// The same, and smooth terms are left out: the limits for vanishing feed.
     WithoutSmooth,
-    /// Everything that has slopes about a forced orbit.
+    /// All effects with a Jacobian or an equivalent about a forced orbit.
     AboutOrbit,
 }
 
@@ -48,72 +22,49 @@ pub fn needs_orbit(case: &Case) -> bool {
     case.structure
         .as_ref()
         .is_some_and(quietcut_model::structure::Structure::is_nonlinear)
-        || case
-            .extensions
-            .keys()
-            .any(|name| SMOOTH.contains(&name.as_str()) || ABOUT_FORCED_CHIP.contains(&name.as_str()))
-        || is_not_smooth(case)
+        || case.effects().any(|spec| {
+            matches!(
+                spec.treatment,
+                Treatment::Smooth | Treatment::ChipLaw | Treatment::Equivalent
+            )
+        })
 }
 
-/// True where a case has friction, backlash or hysteresis.
+/// True where a case has an effect that acts by its equivalent stiffness and damping: friction, backlash or hysteresis.
 pub(crate) fn is_not_smooth(case: &Case) -> bool {
-    case.extensions
-        .keys()
-        .any(|name| NOT_SMOOTH.contains(&name.as_str()))
+    case.effects().any(|spec| spec.treatment == Treatment::Equivalent)
 }
 
-/// Refuses what a method cannot treat, with the reason.
+/// Refuses the extensions that a method cannot treat, with the reason.
 ///
 /// # Errors
 /// The first such extension.
 pub(crate) fn refuse_others(case: &Case, treated: Treated) -> Result<(), StabilityError> {
-    let mut names = OF_LINEAR_PROCESS.to_vec();
-    if treated != Treated::LinearProcess {
-        names.extend(OF_LINEAR_STRUCTURE);
-    }
-    if matches!(treated, Treated::WithoutSmooth | Treated::AboutOrbit) {
-        names.extend(SMOOTH);
-    }
-    if treated == Treated::AboutOrbit {
-        names.extend(ABOUT_FORCED_CHIP);
-        names.extend(NOT_SMOOTH);
-    }
-    names.extend(EXTENSIONS_OF_SENSORS);
-    match case
-        .extensions
-        .keys()
-        .find(|name| !names.contains(&name.as_str()))
-    {
-        None => Ok(()),
-        Some(name) => Ok(case.refuse_extensions_but(&names, reason(name))?),
-    }
+    Ok(case.refuse_extensions(|spec| reason(spec, treated))?)
 }
 
-fn reason(name: &str) -> &'static str {
-    match name {
-        name if SMOOTH.contains(&name) || ABOUT_FORCED_CHIP.contains(&name) => {
-            "the limit then depends on the forced motion, which this method does not follow; --method collocation does, and \
-             --linear leaves smooth terms of the structure out"
-        }
-        name if OF_LINEAR_STRUCTURE.contains(&name) => {
-            "it changes the structure, and this method takes receptances as they were measured; remove the table"
-        }
-        "drift" => {
-            "stiffness that moves with time has limits for one moment only; give the stiffness of that moment in \
-             [extension.stiffness] instead, or say after how long (--after-s 0 and --after-s T: between, limits lie between)"
-        }
-        "wear" => {
-            "forces that grow with time have limits for one moment only; give the coefficients of that moment in \
-             [extension.force-coefficients] instead, or say after how long (--after-s 0 and --after-s T: between, limits lie \
-             between)"
-        }
-        "speed-fluctuation" => {
-            "the tooth period then changes from tooth to tooth, and there is no one-period map; `simulate` runs it, and without \
-             the table the limits are those of the mean speed"
-        }
-        _ => {
-            "it is not smooth: what it does depends on the amplitude of the forced motion, which this method does not follow; \
-             --method collocation takes its equivalent stiffness and damping there, and `simulate` runs it as it is"
-        }
-    }
+/// The reason against an effect; `None` for one that is treated.
+fn reason(spec: &EffectSpec, treated: Treated) -> Option<&'static str> {
+    let (is_treated, reason) = match spec.treatment {
+        Treatment::Sensor | Treatment::LinearProcess => return None,
+        Treatment::LinearStructure => (
+            treated != Treated::LinearProcess,
+            "it changes the structure, and this method takes receptances as they were measured; remove the table",
+        ),
+        Treatment::Smooth => (
+            matches!(treated, Treated::WithoutSmooth | Treated::AboutOrbit),
+            OF_FORCED_MOTION,
+        ),
+        Treatment::ChipLaw => (treated == Treated::AboutOrbit, OF_FORCED_MOTION),
+        Treatment::Equivalent => (
+            treated == Treated::AboutOrbit,
+            "it is not smooth: its equivalent depends on the amplitude of the forced motion, which this method does not follow; \
+             --method collocation takes its equivalent stiffness and damping there, and `simulate` runs it as it is",
+        ),
+        Treatment::OfMoment(reason) | Treatment::Refused(reason) => (false, reason),
+    };
+    (!is_treated).then_some(reason)
 }
+
+const OF_FORCED_MOTION: &str = "the limit then depends on the forced motion, which this method does not follow; --method \
+    collocation does, and --linear leaves smooth terms of the structure out";

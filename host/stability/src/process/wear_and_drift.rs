@@ -4,6 +4,7 @@ use super::extension::{material, wrong};
 use crate::error::StabilityError;
 use quietcut_model::Effects;
 use quietcut_model::case::Case;
+use quietcut_model::effects::EffectName;
 
 /// The case as it is after `after_s` of work: drift and wear are then a stiffness and coefficients of that moment.
 ///
@@ -24,7 +25,7 @@ pub fn after(case: &Case, after_s: f64) -> Result<Case, StabilityError> {
             .or_else(|| value.as_integer().map(|whole| whole as f64))
     };
     let mut moved = case.clone();
-    if let Some(wear) = moved.extensions.remove("wear") {
+    if let Some(wear) = moved.extensions.remove(EffectName::Wear.name()) {
         let factor = 1.0 + number(&wear, "relative_rate_per_s").unwrap_or(0.0) * after_s;
         if factor <= 0.0 {
             return Err(not_covered(
@@ -43,16 +44,16 @@ pub fn after(case: &Case, after_s: f64) -> Result<Case, StabilityError> {
             *value *= factor;
         }
         moved.material = Some(material);
-        moved.extensions.remove("force-coefficients");
-        moved.extensions.remove("edge-force");
-        if let Some(flank) = moved.extensions.get_mut("process-damping")
+        moved.extensions.remove(EffectName::ForceCoefficients.name());
+        moved.extensions.remove(EffectName::EdgeForce.name());
+        if let Some(flank) = moved.extensions.get_mut(EffectName::ProcessDamping.name())
             && let Some(damping) = number(flank, "process_damping_n_per_m")
         {
             flank.insert("process_damping_n_per_m".into(), (factor * damping).into());
         }
     }
-    if let Some(drift) = moved.extensions.remove("drift") {
-        if moved.extensions.contains_key("stiffness") {
+    if let Some(drift) = moved.extensions.remove(EffectName::Drift.name()) {
+        if moved.has(EffectName::Stiffness) {
             return Err(not_covered(
                 "extension.drift beside extension.stiffness: put the stiffness into the structure, so that drift starts from it",
             ));
@@ -79,7 +80,9 @@ pub fn after(case: &Case, after_s: f64) -> Result<Case, StabilityError> {
         if let Some(direction) = drift.get("direction") {
             stiffness.insert("direction".into(), direction.clone());
         }
-        moved.extensions.insert("stiffness".into(), stiffness);
+        moved
+            .extensions
+            .insert(EffectName::Stiffness.name().into(), stiffness);
     }
     Ok(moved)
 }

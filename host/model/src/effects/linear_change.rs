@@ -8,29 +8,14 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::{Effect, EffectError, Kind, Parameters};
+use super::{Effect, EffectError, EffectName, Prior, Values};
 use crate::structure::{Direction, Form, Mode, Structure};
 
-pub(super) const MASS: Kind = Kind {
-    name: "mass",
-    keys: "mass_kg or relative_change, and direction",
-    build: |parameters| build(Which::Mass, parameters),
-};
-
-pub(super) const STIFFNESS: Kind = Kind {
-    name: "stiffness",
-    keys: "stiffness_n_per_m, frequency_hz (of a single mode) or relative_change, and direction",
-    build: |parameters| build(Which::Stiffness, parameters),
-};
-
-pub(super) const DAMPING: Kind = Kind {
-    name: "damping",
-    keys: "damping_ns_per_m, damping_ratio (of a single mode) or relative_change, and direction",
-    build: |parameters| build(Which::Damping, parameters),
-};
+/// A parameter that vanishes or changes its sign is another machine.
+pub(super) const ABOVE_MINUS_ONE: Prior = Prior::open(-1.0, f64::INFINITY, "a relative change above −1");
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Which {
+pub(super) enum Matrix {
     Mass,
     Stiffness,
     Damping,
@@ -47,33 +32,29 @@ enum Change {
 
 #[derive(Clone, Copy, Debug)]
 struct Linear {
-    which: Which,
+    matrix: Matrix,
     change: Change,
     direction: Option<Direction>,
 }
 
-fn build(which: Which, parameters: &mut Parameters) -> Result<Arc<dyn Effect>, EffectError> {
-    let direction = parameters.direction("direction")?;
-    let (entry, of_mode) = match which {
-        Which::Mass => ("mass_kg", None),
-        Which::Stiffness => ("stiffness_n_per_m", Some("frequency_hz")),
-        Which::Damping => ("damping_ns_per_m", Some("damping_ratio")),
+pub(super) fn build(matrix: Matrix, values: &mut Values) -> Result<Arc<dyn Effect>, EffectError> {
+    let direction = values.direction()?;
+    let (entry, of_mode) = match matrix {
+        Matrix::Mass => ("mass_kg", None),
+        Matrix::Stiffness => ("stiffness_n_per_m", Some("frequency_hz")),
+        Matrix::Damping => ("damping_ns_per_m", Some("damping_ratio")),
     };
-    let change = if let Some(value) = parameters.positive(entry)? {
+    let change = if let Some(value) = values.number(entry)? {
         Change::Entry(value)
-    } else if let Some(value) = of_mode.map(|key| parameters.positive(key)).transpose()?.flatten() {
+    } else if let Some(value) = of_mode.map(|key| values.number(key)).transpose()?.flatten() {
         Change::OfMode(value)
     } else {
-        let above = "a relative change above −1";
-        let named = parameters.number("relative_change", |r| r > -1.0, above)?;
-        let bare = parameters.number("", |r| r > -1.0, above)?;
-        Change::Relative(named.or(bare).ok_or(EffectError::Missing {
-            name: parameters.effect().into(),
-            key: entry,
-        })?)
+        let named = values.number("relative_change")?;
+        let bare = values.number("")?;
+        Change::Relative(named.or(bare).ok_or_else(|| values.missing(entry))?)
     };
     Ok(Arc::new(Linear {
-        which,
+        matrix,
         change,
         direction,
     }))
@@ -120,18 +101,18 @@ impl Linear {
             Change::Relative(change) => {
                 let root = (1.0 + change).sqrt();
                 for mode in modes.iter_mut() {
-                    let residue = match self.which {
-                        Which::Mass => {
+                    let residue = match self.matrix {
+                        Matrix::Mass => {
                             mode.frequency_hz /= root;
                             mode.damping_ratio /= root;
                             1.0 / root
                         }
-                        Which::Stiffness => {
+                        Matrix::Stiffness => {
                             mode.frequency_hz *= root;
                             mode.damping_ratio /= root;
                             1.0 / root
                         }
-                        Which::Damping => {
+                        Matrix::Damping => {
                             mode.damping_ratio *= 1.0 + change;
                             1.0
                         }
@@ -145,8 +126,8 @@ impl Linear {
                 let [mode] = modes else {
                     return Err(self.refused("the structure has several modes: say a relative change"));
                 };
-                match self.which {
-                    Which::Stiffness => mode.frequency_hz = value,
+                match self.matrix {
+                    Matrix::Stiffness => mode.frequency_hz = value,
                     _ => mode.damping_ratio = value,
                 }
             }
@@ -167,21 +148,21 @@ impl Linear {
 }
 
 impl Effect for Linear {
-    fn name(&self) -> &'static str {
-        match self.which {
-            Which::Mass => MASS.name,
-            Which::Stiffness => STIFFNESS.name,
-            Which::Damping => DAMPING.name,
+    fn id(&self) -> EffectName {
+        match self.matrix {
+            Matrix::Mass => EffectName::Mass,
+            Matrix::Stiffness => EffectName::Stiffness,
+            Matrix::Damping => EffectName::Damping,
         }
     }
 
     fn alter_structure(&self, structure: &mut Structure) -> Result<(), EffectError> {
         match &mut structure.form {
             Form::Matrices(matrices) => {
-                let matrix = match self.which {
-                    Which::Mass => &mut matrices.mass,
-                    Which::Stiffness => &mut matrices.stiffness,
-                    Which::Damping => &mut matrices.damping,
+                let matrix = match self.matrix {
+                    Matrix::Mass => &mut matrices.mass,
+                    Matrix::Stiffness => &mut matrices.stiffness,
+                    Matrix::Damping => &mut matrices.damping,
                 };
                 self.of_matrix(matrix, &structure.directions)
             }

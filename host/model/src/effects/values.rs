@@ -1,8 +1,9 @@
-//! The parameters of an effect, from the command line or from a case.
+//! The values given for an effect, from the command line or from a case.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::EffectError;
+use super::spec::{EffectSpec, Prior, ValueKind};
+use super::{EffectError, EffectName};
 use crate::structure::Direction;
 
 /// A value as it was given.
@@ -58,7 +59,7 @@ impl Value {
         }
     }
 
-    fn said(&self) -> String {
+    pub(super) fn said(&self) -> String {
         match self {
             Self::Number(number) => number.to_string(),
             Self::Text(text) => text.clone(),
@@ -71,163 +72,186 @@ impl Value {
     }
 }
 
-/// What was given for one effect; an effect takes out what it knows.
+/// The values given for one effect; the effect takes out what it has a key for.
 #[derive(Clone, Debug)]
-pub struct Parameters {
-    effect: String,
-    /// By key; the quantity that the effect is named for has the key "".
-    values: BTreeMap<String, Value>,
-    /// How long the record is, s; `None` where that is not known.
+pub struct Values {
+    effect: EffectName,
+    /// By key; the VALUE of the command line has the key "".
+    by_key: BTreeMap<String, Value>,
+    /// Length of the record, s; `None` where it is not set.
     record_s: Option<f64>,
 }
 
-impl Parameters {
-    pub(super) fn new(effect: &str) -> Self {
+impl Values {
+    pub(super) fn new(effect: EffectName) -> Self {
         Self {
-            effect: effect.into(),
-            values: BTreeMap::new(),
+            effect,
+            by_key: BTreeMap::new(),
             record_s: None,
         }
     }
 
-    /// The same, for a record that is so long.
+    /// The same for a record of a length in s.
     pub(super) fn over(mut self, record_s: Option<f64>) -> Self {
         self.record_s = record_s;
         self
     }
 
-    pub(super) fn effect(&self) -> &str {
-        &self.effect
+    pub(super) fn effect(&self) -> EffectName {
+        self.effect
+    }
+
+    fn spec(&self) -> &'static EffectSpec {
+        self.effect.spec()
     }
 
     pub(super) fn put(&mut self, key: &str, value: Value) {
-        self.values.insert(key.into(), value);
+        self.by_key.insert(key.into(), value);
+    }
+
+    /// The bounds of a key; those of the main parameter for the VALUE of the command line.
+    fn prior(&self, key: &str) -> Prior {
+        let parameter = if key.is_empty() {
+            self.spec().main()
+        } else {
+            self.spec().parameter(key)
+        };
+        parameter.map_or(Prior::ANY, |parameter| parameter.prior)
     }
 
     /// The number of a key; `None` where it is not given.
     ///
     /// # Errors
-    /// It is no finite number, or not one that `allowed` allows.
-    pub(super) fn number(
-        &mut self,
-        key: &str,
-        allowed: fn(f64) -> bool,
-        needed: &'static str,
-    ) -> Result<Option<f64>, EffectError> {
-        match self.values.remove(key) {
+    /// It is no finite number, or out of the bounds of its parameter.
+    pub(super) fn number(&mut self, key: &str) -> Result<Option<f64>, EffectError> {
+        let prior = self.prior(key);
+        match self.by_key.remove(key) {
             None => Ok(None),
-            Some(Value::Number(number)) if number.is_finite() && allowed(number) => Ok(Some(number)),
-            Some(other) => Err(self.wrong(key, &other, needed)),
+            Some(Value::Number(number)) if prior.allows(number) => Ok(Some(number)),
+            Some(other) => Err(self.wrong(key, &other, prior.words)),
         }
     }
 
-    /// One set of parameters for each place, where `direction`, or else `channel`, names several: what has several numbers has one for
-    /// each, what has one has the same for all. Ratios are one for each mode, of one channel.
+    /// One set of values for each location, where `direction`, or else `channel`, is a list: a list of numbers has one for each, a single
+    /// number is the same for all. Numbers for each mode belong to one channel.
     ///
     /// # Errors
-    /// Numbers that are not as many as the places.
-    pub(super) fn by_place(self) -> Result<Vec<Self>, EffectError> {
+    /// A list of numbers that is not as long as that of the locations.
+    pub(super) fn by_location(self) -> Result<Vec<Self>, EffectError> {
+        let has_number_per_mode = self
+            .spec()
+            .parameters
+            .iter()
+            .any(|parameter| parameter.kind == ValueKind::NumberPerMode);
         let listed = ["direction", "channel"]
             .into_iter()
-            .find_map(|key| match self.values.get(key) {
-                Some(Value::List(names)) if key == "direction" || !self.values.contains_key("ratio") => {
+            .find_map(|key| match self.by_key.get(key) {
+                Some(Value::List(names)) if key == "direction" || !has_number_per_mode => {
                     Some((key, names.clone()))
                 }
                 _ => None,
             });
-        let Some((place, names)) = listed else {
+        let Some((location, names)) = listed else {
             return Ok(vec![self]);
         };
         let distinct: BTreeSet<&String> = names.iter().collect();
         if names.is_empty() || distinct.len() < names.len() {
             let found = Value::List(names);
-            return Err(self.wrong(place, &found, "one name, or several that differ"));
+            return Err(self.wrong(location, &found, "one name, or several that differ"));
         }
         let uneven = self
-            .values
+            .by_key
             .iter()
             .find(|(_, value)| matches!(value, Value::Numbers(numbers) if numbers.len() != names.len()));
         if let Some((key, value)) = uneven {
-            return Err(self.wrong(key, value, "one number, or one for each of its places"));
+            return Err(self.wrong(key, value, "one number, or one for each location,"));
         }
         let of = |(index, name): (usize, &String)| {
             let mut own = self.clone();
-            for value in own.values.values_mut() {
+            for value in own.by_key.values_mut() {
                 if let Value::Numbers(numbers) = value {
                     *value = Value::Number(numbers[index]);
                 }
             }
-            own.put(place, Value::Text(name.clone()));
+            own.put(location, Value::Text(name.clone()));
             own
         };
         Ok(names.iter().enumerate().map(of).collect())
     }
 
-    /// Any finite number.
-    pub(super) fn finite(&mut self, key: &str) -> Result<Option<f64>, EffectError> {
-        self.number(key, |_| true, "a number")
-    }
-
-    /// A number greater than 0.
-    pub(super) fn positive(&mut self, key: &str) -> Result<Option<f64>, EffectError> {
-        self.number(key, |x| x > 0.0, "a number greater than 0")
-    }
-
-    /// The quantity that the effect is named for, by its own key or without one.
+    /// The main parameter, by its key or as VALUE.
     pub(super) fn main(&mut self, key: &'static str) -> Result<f64, EffectError> {
-        match self.finite("")? {
+        match self.number("")? {
             Some(number) => Ok(number),
             None => self.needed(key),
         }
     }
 
-    /// The quantity that the effect is named for, of which there may be several, by its own key or without one.
+    /// The main parameter that may have several numbers, by its key or as VALUE.
     pub(super) fn main_numbers(&mut self, key: &'static str) -> Result<Vec<f64>, EffectError> {
-        let given = if self.values.contains_key("") { "" } else { key };
-        match self.values.remove(given) {
+        let given = if self.by_key.contains_key("") { "" } else { key };
+        match self.by_key.remove(given) {
             Some(Value::Number(number)) if number.is_finite() => Ok(vec![number]),
             Some(Value::Numbers(numbers)) if !numbers.is_empty() && numbers.iter().all(|x| x.is_finite()) => {
                 Ok(numbers)
             }
             Some(other) => Err(self.wrong(given, &other, "a number, or several")),
-            None => Err(EffectError::Missing {
-                name: self.effect.clone(),
-                key,
-            }),
+            None => Err(self.missing(key)),
         }
     }
 
-    /// A relative rate per s: by its own key, or from the change over the whole record that the effect is named for.
+    /// A switch, by its key or as VALUE: true, false, 1 or 0.
+    pub(super) fn switch(&mut self, key: &'static str) -> Result<bool, EffectError> {
+        let given = if self.by_key.contains_key("") { "" } else { key };
+        match self.by_key.remove(given) {
+            Some(Value::Number(number)) if number == 0.0 || number == 1.0 => Ok(number == 1.0),
+            Some(other) => Err(self.wrong(given, &other, "true or false (1 or 0)")),
+            None => Err(self.missing(key)),
+        }
+    }
+
+    /// A relative rate per s: by its key, or from the VALUE, which is the change over the whole record.
     pub(super) fn rate(&mut self, key: &'static str) -> Result<f64, EffectError> {
-        match (self.finite("")?, self.record_s) {
+        match (self.number("")?, self.record_s) {
             (Some(change), Some(record_s)) => Ok(change / record_s),
             (Some(_), None) => Err(EffectError::NoDuration {
-                name: self.effect.clone(),
+                name: self.effect.name(),
                 key,
             }),
             (None, _) => self.needed(key),
         }
     }
 
-    /// A number that must be there.
+    /// A number that must be given.
     pub(super) fn needed(&mut self, key: &'static str) -> Result<f64, EffectError> {
-        self.finite(key)?.ok_or_else(|| EffectError::Missing {
-            name: self.effect.clone(),
+        self.number(key)?.ok_or_else(|| self.missing(key))
+    }
+
+    /// The error of a key that must be given.
+    pub(super) fn missing(&self, key: &'static str) -> EffectError {
+        EffectError::Missing {
+            name: self.effect.name(),
             key,
-        })
+        }
+    }
+
+    /// The error of a value that is possible alone but not beside the others.
+    pub(super) fn clash(&self, key: &str, found: impl ToString, needed: &'static str) -> EffectError {
+        self.wrong(key, &Value::Text(found.to_string()), needed)
     }
 
     /// A word.
     pub(super) fn text(&mut self, key: &str) -> Result<Option<String>, EffectError> {
-        match self.values.remove(key) {
+        match self.by_key.remove(key) {
             None => Ok(None),
             Some(Value::Text(text)) => Ok(Some(text)),
             Some(other) => Err(self.wrong(key, &other, "a name")),
         }
     }
 
-    /// A direction.
-    pub(super) fn direction(&mut self, key: &str) -> Result<Option<Direction>, EffectError> {
+    /// The key `direction`.
+    pub(super) fn direction(&mut self) -> Result<Option<Direction>, EffectError> {
+        let key = "direction";
         match self.text(key)? {
             None => Ok(None),
             Some(text) => match text.parse() {
@@ -237,9 +261,15 @@ impl Parameters {
         }
     }
 
-    /// Two directions, as `directions = ["x", "y"]` or `x,y`.
-    pub(super) fn pair(&mut self, key: &str) -> Result<Option<[Direction; 2]>, EffectError> {
-        let Some(value) = self.values.remove(key) else {
+    /// The key `channel`.
+    pub(super) fn channel(&mut self) -> Result<Option<String>, EffectError> {
+        self.text("channel")
+    }
+
+    /// The key `directions`: `["x", "y"]` or `x,y`.
+    pub(super) fn directions(&mut self) -> Result<Option<[Direction; 2]>, EffectError> {
+        let key = "directions";
+        let Some(value) = self.by_key.remove(key) else {
             return Ok(None);
         };
         if let Value::List(words) = &value
@@ -254,25 +284,21 @@ impl Parameters {
 
     fn wrong(&self, key: &str, found: &Value, needed: &'static str) -> EffectError {
         EffectError::Value {
-            effect: if key.is_empty() {
-                self.effect.clone()
-            } else {
-                format!("{}.{key}", self.effect)
-            },
+            name: self.effect.name(),
+            key: key.into(),
             found: found.said(),
             needed,
         }
     }
 
     /// # Errors
-    /// A key that nobody has taken.
-    pub(super) fn finish(self, known: &'static str) -> Result<(), EffectError> {
-        match self.values.into_keys().next() {
+    /// A key that the effect has not taken.
+    pub(super) fn finish(self) -> Result<(), EffectError> {
+        match self.by_key.into_keys().next() {
             None => Ok(()),
             Some(key) => Err(EffectError::Key {
-                name: self.effect,
+                effect: self.effect,
                 key: if key.is_empty() { "a value".into() } else { key },
-                known,
             }),
         }
     }

@@ -5,16 +5,38 @@
 use std::sync::Arc;
 
 use super::sensor_gain::meant;
-use super::{Effect, EffectError, Kind, Pickup};
+use super::{
+    Class, Effect, EffectError, EffectName, EffectSpec, Locations, Parameter, Pickup, Treatment, ValueKind,
+};
 use crate::structure::{Form, Structure};
 
-pub(super) const KIND: Kind = Kind {
+/// The specification.
+pub(super) const SENSOR_OFFSET_FROM_TOOL_TIP: EffectSpec = EffectSpec {
+    id: EffectName::SensorOffsetFromToolTip,
     name: "sensor-offset-from-tool-tip",
-    keys: "ratio (one, or one for each mode) and channel",
-    build: |parameters| {
+    class: Class::Sensor,
+    locations: Locations::Channels,
+    parameters: &[Parameter::number(
+        "ratio",
+        "",
+        "ratio of the motion of the sensor to that of the tool",
+    )
+    .of_kind(ValueKind::NumberPerMode)
+    .linear()
+    .main()],
+    treatment: Treatment::Sensor,
+    candidates: &["one ratio for each mode that moves the channel, or one for all"],
+    shares_term_with: &[EffectName::SensorGain],
+    summary: "the sensor sits away from the tool tip",
+    equation: "y = Σ ratio_r·u_r, u_r the motion of the tool in mode r",
+    shows: "each mode larger or smaller by a ratio of its own, without a phase, in the receptance of the tool tip beside that of the sensor",
+    hidden_by: "one mode, where it is a sensor gain",
+    source: "Ewins, Modal Testing (2000), ch. 2",
+    example: "ratio = 0.8\nchannel = \"x\"",
+    build: |values| {
         Ok(Arc::new(SensorOffset {
-            ratios: parameters.main_numbers("ratio")?,
-            channel: parameters.text("channel")?,
+            ratios: values.main_numbers("ratio")?,
+            channel: values.channel()?,
         }))
     },
 };
@@ -27,8 +49,8 @@ struct SensorOffset {
 }
 
 impl Effect for SensorOffset {
-    fn name(&self) -> &'static str {
-        KIND.name
+    fn id(&self) -> EffectName {
+        EffectName::SensorOffsetFromToolTip
     }
 
     fn alter_structure(&self, structure: &mut Structure) -> Result<(), EffectError> {
@@ -40,7 +62,7 @@ impl Effect for SensorOffset {
             return Ok(());
         }
         Err(EffectError::Structure {
-            name: KIND.name,
+            name: self.name(),
             what: match structure.form {
                 Form::Modes(_) => format!(
                     "{} ratios are given; one, or one for each of the {modes} modes of the structure is needed",

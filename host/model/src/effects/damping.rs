@@ -1,0 +1,39 @@
+//! The damping differs from the case: C → C·(1 + r).
+
+use super::linear_change::{ABOVE_MINUS_ONE, Matrix, build};
+use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Prior, Treatment};
+
+/// The specification.
+pub(super) const DAMPING: EffectSpec = EffectSpec {
+    id: EffectName::Damping,
+    name: "damping",
+    class: Class::RestoringForce(Argument::Velocity),
+    locations: Locations::WholeOrDirection,
+    parameters: &[
+        Parameter::number(
+            "damping_ns_per_m",
+            "N s/m",
+            "diagonal entry of the damping matrix",
+        )
+        .within(Prior::POSITIVE),
+        Parameter::number("damping_ratio", "", "damping ratio of a single mode").within(Prior::POSITIVE),
+        Parameter::number(
+            "relative_change",
+            "",
+            "relative change of the matrix, or of its entry",
+        )
+        .within(ABOVE_MINUS_ONE)
+        .linear()
+        .main(),
+    ],
+    treatment: Treatment::LinearStructure,
+    candidates: &["the whole matrix, or one diagonal entry"],
+    shares_term_with: &[],
+    summary: "the damping differs from the case",
+    equation: "C → C·(1 + r)",
+    shows: "a receptance that differs at resonance, alike at all levels",
+    hidden_by: "mass, stiffness and damping changed by one factor, which is a sensor gain",
+    source: "Pintelon and Schoukens, System Identification (2012)",
+    example: "relative_change = 0.3\ndirection = \"x\"",
+    build: |values| build(Matrix::Damping, values),
+};

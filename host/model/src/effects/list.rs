@@ -1,0 +1,57 @@
+//! The type that the list of all effects makes.
+
+use std::str::FromStr;
+
+use super::{EffectError, EffectName};
+
+macro_rules! list {
+    ($($variant:ident => $module:ident::$spec:ident,)+) => {
+        /// The name of an effect.
+        ///
+        /// A crate that treats effects one by one matches on it without a wildcard, so that the compiler asks for the treatment of a
+        /// new effect.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum EffectName {
+            $(#[doc = concat!("The effect of the file `", stringify!($module), ".rs`.")] $variant,)+
+        }
+
+        /// The specifications of all effects, in the order of [`EffectName`].
+        pub const ALL: [&EffectSpec; [$(EffectName::$variant),+].len()] = [$(&$module::$spec),+];
+
+        impl EffectName {
+            /// All effects.
+            pub const ALL: [Self; ALL.len()] = [$(Self::$variant),+];
+
+            /// Its specification.
+            pub const fn spec(self) -> &'static EffectSpec {
+                match self {
+                    $(Self::$variant => &$module::$spec,)+
+                }
+            }
+
+            /// Its name in cases, answers and on the command line.
+            pub const fn name(self) -> &'static str {
+                self.spec().name
+            }
+        }
+    };
+}
+
+pub(super) use list;
+
+impl FromStr for EffectName {
+    type Err = EffectError;
+
+    fn from_str(name: &str) -> Result<Self, EffectError> {
+        Self::ALL
+            .into_iter()
+            .find(|known| known.name() == name)
+            .ok_or_else(|| EffectError::Unknown(name.into()))
+    }
+}
+
+impl std::fmt::Display for EffectName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
