@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use quietcut::case::{Case, EXTENSION_NAMES};
+use quietcut::case::Case;
 use quietcut::recording::Sidecar;
 use quietcut::simulate::Effects;
+use quietcut::simulate::effect::ALL;
+use quietcut::simulate::effect::table::markdown;
 use quietcut_tests::command::folder;
 use quietcut_tests::documents::text;
 
@@ -96,63 +98,23 @@ fn the_page_has_every_key_of_a_sidecar() {
 
 #[test]
 fn the_page_has_every_extension_with_an_example_that_reads() {
-    let rows = rows("[extension.NAME]");
-    let names: BTreeSet<_> = rows.iter().map(|row| row[0].trim_matches('`')).collect();
-    assert_eq!(names, EXTENSION_NAMES.into_iter().collect());
-    for row in &rows {
-        let name = row[0].trim_matches('`');
-        let example = row.last().expect("a row").trim_matches('`');
+    let table = markdown();
+    assert!(
+        text(PAGE).contains(&table),
+        "the table under [extension.NAME] in {PAGE} is not that of the specifications; it must be\n{table}"
+    );
+    for spec in ALL {
         let case = |more: &str| {
-            let body = example
-                .replace(", direction", "\ndirection")
-                .replace(", channel", "\nchannel");
-            let lines: Vec<_> = split_outside_lists(&body);
-            let text = format!("[extension.{name}]\n{}\n{more}\n", lines.join("\n"));
+            let text = format!("[extension.{}]\n{}\n{more}\n", spec.name, spec.example);
             Case::parse(Path::new("case.toml"), &text)
         };
-        let read = case("").unwrap_or_else(|error| panic!("{name}: {error}"));
-        Effects::of_case(&read).unwrap_or_else(|error| panic!("{name}: {error}"));
-        if name == "axial-depth-modulation" {
-            continue;
-        }
+        let read = case("").unwrap_or_else(|error| panic!("{}: {error}", spec.name));
+        Effects::of_case(&read).unwrap_or_else(|error| panic!("{}: {error}", spec.name));
         // An unknown key is answered with all that the effect has.
         let stranger = format!("{STRANGER} = 1");
-        let message = match case(&stranger) {
-            Err(error) => error.to_string(),
-            Ok(case) => Effects::of_case(&case).expect_err("an unknown key").to_string(),
-        };
-        let (_, known) = message
-            .split_once("it has ")
-            .unwrap_or_else(|| panic!("{name}: no list of keys in: {message}"));
-        let on_page: BTreeSet<_> = row[2].split('`').skip(1).step_by(2).collect();
-        let missing: Vec<_> = known
-            .split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
-            .filter(|word| word.contains('_') && !on_page.contains(word))
-            .collect();
-        assert!(
-            missing.is_empty(),
-            "{name}: {missing:?} of `{known}` are not on the page"
-        );
-        for key in on_page.iter().filter(|key| key.contains('_')) {
-            assert!(known.contains(*key), "{name}: the effect has no {key}: {known}");
+        let message = case(&stranger).expect_err("an unknown key").to_string();
+        for key in spec.keys() {
+            assert!(message.contains(key), "{}: {key} is not in {message}", spec.name);
         }
     }
-}
-
-/// `a = 1, b = ["x", "y"]` as lines of TOML.
-fn split_outside_lists(text: &str) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    let mut depth = 0;
-    for character in text.chars() {
-        match character {
-            '[' => depth += 1,
-            ']' => depth -= 1,
-            _ => {}
-        }
-        match (character, depth) {
-            (',', 0) => lines.push(String::new()),
-            (_, _) => lines.last_mut().expect("a line").push(character),
-        }
-    }
-    lines
 }

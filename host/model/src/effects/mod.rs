@@ -35,6 +35,7 @@ mod softening_hardening;
 mod spec;
 mod speed_fluctuation;
 mod stiffness;
+pub mod table;
 mod values;
 mod wear;
 
