@@ -102,14 +102,14 @@ pub(crate) const AIR_LEVEL: f64 = 0.2;
 /// Level at which the tool is well engaged, in every channel, over that in the cut. Unfounded.
 pub(crate) const ENGAGED_LEVEL: f64 = 0.8;
 
-/// Time from air to full engagement over that from air to [`ENGAGED_LEVEL`]: 4/3 for a depth that grows linearly from [`AIR_LEVEL`], with
+/// Time from air to full engagement over that from air to `ENGAGED_LEVEL`: 4/3 for a depth that grows linearly from `AIR_LEVEL`, with
 /// a margin of 5 %.
 pub(crate) const ENGAGEMENT_AFTER_LEVEL: f64 = 1.4;
 
-/// Margin on the way in: the first contact itself is below [`AIR_LEVEL`]. Unfounded.
+/// Margin on the way in: the first contact itself is below `AIR_LEVEL`. Unfounded.
 pub(crate) const ENTRY_MARGIN: f64 = 1.1;
 
-/// Share of the way out that is over when the level falls to [`AIR_LEVEL`]: the chips are thin at its end. Unfounded.
+/// Share of the way out that is over when the level falls to `AIR_LEVEL`: the chips are thin at its end. Unfounded.
 pub(crate) const EXIT_SHARE: f64 = 0.7;
 
 /// Level over that by the feed alone at which a cut chatters. Unfounded.
@@ -210,7 +210,7 @@ pub(crate) const UNEXPLAINED_OF_RESPONSE: f64 = 0.012;
 /// The same of forces, where derivatives of the motion add noise that is not white. Unfounded.
 pub(crate) const UNEXPLAINED_OF_FORCE: f64 = 0.15;
 
-/// Factor on [`UNEXPLAINED_OF_RESPONSE`] for each further cause of a simulated candidate model: two or three terms imitate much, but
+/// Factor on `UNEXPLAINED_OF_RESPONSE` for each further cause of a simulated candidate model: two or three terms imitate much, but
 /// leave more than this. Unfounded.
 pub(crate) const UNEXPLAINED_PER_FURTHER_CAUSE: f64 = 0.05;
 
@@ -218,10 +218,10 @@ pub(crate) const UNEXPLAINED_PER_FURTHER_CAUSE: f64 = 0.05;
 /// Unfounded.
 pub(crate) const DOUBTFUL_RESIDUAL: f64 = 0.03;
 
-/// Standard deviations of χ² that count as chance beside [`DOUBTFUL_RESIDUAL`]. Unfounded.
+/// Standard deviations of χ² that count as chance beside `DOUBTFUL_RESIDUAL`. Unfounded.
 pub(crate) const CHANCE_OF_DOUBT: f64 = 5.0;
 
-/// Factor on the confidence in a candidate model that leaves [`DOUBTFUL_RESIDUAL`]. Unfounded.
+/// Factor on the confidence in a candidate model that leaves `DOUBTFUL_RESIDUAL`. Unfounded.
 pub(crate) const DOUBT: f64 = 0.8;
 
 /// NRMSE of the whole records over that of the held-out segments from which on the user is warned. Unfounded.
@@ -261,7 +261,7 @@ pub(crate) const SAME_FEED: f64 = 1e-3;
 // Next test
 
 /// Squared distance D² of two candidate models at which a test separates them nearly always. The difference of twice their
-/// log-likelihoods is D² ± 2D, and [`EQUIVALENT`] of it is required.
+/// log-likelihoods is D² ± 2D, and `EQUIVALENT` of it is required.
 pub(crate) const SEPARATING_DISTANCE: f64 = 60.0;
 
 /// Displacement of a cut over that of the records above which it is not proposed. Unfounded.

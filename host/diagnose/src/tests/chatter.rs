@@ -1,4 +1,4 @@
-//! Virtual cuts near a lobe and in grown chatter, diagnosed with the plain case.
+//! Virtual cuts near a lobe and in grown chatter, diagnosed with the baseline case.
 
 use crate::conclusion::answer::Outcome;
 use crate::records::study::Study;
@@ -9,14 +9,14 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::{Effects, Entry, VirtualCut};
 
 const RPM: f64 = 900.0;
-/// Where this slot becomes unstable at that speed.
+/// Stability limit of this slot at that speed.
 const LIMIT_MM: f64 = 2.083;
 
 fn believed() -> Case {
     case("kuka-kr90-full", "")
 }
 
-/// A slot of six seconds with half a percent of noise in all channels of these kinds.
+/// A slot of six seconds with 0.5 % noise in the channels of these quantities.
 fn slot(depth_mm: f64, effects: &[&str], measured: &[Quantity], seed: u64) -> Recording {
     let seconds = 6.0;
     let cut = VirtualCut {
@@ -62,7 +62,7 @@ fn a_shallow_cut_does_not_amplify() {
 fn what_chatter_hides_is_named() {
     let forces = &[Quantity::Force, Quantity::Displacement][..];
     let motion = &[Quantity::Displacement][..];
-    // Of the believed stiffness, 1.539947 N/µm, and K_tc, 76 MPa.
+    // The baseline has a stiffness of 1.539947 N/µm and K_tc = 76 MPa.
     let hidden: [(f64, &[&str], _, _, _, f64); 6] = [
         (
             3.0,
@@ -97,7 +97,7 @@ fn what_chatter_hides_is_named() {
             "ktc_mpa",
             91.2,
         ),
-        // Believed to be stable by a fifth.
+        // The baseline predicts it stable by a fifth.
         (
             1.7,
             &["force-coefficients=0.6"],
@@ -113,10 +113,10 @@ fn what_chatter_hides_is_named() {
         let names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name).collect();
         assert_eq!(names, [name], "{effects:?}");
         let found = diagnosis.causes[0].parameters[key];
-        // Twice the 90 % interval: one of six may miss it, and none by as much again.
+        // Twice the 90 % interval: one of six may exceed the interval, none twice.
         let reach = found.ci90[1] - found.ci90[0];
         assert!((found.value - truth).abs() < reach, "{effects:?}: {found:?}");
-        // Half a percent of noise in some 3 000 samples: the loudest cause is known to a hundredth at least.
+        // 0.5 % noise in some 3 000 samples determine the strongest cause to a hundredth.
         assert!(reach < 0.03 * truth, "{effects:?}: {found:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Virtual cuts that hide something of the process, diagnosed with the plain case.
+//! Virtual cuts with a hidden effect of the process, diagnosed with the baseline case.
 
 use std::path::Path;
 
@@ -27,12 +27,12 @@ fn case(feed_mm: &str, more: &str) -> Case {
     Case::parse(Path::new("believed.toml"), &format!("{text}\n{more}")).unwrap()
 }
 
-/// Two cuts of four seconds at different speeds and feeds, with two percent of noise.
+/// Two cuts of four seconds at different speeds and feeds, with 2 % noise.
 fn records(effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
     records_of(4.0, effects, forces, seed)
 }
 
-/// The same, of so many seconds.
+/// The same with another duration, s.
 fn records_of(seconds: f64, effects: &[&str], forces: bool, seed: u64) -> Vec<Recording> {
     [(900.0, 0.8, "0.15"), (1230.0, 0.6, "0.09")]
         .into_iter()
@@ -68,7 +68,7 @@ fn told(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// What is hidden, with or without force channels.
+/// Hidden effects, with or without force channels.
 const HIDDEN: [(&str, &[&str], bool); 6] = [
     ("force-coefficients", &["force-coefficients=0.2"], true),
     (
@@ -104,7 +104,7 @@ fn what_a_cut_hides_is_named_with_and_without_force() {
         if diagnosis.causes.first().map(|cause| cause.name) != Some(name) {
             wrong.push((name, forces, told(&diagnosis)));
         }
-        // What people are shown as left is noise too: nothing of a start that nobody knows.
+        // The views show noise as the residual, without a free decay of the unknown initial state.
         for view in &diagnosis.views {
             let [_, _, left] = view.sizes();
             assert!(
@@ -147,7 +147,7 @@ fn a_cut_without_tachometer_or_depth_is_refused() {
 
 #[test]
 fn what_moves_a_resonance_is_found_beside_another_cause_and_no_third_is() {
-    // Of the believed machine, 97.0 and 188.0 kg. The second time slopes of the believed machine are far from those at the end.
+    // The baseline has masses of 97.0 and 188.0 kg. In the second case its Jacobian is far from that at the end.
     let hidden: [(&[&str], _, _); 2] = [
         (
             &[
@@ -183,7 +183,7 @@ fn what_moves_a_resonance_is_found_beside_another_cause_and_no_third_is() {
         let mut expected = ["mass", other];
         expected.sort_unstable();
         assert_eq!(names, expected, "{}", told(&diagnosis));
-        // A thousandth of the mass, three percent of what only the steps of the force show.
+        // A thousandth for the mass, three percent for the cause that only steps of the force show.
         for (name, key, truth, share) in [("mass", "mass_kg", mass_kg, 1e-3), (other, key, value, 0.03)] {
             let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
             let found = cause.parameters[key].value;
@@ -199,12 +199,12 @@ fn mean_slopes_of_a_cut_are_those_that_averaged_lobes_have() {
     let study = Study::new(&believed, &recordings).unwrap();
     let (tool, cut) = (believed.tool().unwrap(), believed.cut().unwrap());
     let force = ToothForce::new(tool, believed.material().unwrap());
-    // The deeper of the two: cut in feed direction x, 60 turns less what is lost at the ends.
+    // The deeper of the two: a cut in feed direction x of 60 revolutions, without its ends.
     let averaged = force.averaged(&Engagement::new(tool, cut), 1e-3 * cut.feed_per_tooth_mm);
     let expected = averaged.directional * 0.8e-3;
     let slopes = study.records[0].cut.as_ref().unwrap().mean_slopes();
     let sum: Matrix3<f64> = slopes.by_delay.iter().map(|(_, slope)| slope).sum();
-    // Where teeth leave the chip comes to nothing, and noise decides about contact.
+    // At the exit the chip thickness goes to zero, and noise decides about contact.
     assert!(
         (sum - expected).norm() < 5e-3 * expected.norm(),
         "{sum} {expected}"
@@ -219,7 +219,7 @@ fn mean_slopes_of_a_cut_are_those_that_averaged_lobes_have() {
 
 #[test]
 fn much_process_damping_is_found_beside_runout() {
-    // Six times the damping of the structure: force and motion computed in turns, each from the other, run away from each other.
+    // With six times the damping of the structure, the fixed-point iteration of force and motion diverges.
     let effects = ["process-damping=2e7", "runout=20", "runout.angle_deg=40"];
     let diagnosis = diagnose(
         &case("0.15", ""),
@@ -236,7 +236,7 @@ fn much_process_damping_is_found_beside_runout() {
     ] {
         let cause = diagnosis.causes.iter().find(|cause| cause.name == name).unwrap();
         let found = cause.parameters[key].value;
-        // Of two percent of noise in some 30 000 samples less than two thousandths are left.
+        // 2 % noise in some 30 000 samples leave an error below two thousandths.
         assert!((found / truth - 1.0).abs() < 2e-3, "{}", told(&diagnosis));
     }
 }
@@ -253,11 +253,11 @@ fn a_dynamometer_that_reads_too_much_is_no_harder_material() {
     let expected = ["fx", "fy"].map(|name| ("sensor-gain", Some(name)));
     assert_eq!(said, expected, "{}", told(&diagnosis));
     for cause in &diagnosis.causes {
-        // 2 % of noise in 16 000 samples of each channel.
+        // 2 % noise in 16 000 samples of each channel.
         let gain = cause.parameters["gain"].value;
         assert!((gain - 1.1).abs() < 2e-3, "{gain}");
     }
-    // The case with it reads as the dynamometer does.
+    // The case with this extension predicts the dynamometer.
     let extended = diagnosis.extended(&case("0.15", "")).unwrap();
     let again = diagnose(&extended, &cuts, &Options::default()).unwrap();
     assert_eq!(

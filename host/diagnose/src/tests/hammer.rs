@@ -1,4 +1,4 @@
-//! Blows of a hammer, a minute of them: a search of the first, held against the rest.
+//! A minute of hammer impacts: a search of the first ones, validated on the rest.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
 use quietcut_simulate::rig::{Impact, Noise, Rig, Signal};
 
-/// Ten blows on the Stäubli, heard by accelerometers with 1 % of noise on every channel; their spectrum reaches to the end of the band.
+/// Ten impacts on the Stäubli with accelerometers and 1 % noise on every channel. Their spectrum reaches to the end of the band.
 fn asked(effects: &[&str]) -> Diagnosis {
     let believed = case("staubli-tx200", "");
     let impacts = (0..10).map(|blow| Impact {

@@ -1,4 +1,4 @@
-//! Sensors away from the tool, of each mode of which they read a share of their own; and gains that cannot be told from something else.
+//! Sensors away from the tool, which read each mode by another ratio, and gains that are equivalent to other causes.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ left = [[0.0, -1.951294e-5]]
 right = [[1.0, 0.0]]
 "#;
 
-/// Sweeps at two levels, x read at the spindle housing, with these effects beside a share of 0.9 and 0.55 of the two modes.
+/// Sweeps at two levels, with x measured at the spindle housing: ratios of 0.9 and 0.55 of the two modes, and further effects.
 fn records(case: &Case, effects: &[&str]) -> Vec<Recording> {
     let place = [
         "sensor-offset-from-tool-tip.ratio=0.9,0.55",
@@ -63,7 +63,7 @@ fn ratios(answer: &Diagnosis) -> [f64; 2] {
 
 fn assert_are_found(answer: &Diagnosis) {
     let [first, second] = ratios(answer);
-    // 10 000 samples with 1 % of noise.
+    // 10 000 samples with 1 % noise.
     assert!(
         (first - 0.9).abs() < 2e-3 && (second - 0.55).abs() < 2e-3,
         "{first} {second}"
@@ -158,7 +158,7 @@ fn of_two_sensors_that_disagree_nobody_knows_which_is_wrong() {
     };
     noise.add(&mut record, 5);
     record.channels.retain(|channel| channel.name != "fx");
-    // At the release itself the acceleration jumps: the record begins after it.
+    // The acceleration jumps at the release: the record begins after it.
     for channel in &mut record.channels {
         channel.samples.drain(..=(1.2 * pull_s * 256.0) as usize);
     }

@@ -1,4 +1,4 @@
-//! Effects of the simulation, hidden and found again.
+//! Virtual tests of a structure with hidden effects, diagnosed with the baseline case.
 
 use std::path::Path;
 
@@ -25,12 +25,12 @@ pub(crate) fn believed() -> Case {
     Case::parse(Path::new("believed.toml"), BELIEVED).unwrap()
 }
 
-/// What a rig records of the machine with effects, with 1 % of noise on the displacement.
+/// Recording of a rig with effects, with 1 % noise on the displacement.
 fn recorded(signal: Signal, rate_hz: f64, effects: &[&str], seed: u64) -> Recording {
     recorded_of(&believed(), Direction::X, signal, rate_hz, effects, seed)
 }
 
-/// The same of another machine, driven along `direction`.
+/// The same of another machine, with the force along `direction`.
 pub(crate) fn recorded_of(
     case: &Case,
     direction: Direction,
@@ -53,7 +53,7 @@ pub(crate) fn recorded_of(
     recording
 }
 
-/// A recording of one second and more that a test fills with samples of its own.
+/// A recording of more than one second, whose samples a test replaces.
 fn to_be_filled(rate_hz: f64, seed: u64) -> Recording {
     let signal = Signal::Release {
         force_n: 1.0,
@@ -77,7 +77,7 @@ fn records(effects: &[&str]) -> Vec<Recording> {
     [(7, 5.0), (8, 20.0), (9, 60.0)].map(sweep).into()
 }
 
-/// Pulled by two forces and let go: what is recorded from there on, without the force.
+/// Two free decays from static forces, recorded from the release on, without the force.
 fn releases(effects: &[&str]) -> Vec<Recording> {
     let (rate_hz, pull_s) = (256.0, 5.0);
     let release = |(seed, force_n)| {
@@ -114,7 +114,7 @@ fn nothing_is_found_where_nothing_is_hidden() {
 
 #[test]
 fn single_causes_are_named_with_their_size() {
-    // Noise of 1 %, 15 000 samples: the deviations are well below a percent.
+    // 1 % noise in 15 000 samples: the standard deviations are well below a percent.
     for (effects, name, key, truth) in [
         (
             vec!["cubic-stiffness=-1e12"],
@@ -156,7 +156,7 @@ fn single_causes_are_named_with_their_size() {
 
 #[test]
 fn a_cause_that_hardly_shows_is_named_beside_one_that_does() {
-    // By itself the delay leaves a few percent more than the noise, as chance may with so many numbers of unknown deviation.
+    // Alone, the delay leaves a few percent more than the noise, which is within chance for an unknown noise variance.
     let answer = ask(&["cubic-stiffness=-1e12", "sensor-delay=3e-5"]);
     assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
     let names: Vec<&str> = answer.causes.iter().map(|cause| cause.name).collect();
@@ -165,8 +165,8 @@ fn a_cause_that_hardly_shows_is_named_beside_one_that_does() {
     assert!((delay_s / 3e-5 - 1.0).abs() < 0.3, "{delay_s}");
 }
 
-/// A guide whose damping depends on where it stands, f_r = e·x·v, which the library does not have; by steps of Runge and Kutta that are
-/// a tenth of a sample.
+/// A guide whose damping depends on the position, f_r = e·x·v, which is no cause of the library; Runge–Kutta with steps of a tenth of a
+/// sample.
 fn unevenly_damped(by_place: f64, amplitude_n: f64, seed: u64) -> Recording {
     const FINER: usize = 10;
     let signal = Signal::Sweep {
@@ -212,7 +212,7 @@ fn of_what_no_cause_explains_a_formula_is_guessed() {
     assert_eq!(answer.outcome, Outcome::Unexplained, "{:?}", answer.causes);
     let guess = answer.unexplained.guess.unwrap();
     assert!(guess.starts_with("a guess and no cause: "), "{guess}");
-    // The first term is the largest: its number and its words.
+    // The first term is the largest: its coefficient and its expression.
     let (number, words) = guess
         .split_once("force of + ")
         .and_then(|(_, formula)| formula.split_once('·'))
@@ -234,7 +234,7 @@ fn a_mode_that_is_missing_shows_in_what_was_let_go() {
     let answer = diagnose(&believed(), &releases(&mode), &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
     assert_eq!(answer.causes[0].name, "missing-mode");
-    // 4 000 samples with 1 % of noise: a mass to a percent or so, by the pull that both modes had.
+    // 4 000 samples with 1 % noise: a mass to about a percent, from the static force on both modes.
     for (key, truth, bound) in [
         ("frequency_hz", 31.0, 2e-3),
         ("damping_ratio", 0.02, 0.06),
@@ -254,7 +254,7 @@ fn a_gain_is_the_same_as_mass_stiffness_and_damping_by_one_factor() {
     let mut group = answer.equivalent[0].clone();
     group.sort_unstable();
     assert_eq!(group, ["damping", "mass", "sensor-gain", "stiffness"]);
-    // Which of them act together.
+    // The causes that act together.
     let said = answer.alternatives();
     assert_eq!(
         said,
@@ -265,7 +265,7 @@ fn a_gain_is_the_same_as_mass_stiffness_and_damping_by_one_factor() {
     assert!(json["explanations"][1][2]["confidence"].as_f64().unwrap() < 0.3);
     assert!((value(&answer, "sensor-gain", "gain") - 1.1).abs() < 0.002);
     assert!((value(&answer, "mass", "mass_kg") * 1.1 / 188.0 - 1.0).abs() < 0.002);
-    // Nothing that the same sensor says of the same force can tell them apart.
+    // The readings of the same sensor under the same force cannot separate them.
     let test = answer.next_test.unwrap();
     assert!(
         test.measure
@@ -316,7 +316,7 @@ fn one_law_along_two_directions_is_one_cause_with_a_number_for_each() {
     else {
         panic!("{named:?}");
     };
-    // 5 000 samples a direction with 1 % of noise.
+    // 5 000 samples per direction with 1 % noise.
     assert!(
         (x / -1e12 - 1.0).abs() < 0.01 && (y / -2e12 - 1.0).abs() < 0.01,
         "{named:?}"
@@ -332,8 +332,8 @@ fn one_law_along_two_directions_is_one_cause_with_a_number_for_each() {
     assert_eq!(again.outcome, Outcome::None, "{:?}", again.causes);
 }
 
-/// Imposed motion of two tones, and the force on it: of the machine, of 150 N of dry friction, of something unknown that pushes with so
-/// many N, and 5 N of noise.
+/// Imposed motion of two tones, and its force: of the machine, of 150 N of dry friction, of an unknown force with the amplitude
+/// `unknown_n`, and 5 N of noise.
 fn imposed(unknown_n: f64, seed: u64) -> Recording {
     use rand::SeedableRng;
     use rand_distr::Distribution;
@@ -342,7 +342,7 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
     let (mut moved, mut force) = (Vec::new(), Vec::new());
     for n in 0..4096 {
         let t = f64::from(n) / rate_hz;
-        // Whole periods: position, velocity, acceleration.
+        // Position, velocity and acceleration over whole periods.
         let (mut x, mut v, mut a) = (0.0, 0.0, 0.0);
         for (size, hz) in [(2e-3, 1.0), (1e-3, 2.75)] {
             let omega = std::f64::consts::TAU * hz;
@@ -352,7 +352,7 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
         }
         let noise: f64 = rand_distr::StandardNormal.sample(&mut random);
         moved.push(x);
-        // As friction has it at times, three times in a period of the first tone.
+        // An irregular modulation as of real friction, three times in a period of the first tone.
         let turn = 3.0 * std::f64::consts::TAU * t + 0.8 * (0.4 * t).sin();
         force.push(
             188.0 * a + 305.0 * v + 2.26e6 * x + 150.0 * v.signum() + unknown_n * turn.cos() + 5.0 * noise,
@@ -388,13 +388,14 @@ fn of_forces_the_record_that_is_described_worst_counts_least() {
     let answer = diagnose(&believed(), &records, &Options::default()).unwrap();
     assert_eq!(answer.causes[0].name, "coulomb-friction", "{:?}", answer.causes);
     let friction = &answer.causes[0].parameters["fc_n"];
-    // The record without anything unknown says 0.15 % too much, where the velocity is noise; both alike would say 0.44 %.
+    // The record without the unknown force is biased by 0.15 %, where the velocity is noise. Both records with equal weight would be biased
+    // by 0.44 %.
     assert!((friction.value / 150.0 - 1.0).abs() < 2.5e-3, "{friction:?}");
 }
 
 #[test]
 fn simulations_are_as_exact_as_the_smallest_motion_is_measured() {
-    // A spindle let go from some micrometers, with the noise of an interferometer: motion by the formula of a damped mass.
+    // Free decay of a spindle from some micrometers, with the noise of an interferometer: the solution of a damped oscillator.
     let (mass, damping, stiffness) = (0.048, 1.78, 2.2e5);
     let case = BELIEVED
         .replace("188.0", &format!("{mass:?}"))
@@ -431,7 +432,7 @@ fn what_was_found_is_not_found_again() {
     let records = records(&["cubic-stiffness=-2e11"]);
     let first = diagnose(&believed(), &records, &Options::default()).unwrap();
     let text = first.extended_case(BELIEVED).unwrap();
-    // As an extension it may not be named a second time; as a term of the structure it could be.
+    // A case cannot have the extension twice, but its structure can have the term.
     let k3 = value(&first, "cubic-stiffness", "k3_n_per_m3");
     let inside = BELIEVED.replacen(
         "stiffness = [[",
@@ -536,7 +537,7 @@ fn of_long_records_the_beginnings_are_searched_and_all_is_checked() {
     );
 }
 
-/// A drift of 4 % within a minute is a quarter of a percent within its first seconds.
+/// A drift of 4 % per minute is a quarter of a percent in the first seconds.
 #[test]
 fn what_only_the_whole_of_long_records_shows_is_not_overlooked() {
     let recordings = long_records(&["drift.relative_rate_per_s=0.0007"]);

@@ -1,4 +1,4 @@
-//! Two effects, of which one stands in the way of the other.
+//! Two effects, of which one masks the other.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ fn assert_found(diagnosis: &Diagnosis, expected: &[(&str, &str, f64, f64)]) {
 #[test]
 fn beside_a_cause_that_moves_the_resonance_another_is_sought_around_it() {
     let case = believed();
-    // Of 2.26e6 N/m: from 24 to 33 Hz, many times the width of the resonance.
+    // The baseline has 2.26e6 N/m: the resonance moves from 24 to 33 Hz, many times its width.
     let effects = [
         "stiffness=0.9",
         "softening-hardening.k3_n_per_m3=-3e10",
@@ -56,7 +56,7 @@ fn beside_a_cause_that_moves_the_resonance_another_is_sought_around_it() {
     );
 }
 
-/// The mode of x at 507 Hz is seen along y too, at one fiftieth of the 339 Hz mode there.
+/// The mode of x at 507 Hz appears along y too, at one fiftieth of the 339 Hz mode there.
 const COUPLED: &str = r#"
 [structure]
 kind = "matrices"

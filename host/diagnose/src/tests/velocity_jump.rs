@@ -1,5 +1,5 @@
-//! Accelerations of a structure whose modes add up to no mass: a force that jumps makes its velocity jump, and an accelerometer reads
-//! the mean over a sample.
+//! Accelerations of a structure whose modal masses add up to no mass: a step of the force makes the velocity jump, and an accelerometer
+//! reads the average over a sample.
 
 use crate::conclusion::answer::Outcome;
 use crate::tests::virtual_records::{case, record};
