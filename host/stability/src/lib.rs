@@ -1,11 +1,79 @@
-//! Stability of the cut: multipliers, limits, their derivatives and spread, charts.
+//! Linear stability of milling: Floquet multipliers, stability limits, forced periodic orbits, lobe tables.
 //!
-//! Sign of the regenerative force: F = w K_tc α (u − u_τ), with α as in eq. 6.7, is stable at small depth w.
+//! A cut is stable where all Floquet multipliers (characteristic multipliers) μ of the delay equation
 //!
-//! Rooms, each of which uses only those above it: `criteria` and `error`; `process` (extensions of the case); `problem`
-//! (equation and meshes); `spectrum` (multipliers of a period map); `limits` (one speed, charts, derivatives, spread);
-//! `frequency` (loops of receptances); `methods` (one file per method); [`orbit`] (forced periodic orbits);
-//! [`lobe_table`]; [`trial_cuts`]. Tests across rooms are in `tests`.
+//!   ẋ = A x + B F,   u = C x,   F = w K α(φ)(u − u_τ) − β(φ) u
+//!
+//! lie inside the unit circle. Here w is the axial depth, α the directional coefficients, β what edge and feed forces add, and τ
+//! the tooth period. F = w K_tc α (u − u_τ) with α as in eq. 6.7 is stable at small w. The default method collocates the map
+//! over one period; others are interchangeable behind [`Method`].
+//!
+//! Main types: [`Problem`] is the linear delay equation of a case. A [`Method`] computes from it the stability of one cut
+//! ([`CutStability`]) or all limits at one speed ([`SpeedLine`]). [`chart()`] does so at many speeds, and
+//! [`lobe_table::build_table`] writes the table of the device.
+//!
+//! ```
+//! use quietcut_model::case::Case;
+//! use quietcut_stability::{Collocation, CubicTerms, Method, Problem, Verdict};
+//!
+//! let text = r#"
+//! name = "one mode"
+//!
+//! [structure]
+//! kind = "matrices"
+//! directions = ["x"]
+//! mass = [[0.0399]]
+//! damping = [[5.516]]
+//! stiffness = [[1.348e6]]
+//!
+//! [tool]
+//! teeth = 2
+//! edge_angle_deg = 90.0
+//!
+//! [material]
+//! ktc_mpa = 600.0
+//! krc_mpa = 200.0
+//! kac_mpa = 0.0
+//! kte_n_per_mm = 0.0
+//! kre_n_per_mm = 0.0
+//! kae_n_per_mm = 0.0
+//!
+//! [cut]
+//! start_deg = 90.0
+//! exit_deg = 180.0
+//! feed_per_tooth_mm = 0.1
+//! "#;
+//! let case = Case::parse("one-mode.toml".as_ref(), text)?;
+//! let method = Collocation {
+//!     problem: Problem::new(&case, CubicTerms::Refuse)?,
+//! };
+//! let line = method.line(10_000.0, 5.0, 40)?;
+//! let limit = line.first_limit.ok_or("stable up to 5 mm")?;
+//! let below = method.point(10_000.0, 0.9 * limit.depth_mm)?;
+//! assert_eq!(below.verdict, Verdict::Stable);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Rooms, each of which uses only those above it:
+//!
+//! | room | content |
+//! |---|---|
+//! | `criteria`, `error` | thresholds of decisions; why stability cannot be computed |
+//! | `process` | extensions of the case in the stability problem |
+//! | `problem` | the linear delay problem: equation, tooth passages, meshes |
+//! | `spectrum` | multipliers of a period map: Krylov, characteristic matrix, winding number, Floquet modes |
+//! | `limits` | one cut, one speed, charts, cells, derivatives, spread; the interface [`Method`] |
+//! | `frequency` | loops of receptances: characteristic loci, Nyquist counts |
+//! | `methods` | one file per method |
+//! | [`orbit`] | forced periodic orbits and their branches |
+//! | [`lobe_table`] | the table of the device |
+//! | [`trial_cuts`] | predictions against tried cuts |
+//!
+//! `methods` stands above `limits`, since [`Method`] returns limits; `frequency` is the mathematics that four methods share. Tests
+//! across rooms, with a test oracle of Taylor series that shares no code with them, are in `tests`.
+//!
+//! This crate must not know recordings of vibration, simulation in time, identification or the command line. It opens no file
+//! other than a table of tried cuts.
 
 mod criteria;
 mod error;

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::loci::{crossings, trace, turning};
 use super::open_loop::OpenLoop;
-use crate::criteria::LEAST_ERROR;
+use crate::criteria::{LEAST_ERROR, SAME_LIMIT};
 use crate::error::StabilityError;
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
@@ -101,9 +101,6 @@ pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
     ((half_turns - rounded).abs() < 0.2).then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
 }
 
-/// Limits that differ by more than this share are not the same.
-const SAME: f64 = 0.1;
-
 /// An estimate of the error of a limit, m: what other computations change (with every second line of a table, with another number
 /// of harmonics), and what has been checked against other methods. `None` where one of them has no such limit.
 fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
@@ -113,7 +110,7 @@ fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
             .filter(|other| other.kind == limit.kind && other.outward == limit.outward)
             .map(|other| (other.depth_m - limit.depth_m).abs());
         let change = changes.min_by(f64::total_cmp)?;
-        (change < SAME * limit.depth_m).then_some(sum + change)
+        (change < SAME_LIMIT * limit.depth_m).then_some(sum + change)
     })
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::Matrix3;
 use num_complex::Complex64;
 
+use crate::criteria::UNDAMPED;
 use crate::error::StabilityError;
 use crate::problem::linear::{CubicTerms, Problem, cutting};
 use crate::process::treatment::Treated;
@@ -10,9 +11,6 @@ use quietcut_frf::{FrfTable, Interpolation};
 use quietcut_model::case::Case;
 use quietcut_model::milling::Process;
 use quietcut_model::structure::FirstOrder;
-
-/// A pole whose distance from the imaginary axis is below this share of its size has no damping.
-const UNDAMPED: f64 = 1e-9;
 
 /// Receptances and a cutting process, in feed, normal and axial direction.
 #[derive(Clone, Debug)]

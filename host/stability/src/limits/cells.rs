@@ -9,24 +9,13 @@ use num_complex::Complex64;
 
 use super::bounds::{check_depth, check_speed};
 use super::cell::Cell;
-use crate::criteria::{LEAST_ERROR, UNCONFIRMED};
+use crate::criteria::{
+    CELL_FAR, CELL_FOLLOWED, CELL_TOLERANCE, CELL_TOLERANCE_FAR, LEAST_ERROR, UNCONFIRMED,
+};
 use crate::error::StabilityError;
 use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::root::Root;
 use crate::spectrum::verdict::Verdict;
-
-/// Error of the cubic, relative, below which an interval is not halved: half of the 1e-4 that a cell may have.
-const TOLERANCE: f64 = 5e-5;
-
-/// The same for multipliers beyond [`FAR`], of which only the verdict matters.
-const TOLERANCE_FAR: f64 = 5e-3;
-
-/// Multipliers beyond this size need not be known well.
-const FAR: f64 = 2.1;
-
-/// Multipliers below this share of the largest are not followed: between two samples none of them overtakes it, or the
-/// branches bend so much that the samples lie closer.
-const FOLLOWED: f64 = 0.4;
 
 /// Intervals in depth that are begun with; cells that are fewer are all computed.
 const INTERVALS: usize = 10;
@@ -151,7 +140,7 @@ impl<S: Spectrum> Column<S> {
         let mut roots = Some(Vec::with_capacity(4));
         for &multiplier in all
             .iter()
-            .take_while(|multiplier| multiplier.norm() >= FOLLOWED * largest)
+            .take_while(|multiplier| multiplier.norm() >= CELL_FOLLOWED * largest)
             .filter(|multiplier| multiplier.im >= 0.0)
         {
             let Some(root) = self.spectrum.root_near(multiplier, depth_m) else {
@@ -200,7 +189,11 @@ impl<S: Spectrum> Column<S> {
         let mut roots = Vec::with_capacity(curves.len());
         let (mut fits, mut worst) = (true, 0.0_f64);
         let least = low.largest().min(high.largest());
-        let tolerance = if least > FAR { TOLERANCE_FAR } else { TOLERANCE };
+        let tolerance = if least > CELL_FAR {
+            CELL_TOLERANCE_FAR
+        } else {
+            CELL_TOLERANCE
+        };
         for curve in &mut curves {
             let guess = curve.at(share);
             let root = self.polished(guess, depth_m);
@@ -219,7 +212,11 @@ impl<S: Spectrum> Column<S> {
         };
         self.cells[index] = Cell::exact(middle.largest());
         // The correction makes the curve much better than the cubic was; over wide intervals less so.
-        let error = if least > FAR { 4.0 * worst } else { 2.0 * worst };
+        let error = if least > CELL_FAR {
+            4.0 * worst
+        } else {
+            2.0 * worst
+        };
         if fits && self.fill(low, high, &curves, error).is_some() {
             Followed::Filled
         } else {

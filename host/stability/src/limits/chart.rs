@@ -7,10 +7,8 @@ use super::method::{Label, Method};
 use super::speed_line::SpeedLine;
 use super::spread::LimitSpread;
 use super::uncertainty::Uncertainty;
+use crate::criteria::CHART_SAMPLES_MIN;
 use crate::error::StabilityError;
-
-/// The fewest steps in depth at which multipliers are followed, however coarse the chart.
-const SAMPLES_MIN: usize = 40;
 
 /// A stability chart.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,7 +37,7 @@ pub fn chart<M: Method + ?Sized>(
 ) -> Result<Chart, StabilityError> {
     Ok(Chart {
         label: Label::of(method),
-        speeds: method.lines(speeds_rpm, depth_mm, samples.max(SAMPLES_MIN))?,
+        speeds: method.lines(speeds_rpm, depth_mm, samples.max(CHART_SAMPLES_MIN))?,
         cells_mm: Vec::new(),
     })
 }
@@ -103,7 +101,7 @@ impl Chart {
                 })
                 .map(|(pair, _)| 0.5 * (pair[0].rpm + pair[1].rpm))
                 .collect();
-            let between = chart(method, &middles, depth_mm, SAMPLES_MIN)?.speeds;
+            let between = chart(method, &middles, depth_mm, CHART_SAMPLES_MIN)?.speeds;
             let mut between = between.into_iter().peekable();
             let mut speeds = Vec::with_capacity(self.speeds.len() + middles.len());
             let mut next_open = Vec::with_capacity(speeds.capacity());

@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use super::bounds::{check_depth, check_speed};
 use super::speed_line::{SpeedLine, Switch};
+use crate::criteria::{LINE_FAR, LINE_FOLLOWED, LINE_LEVELS, LINE_POLISHED};
 use crate::error::StabilityError;
 use crate::problem::linear::Problem;
 use crate::problem::period::check_length;
@@ -13,22 +14,8 @@ use crate::spectrum::crossing::Crossing;
 use crate::spectrum::root::Root;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// How often an interval of depths is halved where its multipliers cannot be followed from end to end.
-const LEVELS: u32 = 12;
-
-/// Multipliers below this size are not followed: from one sampled depth to the next none of them reaches the circle
-/// unseen, since the number outside is compared at every depth.
-const FOLLOWED: f64 = 0.3;
-
 /// Share of the depth range that is scanned first; then ranges double.
 const FIRST_PART: f64 = 0.125;
-
-/// Distance from the circle beyond which multipliers are only counted: with the steps of a chart none comes from there to
-/// the circle and back unseen.
-const FAR: f64 = 0.5;
-
-/// Distance from the circle within which multipliers are polished: far above the error of the scan.
-const POLISHED: f64 = 1e-3;
 
 /// To what crossings are solved for, relative to the depth.
 const ROOT: f64 = 1e-9;
@@ -86,7 +73,7 @@ pub(crate) fn line_of<S: Spectrum>(
 
 /// True where the circle may be reached within a step.
 fn is_near(root: &Root, step_m: f64) -> bool {
-    root.excess().abs() < (3.0 * root.slope.norm() * step_m + 0.02).min(FAR)
+    root.excess().abs() < (3.0 * root.slope.norm() * step_m + 0.02).min(LINE_FAR)
 }
 
 #[derive(Clone, Debug)]
@@ -134,7 +121,7 @@ impl<S: Spectrum> Scan<S> {
             .ok_or_else(|| self.broke_down(depth_m, "the equations of the period have no finite solution"))?;
         let roots = all
             .into_iter()
-            .take_while(|multiplier| multiplier.norm() > FOLLOWED)
+            .take_while(|multiplier| multiplier.norm() > LINE_FOLLOWED)
             .filter(|multiplier| multiplier.im >= 0.0)
             .map(|multiplier| self.root(multiplier, depth_m))
             .collect();
@@ -144,14 +131,14 @@ impl<S: Spectrum> Scan<S> {
     /// A multiplier with its derivative; near the circle it is polished first, so that its side is right.
     fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
         let spectrum = &mut self.spectrum;
-        let multiplier = if (coarse.norm() - 1.0).abs() < POLISHED {
+        let multiplier = if (coarse.norm() - 1.0).abs() < LINE_POLISHED {
             spectrum
-                .multiplier_near(coarse, depth_m, POLISHED)
+                .multiplier_near(coarse, depth_m, LINE_POLISHED)
                 .unwrap_or(coarse)
         } else {
             coarse
         };
-        let slope = if (multiplier.norm() - 1.0).abs() < FAR {
+        let slope = if (multiplier.norm() - 1.0).abs() < LINE_FAR {
             spectrum.sensitivity(multiplier, depth_m)
         } else {
             None
@@ -174,7 +161,7 @@ impl<S: Spectrum> Scan<S> {
         {
             return Ok(found);
         }
-        if level == LEVELS {
+        if level == LINE_LEVELS {
             return self.by_halving(low, high);
         }
         let middle = self.sample(0.5 * (low.depth_m + high.depth_m))?;

@@ -1,9 +1,7 @@
 //! Percentiles of first limits, with confidence intervals from the scatter between batches.
 
 use super::speed_line::SpeedLine;
-
-/// Half the width of the interval of every percentile, relative to it, with which no further batch is drawn.
-const SETTLED: f64 = 7e-3;
+use crate::criteria::PERCENTILE_SETTLED;
 
 /// Two-sided quantile of the standard normal distribution for 90 % confidence.
 const CONFIDENCE_90: f64 = 1.644_853_626_951_473;
@@ -42,7 +40,7 @@ impl Limits {
     }
 
     pub(super) fn is_settled(&self, share: f64, depth_mm: f64) -> bool {
-        self.relative_width(share, depth_mm) <= SETTLED
+        self.relative_width(share, depth_mm) <= PERCENTILE_SETTLED
     }
 }
 

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::bounds::{check_depth, check_speed};
-use crate::criteria::{LEAST_ERROR, UNCONFIRMED};
+use crate::criteria::{KAPPA_MAX, LEAST_ERROR, MESH_ROOM, RIVAL, UNCONFIRMED, WOUND};
 use crate::error::StabilityError;
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution, check_length};
@@ -13,13 +13,7 @@ use crate::spectrum::chatter_frequency::chatter_hz;
 use crate::spectrum::period_map;
 use crate::spectrum::stability_loss::StabilityLoss;
 use crate::spectrum::verdict::Verdict;
-use crate::spectrum::winding::{self, Search};
-
-/// Multipliers within this share of the largest at a coarse resolution may be the largest at a finer one.
-const RIVAL: f64 = 0.9;
-
-/// How many times the depth |w (1 − 1/μ)| may be for Newton: multipliers below about a twentieth are found among all.
-const KAPPA_MAX: f64 = 20.0;
+use crate::spectrum::winding::Search;
 
 /// What is known of one working point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -123,7 +117,7 @@ struct Solution {
 
 /// From what changes between the working and a finer resolution; no less than `least`, relative to max(1, |μ|).
 fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
-    (10.0 * (coarse - fine).norm()).max(least * fine.norm().max(1.0))
+    (MESH_ROOM * (coarse - fine).norm()).max(least * fine.norm().max(1.0))
 }
 
 /// Multipliers of a rough map.
@@ -190,7 +184,7 @@ fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<S
 
 /// The dominant multiplier where maps do not tell: one that is found, and a radius beyond which none is.
 fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
-    let kappa_m = (1.0 + winding::LEAST.recip()) * depth_m;
+    let kappa_m = (1.0 + WOUND.recip()) * depth_m;
     let working = Period::new(problem, rpm, kappa_m, Resolution::WORKING);
     let characteristic = Characteristic::new(&working, kappa_m);
     let beyond = Search::new(&characteristic, depth_m).largest(candidates);

@@ -22,6 +22,7 @@ use super::plane::{Linearized, Plane};
 use super::sampling::{Basis, Variable};
 use super::speed_line::SpeedLine;
 use super::spread::{LimitSpread, Percentile, PercentileIntervals, Percentiles};
+use crate::criteria::{BATCHES_OF_CELLS, IMPOSSIBLE_MAX};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
 
@@ -42,12 +43,6 @@ const SAMPLES_NEAR: usize = 16;
 
 /// Steps over the whole depth, as in a chart.
 const SAMPLES: usize = 40;
-
-/// Share of machines that may be impossible (negative damping, indefinite matrices) and are left out.
-const IMPOSSIBLE_MAX: f64 = 0.2;
-
-/// Batches for the probability of stability, 256 machines: its standard error is 3 % at most.
-const BATCHES_OF_CELLS: u32 = 4;
 
 /// Makes the method on a case; `None` where the case is no machine.
 pub type Maker<'a> = dyn Fn(&Case) -> Option<Box<dyn Method>> + Sync + 'a;

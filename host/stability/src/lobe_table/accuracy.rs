@@ -7,6 +7,7 @@ use quietcut_core::working_point::WorkingPoint;
 use super::encoding::towards;
 use super::entries::{Entry, surely_stable, unstable, with_all_of};
 use super::layers::{CheckedLayers, Family};
+use crate::criteria::{CHECK_GROWTH, CHECK_STEP, LEAST_CHECKS, SUSPECT, TABLE_ROOM};
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
 
@@ -14,27 +15,8 @@ use crate::limits::speed_line::SpeedLine;
 /// and not symmetric, so that lobes symmetric about the gap are seen.
 const OFFSETS: [f64; 2] = [0.38, 0.62];
 
-/// The fewest speeds checked in a gap. With the offsets above one of two lies where the error of a straight line between the
-/// entries, 4 s (1 − s) of the largest, is at least 85 %.
-const LEAST_CHECKS: f64 = 2.0;
-
-/// The largest distance between speeds checked, relative to the speed: a third of the narrowest flip lobe of the cases at hand.
-const CHECK_STEP: f64 = 0.01;
-
-/// Gaps in which the table is off by more than this share of the tolerance are checked at more speeds: limits have a corner there, or
-/// kinds change, and a few speeds do not show the worst. A smooth limit that passed refinement is off by a quarter at most.
-const SUSPECT: f64 = 0.5;
-
 /// How often the speeds checked in such a gap are doubled: from two to five, eleven, 23.
 const ROUNDS: usize = 3;
-
-/// A gap is checked no further where twice as many speeds find no more than this factor of what was found before: the room below
-/// covers as much.
-const GROWTH: f64 = 1.2;
-
-/// Factor of the stated depth on the worst at the speeds checked. Two checks of a smooth limit see 85 % of the worst, and repeated
-/// doubling stops within a factor of 1.2.
-const ROOM: f64 = 1.5;
 
 /// Depths at which a table differs from the method, by their distance from the nearest limit of the method, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -176,7 +158,7 @@ impl<'a> Checks<'a> {
             let next = misses(self);
             let pairs = next.iter().flatten().zip(worst.iter().flatten());
             for (open, (next, worst)) in open.iter_mut().flatten().zip(pairs) {
-                *open &= next.exceeds(worst.max(least), GROWTH);
+                *open &= next.exceeds(worst.max(least), CHECK_GROWTH);
             }
             worst = next;
         }
@@ -287,7 +269,7 @@ impl<'a> Checks<'a> {
             }
         }
         InterpolationError {
-            depth: Millimeters((ROOM * depth + f64::from(table.depth_step().0)) as f32),
+            depth: Millimeters((TABLE_ROOM * depth + f64::from(table.depth_step().0)) as f32),
             // A gap as wide as the speed itself bounds nothing; refinement never leaves one.
             speed: speed.min(0.999) as f32,
         }

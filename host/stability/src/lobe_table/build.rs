@@ -9,6 +9,7 @@ use super::entries::{self, Entry};
 use super::error::BuildError;
 use super::request::TableRequest;
 use super::{grid, layers};
+use crate::criteria::TABLE_TOLERANCE;
 use crate::limits::chart::Refinement;
 use crate::limits::speeds::{default_speeds, spaced};
 use quietcut_model::case::Case;
@@ -16,9 +17,6 @@ use quietcut_model::case::Case;
 /// Bytes that a table should have: a quarter of a slot of the board, so that refinement, which stops only after it
 /// is exceeded, stays within. A speed takes 4 bytes, and in each layer 2 and 8 for each of one or two unstable intervals.
 const BYTES: usize = 32 * 1024;
-
-/// Share of the largest depth by which a limit may differ from the straight line between its neighbours.
-const TOLERANCE: f64 = 0.003;
 
 /// Speeds before refinement.
 const SPEEDS: usize = 121;
@@ -50,7 +48,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
         None => grid::default_depth(&asked, from_rpm, to_rpm)?,
     };
     let probes = spaced(from_rpm, to_rpm, layers::PROBES);
-    let families = layers::refined(cases, request, &probes, depth_mm, TOLERANCE * depth_mm)?;
+    let families = layers::refined(cases, request, &probes, depth_mm, TABLE_TOLERANCE * depth_mm)?;
     let modes = if request.derivatives {
         derivatives::mode_count(&families)?
     } else {
@@ -59,7 +57,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
     let slopes_bytes = if modes == 0 { 0 } else { 4 * (2 * modes + 1) };
     let bytes_of_speed = 4 + families.len() * (2 + 3 * (8 + slopes_bytes) / 2);
     let refinement = Refinement {
-        tolerance: TOLERANCE,
+        tolerance: TABLE_TOLERANCE,
         least_step: 2e-4,
         most_speeds: (BYTES / bytes_of_speed).max(SPEEDS),
     };
@@ -93,7 +91,7 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
         };
         table.bytes(error)
     };
-    let tolerance_mm = TOLERANCE * depth_mm;
+    let tolerance_mm = TABLE_TOLERANCE * depth_mm;
     let spans = layers::spans(&families)?;
     let mut checks = Checks::new(&spans, &speeds, depth_mm)?;
     let mut written = bytes(&entries, None)?;

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use crate::criteria::{HARMONICS_SETTLED_LIMIT, HARMONICS_SETTLED_MULTIPLIER, SAME_WITH_TWICE_HARMONICS};
 use crate::error::StabilityError;
 use crate::frequency::averaged::AveragedLoop;
 use crate::frequency::harmonic::HarmonicLoop;
@@ -14,18 +15,8 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Largest relative change of a limit with twice the harmonics at which they are enough. What is left out then falls by
-/// four or more with each doubling: the limits with twice the harmonics are right to a third of it.
-const LIMIT_SETTLED: f64 = 1e-4;
-
-/// The same for multipliers.
-const MULTIPLIER_SETTLED: f64 = 1e-6;
-
 /// The most harmonics: beyond them the matrices are too large to be of use.
 const HARMONICS_MAX: usize = 400;
-
-/// Limits that move by more than this share with twice the harmonics are not the same limits.
-const SAME: f64 = 0.1;
 
 /// The multi-frequency solution on modelled or measured receptances.
 ///
@@ -65,7 +56,7 @@ impl MultiFrequency {
             let finer = find(harmonics)?;
             let change = largest_change(&found.1, &finer.1, depth_mm * 1e-3);
             let (_, coarser) = std::mem::replace(&mut found, finer);
-            if change.is_some_and(|change| change <= LIMIT_SETTLED) {
+            if change.is_some_and(|change| change <= HARMONICS_SETTLED_LIMIT) {
                 return Ok((found.0, found.1, coarser));
             }
         }
@@ -83,7 +74,7 @@ fn largest_change(coarse: &[AxisCrossing], fine: &[AxisCrossing], depth_m: f64) 
     let inside = |limits: &[AxisCrossing]| -> Vec<AxisCrossing> {
         let within = limits
             .iter()
-            .filter(|limit| limit.depth_m < (1.0 - LIMIT_SETTLED) * depth_m);
+            .filter(|limit| limit.depth_m < (1.0 - HARMONICS_SETTLED_LIMIT) * depth_m);
         within.copied().collect()
     };
     let (coarse, fine) = (inside(coarse), inside(fine));
@@ -100,7 +91,7 @@ fn largest_change(coarse: &[AxisCrossing], fine: &[AxisCrossing], depth_m: f64) 
             .filter(|(_, other)| other.kind == limit.kind && other.outward == limit.outward)
             .map(|(index, other)| (index, change(other)))
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        if nearest > SAME {
+        if nearest > SAME_WITH_TWICE_HARMONICS {
             return None;
         }
         free.swap_remove(index);
@@ -135,7 +126,7 @@ impl Method for MultiFrequency {
             let multiplier = (root * delay_s).exp();
             let change = (multiplier - before).norm();
             harmonics = 2 * harmonics + 1;
-            let is_enough = change <= MULTIPLIER_SETTLED * multiplier.norm().max(1.0);
+            let is_enough = change <= HARMONICS_SETTLED_MULTIPLIER * multiplier.norm().max(1.0);
             if self.harmonics.is_some() || is_enough || 2 * harmonics > HARMONICS_MAX {
                 return self.judged(&finer, rpm, depth_mm, root, change);
             }

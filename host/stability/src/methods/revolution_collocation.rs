@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use num_complex::Complex64;
 
-use crate::criteria::LEAST_ERROR;
+use crate::criteria::{LEAST_ERROR, MESH_ROOM};
 use crate::error::StabilityError;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::line::line_of;
@@ -82,5 +82,5 @@ impl Method for RevolutionCollocation {
 
 /// The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
 fn error(coarse: Complex64, fine: Complex64) -> f64 {
-    (10.0 * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
+    (MESH_ROOM * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
 }

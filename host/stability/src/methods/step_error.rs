@@ -2,6 +2,8 @@
 
 use num_complex::Complex64;
 
+use crate::criteria::STEP_ROOM;
+
 /// An estimate of |error| of a multiplier from a method of an order p in its step, by comparison with a half and a
 /// quarter of the step (Richardson).
 ///
@@ -20,7 +22,7 @@ pub(crate) fn step_error(
         (whole - finer).norm() * power / (power - 1.0)
     };
     let change = by_change(half, 1).max(by_change(quarter, 2));
-    (3.0 * change).max(least * whole.norm().max(1.0))
+    (STEP_ROOM * change).max(least * whole.norm().max(1.0))
 }
 
 #[cfg(test)]

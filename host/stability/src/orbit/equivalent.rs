@@ -21,7 +21,7 @@ use super::forced::ForcedProblem;
 use super::periodic_orbit::{Orbit, PeriodMap, Scale};
 use super::restoring::{Samples, Spring, equivalent, incremental};
 use super::tooth_period::ToothPeriod;
-use crate::criteria::LEAST_ERROR;
+use crate::criteria::{EQUIVALENT_FOLLOWED, LEAST_ERROR, STICKING_DAMPER};
 use crate::error::StabilityError;
 use crate::limits::bounds::{check_depth, check_speed};
 use crate::limits::method::Method;
@@ -35,9 +35,6 @@ use quietcut_model::effects::{ALL, Treatment};
 
 /// Steps in depth, at least, at which multipliers are counted.
 const SAMPLES: usize = 32;
-
-/// Multipliers below this size are not followed.
-const FOLLOWED: f64 = 0.5;
 
 /// To what spring and orbit agree, relative to the stiffness of the structure.
 const SETTLED: f64 = 1e-7;
@@ -53,9 +50,6 @@ const CROSSING: f64 = 1e-6;
 
 /// The depth that stands for none, mm: without any motion nothing has an amplitude.
 const NONE_MM: f64 = 1e-4;
-
-/// Where friction sticks a damper of this many times k/ω of the slowest mode holds the tool: it still gives way by a twentieth.
-const HOLDS: f64 = 20.0;
 
 /// A case with friction, backlash or hysteresis.
 #[derive(Debug)]
@@ -155,7 +149,7 @@ impl EquivalentProblem {
             velocity: DMatrix::from_fn(3, order, |i, j| {
                 machine.c.row(i).dot(&machine.a.column(j).transpose())
             }),
-            most_damping: stiffness.map(|stiffness: f64| HOLDS * stiffness / slowest),
+            most_damping: stiffness.map(|stiffness: f64| STICKING_DAMPER * stiffness / slowest),
             stiffness,
             smooth,
         })
@@ -273,7 +267,7 @@ impl<'a> Follower<'a> {
         })?;
         Ok(all
             .into_iter()
-            .take_while(|multiplier| multiplier.norm() > FOLLOWED)
+            .take_while(|multiplier| multiplier.norm() > EQUIVALENT_FOLLOWED)
             .filter(|multiplier| multiplier.im >= 0.0)
             .collect())
     }

@@ -12,17 +12,8 @@ use super::pairing::{FOLLOWED, nearest, pair};
 use super::periodic_orbit::{Orbit, OrbitError, PeriodMap, Scale, Tangent};
 use super::revolution_period::RevolutionPeriod;
 use super::tooth_period::ToothPeriod;
-use crate::criteria::LEAST_ERROR;
+use crate::criteria::{BRANCH_STEP_MAX, BRANCH_STEP_MIN, LEAST_ERROR, ORBIT_ROOM};
 use crate::spectrum::stability_loss::StabilityLoss;
-
-/// The longest step, as a share of the last depth (or of the size of the orbit there).
-const STEP_MAX: f64 = 1.0 / 30.0;
-
-/// The shortest step: below it multipliers that come together cannot be told apart, and are paired as they are.
-const STEP_MIN: f64 = 1e-5;
-
-/// By how much less a mesh twice as fine errs, at the least: what changes to it times this is an estimate with room to spare.
-const ROOM: f64 = 10.0;
 
 /// The most steps of a branch: with the longest step a branch that is followed up and down needs about a hundred.
 const STEPS_MAX: usize = 1000;
@@ -166,7 +157,7 @@ impl<M: PeriodMap> Follower<M> {
         let mut along_depth = DVector::zeros(order + 1);
         along_depth[order] = 1.0;
         let mut here = self.sample(&Orbit::rest(&self.map), &along_depth)?;
-        let mut step = STEP_MAX;
+        let mut step = BRANCH_STEP_MAX;
         while here.orbit.depth_m < depth_m {
             let depth_mm = here.orbit.depth_m * 1e3;
             let towards = here.tangent.along[order] * self.scale.depth_m;
@@ -184,7 +175,7 @@ impl<M: PeriodMap> Follower<M> {
             };
             match next {
                 Ok(next) => here = next,
-                Err(_) if step > STEP_MIN => step *= 0.5,
+                Err(_) if step > BRANCH_STEP_MIN => step *= 0.5,
                 Err(error) => return Err(error),
             }
             if (here.orbit.depth_m - depth_m).abs() <= 1e-12 * depth_m {
@@ -204,18 +195,18 @@ impl<M: PeriodMap> Follower<M> {
             points: vec![self.point(&here)],
             events: Vec::new(),
         };
-        let mut step = STEP_MAX;
+        let mut step = BRANCH_STEP_MAX;
         for _ in 0..STEPS_MAX {
             let depth_mm = here.orbit.depth_m * 1e3;
             let next = self.step(&here, step).ok().and_then(|next| {
-                let pairs = pair(&here.roots, &next.roots, step <= 2.0 * STEP_MIN)?;
+                let pairs = pair(&here.roots, &next.roots, step <= 2.0 * BRANCH_STEP_MIN)?;
                 Some((next, pairs))
             });
             let Some((next, pairs)) = next else {
-                if step <= STEP_MIN {
+                if step <= BRANCH_STEP_MIN {
                     return Err(OrbitError::NoConvergence { depth_mm });
                 }
-                step = (0.5 * step).max(STEP_MIN);
+                step = (0.5 * step).max(BRANCH_STEP_MIN);
                 continue;
             };
             let mut events: Vec<(f64, Event)> = pairs
@@ -231,7 +222,7 @@ impl<M: PeriodMap> Follower<M> {
             if lost || here.orbit.depth_m >= self.scale.depth_m || here.orbit.depth_m <= 0.0 {
                 return Ok(branch);
             }
-            step = (1.5 * step).min(STEP_MAX);
+            step = (1.5 * step).min(BRANCH_STEP_MAX);
         }
         Err(OrbitError::NoConvergence {
             depth_mm: here.orbit.depth_m * 1e3,
@@ -342,18 +333,18 @@ impl<M: PeriodMap> Follower<M> {
             .sample(&at.orbit.onto(&self.map, &finer.map), &(normal / length))
             .ok()?;
         let change = (nearest(&there.roots, root)? - root).norm();
-        let error = (ROOM * change).max(LEAST_ERROR);
-        let beside = self.step(at, STEP_MIN).ok()?;
-        let slope = (nearest(&beside.roots, root)?.norm() - root.norm()).abs() / STEP_MIN;
+        let error = (ORBIT_ROOM * change).max(LEAST_ERROR);
+        let beside = self.step(at, BRANCH_STEP_MIN).ok()?;
+        let slope = (nearest(&beside.roots, root)?.norm() - root.norm()).abs() / BRANCH_STEP_MIN;
         let reach = error / slope;
-        if reach.is_nan() || reach > STEP_MAX {
+        if reach.is_nan() || reach > BRANCH_STEP_MAX {
             return None;
         }
         let depth_m = at.orbit.depth_m;
         let shift_m = |step: f64| Some((self.depth_m(at, step).ok()? - depth_m).abs());
         let along_m = shift_m(reach)?.max(shift_m(-reach)?);
         // At a fold the depth does not change along the branch: there, what has been checked of orbits is the least.
-        Some(along_m.max(LEAST_ERROR * depth_m) + ROOM * (there.orbit.depth_m - depth_m).abs())
+        Some(along_m.max(LEAST_ERROR * depth_m) + ORBIT_ROOM * (there.orbit.depth_m - depth_m).abs())
     }
 
     fn point(&self, sample: &Sample) -> BranchPoint {

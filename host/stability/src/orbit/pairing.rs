@@ -2,13 +2,11 @@
 
 use num_complex::Complex64;
 
+use crate::criteria::MULTIPLIER_MOVE_MAX;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// How far a multiplier near the circle may move in one step.
-const MOVE_MAX: f64 = 0.12;
-
 /// Multipliers below this size are not followed: they are more than two steps away from the circle.
-pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MOVE_MAX;
+pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MULTIPLIER_MOVE_MAX;
 
 /// Pairs the multipliers of two samples; `None` where one near the circle cannot be recognized again.
 ///
@@ -31,7 +29,7 @@ pub(super) fn pair(
         match best {
             Some((index, &next))
                 if anyhow
-                    || ((next - root).norm() < MOVE_MAX * root.norm().max(1.0)
+                    || ((next - root).norm() < MULTIPLIER_MOVE_MAX * root.norm().max(1.0)
                         && (StabilityLoss::of(root) == StabilityLoss::of(next)
                             || is_far(root) && is_far(next))) =>
             {
@@ -51,7 +49,7 @@ pub(super) fn pair(
 /// met on the axis over the step, and none of them has crossed.
 fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     conjugate.retain(|&root| {
-        let reach = MOVE_MAX * root.norm().max(1.0);
+        let reach = MULTIPLIER_MOVE_MAX * root.norm().max(1.0);
         let is_near = |other: &Complex64| (other - root).norm() < reach;
         if root.im == 0.0 || real.iter().any(|other| other.im != 0.0 && is_near(other)) {
             return true;
@@ -69,7 +67,7 @@ fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
 
 /// True where a multiplier cannot reach the circle in a step.
 fn is_far(multiplier: Complex64) -> bool {
-    (multiplier.norm() - 1.0).abs() > MOVE_MAX
+    (multiplier.norm() - 1.0).abs() > MULTIPLIER_MOVE_MAX
 }
 
 /// The multiplier nearest to one that is expected.

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::DMatrix;
 
 use super::periodic_orbit::{Orbit, SubintervalNodes};
+use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
 use quietcut_model::Term;
 use quietcut_model::path::{Motion, restoring_along, restoring_from};
 
@@ -19,12 +20,6 @@ const PERIODS: usize = 64;
 
 /// How nearly it closes, relative to the size of the force.
 const CLOSED: f64 = 1e-8;
-
-/// Size of a small disturbance, as a share of the orbit.
-const SMALL: f64 = 0.02;
-
-/// Periods of the orbit over which a disturbance of another frequency is watched, to the nearest of its own periods.
-const WATCHED: usize = 40;
 
 /// f_r = force + stiffness·x + damping·ẋ along one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -209,16 +204,16 @@ pub(super) fn incremental(
     std::array::from_fn(|axis| {
         let middle_m = mean(&samples.x[axis]);
         let centered: Vec<f64> = samples.x[axis].iter().map(|x| x - middle_m).collect();
-        let size_m = SMALL * (dot(&centered, &centered) / centered.len().max(1) as f64).sqrt();
+        let size_m = DISTURBANCE * (dot(&centered, &centered) / centered.len().max(1) as f64).sqrt();
         if size_m == 0.0 || springs[axis].damping >= most_damping[axis] {
             return springs[axis];
         }
         let disturbance = |t: f64| [size_m * (omega * t).sin(), size_m * omega * (omega * t).cos()];
         let mut spring = Spring::default();
-        let first = WATCHED / 2 * samples.len();
+        let first = DISTURBANCE_PERIODS / 2 * samples.len();
         for term in terms {
-            let plain = restoring_along(&**term, &samples.motion(WATCHED, axis, |_| [0.0; 2]));
-            let disturbed = restoring_along(&**term, &samples.motion(WATCHED, axis, disturbance));
+            let plain = restoring_along(&**term, &samples.motion(DISTURBANCE_PERIODS, axis, |_| [0.0; 2]));
+            let disturbed = restoring_along(&**term, &samples.motion(DISTURBANCE_PERIODS, axis, disturbance));
             let change: Vec<f64> = (first..plain[axis].len())
                 .map(|n| disturbed[axis][n] - plain[axis][n])
                 .collect();

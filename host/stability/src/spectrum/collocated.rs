@@ -8,15 +8,9 @@ use super::chatter_frequency::chatter_hz;
 use super::crossing::Crossing;
 use super::period_map;
 use super::root::Root;
-use crate::criteria::LEAST_ERROR;
+use crate::criteria::{LEAST_ERROR, MESH_ROOM, SCANNED, SCANNED_SHARE};
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution};
-
-/// Multipliers below this size are not needed to follow others along the depth.
-const FOLLOWED: f64 = 0.25;
-
-/// The same as a share of the largest, where all are small.
-const SHARE: f64 = 0.3;
 
 /// The multipliers at one speed: all of them by collocation, single ones from the characteristic matrix.
 pub(crate) struct Collocated<'a> {
@@ -54,7 +48,7 @@ impl<'a> Collocated<'a> {
 
 impl Spectrum for Collocated<'_> {
     fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>> {
-        period_map::larger_than(&self.coarse, depth_m, FOLLOWED, SHARE)
+        period_map::larger_than(&self.coarse, depth_m, SCANNED, SCANNED_SHARE)
     }
 
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64> {
@@ -90,6 +84,6 @@ impl Spectrum for Collocated<'_> {
             Characteristic::new(&period, 2.0 * deepest_m)
         });
         let fine = finer.multiplier_near(multiplier, depth_m, 0.05, &mut self.workspace)?;
-        Some((10.0 * (fine - multiplier).norm()).max(LEAST_ERROR))
+        Some((MESH_ROOM * (fine - multiplier).norm()).max(LEAST_ERROR))
     }
 }

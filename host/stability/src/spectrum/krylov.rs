@@ -9,6 +9,7 @@ use num_complex::Complex64;
 
 use super::eigenvector::eigenvector;
 use super::hessenberg::Shifted;
+use crate::criteria::{CROWD, KRYLOV_ANY};
 use quietcut_numerics::eigenvalues::eigenvalues;
 
 /// Vectors in a block: as many directions may have the same mode.
@@ -25,12 +26,6 @@ const RESIDUAL: f64 = 1e-11;
 
 /// The same where Newton goes on from there.
 const ROUGH: f64 = 1e-7;
-
-/// Eigenvalues above this size are all of interest.
-const ANY: f64 = 0.25;
-
-/// So many eigenvalues of nearly one size are no candidates for the largest but a crowd near zero.
-const CROWD: usize = 24;
 
 /// The most vectors of a space: looks at it take a second or two then, and maps that need more have a crowd of eigenvalues of one
 /// size.
@@ -77,8 +72,8 @@ impl Dominant {
     pub(crate) fn any(map: &impl LinearMap) -> Option<Self> {
         Self::kept(map, &|values| {
             let largest = values.first().map_or(0.0, |value| value.norm());
-            if largest > ANY {
-                values.retain(|value| value.norm() > ANY);
+            if largest > KRYLOV_ANY {
+                values.retain(|value| value.norm() > KRYLOV_ANY);
             } else {
                 values.retain(|value| value.norm() >= 0.5 * largest);
                 values.truncate(CROWD);

@@ -6,9 +6,7 @@ use super::along_depth::Spectrum;
 use super::crossing::Crossing;
 use super::krylov::{Dominant, LinearMap};
 use super::stability_loss::StabilityLoss;
-
-/// Multipliers below this size do not matter: lines follow only larger ones.
-const LEAST: f64 = 0.25;
+use crate::criteria::MAPPED;
 
 /// Share of the largest depth over which a difference stands for the derivative: its error, and that of multipliers
 /// divided by it, are then both near 1e-6, and slopes are used as predictions only.
@@ -53,7 +51,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         if self.known.as_ref().is_none_or(|known| known.depth_m != depth_m) {
             self.known = Some(Known {
                 depth_m,
-                dominant: Dominant::of(&(self.map)(depth_m)?, LEAST)?,
+                dominant: Dominant::of(&(self.map)(depth_m)?, MAPPED)?,
                 beside: None,
             });
         }
@@ -91,7 +89,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         let step_m = self.step_m;
         let own = self.nearest(multiplier, depth_m)?;
         if self.at(depth_m)?.beside.is_none() {
-            let beside = Dominant::of(&(self.map)(depth_m + step_m)?, LEAST)?.eigenvalues;
+            let beside = Dominant::of(&(self.map)(depth_m + step_m)?, MAPPED)?.eigenvalues;
             self.at(depth_m)?.beside = Some(beside);
         }
         let beside = self.at(depth_m)?.beside.as_deref()?;
@@ -133,7 +131,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
 
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64> {
         let map = (self.map)(crossing.depth_m)?;
-        let dominant = Dominant::of(&map, LEAST)?;
+        let dominant = Dominant::of(&map, MAPPED)?;
         let multiplier = nearest(&dominant.eigenvalues, crossing.multiplier)?;
         map.chatter_hz(multiplier, &dominant.vector(multiplier)?)
     }

@@ -11,11 +11,9 @@
 use num_complex::Complex64;
 
 use super::characteristic::{Characteristic, Workspace};
+use crate::criteria::WOUND;
 
-/// Multipliers below this size are not looked for: the depth |w (1 − 1/μ)| is five times w at most.
-pub(crate) const LEAST: f64 = 0.25;
-
-/// How far beyond [`LEAST`], or beyond the largest multiplier, it is shown that there is none, in turn.
+/// How far beyond [`WOUND`], or beyond the largest multiplier, it is shown that there is none, in turn.
 const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
 
 /// The same while a verdict is not certain.
@@ -36,7 +34,7 @@ const ROOTS_MAX: usize = 12;
 /// What is known of the largest multiplier.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beyond {
-    /// The largest that was found, if it is larger than [`LEAST`]; of a pair the upper one.
+    /// The largest that was found, if it is larger than [`WOUND`]; of a pair the upper one.
     pub(crate) multiplier: Option<Complex64>,
     /// No multiplier is larger than this; infinite where that could not be shown.
     pub(crate) radius: f64,
@@ -132,7 +130,7 @@ impl<'a> Search<'a> {
             let step = -z / slope;
             z += step;
             // Beyond, the polynomials of the elements are not good.
-            if !z.is_finite() || z.norm() > LEAST.recip() {
+            if !z.is_finite() || z.norm() > WOUND.recip() {
                 return None;
             }
             if step.norm() < 1e-9 * z.norm() {
@@ -149,7 +147,7 @@ impl<'a> Search<'a> {
     pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> Beyond {
         let mut known: Vec<Complex64> = Vec::new();
         let mut best: Option<Complex64> = None;
-        let is_large = |candidate: &&Complex64| candidate.norm() > LEAST && candidate.im >= 0.0;
+        let is_large = |candidate: &&Complex64| candidate.norm() > WOUND && candidate.im >= 0.0;
         for candidate in candidates.iter().filter(is_large).take(CANDIDATES_MAX) {
             if let Some(found) = self.newton(candidate.inv(), &[])
                 && best.is_none_or(|best| found.norm() > best.norm())
@@ -165,7 +163,7 @@ impl<'a> Search<'a> {
                 break;
             }
             loop {
-                let at = best.map_or(LEAST, |best| best.norm()) * (1.0 + margin);
+                let at = best.map_or(WOUND, |best| best.norm()) * (1.0 + margin);
                 match self.count_beyond(at) {
                     Some(0) => radius = at,
                     Some(_) if known.len() < ROOTS_MAX => {
@@ -201,7 +199,7 @@ mod tests {
         for (name, rpm) in [("insperger-2dof-ad0.5", 6000.0), ("kuka-kr90-acetal", 900.0)] {
             for depth_mm in [0.1, 1.0, 4.0] {
                 let (problem, depth_m) = (problem(name), depth_mm * 1e-3);
-                let kappa_m = (1.0 + LEAST.recip()) * depth_m;
+                let kappa_m = (1.0 + WOUND.recip()) * depth_m;
                 let period = Period::new(&problem, rpm, kappa_m, Resolution::WORKING);
                 let all = period_map::multipliers(&period, depth_m).unwrap();
                 let characteristic = Characteristic::new(&period, kappa_m);
@@ -227,10 +225,10 @@ mod tests {
                 // The map is good to 1e-9, the last margin 2e-3 or better.
                 match beyond.multiplier {
                     Some(found) => assert!((found.norm() - largest).abs() < 1e-8, "{beyond:?} {largest}"),
-                    None => assert!(largest < LEAST * 1.05),
+                    None => assert!(largest < WOUND * 1.05),
                 }
                 assert!(
-                    largest <= beyond.radius && beyond.radius < 1.003 * largest.max(LEAST),
+                    largest <= beyond.radius && beyond.radius < 1.003 * largest.max(WOUND),
                     "{beyond:?} {largest}"
                 );
             }
