@@ -23,7 +23,7 @@ use quietcut::identify::law::{Extra, Law, Role};
 use quietcut::orbit::ForcedProblem;
 use quietcut::report::lobe_chart::{Column, lobe_chart};
 use quietcut::report::marks::Mark;
-use quietcut::simulate::{Entry, Room, Settings, SimulateError, VirtualCut};
+use quietcut::simulate::{Entry, Settings, SimulateError, VirtualCut, Workspace};
 use quietcut::stability::{
     Chart, Collocation, CubicTerms, FrequencyProblem, Method, MultiFrequency, Problem, chart,
 };
@@ -91,7 +91,7 @@ fn judged(case: &Case, rpm: f64, depth_mm: f64, teeth: usize) -> Judged {
     let model = cut.model(case).expect("a cut");
     let count = INSTANTS * (teeth + 1);
     let mut motion: Vec<[f64; 3]> = Vec::with_capacity(count);
-    let mut room = Room::new(&model);
+    let mut room = Workspace::new(&model);
     let run = model.run(seconds, Settings::default(), |segment| {
         while motion.len() < count {
             let t = (motion.len() + 1) as f64 * period_s / INSTANTS as f64;

@@ -4,8 +4,8 @@ use std::fmt;
 
 use quietcut::case::Case;
 use quietcut::simulate::{
-    Accelerometer, Heard, Model, Regeneration, Room, Sampler, Segment, Settings, Spindle, Statistics,
-    TachometerModel, VirtualCut,
+    Accelerometer, Heard, Model, Regeneration, Sampler, Segment, Settings, Spindle, Statistics,
+    TachometerModel, VirtualCut, Workspace,
 };
 use quietcut_core::detector::Verdict;
 use quietcut_core::monitor::{self, Monitor, State};
@@ -196,7 +196,7 @@ fn forced_m(case: &Case, cut: &VirtualCut, [from, to]: [f64; 2]) -> f64 {
 /// Half the largest peak-to-peak displacement of any axis, turn by turn.
 struct Sizes {
     every_s: f64,
-    room: Room,
+    workspace: Workspace,
     taken: usize,
     low: [f64; 3],
     high: [f64; 3],
@@ -211,7 +211,7 @@ impl Sizes {
     fn new(model: &Model, rpm: f64) -> Self {
         Self {
             every_s: 60.0 / rpm / Self::PER_TURN as f64,
-            room: Room::new(model),
+            workspace: Workspace::new(model),
             taken: 0,
             low: [f64::MAX; 3],
             high: [f64::MIN; 3],
@@ -222,7 +222,7 @@ impl Sizes {
     fn observe(&mut self, segment: &Segment<'_>) {
         while self.taken as f64 * self.every_s <= segment.to_s() {
             let t = self.taken as f64 * self.every_s;
-            let x = segment.motion(t, &mut self.room).displacement_m;
+            let x = segment.motion(t, &mut self.workspace).displacement_m;
             for ((low, high), x) in self.low.iter_mut().zip(&mut self.high).zip(x) {
                 *low = low.min(x);
                 *high = high.max(x);

@@ -3,7 +3,7 @@
 use super::contact::{Change, Contact};
 use super::error::SimulateError;
 use super::model::{Model, Stretch};
-use super::segment::{Room, Segment};
+use super::segment::{Segment, Workspace};
 use super::settings::Settings;
 use quietcut_model::term::{self, At, Branch, Branches};
 use quietcut_numerics::crossing::first_below_zero;
@@ -35,7 +35,7 @@ pub(super) struct Integrator<'a> {
     /// Length of the next step if nothing comes between.
     next_h: f64,
     statistics: Statistics,
-    room: Room,
+    workspace: Workspace,
     /// The branch of each term of the model.
     branches: Vec<Branch>,
     /// The stretch looked at, a little shortened at both ends.
@@ -85,7 +85,7 @@ impl<'a> Integrator<'a> {
             next_h: 0.0,
             statistics: Statistics::default(),
             branches: vec![0; model.terms.len()],
-            room: Room::new(model),
+            workspace: Workspace::new(model),
             within: [0.0; 2],
         }
     }
@@ -195,9 +195,9 @@ impl<'a> Integrator<'a> {
         let Some(axis) = self.model.terms[index].holds() else {
             return 0.0;
         };
-        let mut rate = std::mem::take(&mut self.room.rate);
+        let mut rate = std::mem::take(&mut self.workspace.rate);
         let holding = self.held_n(index, axis, (t, y), &mut rate);
-        self.room.rate = rate;
+        self.workspace.rate = rate;
         holding
     }
 
@@ -314,11 +314,11 @@ impl<'a> Integrator<'a> {
             .as_ref()
             .and_then(|contact| contact.first_change(self.t, h, &self.displacement))
             .map(Event::Contact);
-        let mut room = std::mem::take(&mut self.room);
+        let mut workspace = std::mem::take(&mut self.workspace);
         let terms: Option<Event> = (0..self.branches.len())
-            .filter_map(|index| self.end_of_branch(index, h, &mut room))
+            .filter_map(|index| self.end_of_branch(index, h, &mut workspace))
             .min_by(|a, b| a.u().total_cmp(&b.u()));
-        self.room = room;
+        self.workspace = workspace;
         match (contact, terms) {
             (Some(contact), Some(term)) if contact.u() > term.u() => Some(term),
             (Some(contact), _) => Some(contact),
@@ -326,13 +326,13 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    fn end_of_branch(&self, index: usize, h: f64, room: &mut Room) -> Option<Event> {
+    fn end_of_branch(&self, index: usize, h: f64, workspace: &mut Workspace) -> Option<Event> {
         let (term, branch) = (&self.model.terms[index], self.branches[index]);
         let place = self.place(index);
-        let room = std::cell::RefCell::new(room);
+        let workspace = std::cell::RefCell::new(workspace);
         let margin = |u: f64| {
-            let mut room = room.borrow_mut();
-            let Room { state, rate, .. } = &mut **room;
+            let mut workspace = workspace.borrow_mut();
+            let Workspace { state, rate, .. } = &mut **workspace;
             for (state, quartic) in state.iter_mut().zip(&self.quartics) {
                 *state = at(quartic, u);
             }
@@ -400,15 +400,19 @@ impl<'a> Integrator<'a> {
     fn switch(&mut self) {
         let Some(contact) = &mut self.contact else { return };
         let x = self.model.dynamics.displacement(&self.y);
-        self.room.state.copy_from_slice(&self.y);
+        self.workspace.state.copy_from_slice(&self.y);
         let stretch = Stretch {
             contact: Some(contact),
             within: self.within,
             branches: Branches(&self.branches),
         };
-        self.model
-            .rate(stretch, (self.t, x), &self.room.state, &mut self.room.rate);
-        let v = self.model.dynamics.velocity(&self.room.rate);
+        self.model.rate(
+            stretch,
+            (self.t, x),
+            &self.workspace.state,
+            &mut self.workspace.rate,
+        );
+        let v = self.model.dynamics.velocity(&self.workspace.rate);
         contact.switch(self.t, x, v);
     }
 

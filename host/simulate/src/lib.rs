@@ -1,8 +1,55 @@
-//! Virtual cuts: the delay equations of milling integrated in time, and the sensors that hear them.
+//! Time-domain simulation: the delay differential equations of milling integrated in time, test rigs, and the sensors that record them.
 //!
-//! The equations are those of thesis chapters 3 and 6 without any smoothing: teeth enter and leave exactly at their
-//! angles, a chip is as thick as the surface left by *all* earlier passes leaves it (eqs 6.20 to 6.27), and a tooth
-//! off the surface feels no force.
+//! The equations are those of thesis chapters 3 and 6 without smoothing. Teeth enter and leave exactly at their angles. The chip thickness
+//! follows from the surface that *all* earlier passes left (eqs 6.20 to 6.27), and a tooth that does not reach the surface has no force.
+//!
+//! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`Segment`] the motion over one step with dense
+//! output, [`rig::Rig`] a test with shaker, hammer or free decay, [`Recorder`] the recording of a cut.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use quietcut_model::case::Case;
+//! use quietcut_simulate::{Settings, VirtualCut, Workspace};
+//!
+//! let text = r#"
+//! [structure]
+//! kind = "modes"
+//! directions = ["y"]
+//! [[structure.mode]]
+//! frequency_hz = 16.99
+//! damping_ratio = 0.0285
+//! left = [[-0.005147, 0.004861]]
+//! right = [[-0.003921, 0.005505]]
+//! [tool]
+//! teeth = 2
+//! edge_angle_deg = 90.0
+//! diameter_mm = 12.7
+//! [material]
+//! ktc_mpa = 119.0
+//! krc_mpa = 20.23
+//! kac_mpa = 39.27
+//! kte_n_per_mm = 0.0
+//! kre_n_per_mm = 0.0
+//! kae_n_per_mm = 0.0
+//! [cut]
+//! start_deg = 90.0
+//! exit_deg = 180.0
+//! feed_per_tooth_mm = 0.15
+//! "#;
+//! let case = Case::parse(Path::new("robot.toml"), text)?;
+//! let model = VirtualCut::new(900.0, 1.0, 0.5).model(&case)?;
+//! let mut workspace = Workspace::new(&model);
+//! let mut largest_m: f64 = 0.0;
+//! model.run(0.5, Settings::default(), |segment| {
+//!     let motion = segment.motion(segment.to_s(), &mut workspace);
+//!     largest_m = largest_m.max(motion.displacement_m[1].abs());
+//! })?;
+//! assert!(largest_m > 1e-6 && largest_m < 1e-2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! This crate computes no stability limit and estimates no parameter. It knows no table of receptances.
 
 mod anti_aliasing;
 mod contact;
@@ -41,7 +88,7 @@ pub use passage::Passage;
 pub use pores::Pores;
 pub use reading::Reading;
 pub use record::Recorder;
-pub use segment::{Motion, Room, Segment};
+pub use segment::{Motion, Segment, Workspace};
 pub use sensor::{Accelerometer, STANDARD_GRAVITY, Sampler, TachometerModel};
 pub use settings::Settings;
 pub use virtual_cut::{Entry, Heard, VirtualCut, VirtualCutError};

@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::effect::Pickup;
-use super::segment::{Motion, Room, Segment};
+use super::segment::{Motion, Segment, Workspace};
 use quietcut_recording::Quantity;
 
 /// The samples of one channel, as a motion is computed.
@@ -11,7 +11,7 @@ use quietcut_recording::Quantity;
 /// (v(t + h/2) − v(t − h/2))/h.
 pub struct Reading {
     pickup: Pickup,
-    room: Room,
+    workspace: Workspace,
     rate_hz: f64,
     count: usize,
     is_mean: bool,
@@ -24,7 +24,7 @@ impl Reading {
     pub fn new(model: &Model, pickup: Pickup, rate_hz: f64, count: usize) -> Self {
         let is_mean = pickup.quantity == Quantity::Acceleration && model.dynamics.velocity_jumps();
         Self {
-            room: Room::seeing(model, &pickup.modes),
+            workspace: Workspace::seeing(model, &pickup.modes),
             values: Vec::with_capacity(count + 1),
             pickup,
             rate_hz,
@@ -45,7 +45,7 @@ impl Reading {
             if t > segment.to_s() {
                 break;
             }
-            let motion = segment.motion(t.max(0.0), &mut self.room);
+            let motion = segment.motion(t.max(0.0), &mut self.workspace);
             let value = if t < 0.0 {
                 self.read_before(&motion)
             } else {

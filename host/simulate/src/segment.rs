@@ -27,27 +27,27 @@ pub struct Motion {
     pub force_n: [f64; 3],
 }
 
-/// Room to compute a [`Motion`] in.
+/// Buffers in which a [`Motion`] is computed.
 #[derive(Clone, Debug, Default)]
-pub struct Room {
+pub struct Workspace {
     pub(super) state: Vec<f64>,
     pub(super) rate: Vec<f64>,
     /// The equations as they are seen from where the modes have other shapes than at the tool.
     pub(super) seen: Option<Dynamics>,
 }
 
-impl Room {
-    /// Room for the states of `model`.
+impl Workspace {
+    /// Buffers for the states of `model`.
     pub fn new(model: &Model) -> Self {
-        let room = vec![0.0; model.order()];
+        let zeros = vec![0.0; model.order()];
         Self {
-            state: room.clone(),
-            rate: room,
+            state: zeros.clone(),
+            rate: zeros,
             seen: None,
         }
     }
 
-    /// Room for the motion that a sensor sees, where each mode of `model`'s structure has so many times its shape at the tool; with no
+    /// Buffers for the motion that a sensor sees, where each mode of `model`'s structure has so many times its shape at the tool; with no
     /// modes said, the tool's.
     pub fn seeing(model: &Model, modes: &[f64]) -> Self {
         Self {
@@ -69,23 +69,26 @@ impl Segment<'_> {
     }
 
     /// The motion at `t` within the stretch.
-    pub fn motion(&self, t: f64, room: &mut Room) -> Motion {
+    pub fn motion(&self, t: f64, workspace: &mut Workspace) -> Motion {
         let u = (t - self.from_s) / (self.to_s - self.from_s);
-        for (state, quartic) in room.state.iter_mut().zip(self.quartics) {
+        for (state, quartic) in workspace.state.iter_mut().zip(self.quartics) {
             *state = at(quartic, u);
         }
         let displacement_m = std::array::from_fn(|axis| at(&self.displacement[axis], u));
-        let force_n = self
-            .model
-            .rate(self.stretch, (t, displacement_m), &room.state, &mut room.rate);
-        let dynamics = room.seen.as_ref().unwrap_or(&self.model.dynamics);
+        let force_n = self.model.rate(
+            self.stretch,
+            (t, displacement_m),
+            &workspace.state,
+            &mut workspace.rate,
+        );
+        let dynamics = workspace.seen.as_ref().unwrap_or(&self.model.dynamics);
         Motion {
-            displacement_m: match &room.seen {
-                Some(seen) => seen.displacement(&room.state),
+            displacement_m: match &workspace.seen {
+                Some(seen) => seen.displacement(&workspace.state),
                 None => displacement_m,
             },
-            velocity_m_per_s: dynamics.velocity(&room.rate),
-            acceleration_m_per_s2: dynamics.acceleration(&room.rate),
+            velocity_m_per_s: dynamics.velocity(&workspace.rate),
+            acceleration_m_per_s2: dynamics.acceleration(&workspace.rate),
             force_n,
         }
     }

@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Model, Room, Segment, Spindle};
+use super::{Model, Segment, Spindle, Workspace};
 
 /// Standard gravity, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
@@ -85,7 +85,7 @@ pub struct Sampler {
     step_s: f64,
     delay_s: f64,
     filter: [f64; 2 * HALF + 1],
-    room: Room,
+    workspace: Workspace,
     /// Velocities taken so far; number k is that at (k − ½) steps.
     taken: usize,
     velocity: [f64; 3],
@@ -102,7 +102,7 @@ impl Sampler {
             delay_s: 0.0,
             step_s: 1.0 / (accelerometer.rate_hz() * OVERSAMPLING as f64),
             filter: low_pass(),
-            room: Room::new(model),
+            workspace: Workspace::new(model),
             taken: 0,
             velocity: [0.0; 3],
             ring: vec![[0.0; 3]; 2 * HALF + 1],
@@ -110,11 +110,11 @@ impl Sampler {
         }
     }
 
-    /// The same from where the modes have so many times their shapes at the tool: see [`Room::seeing`].
+    /// The same from where the modes have so many times their shapes at the tool: see [`Workspace::seeing`].
     #[must_use]
     pub fn seeing(self, model: &Model, modes: &[f64]) -> Self {
         Self {
-            room: Room::seeing(model, modes),
+            workspace: Workspace::seeing(model, modes),
             ..self
         }
     }
@@ -140,7 +140,7 @@ impl Sampler {
             let velocity = if t < 0.0 {
                 [0.0; 3]
             } else {
-                segment.motion(t, &mut self.room).velocity_m_per_s
+                segment.motion(t, &mut self.workspace).velocity_m_per_s
             };
             self.take(velocity);
         }

@@ -681,39 +681,3 @@ fn records_that_cannot_be_measured_are_refused_with_the_reason() {
     };
     assert!(said(&|_| {}, &stepped).contains("step-sine"));
 }
-
-#[test]
-fn a_step_sine_test_at_several_forces_is_measured_at_the_one_that_is_meant() {
-    use quietcut_simulate::rig::{Rig, Signal};
-    use quietcut_testkit::case;
-
-    // A softening mode: its resonance is another at each force.
-    let structure = case("kuka-kr90-y17-low").structure.unwrap();
-    let frequencies: Vec<f64> = (0..9).map(|k| 17.0 + 0.1 * f64::from(k)).collect();
-    let signal = Signal::step_sine(&frequencies, &[1.8, 9.5], 20.0, 4.0);
-    let rig = Rig::new(Direction::Y, signal, 128.0);
-    let (recording, _) = rig.record(&structure, Path::new("steps.csv")).unwrap();
-    let measured = |force_n| {
-        let settings = MeasurementSettings {
-            force_n,
-            channels: vec!["fy".into(), "y".into()],
-            ..MeasurementSettings::default()
-        };
-        measure(std::slice::from_ref(&recording), &settings)
-    };
-    let said = measured(None).unwrap_err().to_string();
-    assert!(
-        said.contains("1.80") && said.contains("9.50") && said.contains("--force-n"),
-        "{said}"
-    );
-    assert!(measured(Some(4.0)).unwrap_err().to_string().contains("9.50"));
-    let peaks = [1.8, 9.5].map(|force_n| {
-        let measurement = measured(Some(force_n)).unwrap();
-        let table = measurement.table;
-        assert_eq!(table.frequency_hz().len(), frequencies.len());
-        let sizes = table.entries()[0].receptance.iter().map(|h| h.norm());
-        sizes.fold(0.0, f64::max)
-    });
-    // Cubic damping takes of the peak: at 9.5 N far more than at 1.8 N.
-    assert!(peaks[1] < 0.9 * peaks[0], "{peaks:?}");
-}

@@ -425,11 +425,15 @@ fn difference_with(
     let spindle = model.cutting.as_ref().unwrap().spindle;
     let when_s = |index: usize| spindle.time_s(2.0 * std::f64::consts::TAU * index as f64 / points as f64);
     let mut motions = Vec::new();
-    let mut room = Room::new(&model);
+    let mut workspace = Workspace::new(&model);
     let statistics = model
         .run(when_s(turns * points / 2 + 1), Settings::default(), |segment| {
             while motions.len() <= turns * points / 2 && when_s(motions.len()) <= segment.to_s() {
-                motions.push(segment.motion(when_s(motions.len()), &mut room).displacement_m);
+                motions.push(
+                    segment
+                        .motion(when_s(motions.len()), &mut workspace)
+                        .displacement_m,
+                );
             }
         })
         .unwrap();

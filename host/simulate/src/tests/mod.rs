@@ -1,10 +1,9 @@
-//! Tests of the simulation: closed forms, reference multipliers, a brute-force integration, facts of chapter 6.
+//! Tests of the simulation: closed forms, a brute-force integration, facts of chapter 6.
 
 mod brute_force;
 mod closed_form;
 mod facts;
 mod milling_rigs;
-mod multipliers;
 mod sensors;
 
 use super::*;
@@ -63,7 +62,7 @@ fn motions_from(
     end_s: f64,
 ) -> Vec<Motion> {
     let mut found: Vec<Motion> = Vec::new();
-    let mut room = Room::new(model);
+    let mut workspace = Workspace::new(model);
     model
         .run_from(states, end_s, settings, |segment| {
             loop {
@@ -71,7 +70,7 @@ fn motions_from(
                 if t > segment.to_s() {
                     break;
                 }
-                found.push(segment.motion(t, &mut room));
+                found.push(segment.motion(t, &mut workspace));
             }
         })
         .unwrap();

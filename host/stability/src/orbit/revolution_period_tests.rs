@@ -103,7 +103,7 @@ fn settled(case: &Case, rpm: f64, depth_mm: f64, turns: usize, regeneration: Reg
     let turn_s = 60.0 / rpm;
     let at_s = turn_s * (turns as f64 + case.cut().unwrap().start_deg / 360.0);
     let mut found = [0.0; 3];
-    let mut room = quietcut_simulate::Room::new(&model);
+    let mut room = quietcut_simulate::Workspace::new(&model);
     let settings = Settings {
         absolute_m: 1e-14,
         relative: 1e-10,

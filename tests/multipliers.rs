@@ -3,9 +3,81 @@
 //! The references were computed by Chebyshev collocation of the monodromy operator and by a characteristic-matrix
 //! Newton, which agree to 2e-8.
 
-use super::*;
-use quietcut_stability::orbit::ForcedProblem;
-use quietcut_stability::{CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
+#![allow(clippy::expect_used)]
+
+use quietcut::case::Case;
+use quietcut::simulate::{
+    Cutter, Cutting, Drive, Dynamics, Model, Motion, Passage, Regeneration, Settings, Spindle, Workspace,
+};
+use quietcut::stability::orbit::ForcedProblem;
+use quietcut::stability::{self, CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
+use quietcut_testkit::case;
+
+fn cutter(case: &Case, depth_mm: f64) -> Cutter {
+    let (tool, material, cut) = (
+        case.tool().unwrap(),
+        case.material().unwrap(),
+        case.cut().unwrap(),
+    );
+    let mut cutter = Cutter::new(tool, material, cut, 1e-3 * depth_mm).unwrap();
+    cutter.axial_depth_modulation = case.axial_depth_modulation();
+    cutter
+}
+
+/// A case in full cut from the start.
+fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
+    Model {
+        dynamics: Dynamics::new(case.structure().unwrap()).unwrap(),
+        cutting: Some(Cutting {
+            cutter: cutter(case, depth_mm),
+            spindle: Spindle::new(spindle_rpm),
+            passage: Passage::Steady,
+            regeneration: Regeneration::AllPasses,
+            pores: None,
+        }),
+        drive: None,
+        terms: Vec::new(),
+    }
+}
+
+fn motions_from(
+    model: &Model,
+    states: Vec<f64>,
+    settings: Settings,
+    first_s: f64,
+    every_s: f64,
+    end_s: f64,
+) -> Vec<Motion> {
+    let mut found: Vec<Motion> = Vec::new();
+    let mut workspace = Workspace::new(model);
+    model
+        .run_from(states, end_s, settings, |segment| {
+            loop {
+                let t = first_s + found.len() as f64 * every_s;
+                if t > segment.to_s() {
+                    break;
+                }
+                found.push(segment.motion(t, &mut workspace));
+            }
+        })
+        .unwrap();
+    found
+}
+
+fn exact(relative: f64) -> Settings {
+    Settings {
+        absolute_m: 1e-4 * relative,
+        relative,
+        largest_m: f64::INFINITY,
+        ..Settings::default()
+    }
+}
+
+/// The motion at `first_s + k·every_s` up to `end_s`, from rest.
+fn motions(model: &Model, settings: Settings, first_s: f64, every_s: f64, end_s: f64) -> Vec<Motion> {
+    let at_rest = vec![0.0; model.dynamics.order()];
+    motions_from(model, at_rest, settings, first_s, every_s, end_s)
+}
 
 /// The force of a cut without vibration, thesis eq. 3.6, turned round: with it a tool at rest stays at rest.
 struct Counterforce {
@@ -263,7 +335,7 @@ fn growth_of_a_push(mut model: Model, period_s: f64, expected: f64, order: usize
 
 #[test]
 fn disturbances_of_unequal_teeth_with_cubic_terms_grow_as_their_multipliers_say() {
-    let runout = quietcut_model::milling::Runout {
+    let runout = quietcut::milling::Runout {
         offset_um: 40.0,
         angle_deg: 30.0,
     };
@@ -325,12 +397,12 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         let extended = Case::parse(path.as_ref(), &format!("{text}\n{extension}")).unwrap();
         let rpm = 6200.0;
         let at = |depth_mm: f64| {
-            if quietcut_stability::needs_orbit(&extended) {
+            if stability::needs_orbit(&extended) {
                 // An orbit may be lost in a fold before this depth: then there is nothing to disturb.
                 ForcedProblem::new(&extended).unwrap().point(rpm, depth_mm).ok()
             } else {
                 let problem = Problem::new(&extended, CubicTerms::Refuse).unwrap();
-                Some(quietcut_stability::point(&problem, rpm, depth_mm).unwrap())
+                Some(stability::point(&problem, rpm, depth_mm).unwrap())
             }
         };
         // Deep enough that a disturbance lives long enough to be measured.
@@ -341,8 +413,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
             .unwrap();
         let plain = Case::parse(path.as_ref(), &text).unwrap();
         let plain =
-            quietcut_stability::point(&Problem::new(&plain, CubicTerms::Refuse).unwrap(), rpm, depth_mm)
-                .unwrap();
+            stability::point(&Problem::new(&plain, CubicTerms::Refuse).unwrap(), rpm, depth_mm).unwrap();
         let cut = VirtualCut {
             entry: Entry::None,
             ..VirtualCut::new(rpm, depth_mm, 1.0)
