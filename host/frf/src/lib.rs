@@ -1,4 +1,37 @@
-//! Frequency response functions: measured from recordings, their table in a file, and what lies between its lines.
+//! Frequency response functions: measured from recordings, tabulated in a file, and interpolated between the lines of a table.
+//!
+//! Main types: [`measure`] turns recordings of shaker, hammer, sweep or step-sine tests into a [`Measurement`] (receptances with coherence
+//! and standard deviation; estimators H1, H2 and their mean, [`Estimator`]); [`FrfTable`] holds receptances in m/N and reads and writes
+//! CSV and UFF 58; [`Interpolation`] evaluates a table between its lines.
+//!
+//! ```
+//! use std::f64::consts::TAU;
+//! use std::path::Path;
+//!
+//! use num_complex::Complex64;
+//! use quietcut_frf::{Frf, FrfTable, Interpolation};
+//! use quietcut_model::structure::Direction;
+//!
+//! // One mode of 20 Hz, 2 % damping and 1 MN/m: H = 1/(k (1 − r² + 2iζr)) with r = f/f_n.
+//! let receptance = |hertz: f64| {
+//!     let r = hertz / 20.0;
+//!     (1e6 * Complex64::new(1.0 - r * r, 2.0 * 0.02 * r)).inv()
+//! };
+//! let frequency_hz: Vec<f64> = (40..=80).map(|line| 0.4 * f64::from(line)).collect();
+//! let entry = Frf {
+//!     response: Direction::X,
+//!     force: Direction::X,
+//!     receptance: frequency_hz.iter().map(|&hertz| receptance(hertz)).collect(),
+//!     coherence: None,
+//! };
+//! let table = FrfTable::new(Path::new("one-mode"), frequency_hz, vec![entry])?;
+//!
+//! let between = Interpolation::new(&table)?.at(Complex64::from(20.1))[(0, 0)];
+//! assert!((between / receptance(20.1) - 1.0).norm() < 0.01);
+//! # Ok::<(), quietcut_frf::FrfError>(())
+//! ```
+//!
+//! This crate knows structures only by their directions: no modes, no cutting force, no stability.
 
 mod cross_spectra;
 mod driven;

@@ -1,9 +1,46 @@
-//! From recordings to a model of the structure: parameters with intervals.
+//! System identification: parameters of structures, materials and robots from recordings, each with a 90 % interval.
 //!
-//! Steady tests: [`dwell`] finds where a frequency is held and what moves there, [`steady_fit`] fits a [`law`] to it by
-//! [`harmonic_balance`]; [`hfrf`] and [`ncma`] are the thesis's own ways, [`linearity`] judges. Any record:
-//! [`restoring_force`]; whole periods of a multisine: [`periodic_fit`]. Cutting tests: [`force_coefficients`].
-//! A robot at several postures: [`joints`], with cubic terms [`cubic_joints`]. Without any force: [`subspace`], and from chatter [`inverse_stability`].
+//! | folder | parameters | tests |
+//! |---|---|---|
+//! | [`modes`] | complex modes with left and right shapes | receptances, whole recordings |
+//! | [`nonlinear`] | cubic, quadratic and friction terms; linearity tests | step-sine dwells ([`dwells`]), multisines, any record |
+//! | [`cutting`] | cutting and edge coefficients, runout; modes from stability limits | cuts with measured force; trial cuts |
+//! | [`robot`] | joint stiffness and damping, payload | receptances or dwells at several postures |
+//! | [`ambient`] | modes from responses alone (stochastic subspace) | idle spindle, background vibration |
+//! | [`plan`] | none: the fewest tests that narrow the limits of a lobe chart | |
+//!
+//! [`case_file`] writes what was identified as a case file.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use num_complex::Complex64;
+//! use quietcut_frf::{Frf, FrfTable};
+//! use quietcut_identify::modes::{Options, Receptances, identify};
+//! use quietcut_model::structure::Direction;
+//!
+//! // One mode of 20 Hz, 2 % damping and 1 MN/m.
+//! let frequency_hz: Vec<f64> = (0..200).map(|line| 15.0 + 0.05 * f64::from(line)).collect();
+//! let receptance = frequency_hz.iter().map(|hertz| {
+//!     let r = hertz / 20.0;
+//!     (1e6 * Complex64::new(1.0 - r * r, 2.0 * 0.02 * r)).inv()
+//! });
+//! let entry = Frf {
+//!     response: Direction::X,
+//!     force: Direction::X,
+//!     receptance: receptance.collect(),
+//!     coherence: None,
+//! };
+//! let table = FrfTable::new(Path::new("one-mode"), frequency_hz, vec![entry])?;
+//!
+//! let model = identify(&Receptances::new(&table, None, None)?, &Options::default())?;
+//! let mode = &model.modes[0].mode;
+//! assert!((mode.frequency_hz - 20.0).abs() < 1e-3);
+//! assert!((mode.damping_ratio - 0.02).abs() < 1e-4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! This crate judges no baseline model: that a recording contradicts a case is for the crate `diagnose` to say.
 
 pub mod ambient;
 pub mod case_file;

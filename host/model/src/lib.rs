@@ -1,4 +1,43 @@
-//! The machine model: case, structure, tool, material and cut.
+//! The machine model: structure, tool, material and cut of one case, and the effects that may extend it.
+//!
+//! Main types: [`case::Case`] (the case file), [`structure::Structure`] (M, C, K matrices, complex modes or joints of a robot),
+//! [`milling::Tool`], [`milling::Material`] and [`milling::Cut`], [`Dynamics`] (first-order equation of motion), [`Effects`] (terms of the
+//! restoring force, of the cutting force, of spindle and sensors that a case may have beyond the linear model).
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use quietcut_model::case::Case;
+//!
+//! let text = r#"
+//! [structure]
+//! kind = "modes"
+//! directions = ["y"]
+//!
+//! [[structure.mode]]
+//! frequency_hz = 16.99
+//! damping_ratio = 0.0285
+//! left = [[-0.005147, 0.004861]]
+//! right = [[-0.003921, 0.005505]]
+//!
+//! [tool]
+//! teeth = 2
+//! edge_angle_deg = 90.0
+//!
+//! [cut]
+//! start_deg = 90.0
+//! exit_deg = 180.0
+//! feed_per_tooth_mm = 0.15
+//! "#;
+//! let case = Case::parse(Path::new("robot.toml"), text)?;
+//! assert_eq!(case.name, "robot");
+//! assert_eq!(case.tool()?.teeth, 2);
+//! assert!(case.material().is_err(), "the case has no section [material]");
+//! # Ok::<(), quietcut_model::case::CaseError>(())
+//! ```
+//!
+//! This crate integrates no motion, computes no stability limit and estimates no parameter. Apart from the text of a case file it reads
+//! no file.
 
 pub mod case;
 pub mod cutter;

@@ -1,6 +1,38 @@
-//! Recordings: channels with name, unit and rate, and what the file beside them says.
+//! Recordings: channels with name, unit and sample rate, and the sidecar file that describes the test.
 //!
-//! Forces act on the structure. A rising edge of `tacho` is immersion angle 0 of tooth 1. Samples are in SI units.
+//! Sign conventions: a force is the force on the structure. A rising edge of `tacho` is immersion angle 0 of tooth 1. All samples are in
+//! SI units.
+//!
+//! Main types: [`Recording`] with its [`Channel`]s, [`Sidecar`] (kind of test, cut, posture, names and units of channels), [`Unit`] and
+//! [`Quantity`], [`SpindleAngle`] (spindle angle from the tachometer). Formats: CSV, WAV, MAT and UFF 58 ([`uff`]).
+//!
+//! ```
+//! use quietcut_recording::{Channel, Quantity, Recording, Sidecar};
+//!
+//! let path = std::env::temp_dir().join(format!("quietcut-recording-{}.csv", std::process::id()));
+//! let written = Recording {
+//!     path: path.clone(),
+//!     sample_rate_hz: 1000.0,
+//!     start_s: 0.0,
+//!     since_s: 0.0,
+//!     channels: vec![Channel {
+//!         name: "fx".into(),
+//!         quantity: Quantity::Force,
+//!         samples: vec![0.0, 12.5, 25.0],
+//!     }],
+//!     sidecar: Sidecar::default(),
+//! };
+//! written.write(&path)?;
+//!
+//! let read = Recording::read(&path)?;
+//! assert_eq!(read.sample_rate_hz, 1000.0);
+//! assert_eq!(read.channel("fx").map(|channel| channel.samples[1]), Some(12.5));
+//! # std::fs::remove_file(&path).ok();
+//! # std::fs::remove_file(path.with_extension("toml")).ok();
+//! # Ok::<(), quietcut_recording::RecordingError>(())
+//! ```
+//!
+//! This crate knows no structure, tool or cut beyond what the sidecar states, and computes no spectra.
 
 mod assemble;
 mod blocks;

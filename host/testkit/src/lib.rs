@@ -1,6 +1,11 @@
-//! What unit tests of several crates share: the cases that the project brings.
+//! What unit tests of several crates share: the cases of the project, the folder of measured records, and the files of results.
 //!
 //! A dev-dependency only. It knows the layers up to `quietcut-model`; that crate and those below it cannot use it.
+//!
+//! ```
+//! let case = quietcut_testkit::case("kuka-kr90-acetal");
+//! assert_eq!(case.tool().map(|tool| tool.teeth).ok(), Some(2));
+//! ```
 #![allow(clippy::expect_used, clippy::panic)]
 
 pub mod results;
