@@ -1,4 +1,4 @@
-//! What was identified, as the text of a case file.
+//! The text of a case file from identified parameters.
 
 use nalgebra::{DMatrix, Vector3};
 use num_complex::Complex64;
@@ -14,7 +14,7 @@ use quietcut_model::structure::{Direction, Joint, Mode, Robot};
 pub struct Estimate {
     /// Its key: `mass_kg`, `k3_n_per_m3` …
     pub key: &'static str,
-    /// The directions that it belongs to: one, or two for an entry off the diagonal and for a coupling.
+    /// Its directions: one, or two for an off-diagonal entry and for a coupling.
     pub directions: Vec<Direction>,
     /// Its value, SI.
     pub value: f64,
@@ -33,7 +33,7 @@ pub enum CaseFileError {
         "[extension.{0}] is needed in two directions; a case holds one: identify the directions one by one"
     )]
     Twice(&'static str),
-    /// Modes that are driven in other directions than they are seen in.
+    /// Modes without a direction that is both excited and measured.
     #[error(
         "no direction is both driven and measured, so the modes are not those of a tool; drive where the motion is measured"
     )]
@@ -54,7 +54,7 @@ pub fn with_sections(text: &str, other: &Table) -> String {
     toml::to_string(&case).unwrap_or_default()
 }
 
-/// The text of a case with complex modes, in the directions that are both driven and measured.
+/// The text of a case with complex modes, in the directions that are both excited and measured.
 ///
 /// # Errors
 /// There is no such direction.
@@ -169,7 +169,7 @@ fn numbers(values: impl Iterator<Item = f64>) -> Value {
     Value::Array(values.map(Value::Float).collect())
 }
 
-/// A case that says what is cut by what: force coefficients, teeth, and the runout where it was told.
+/// The text of a case with force coefficients, teeth, and the runout if it was identified.
 ///
 /// # Errors
 /// A cutting coefficient is missing.
@@ -204,7 +204,7 @@ pub fn cutting(
     Ok(case)
 }
 
-/// The extension that holds a key.
+/// The extension of a key.
 fn extension_of(key: &str) -> Option<&'static str> {
     Some(match key {
         "k2_n_per_m2" => "quadratic-stiffness",

@@ -60,7 +60,7 @@ pub(super) struct Normal {
 pub(super) struct Spread {
     /// Covariance of the parameters.
     pub(super) covariance: DMatrix<f64>,
-    /// Sum of squares over degrees of freedom, in units of the noise.
+    /// χ² per degree of freedom.
     pub(super) misfit: f64,
     /// True where the covariance is the sandwich.
     pub(super) robust: bool,

@@ -1,4 +1,4 @@
-//! Modes from motion alone, under a force that nobody measured.
+//! Output-only modal analysis: modes from motion under an unmeasured excitation.
 
 mod recording;
 pub mod subspace;

@@ -1,4 +1,4 @@
-//! Records of motion alone, made ready: what turns with the spindle is taken out, the band is kept, the rest is thinned out.
+//! Preparation of response-only records: removes the spindle harmonics, limits the band and decimates.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::least_squares::scaled_solve;
 use quietcut_recording::{Quantity, Recording, SpindleAngle};
 
-/// Motion that is driven by something that nobody measured.
+/// Motion under an unmeasured excitation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ambient {
     /// Samples of each channel.
@@ -16,11 +16,11 @@ pub struct Ambient {
     pub names: Vec<String>,
     /// Samples per second.
     pub rate_hz: f64,
-    /// The spindle's turns per second whose harmonics were taken out; `None` where no speed is known.
+    /// Spindle frequency whose harmonics were removed, Hz; `None` if no speed is known.
     pub turn_hz: Option<f64>,
 }
 
-/// How many samples per period of the highest frequency are kept at least.
+/// Fewest samples per period of the highest frequency after decimation.
 const PER_PERIOD: f64 = 3.0;
 
 impl Ambient {
@@ -55,8 +55,8 @@ impl Ambient {
     }
 }
 
-/// Takes the mean and every harmonic of the turning spindle up to a fifth beyond `high_hz` out, by least squares over the record;
-/// what is left begins and ends where the angle is known. The turns per second.
+/// Removes the mean and all spindle harmonics up to 1.2 `high_hz` by least squares over the record, and trims it to the range in
+/// which the spindle angle is known. Returns the spindle frequency, Hz.
 fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f64) -> Option<f64> {
     let cut = recording.sidecar.cut.unwrap_or_default();
     let rate_hz = recording.sample_rate_hz;

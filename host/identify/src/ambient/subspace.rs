@@ -1,4 +1,4 @@
-//! Modes from motion alone: stochastic subspace identification by covariances, with intervals.
+//! Output-only modes: covariance-driven stochastic subspace identification (SSI-cov) with intervals.
 //!
 //! Of a structure that white noise drives the covariances R_k = E[y(t + k) y(t)ᵀ] = C A^(k−1) G are those of a free decay. Their
 //! block Hankel matrix is O·Γ; its left singular vectors are O in some basis, and A follows from its shift (Peeters and De
@@ -16,7 +16,7 @@ use super::recording::Ambient;
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 
-/// A mode with deviations: 1.645 of them are half the 90 % interval.
+/// A mode with standard deviations; the half-width of the 90 % interval is 1.645 standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmbientMode {
     /// Natural frequency |λ|/2π, Hz.
@@ -29,18 +29,18 @@ pub struct AmbientMode {
     pub damping_deviation: f64,
 }
 
-/// What a record says.
+/// Modes of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AmbientModes {
-    /// The modes within the band by rising frequency, that stay where they are when the order grows.
+    /// The modes within the band that are stable over the model order, by ascending frequency.
     pub modes: Vec<AmbientMode>,
-    /// Number of states that stand out of the scatter of the blocks.
+    /// Number of states whose singular values exceed the scatter of the blocks.
     pub order: usize,
-    /// Blocks that the record was cut into.
+    /// Number of blocks of the record.
     pub blocks: usize,
 }
 
-/// Why nothing can be said.
+/// Why the test gives no result.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum AmbientError {
     /// Too short.
@@ -65,7 +65,7 @@ pub enum AmbientError {
 /// Fewest and most blocks of a record.
 const BLOCKS: [usize; 2] = [12, 40];
 
-/// A block is so many times as long as the longest lag: then what hangs over from one to the next does not count.
+/// Ratio of block length to longest lag. At this ratio the correlation between neighbouring blocks is negligible.
 const BLOCK_LENGTH: usize = 6;
 
 /// Periods of the lowest frequency that the lags span.
@@ -135,7 +135,7 @@ pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientMo
 }
 
 impl AmbientMode {
-    /// True where the 90 % interval of the damping ratio is wider than the ratio itself: the data cannot tell it.
+    /// True if the 90 % interval of the damping ratio is wider than the ratio itself: it is not identifiable.
     pub fn is_vague(&self) -> bool {
         2.0 * NINETY_PERCENT * self.damping_deviation > self.damping_ratio
     }
@@ -168,7 +168,7 @@ fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> 
 }
 
 impl Record {
-    /// How many singular values stand out of the scatter: even, since modes come in pairs.
+    /// Number of singular values above the scatter: even, since poles come in conjugate pairs.
     fn order(&self) -> usize {
         let values = self.mean.singular_values();
         // The mean of two halves that alternate, one taken from the other: noise of the size of that of the mean.

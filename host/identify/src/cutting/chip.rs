@@ -1,10 +1,10 @@
-//! The chips of a recorded cut: who cut how thick a chip where, by the surface that all passes before have left.
+//! Chip thickness of every tooth in a recorded cut, from the surface that all earlier passes left.
 
 use nalgebra::Vector3;
 
 use crate::cutting::force_test::CuttingTest;
 
-/// A tooth in its chip at the instant of a sample.
+/// The chip of one tooth at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chip {
     /// Immersion angle, rad.
@@ -26,7 +26,7 @@ struct Point {
     owner: usize,
 }
 
-/// For every sample the chips that are cut, those of `runout_m` for how far each tooth stands out.
+/// The chips cut at every sample; `runout_m` is the radial offset of each tooth.
 ///
 /// On pass k tooth (−k mod N) runs over the arc; the edge stands at p(φ) = (sin φ, cos φ, 0)·u sin γ − z cos γ + r sin γ (eq. 3.1)
 /// before the feed, the surface S_k = max(p_k, S_(k−1) − f sin φ sin γ), and the chip is p_k − S_(k−1) + f sin φ sin γ where that

@@ -2,9 +2,9 @@
 //!
 //! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ} over the teeth that
 //! cut (eqs 3.2 to 3.4), with the chip thickness h of [`chips`], and the runout of each tooth in it: least squares over all
-//! samples, each channel weighed with what it leaves. Beside it the classical way: forces averaged over a revolution, over
-//! the feed (Altintas): runout and a stable vibration do not act on them as long as every tooth stays in its chip. Intervals come from the scatter between
-//! revolutions.
+//! samples, each channel weighted with its residual variance. For comparison the mean-force method (Altintas): forces averaged over
+//! a revolution, regressed on the feed. Runout and stable vibration do not affect it as long as every tooth stays in contact.
+//! Intervals come from the scatter between revolutions.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 use quietcut_model::milling::Runout;
 
-/// The coefficients as they are called in cases: MPa, and N/mm.
+/// Keys of the coefficients in a case: MPa, and N/mm.
 pub const KEYS: [&str; 6] = [
     "ktc_mpa",
     "krc_mpa",
@@ -32,7 +32,7 @@ pub const KEYS: [&str; 6] = [
 /// Feeds that differ by less than this are one.
 const SAME_FEED: f64 = 0.02;
 
-/// A value with its deviation: 1.645 of them are half the 90 % interval.
+/// A value with its standard deviation; the half-width of the 90 % interval is 1.645 standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
     /// The value.
@@ -41,53 +41,53 @@ pub struct Value {
     pub deviation: f64,
 }
 
-/// Length of the last step, in deviations.
+/// Largest length of the last step, in standard deviations.
 const SETTLED: f64 = 1e-2;
 
-/// The same where chips at the edge of contact come and go with every step.
+/// The same for fits in which chips at the edge of contact change with every step.
 const SETTLED_ENOUGH: f64 = 0.3;
 
-/// What a set of cutting tests says.
+/// Force coefficients from a set of cutting tests.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The coefficients in the order of [`KEYS`]; `None` for the axial ones where no axial force was measured.
     pub coefficients: [Option<Value>; 6],
-    /// The same by forces averaged over revolutions; `None` where all feeds are the same.
+    /// The same from forces averaged over revolutions; `None` if all feeds are equal.
     pub averaged: Option<[Option<Value>; 6]>,
-    /// How far each tooth stands out from the mean of all, m.
+    /// Radial offset of each tooth from the mean of all teeth, m.
     pub runout_m: Vec<Value>,
-    /// Root mean square of what is left over that of the force.
+    /// NRMSE of the force.
     pub relative_error: f64,
-    /// Revolutions that were used.
+    /// Number of revolutions used.
     pub revolutions: usize,
-    /// Feeds that differ.
+    /// Number of different feeds.
     pub feeds: usize,
     /// Feed per tooth, mean of the tests, m.
     pub feed_per_tooth_m: f64,
 }
 
-/// Why there is none.
+/// Why the fit gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ForceCoefficientError {
     /// Tests of different tools.
     #[error("the tests have tools with {0} and {1} teeth; tests of one tool are needed")]
     Teeth(usize, usize),
-    /// Radial and axial coefficients cannot be told apart.
+    /// Radial and axial coefficients are not separately identifiable.
     #[error(
         "no fz was measured, and with an edge angle of {0:.1} degrees radial and axial forces act in one direction in the plane of the tool; fz, or a square end mill (90 degrees), is needed"
     )]
     NoAxialForce(f64),
-    /// Data that do not determine the coefficients.
+    /// The data do not determine the coefficients.
     #[error(
         "the tests do not determine the coefficients; cuts at two or more feeds, in which teeth cut air now and then, are needed"
     )]
     Undetermined,
-    /// The fit does not settle.
+    /// The fit does not converge.
     #[error("the fit does not converge: chips that come and go with the runout; larger feeds are needed")]
     NotConverged,
 }
 
-/// The coefficients, and how far teeth stand out.
+/// The coefficients and the radial offsets of the teeth.
 #[derive(Clone)]
 struct State {
     /// In the order of [`KEYS`].
@@ -161,7 +161,7 @@ pub fn fit(tests: &[CuttingTest]) -> Result<Fit, ForceCoefficientError> {
     let linear = fitter.step(&start, &fitter.sums(&start))?.0;
     fitter.weigh(&linear);
     let state = fitter.settle(linear)?;
-    // What is left is known better now.
+    // The residual variances are known better now.
     fitter.weigh(&state);
     let state = fitter.settle(state)?;
     Ok(fitter.finish(&state))
@@ -305,7 +305,7 @@ impl Fitter<'_> {
         }
     }
 
-    /// Weighs each direction of each test with what is left of it.
+    /// Sets the weight of each direction of each test to the inverse of its residual variance.
     fn weigh(&mut self, state: &State) {
         let variances: Vec<Vector3<f64>> = self
             .tests
@@ -425,8 +425,8 @@ impl Fitter<'_> {
 }
 
 impl Fit {
-    /// The coefficients whose values by mean forces and over the arc differ by more than the sum of both half intervals and a
-    /// twentieth of the largest force of a chip: small coefficients may differ by much of their own.
+    /// The coefficients whose values from mean forces and from instantaneous forces differ by more than the sum of both half-widths
+    /// and by more than 1/20 of the largest chip force.
     pub fn apart(&self) -> Vec<&'static str> {
         let averaged = self.averaged.unwrap_or_default();
         let largest = |values: &[Option<Value>]| {
@@ -451,7 +451,7 @@ impl Fit {
     }
 }
 
-/// The offset of the tool axis that explains how far the teeth stand out: r_j = e cos(ψ + 2πj/N).
+/// The offset of the tool axis that explains the radial offsets of the teeth: r_j = e cos(ψ + 2πj/N).
 ///
 /// `None` for one tooth, and where the offset lies within its 90 % interval of zero. Two teeth show the offset along their own
 /// line alone.
@@ -477,8 +477,7 @@ pub fn runout(fit: &Fit) -> Option<Runout> {
     })
 }
 
-/// How much wider than a normal interval that of so many revolutions is, of which the parameters have taken their share of
-/// the scatter.
+/// Ratio of Student's to the normal 90 % quantile for this number of revolutions and parameters.
 fn few(revolutions: usize, parameters: usize) -> f64 {
     let count = revolutions as f64;
     let taken = count / (count - parameters as f64).max(1.0);

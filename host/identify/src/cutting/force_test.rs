@@ -26,22 +26,22 @@ pub struct CuttingTest {
     pub angle: Vec<f64>,
     /// Force on the tool, N.
     pub force: Vec<Vector3<f64>>,
-    /// False where the axial force was not measured: its entries are 0.
+    /// False if the axial force was not measured; its entries are 0.
     pub has_axial_force: bool,
     /// Displacement of the tool, m; `None` where none was measured.
     pub displacement: Option<Vec<Vector3<f64>>>,
-    /// Samples from and to in full cut, whole revolutions.
+    /// First and end sample of full engagement, whole revolutions.
     pub full_cut: [usize; 2],
 }
 
-/// What a recording does not say of the tool and its way.
+/// Tool and feed settings that the recording does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// Edge angle γ, degrees.
     pub edge_angle_deg: f64,
     /// Angle from the machine's x to the feed, degrees.
     pub feed_direction_deg: f64,
-    /// From when to when the tool is in full cut, s; `None`: where the force says so.
+    /// Begin and end of full engagement, s; `None` derives them from the force.
     pub full_cut_s: Option<[f64; 2]>,
 }
 
@@ -55,7 +55,7 @@ impl CuttingTest {
     /// The test of a recording.
     ///
     /// # Errors
-    /// No tachometer, no fx or fy, a cut that the sidecar does not describe in full, or too few revolutions in full cut.
+    /// No tachometer, no fx or fy, a cut that the sidecar does not describe completely, or too few revolutions of full engagement.
     pub fn new(recording: &Recording, setup: Setup) -> Result<Self, RecordingError> {
         let cut = recording.sidecar.cut.unwrap_or_default();
         let said = |value: Option<f64>, key: &str| {
@@ -129,7 +129,8 @@ impl CuttingTest {
         self.angle.partition_point(|&known| known < angle)
     }
 
-    /// Whole revolutions in full cut, as ranges of samples. The first of the recording serves to know the surface.
+    /// Whole revolutions of full engagement, as ranges of samples. The first revolution of the recording only generates the
+    /// surface.
     pub fn revolutions(&self) -> Vec<[usize; 2]> {
         let [from, to] = self.full_cut;
         if to <= from {
@@ -143,7 +144,7 @@ impl CuttingTest {
             .collect()
     }
 
-    /// Finds the revolutions in full cut, within `window` where it is given.
+    /// Finds the revolutions of full engagement, within `window` if it is given.
     fn find_full_cut(&mut self, window: Option<[usize; 2]>) -> Option<()> {
         let (first, last) = (*self.angle.first()?, *self.angle.last()?);
         // The first turn in view leaves the surface that the second one cuts.

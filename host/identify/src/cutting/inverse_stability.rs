@@ -1,11 +1,10 @@
 //! Modes from cuts that chattered and cuts that did not: inverse stability, without a force sensor.
 //!
-//! A structure whose modes have the shapes of a first guess, and other natural frequencies, damping ratios and stiffnesses, has a
-//! dominant multiplier μ at every cut: a cut chatters where |μ| > 1, with the frequency that belongs to μ. Depths are set, and
-//! frequencies read, with errors that are known; so every structure has a likelihood. What the cuts say is the distribution of
-//! structures that it leaves of those which were thought possible before (log-uniform within [`Before`]): drawn by sequential
-//! Monte Carlo from the latter to the former (Del Moral, Doucet and Jasra 2006). Where cuts are few, much is left, and the
-//! intervals are wide; several islands of structures that explain the cuts are all kept.
+//! The mode shapes are those of a first guess; natural frequencies, damping ratios and stiffnesses are unknown. At every cut the
+//! structure has a dominant Floquet multiplier μ (characteristic multiplier): the cut chatters if |μ| > 1, at the frequency given
+//! by μ. With known errors of the set depth and the read frequency every structure has a likelihood. The posterior distribution,
+//! with a log-uniform prior within [`Before`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few
+//! cuts the intervals are wide. Several separate regions that explain the cuts are all kept.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +22,7 @@ use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::{Direction, FirstOrder, Mode};
 use quietcut_stability::{Problem, StabilityError, point};
 
-/// What was thought possible before: factors up and down from the first guess.
+/// The prior: factors up and down from the first guess.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Before {
     /// Of natural frequencies.
@@ -44,7 +43,7 @@ impl Default for Before {
     }
 }
 
-/// How well cuts are known.
+/// Errors of the trial cuts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// Standard deviation of depths, relative.
@@ -53,14 +52,14 @@ pub struct Errors {
     pub frequency: f64,
 }
 
-/// A quantity before and after.
+/// Prior and posterior of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Median.
     pub value: f64,
-    /// 5 % and 95 % of what is left.
+    /// 5 % and 95 % quantiles of the posterior.
     pub ci90: [f64; 2],
-    /// The same of what was possible before.
+    /// 5 % and 95 % quantiles of the prior.
     pub before: [f64; 2],
 }
 
@@ -70,14 +69,15 @@ impl Spread {
         (self.ci90[1] / self.ci90[0]).ln() / (2.0 * NINETY_PERCENT)
     }
 
-    /// True where the cuts have left more than half of what was possible before, on a logarithmic scale: they cannot tell.
+    /// True if the posterior interval is wider than half of the prior on a logarithmic scale: the cuts do not identify the
+    /// quantity.
     pub fn is_vague(&self) -> bool {
         let width = |[low, high]: [f64; 2]| (high / low).ln();
         width(self.ci90) > 0.5 * width(self.before)
     }
 }
 
-/// What is left of one mode.
+/// Posterior of one mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseMode {
     /// Natural frequency, Hz.
@@ -90,13 +90,13 @@ pub struct InverseMode {
     pub start_stiffness_n_per_m: f64,
 }
 
-/// Why nothing can be said.
+/// Why the test gives no result.
 #[derive(Debug, thiserror::Error)]
 pub enum InverseError {
     /// The first guess has no modes that could move.
     #[error("the first guess has no modes: every pole is real, or without a shape of its own")]
     NoModes,
-    /// No structure that was thought possible explains the cuts.
+    /// No structure within the prior explains the cuts.
     #[error(
         "no structure that was thought possible explains the cuts: {0} of {1} are told wrongly by the best; another first guess, or other force coefficients, are needed"
     )]
@@ -106,7 +106,7 @@ pub enum InverseError {
     Stability(#[from] StabilityError),
 }
 
-/// Structures that are drawn.
+/// Number of particles (structures drawn).
 const PARTICLES: usize = 192;
 
 /// From step to step so much of the particles' weight stays effective.
@@ -247,7 +247,7 @@ impl Family<'_> {
         problem
     }
 
-    /// Logarithm of the likelihood, and how many cuts are told wrongly.
+    /// Log-likelihood, and the number of misjudged cuts.
     ///
     /// No cut adds to the sum: once it has fallen to `least` it cannot rise above it again, and −∞ is the answer.
     fn likelihood(&self, theta: &[f64], least: f64) -> (f64, usize) {
@@ -294,7 +294,7 @@ impl Family<'_> {
             .all(|(value, half)| value.abs() <= *half)
     }
 
-    /// Structures that the cuts have left, each as likely as any other.
+    /// Equally weighted particles of the posterior.
     fn draw(&self, seed: u64) -> Vec<Vec<f64>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut particles: Vec<Vec<f64>> = (0..PARTICLES)
@@ -416,12 +416,12 @@ impl Family<'_> {
     }
 }
 
-/// The share of a normal distribution below so many deviations.
+/// Standard normal distribution function.
 fn normal_share(deviations: f64) -> f64 {
     0.5 * libm::erfc(-deviations * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Weights after a step, with the sum 1.
+/// Normalized weights after a step.
 fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     let best = sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let raw: Vec<f64> = sums.iter().map(|sum| (step * (sum - best)).exp()).collect();
@@ -429,7 +429,7 @@ fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     raw.iter().map(|weight| weight / total).collect()
 }
 
-/// How much further the likelihood may be taken.
+/// Next increment of the exponent of the likelihood (tempering).
 fn next_step(sums: &[f64], share: f64) -> f64 {
     let effective = |step: f64| 1.0 / weights(sums, step).iter().map(|w| w * w).sum::<f64>();
     let enough = EFFECTIVE * sums.len() as f64;
@@ -449,7 +449,7 @@ fn next_step(sums: &[f64], share: f64) -> f64 {
     low.max(1e-6).min(1.0 - share)
 }
 
-/// Which particle each new one comes from.
+/// Parent of each new particle (systematic resampling).
 fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
     let count = weights.len();
     let (mut index, mut below) = (0, weights[0]);
@@ -465,7 +465,7 @@ fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
         .collect()
 }
 
-/// A root of the covariance of the particles.
+/// A square root of the covariance of the particles.
 fn scatter_root(particles: &[Vec<f64>]) -> DMatrix<f64> {
     let size = particles.first().map_or(0, Vec::len);
     let count = particles.len() as f64;

@@ -1,4 +1,4 @@
-//! Cutting tests: coefficients of the cutting force, and modes from limits of stability.
+//! Cutting tests: cutting force coefficients, and modes from stability limits.
 
 pub mod chip;
 pub mod force_coefficients;

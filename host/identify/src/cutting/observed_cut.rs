@@ -1,4 +1,4 @@
-//! Cuts of which is known whether they chattered: a table `rpm,depth_mm,chatter_hz,verdict`.
+//! Trial cuts with their verdict: a table `rpm,depth_mm,chatter_hz,verdict`.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use quietcut_recording::file::{self, FileError};
 
-/// A cut that somebody watched.
+/// A trial cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservedCut {
     /// Spindle speed, rev/min.
@@ -15,7 +15,7 @@ pub struct ObservedCut {
     pub depth_mm: f64,
     /// Whether it chattered.
     pub chatters: bool,
-    /// The chatter frequency, Hz; `None` where it was not measured, or nothing chattered.
+    /// The chatter frequency, Hz; `None` for a stable cut or if it was not measured.
     pub chatter_hz: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! A cutting test with what does not change while coefficients are fitted.
+//! A cutting test with the quantities that stay constant during the fit of the coefficients.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use crate::cutting::force_test::CuttingTest;
 use quietcut_model::milling::{Material, Tool, ToothForce, TurningVector};
 
-/// A test with what does not change while fitting.
+/// A test with the quantities that stay constant during the fit.
 pub(super) struct Prepared<'a> {
     pub(super) test: &'a CuttingTest,
     /// a e and a e/sin γ at an angle, N per unit of each coefficient and meter of chip; N per unit.

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use quietcut_recording::Quantity;
 
-/// How often a channel is differentiated.
+/// Order of differentiation of a channel with respect to displacement.
 pub(crate) fn derivative(quantity: Quantity) -> u8 {
     match quantity {
         Quantity::Velocity => 1,
@@ -13,7 +13,7 @@ pub(crate) fn derivative(quantity: Quantity) -> u8 {
     }
 }
 
-/// Coefficients of the integral.
+/// Fourier coefficients of the `order`-fold integral.
 pub(crate) fn undo(x: &DVector<f64>, order: u8, omega: f64) -> DVector<f64> {
     let mut integral = x.clone();
     for _ in 0..order {

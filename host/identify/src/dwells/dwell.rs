@@ -1,4 +1,5 @@
-//! Steady harmonic motion in a recording: where one frequency is held, and its Fourier coefficients with their noise.
+//! Steady harmonic motion in a recording: segments of constant excitation frequency, and their Fourier coefficients with noise
+//! variance.
 
 use std::f64::consts::TAU;
 
@@ -7,12 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Channel, Quantity, Recording};
 
-/// A stretch of samples in which one frequency is held.
+/// A segment of a recording with one constant excitation frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
     /// First sample.
     pub from: usize,
-    /// One behind the last sample.
+    /// Index after the last sample.
     pub to: usize,
     /// The frequency as first estimated, Hz.
     pub frequency_hz: f64,
@@ -25,7 +26,7 @@ pub struct Dwell {
     pub omega: f64,
     /// Its variance.
     pub omega_variance: f64,
-    /// Number of samples that were used.
+    /// Number of samples used.
     pub samples: usize,
     /// (AᵀA)⁻¹ of the harmonic regression: times a channel's variance, the covariance of its coefficients.
     pub gram_inverse: DMatrix<f64>,
@@ -35,7 +36,7 @@ pub struct Dwell {
     pub motions: Vec<Line>,
 }
 
-/// Fourier coefficients of a channel: 1, cos, sin, cos 2 … about the middle of the stretch.
+/// Fourier coefficients of a channel: 1, cos, sin, cos 2 … with the phase zero at the middle of the segment.
 #[derive(Clone, Debug)]
 pub struct Line {
     /// The direction of the channel.
@@ -60,7 +61,7 @@ impl Line {
     }
 }
 
-/// The direction of a channel of force or motion, by its name.
+/// The direction of a force or motion channel, from its name.
 pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
     let direction = match channel.quantity {
         Quantity::Displacement => channel.name.as_str(),
@@ -70,13 +71,13 @@ pub(crate) fn direction_of(channel: &Channel) -> Option<Direction> {
     direction.parse().ok()
 }
 
-/// Blocks in which the size of the force is looked at, s.
+/// Length of the blocks in which the force level is evaluated, s.
 const BLOCK_S: f64 = 0.1;
 
-/// The stretches of `recording` in which one frequency is held, by the force alone.
+/// The segments of `recording` with a constant excitation frequency, found from the force alone.
 ///
-/// A stretch ends where the force pauses or its frequency steps. Steps without a pause are found where the time between
-/// zero crossings changes by more than it scatters.
+/// A segment ends where the force pauses or its frequency steps. A step without a pause shows as a change of the time between zero
+/// crossings that exceeds its scatter.
 pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     let Some(force) = recording
         .channels
@@ -98,7 +99,7 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     let (Some(&quietest), Some(&loudest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
         return Vec::new();
     };
-    // Between noise and the weakest level: a pause is quiet, and every level is well above the noise.
+    // The threshold lies between the noise and the lowest force level.
     let threshold = (3.0 * quietest).min(0.3 * loudest).max(0.02 * loudest);
     let mut found = Vec::new();
     let mut start = None;
@@ -127,7 +128,7 @@ fn energy(samples: &[f64]) -> f64 {
     samples.iter().map(|x| x * x).sum()
 }
 
-/// Periods over which a frequency is estimated where steps are looked for.
+/// Periods over which the frequency is estimated in the search for steps.
 const PERIODS: usize = 8;
 
 /// Cuts `samples[from..]` where the frequency steps.
@@ -170,7 +171,7 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<Stretch>) {
     }
 }
 
-/// Places between samples where the signal rises through zero, at most one per noisy crossing.
+/// Fractional sample indices of the rising zero crossings, at most one per noisy crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
     let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();
     let mut crossings = Vec::new();
@@ -295,7 +296,7 @@ fn slope_by_omega(coefficients: &DVector<f64>, design: &DMatrix<f64>, rate_hz: f
     })
 }
 
-/// One noise variance per channel for all dwells of a recording: their residuals together.
+/// Pools the noise variance of each channel over all dwells of a recording.
 pub fn pool_variances(dwells: &mut [Dwell]) {
     type Pick = fn(&mut Dwell) -> &mut Vec<Line>;
     let picks: [Pick; 2] = [|dwell| &mut dwell.forces, |dwell| &mut dwell.motions];

@@ -1,4 +1,4 @@
-//! Steady motion under a force of constant frequency, and where a recording holds it.
+//! Steady motion under harmonic excitation of constant frequency (dwells), extracted from recordings.
 
 pub(crate) mod differentiation;
 pub mod dwell;

@@ -1,4 +1,4 @@
-//! From recordings of harmonic tests to steady periodic motions.
+//! Steady periodic motions from recordings of harmonic tests.
 
 use std::f64::consts::TAU;
 
@@ -8,18 +8,18 @@ use num_complex::Complex64;
 use crate::dwells::dwell::{Dwell, Stretch, direction_of, pool_variances, stretches};
 use quietcut_recording::Recording;
 
-/// How much of each dwell is transient.
+/// Length of the transient at the start of each dwell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settling {
-    /// So many seconds, the user says.
+    /// A length set by the user, s.
     Seconds(f64),
     /// The first half.
     Half,
-    /// What a motion that decays like e^{−σt} needs until it is below the noise; σ in 1/s.
+    /// Until a decay e^{−σt} has fallen below the noise; σ in 1/s.
     Decay(f64),
 }
 
-/// Steady motions, and what was wrong with the rest.
+/// Steady motions, and warnings about the dwells left out.
 #[derive(Clone, Debug, Default)]
 pub struct Steady {
     /// The dwells.
@@ -88,13 +88,14 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
 /// The settled part of a stretch.
 struct Settled {
     dwell: Dwell,
-    /// True where it is long enough to have settled, by the decay of the structure.
+    /// True if the transient has decayed according to the damping of the structure.
     whole: bool,
-    /// True where its motion no longer changes.
+    /// True if the fundamental is the same in both halves.
     still: bool,
 }
 
-/// The settled part of a stretch; where its motion still changes, its last half, or the half of that, as long as it has the periods.
+/// The settled part of a segment. If its motion still changes, its last half or quarter is taken, as long as that has enough
+/// periods.
 fn settled(recording: &Recording, stretch: Stretch, harmonics: usize, settling: Settling) -> Option<Settled> {
     let (dwell, whole) = first_settled(recording, stretch, harmonics, settling)?;
     let least = (PERIODS * recording.sample_rate_hz / stretch.frequency_hz).ceil() as usize;
@@ -105,7 +106,7 @@ fn settled(recording: &Recording, stretch: Stretch, harmonics: usize, settling: 
     let mut found = dwell;
     loop {
         let still = is_still(recording, last(found.samples), &found);
-        // A user who says how much is transient is believed.
+        // A transient length set by the user is not checked.
         if still || matches!(settling, Settling::Seconds(_)) {
             return Some(Settled {
                 dwell: found,
@@ -216,7 +217,7 @@ fn first_settled(
     }
 }
 
-/// Windows of a tone whose force changes slowly: each is a dwell of its own, of `periods` periods.
+/// Windows of a tone with slowly changing force: each window of `periods` periods is a dwell.
 pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
     let mut dwells = Vec::new();
     for stretch in stretches(recording) {
@@ -235,7 +236,7 @@ pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwe
     dwells
 }
 
-/// The slowest decay of mass, damping and stiffness with these values, 1/s: c/(2m) below critical damping.
+/// The slowest decay rate for these values of mass, damping and stiffness, 1/s: c/(2m) below critical damping.
 pub fn slowest_decay(masses: &[f64], dampings: &[f64]) -> f64 {
     masses
         .iter()

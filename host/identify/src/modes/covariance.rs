@@ -1,8 +1,8 @@
-//! How well the parameters of a fit are known.
+//! Covariance of the parameters of a fit.
 //!
-//! Covariance: Gauss's, N⁻¹ M N⁻¹, where M has what is left as it is correlated: between receptances of one line, as they
-//! share a response's noise, and between neighbouring lines, as windows make it (thesis chapter 7 measures by Welch's
-//! method). Correlations are pooled over all lines.
+//! Sandwich covariance N⁻¹ M N⁻¹. M contains the correlation of the residual between receptances of one line, which share the noise
+//! of a response, and between neighbouring lines, which the window causes (thesis chapter 7 uses Welch's method). Correlations are
+//! pooled over all lines.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -12,7 +12,7 @@ use super::pole_residue::{PoleResidue, shared};
 use super::receptances::Receptances;
 use super::weights::Weights;
 
-/// Lines over which what is left is correlated: a Hann window joins two on each side.
+/// Lines over which the residual is correlated: a Hann window couples two on each side.
 const LAGS: usize = 2;
 
 /// The covariance of the parameters under the constraints of [`shape::normalize`].

@@ -1,12 +1,12 @@
-//! Why no modes come out.
+//! Why no modes are identified.
 
-/// Why no modes come out.
+/// Why no modes are identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModesError {
-    /// Nothing to fit.
+    /// The data cannot be fitted.
     #[error("{0}")]
     Data(String),
-    /// No pole came again from order to order.
+    /// No pole is stable over the model order.
     #[error(
         "no pole is stable over the orders of the model from {from_hz:.2} to {to_hz:.2} Hz ({rejected} poles were rejected); a band with a resonance, or better receptances, are needed"
     )]
@@ -15,18 +15,18 @@ pub enum ModesError {
         from_hz: f64,
         /// Last frequency, Hz.
         to_hz: f64,
-        /// Poles that were looked at.
+        /// Number of rejected poles.
         rejected: usize,
     },
-    /// Other than the wanted number of modes.
+    /// Fewer stable poles than requested modes.
     #[error("{found} poles are stable over the orders of the model, but {wanted} modes are asked for")]
     Fewer {
         /// Modes found.
         found: usize,
-        /// Modes wanted.
+        /// Modes requested.
         wanted: usize,
     },
-    /// The fit broke down.
+    /// The fit does not converge.
     #[error("the fit of {0} modes does not converge; fewer modes or another band are needed")]
     NotConverged(usize),
 }

@@ -1,10 +1,10 @@
 //! Complex modes through measured receptances, with left and right shapes (thesis eq. 7.15):
 //!
-//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugate at the conjugate pole, λ = −ζω + iω√(1 − ζ²), s = iω;
-//! no conjugation and no further factor in the residue. Left and right shapes may differ: nothing is taken for reciprocal.
+//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugate at the conjugate pole, λ = −ζω + iω√(1 − ζ²), s = iω; no conjugation and no
+//! further factor in the residue. Left and right shapes may differ: reciprocity is not assumed.
 //!
-//! `denominator` gives poles of every order of model, [`stabilization`] those that come again from order to order,
-//! `pole_residue` the modes that fit best with their covariance.
+//! `denominator` gives the poles of every model order, [`stabilization`] selects those that are stable over the order, `refinement`
+//! fits the modes in pole–residue form and gives their covariance.
 
 mod covariance;
 mod denominator;
@@ -39,12 +39,12 @@ use pole_residue::PoleResidue;
 use refinement::Refined;
 use rejected::{OVERDAMPED, reject};
 
-/// What to look for.
+/// Options of the identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The highest order of the models whose poles are compared.
+    /// Highest model order of the stabilization diagram.
     pub highest_order: usize,
-    /// The number of modes, where it is known: the strongest of those that are stable.
+    /// Number of modes if it is known: the strongest stable poles are taken.
     pub modes: Option<usize>,
 }
 
@@ -99,7 +99,7 @@ pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, Mod
     }
 }
 
-/// A mode of the refined fit that is none, and why.
+/// A spurious mode of the refined fit, and the reason.
 fn spurious(refined: &Refined, [from_hz, to_hz]: [f64; 2]) -> Option<(usize, String)> {
     refined.fit.modes.iter().enumerate().find_map(|(index, mode)| {
         let (pole, hertz) = (mode.pole, mode.pole.norm() / std::f64::consts::TAU);

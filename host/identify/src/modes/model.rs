@@ -1,4 +1,4 @@
-//! The identified model: its modes, and what is known of them.
+//! The identified modal model.
 
 use num_complex::Complex64;
 
@@ -8,7 +8,7 @@ use super::shape;
 use super::stabilization::Stabilization;
 use quietcut_model::structure::Direction;
 
-/// What was found.
+/// The result.
 #[derive(Clone, Debug)]
 pub struct ModalModel {
     /// Directions of the entries of the left shapes.
@@ -20,16 +20,15 @@ pub struct ModalModel {
     /// For each receptance, by its directions of response and force: the compliance of modes above the band, m/N, and the
     /// inertia of those below, the coefficient of 1/s², 1/kg.
     pub outside: Vec<(Direction, Direction, [f64; 2])>,
-    /// Root mean square of what is left over that of the receptances, each receptance counting alike.
+    /// NRMSE of the receptances, each receptance with equal weight.
     pub fit_error: f64,
-    /// Mean square of what is left over its stated variance; near 1 where only noise is left. `None` where the data have
-    /// no stated variance.
+    /// χ² per degree of freedom of the residual: near 1 if the residual is noise. `None` if the data state no variance.
     pub misfit: Option<f64>,
     /// Poles of every order.
     pub stabilization: Stabilization,
-    /// Poles that are no modes.
+    /// Rejected poles.
     pub rejected: Vec<Rejected>,
-    /// What whoever uses it should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -39,7 +38,7 @@ const GOOD_FIT: f64 = 0.1;
 /// Fewest lines within the width of a resonance, 2ζf, for its damping to be measured rather than extrapolated.
 const LINES_PER_WIDTH: f64 = 3.0;
 
-/// What a model from lines so far apart does not know well.
+/// Warnings about quantities that lines of this spacing determine poorly.
 pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     let mut warnings = Vec::new();
     if model.fit_error > GOOD_FIT {
@@ -78,13 +77,13 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
 }
 
 impl ModalModel {
-    /// Directions in which the structure is both driven and seen: those that a case can have.
+    /// Directions that are both excited and measured: those of a case.
     pub fn directions(&self) -> Vec<Direction> {
         let both = self.responses.iter().copied();
         both.filter(|direction| self.forces.contains(direction)).collect()
     }
 
-    /// The receptance of the fit, with what stands for modes outside the band, m/N; `None` where it was not measured.
+    /// The fitted receptance with the residual terms of modes outside the band, m/N; `None` if it was not measured.
     pub fn receptance(&self, response: Direction, force: Direction, frequency_hz: f64) -> Option<Complex64> {
         let p = self.responses.iter().position(|known| *known == response)?;
         let q = self.forces.iter().position(|known| *known == force)?;

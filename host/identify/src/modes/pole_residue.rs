@@ -21,7 +21,7 @@ pub(super) struct Shaped {
 }
 
 impl Shaped {
-    /// How many numbers it is: its pole, right and left shape.
+    /// Number of real parameters: pole, right and left shape.
     pub(super) fn width(&self) -> usize {
         2 + 2 * (self.right.len() + self.left.len())
     }
@@ -57,7 +57,7 @@ impl PoleResidue {
         Some(start)
     }
 
-    /// U and L by linear least squares of what the modes leave.
+    /// U and L by linear least squares on the residual of the modes.
     fn fit_outside(&mut self, data: &Receptances) {
         for k in 0..data.values.len() {
             let (mut gram, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
@@ -105,7 +105,7 @@ impl PoleResidue {
         DVector::from_vec(all)
     }
 
-    /// The fit a step further, in the order of [`Self::parameters`].
+    /// The fit after a step, in the order of [`Self::parameters`].
     pub(super) fn moved(&self, step: &[f64]) -> Self {
         let mut moved = self.clone();
         let mut values = step.iter();
@@ -124,7 +124,7 @@ impl PoleResidue {
         moved
     }
 
-    /// What is left of receptance `k`, each value over its deviation.
+    /// Residual of receptance `k`, each value over its standard deviation.
     pub(super) fn left_of(&self, data: &Receptances, deviation: &[Vec<f64>], k: usize) -> Vec<Complex64> {
         data.frequency_hz
             .iter()
@@ -166,7 +166,7 @@ impl PoleResidue {
     }
 }
 
-/// Directions that are both driven and seen, as indices of right and left shape.
+/// Directions both excited and measured, as indices of right and left shape.
 pub(super) fn shared(data: &Receptances) -> Vec<(usize, usize)> {
     let of = |(p, direction)| Some((p, data.forces.iter().position(|force| force == direction)?));
     data.responses.iter().enumerate().filter_map(of).collect()

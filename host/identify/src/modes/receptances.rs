@@ -1,4 +1,4 @@
-//! The receptances that modes are fitted to, with the deviation of every value.
+//! Receptances with the standard deviation of every value, as the data of a modal fit.
 
 use num_complex::Complex64;
 

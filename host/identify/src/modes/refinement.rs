@@ -1,5 +1,4 @@
-//! Refines modes in pole–residue form until the weighted squares of what is left are least, by Levenberg and Marquardt with exact
-//! derivatives.
+//! Refines modes in pole–residue form by weighted nonlinear least squares (Levenberg–Marquardt with exact derivatives).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
@@ -14,7 +13,7 @@ use super::shape;
 use super::weights::{Weights, root_mean_square};
 use quietcut_model::structure::Mode;
 
-/// A fit with what is known of it.
+/// A refined fit with covariance and residual.
 pub(super) struct Refined {
     pub(super) fit: PoleResidue,
     /// Covariance of the parameters in the order of [`PoleResidue::parameters`].
@@ -31,10 +30,10 @@ const DAMPING_MAX: f64 = 1e12;
 /// Relative decrease of the squares below which they are least.
 const SETTLED: f64 = 1e-10;
 
-/// Rounds of weighing each receptance by what is left of it.
+/// Rounds of reweighting by the residual of each receptance.
 const ROUNDS: usize = 3;
 
-/// Least squares from `start`; `None` where they break down.
+/// Weighted least squares from `start`; `None` if it does not converge.
 pub(super) fn refine(data: &Receptances, start: PoleResidue) -> Option<Refined> {
     let mut weights = Weights::of(&data.deviation);
     let mut fit = least_squares(data, &weights, start)?;

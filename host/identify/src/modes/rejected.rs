@@ -1,15 +1,15 @@
-//! Poles that are no modes.
+//! Rejected poles.
 
 use num_complex::Complex64;
 
-/// A pole that is no mode.
+/// A rejected pole.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Rejected {
     /// Its frequency |λ|/2π, Hz.
     pub frequency_hz: f64,
     /// Its damping ratio.
     pub damping_ratio: f64,
-    /// What speaks against it.
+    /// Reason of the rejection.
     pub why: String,
 }
 

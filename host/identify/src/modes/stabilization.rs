@@ -1,4 +1,4 @@
-//! The stabilization diagram: which poles come again, with the same shape, as the order of the model grows.
+//! The stabilization diagram: poles that are stable in frequency, damping and shape as the model order increases.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -70,7 +70,7 @@ pub struct Stabilization {
 }
 
 impl Stabilization {
-    /// Poles that are no modes, and why.
+    /// Rejected poles with the reason.
     pub(super) fn rejected(&self) -> Vec<Rejected> {
         let unstable = self
             .unstable
@@ -84,7 +84,7 @@ impl Stabilization {
     }
 }
 
-/// Looks at the models of order 1 to `highest_order`, or as many as the lines allow.
+/// Compares the models of order 1 to `highest_order`, or as many as the lines allow.
 ///
 /// # Errors
 /// Fewer lines than three for each unknown of the lowest orders.
@@ -162,7 +162,7 @@ fn candidates(data: &Receptances, order: usize, poles: &[Complex64]) -> Vec<Cand
         .collect()
 }
 
-/// How far two poles are from each other in units of what counts as the same: 1 and below is the same.
+/// Distance of two poles in units of the stability criteria: 1 and below is the same pole.
 fn distance(a: &Candidate, b: &Candidate) -> f64 {
     let frequency = (a.frequency_hz() / b.frequency_hz() - 1.0).abs() / SAME_FREQUENCY;
     let damping = (a.damping_ratio() / b.damping_ratio() - 1.0).abs() / SAME_DAMPING;

@@ -1,7 +1,7 @@
-//! What each value of each receptance counts in a fit.
+//! Weights of the receptances in a fit.
 //!
-//! Receptances by nearly dependent forces share large errors that cancel in other directions of the force: what is left
-//! of a first fit says how the receptances of a line are correlated, and the next weighs by that.
+//! Receptances from nearly dependent forces have large common errors. The residual of a first fit gives the correlation between the
+//! receptances of a line, and the next fit is weighted with it (feasible GLS).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
@@ -18,17 +18,17 @@ const CORRELATION_RIDGE: f64 = 1e-5;
 /// A receptance of which less than this part is left weighs no more than if this much were.
 const LEAST_LEFT: f64 = 1e-6;
 
-/// How what is left counts.
+/// Weights of the residual.
 #[derive(Clone)]
 pub(super) struct Weights {
     /// Deviation of every value of every receptance.
     pub(super) deviation: Vec<Vec<f64>>,
-    /// Turns values over their deviations, receptance by receptance, into ones that are not correlated.
+    /// Whitening matrix between the receptances of one line.
     whitening: Option<DMatrix<Complex64>>,
 }
 
 impl Weights {
-    /// What is left of all receptances, as it is weighed.
+    /// Weighted residuals of all receptances.
     pub(super) fn left(&self, fit: &PoleResidue, data: &Receptances) -> Vec<DVector<Complex64>> {
         let plain: Vec<DVector<Complex64>> = (0..data.values.len())
             .map(|k| DVector::from_vec(fit.left_of(data, &self.deviation, k)))
@@ -36,7 +36,7 @@ impl Weights {
         self.mixed(plain)
     }
 
-    /// The sum of the squares of what is left.
+    /// Weighted sum of squares of the residual.
     pub(super) fn squares(&self, fit: &PoleResidue, data: &Receptances) -> f64 {
         self.left(fit, data).iter().map(DVector::norm_squared).sum()
     }
@@ -70,7 +70,7 @@ impl Weights {
             .collect()
     }
 
-    /// The weights by what is left of a fit.
+    /// The weights from the residual of a fit.
     pub(super) fn again(&mut self, data: &Receptances, fit: &PoleResidue) {
         let mut left = Vec::with_capacity(data.values.len());
         for k in 0..data.values.len() {
@@ -96,8 +96,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// L⁻¹ of the correlation L Lᴴ of what is left, real and imaginary part having a variance of one each; `None` from too
-/// few lines.
+/// L⁻¹ of the correlation L Lᴴ of the residual, with unit variance of real and imaginary part; `None` for too few lines.
 fn whitening(left: &[DVector<Complex64>]) -> Option<DMatrix<Complex64>> {
     let (count, lines) = (left.len(), left.first().map_or(0, |left| left.len()));
     if lines < LINES_PER_RECEPTANCE * count {

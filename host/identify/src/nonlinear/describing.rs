@@ -1,4 +1,4 @@
-//! What nonlinear terms add to the dynamic stiffness F/X of a harmonic motion: describing functions.
+//! Describing functions: the contribution of nonlinear terms to the dynamic stiffness F/X of a harmonic motion.
 //!
 //! With x = X·sin ωt a force f_r(x, v) acts at the fundamental as N(X, ω)·x, N = (2/(2πX))·∫f_r·(sin + i·cos) d(ωt) over a period:
 //! the real part is a stiffness, the imaginary part a damping force per displacement.
@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-/// A kind of nonlinearity that a structure can be found to have.
+/// A kind of nonlinearity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -62,7 +62,7 @@ pub fn coulomb_friction(amplitude: f64) -> Complex64 {
     Complex64::new(0.0, 4.0 / (PI * amplitude))
 }
 
-/// A spring of stiffness 1 that does not act within ±`half_gap`, less the spring itself.
+/// A spring of unit stiffness with a dead zone ±`half_gap`, minus the spring without it.
 pub fn backlash(amplitude: f64, half_gap: f64) -> Complex64 {
     if amplitude <= half_gap {
         return Complex64::new(-1.0, 0.0);

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::nonlinear::law::Law;
 
-/// Instants of a period and the harmonics on them.
+/// Collocation instants of a period and the harmonics at them.
 #[derive(Clone, Debug)]
 pub struct Grid {
     harmonics: usize,
@@ -46,7 +46,7 @@ pub struct Solution {
     by_omega: DVector<f64>,
 }
 
-/// Newton found no periodic motion from where it was started.
+/// Newton's method did not converge from the start.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("harmonic balance at {frequency_hz:.4} Hz does not converge")]
 pub struct NotConverged {

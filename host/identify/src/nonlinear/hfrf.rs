@@ -26,14 +26,14 @@ pub struct Response {
     pub levels: Vec<(f64, Complex64)>,
 }
 
-/// Parameters by eqs 5.16 and 5.17 with the deviations of their linear regressions.
+/// Parameters from eqs 5.16 and 5.17 with the standard deviations of the linear regressions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HfrfFit {
     /// The law m, c, k, k3, c3.
     pub law: Law,
     /// θ of the law.
     pub theta: DVector<f64>,
-    /// Standard deviations from the scatter over frequency: they do not hold the bias of the method.
+    /// Standard deviations from the scatter over frequency. They do not include the bias of the method.
     pub deviations: DVector<f64>,
     /// The estimates over frequency.
     pub estimates: Vec<HigherOrder>,
@@ -156,7 +156,7 @@ pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     })
 }
 
-/// Least squares, and the standard deviations that its residual gives.
+/// Least squares with standard deviations from the residual.
 fn regression(
     matrix: &DMatrix<f64>,
     right: &DVector<f64>,

@@ -1,11 +1,11 @@
 //! Homogeneity at constant frequency: does the response follow a rising force in proportion (thesis section 4.2.3)?
 
-/// A stretch of force over which the response grows in proportion.
+/// A range of force in which the response is proportional to the force.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Region {
-    /// From which force, N.
+    /// Smallest force, N.
     pub from_n: f64,
-    /// To which force, N.
+    /// Largest force, N.
     pub to_n: f64,
     /// dX/dF, m/N.
     pub slope: f64,
@@ -13,8 +13,8 @@ pub struct Region {
 
 /// Regions of X(F) at constant frequency under a slowly changing force, and the forces at which X jumps (Fig. 4.8).
 ///
-/// `points` are (F, X) in the order in which they were measured. A line is split in two where that explains much more than
-/// noise; a jump is where two neighbouring lines miss each other by more than their scatter.
+/// `points` are (F, X) in the order in which they were measured. A line is split in two where that reduces the residual by much
+/// more than noise does. A jump is where two neighbouring lines differ by more than their scatter.
 pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -81,7 +81,7 @@ fn split_line(points: &[(f64, f64)], from: usize, to: usize, noise: f64, cuts: &
     }
 }
 
-/// Takes out cuts between lines that are one: the first cut of three lines may lie within one of them.
+/// Removes breaks between segments of one line: the first break of three lines may lie within one of them.
 fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
     let mut index = 1;
     while index + 1 < cuts.len() {

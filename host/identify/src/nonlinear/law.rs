@@ -9,16 +9,16 @@ pub struct Law {
     pub parameters: Vec<Parameter>,
 }
 
-/// One parameter and what it multiplies.
+/// One parameter and its regressor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// What it is.
+    /// Its role.
     pub role: Role,
     /// φ_p.
     pub terms: Vec<Monomial>,
 }
 
-/// What a parameter is. Indices are degrees of freedom.
+/// The role of a parameter. Indices are degrees of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Role {
     /// M_ij, kg.
@@ -62,7 +62,7 @@ impl Role {
         }
     }
 
-    /// The degrees of freedom that it belongs to.
+    /// Its degrees of freedom.
     pub fn dofs(self) -> Vec<usize> {
         match self {
             Self::Mass(i, j)
@@ -95,7 +95,7 @@ pub struct Monomial {
     pub factors: Vec<usize>,
 }
 
-/// Which nonlinear terms a law has besides mass, damping and stiffness.
+/// Nonlinear terms of a law beside mass, damping and stiffness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum Extra {
     /// k2·x² in every direction.
@@ -177,7 +177,7 @@ impl Law {
             .unwrap_or(1)
     }
 
-    /// The place of a role in θ.
+    /// Index of a role in θ.
     pub fn index(&self, role: Role) -> Option<usize> {
         self.parameters
             .iter()

@@ -1,8 +1,8 @@
 //! Is the structure linear, and if not, of what kind is it? (Thesis section 4.2 as tests with error rates.)
 //!
-//! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X at one frequency does not depend on the level.
-//! Each candidate kind explains its change by a describing function; a kind is named only where it explains much
-//! more than chance does. *Harmonics*: the response at 2ω and 3ω stays within noise and what the force's own harmonics cause.
+//! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X at one frequency does not depend on the level. The change
+//! with the level is fitted by the describing function of each candidate kind. A kind is named only if it reduces the residual by
+//! much more than chance does. *Harmonics*: the response at 2ω and 3ω stays within noise and what the force's own harmonics cause.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -12,24 +12,24 @@ use crate::dwells::dwell::{Dwell, Line};
 use crate::nonlinear::describing::{self, Kind};
 use crate::nonlinear::homogeneity::line;
 
-/// What was found.
+/// The result.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Verdict {
-    /// True where nothing speaks against a linear structure.
+    /// True if the data are consistent with a linear structure.
     pub linear: bool,
-    /// The kinds that explain what was found, strongest first; empty where none does or all is linear.
+    /// The kinds that explain the level dependence, strongest first. Empty for a linear structure and where no kind explains it.
     pub kinds: Vec<Kind>,
-    /// Sum of squares over degrees of freedom of a linear structure: near 1 for one.
+    /// χ² per degree of freedom of a linear structure: near 1 if the structure is linear.
     pub linear_misfit: f64,
-    /// That of the kinds named.
+    /// The same with the named kinds.
     pub explained_misfit: f64,
-    /// The largest change of |X/F| over level at one frequency, as a share.
+    /// Largest relative change of |X/F| with the force level at one frequency.
     pub level_dependence: f64,
-    /// Response at 2ω and 3ω against ω, by force level: how the figures 5.4 (b) and (c) of the thesis show them.
+    /// Second and third harmonics of the response at each force level, as in figures 5.4 (b) and (c) of the thesis.
     pub harmonics: Vec<Harmonics>,
 }
 
-/// Share of the second and third harmonic in the response at one force level.
+/// Second and third harmonics of the response at one force level, relative to the fundamental.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Harmonics {
     /// Frequency, Hz.
@@ -40,11 +40,11 @@ pub struct Harmonics {
     pub second: f64,
     /// |X(3ω)|/|X(ω)|.
     pub third: f64,
-    /// The size of either that noise alone has.
+    /// The ratio that noise alone causes.
     pub noise: f64,
 }
 
-/// Why nothing can be said.
+/// Why the test gives no result.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LinearityError {
     /// No frequency was measured at two levels.
@@ -57,7 +57,7 @@ pub enum LinearityError {
     },
 }
 
-/// One measured point.
+/// The dynamic stiffness of one dwell.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     group: usize,
@@ -75,7 +75,7 @@ const EVIDENCE: f64 = 25.0;
 /// higher harmonics, and is wrong by up to a tenth of its effect.
 const EXPLAINED: f64 = 0.01;
 
-/// Judges dwells of one direction, force and motion alike.
+/// Tests dwells with force and motion in one direction.
 ///
 /// # Errors
 /// No frequency at two levels.
@@ -168,7 +168,7 @@ fn points(dwells: &[Dwell]) -> Vec<Point> {
     points
 }
 
-/// The dynamic stiffness of each frequency is free; kinds explain how it changes with the level.
+/// The baseline of the test: one free complex stiffness per frequency. Kinds explain its change with the level.
 struct Base<'a> {
     points: &'a [Point],
     groups: usize,
@@ -186,7 +186,7 @@ impl<'a> Base<'a> {
         2.0 * (self.points.len() - self.groups) as f64
     }
 
-    /// What is left after the features and a free complex stiffness per frequency, over the noise.
+    /// χ² of the residual after the features and a free complex stiffness per frequency.
     fn sum_of_squares(&self, features: &[Vec<Complex64>]) -> f64 {
         let rows = 2 * self.points.len();
         let mut matrix = DMatrix::zeros(rows, features.len().max(1));
@@ -213,7 +213,7 @@ impl<'a> Base<'a> {
         }
     }
 
-    /// Over its deviation, less the weighted mean of its frequency.
+    /// Values over their standard deviation, minus the weighted mean at their frequency.
     fn centered(&self, value: &dyn Fn(usize) -> f64) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.groups];
         for (i, point) in self.points.iter().enumerate() {
@@ -236,7 +236,7 @@ struct Choice {
     sum: f64,
 }
 
-/// The simplest set of one or two candidate kinds that explains what the level does.
+/// The simplest set of one or two kinds that explains the level dependence.
 fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
     let candidates = candidates(base, points);
     let mut all: Vec<Choice> = candidates
@@ -268,7 +268,8 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
     let Some(least) = all.first().cloned() else {
         return nothing;
     };
-    // The simplest that explains all but a small share, or about as much as the best; of equally simple ones the best.
+    // Of the sets that explain all but a small share, or about as much as the best, the one with the fewest parameters; among
+    // equals the best fit.
     let enough = (least.sum + EVIDENCE).max(EXPLAINED * nothing.sum);
     all.into_iter()
         .filter(|choice| choice.sum <= enough)
@@ -277,7 +278,7 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
 }
 
 impl Candidate {
-    /// A spring and a damping may be there together. Hysteresis is both by itself.
+    /// A nonlinear spring and a nonlinear damping can act together. Hysteresis is both already.
     fn goes_with(&self, other: &Self) -> bool {
         self.spring != other.spring && self.kind != Kind::Hysteresis && other.kind != Kind::Hysteresis
     }
@@ -300,7 +301,7 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
         parameters,
         features,
     };
-    // A gap or a yield is looked for over the amplitudes that were measured, and a bit beyond.
+    // Gap and yield displacement are searched over the measured amplitudes and slightly beyond.
     let sizes = points.iter().map(|point| point.amplitude);
     let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
     let scan = |of: &dyn Fn(&Point, f64) -> Complex64| {
@@ -314,7 +315,7 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
         };
         let sum = |size: f64| base.sum_of_squares(&features(size));
         let (mut from, mut to) = ((0.05 * least).ln(), (1.5 * largest).ln());
-        // A coarse look at all, then finer ones around the best.
+        // A coarse grid, then finer grids around the best value.
         for _ in 0..4 {
             let step = (to - from) / 40.0;
             let mut best = (f64::INFINITY, from);
@@ -359,7 +360,7 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
     ]
 }
 
-/// True where the change of stiffness with the level is what a quadratic spring alone makes of itself.
+/// True if the change of stiffness with the level is that of a quadratic spring alone.
 ///
 /// Balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k, so that the stiffness changes by
 /// k₂(2a₀ + X₂) = −(5/6)k₂²X²/k = −30·k·(X₂/X)². k comes from how F/X changes with frequency at the lowest level.
@@ -433,7 +434,7 @@ fn at_harmonic(line: &Line, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
     Some((line.amplitude(h), variance.sqrt()))
 }
 
-/// True where harmonic h of the motion is more than noise and than the force's own harmonic can cause.
+/// True if harmonic h of the motion exceeds both the noise and the response to the same harmonic of the force.
 fn harmonic(dwells: &[Dwell], h: usize) -> bool {
     let (mut sum, mut count) = (0.0, 0.0);
     for dwell in dwells {
@@ -445,7 +446,7 @@ fn harmonic(dwells: &[Dwell], h: usize) -> bool {
         else {
             continue;
         };
-        // Off resonance at hω a structure gives way to a force no more than it does at ω near its resonance.
+        // The receptance at hω, off resonance, is at most that at ω near resonance.
         let caused = (f - 3.0 * force_noise).max(0.0) * motion.amplitude(1) / force.amplitude(1);
         sum += ((x - caused).max(0.0) / noise).powi(2);
         count += 2.0;

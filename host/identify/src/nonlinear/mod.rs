@@ -1,4 +1,4 @@
-//! Nonlinear restoring forces: which are there, and how large they are.
+//! Nonlinear restoring forces: tests of linearity, and parameters of nonlinear terms.
 
 pub mod describing;
 pub mod harmonic_balance;

@@ -37,7 +37,7 @@ pub struct Map {
     pub coefficients: Vec<f64>,
     /// Standard deviations of them.
     pub deviations: Vec<f64>,
-    /// Root mean square of what is left over the root mean square of the value.
+    /// NRMSE: root mean square of the residual over that of the values.
     pub relative_error: f64,
     /// Least and largest force, N, and receptance, m/N, of the data.
     pub range: [[f64; 2]; 2],

@@ -30,7 +30,7 @@ pub struct PeriodicFit {
     pub law: Vec<(Term, f64)>,
     /// Standard deviations.
     pub deviations: Vec<f64>,
-    /// Root mean square of what is left over that of the motion.
+    /// NRMSE of the motion.
     pub relative_error: f64,
 }
 
@@ -56,7 +56,7 @@ pub enum PeriodicError {
     Undetermined,
 }
 
-/// How much denser than measured the balance is.
+/// Ratio of the sample rate of the balance to that of the record.
 const DENSER: usize = 2;
 
 struct Balance {

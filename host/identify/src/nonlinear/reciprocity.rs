@@ -11,11 +11,11 @@ use quietcut_model::structure::Direction;
 pub struct Reciprocity {
     /// The two directions.
     pub directions: [&'static str; 2],
-    /// Mean square of H_ij − H_ji over its variance: near 1 where they are the same.
+    /// Mean square of H_ij − H_ji over its variance: near 1 for a reciprocal structure.
     pub misfit: f64,
-    /// The largest difference as a share of the largest of them.
+    /// Largest difference relative to the largest receptance.
     pub largest_change: f64,
-    /// True where nothing speaks against reciprocity.
+    /// True if the data are consistent with reciprocity.
     pub reciprocal: bool,
 }
 
@@ -81,7 +81,7 @@ pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> 
         directions: [i.name(), j.name()],
         misfit,
         largest_change,
-        // A mean of exponentials of mean 1: five deviations above it; and a percent is what a shaker's placing is good to.
+        // The mean of unit exponentials plus five standard deviations; 1 % is the accuracy of the position of a shaker.
         reciprocal: misfit < 1.0 + 5.0 / f64::sqrt(count) || largest_change < 0.01,
     })
 }

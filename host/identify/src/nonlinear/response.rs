@@ -1,4 +1,4 @@
-//! The motion of an identified law under a recorded force: what it predicts of a record that it was not fitted to.
+//! Prediction of an identified law: its motion under a recorded force.
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
@@ -8,13 +8,13 @@ use crate::nonlinear::restoring_force::Term;
 /// Instants between two samples at which the force is interpolated: even, two to a step of the integration.
 const FINER: usize = 8;
 
-/// Why a law predicts nothing.
+/// Why a law gives no prediction.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ResponseError {
     /// No mass.
     #[error("a law without mass has no motion of its own")]
     NoMass,
-    /// The motion left every bound.
+    /// The motion grows without bound.
     #[error("the motion of the law grows without bound after {time_s:.3} s: it means nothing at this force")]
     Diverged {
         /// When.

@@ -1,9 +1,9 @@
 //! The restoring-force surface f_r(q̇, q) = f − m q̈ (thesis eq. 5.4), its slices, and the law that it follows.
 //!
-//! The law is found by least squares between force and motion *within a band*: force and every term of the law, nonlinear
-//! ones too, go through the same filter, so that the equation still holds for what is left, and noise of derivatives
-//! outside the band does not count. Where the law has a spring, its errors are weighed by its receptance: they are errors
-//! of the *motion* then, where the noise is (Sanathanan and Koerner's weighting). One channel of motion is enough; the others are its derivatives or integrals.
+//! The law is fitted by least squares between force and motion *within a band*. Force and every term of the law, nonlinear terms
+//! included, pass the same filter: the filtered signals satisfy the same equation, and noise of derivatives outside the band has no
+//! effect. If the law has a spring, the equation error is weighted by its receptance and becomes an error of the *motion*, where
+//! the noise is (Sanathanan–Koerner weighting). One motion channel is enough; the others are its derivatives or integrals.
 
 use std::f64::consts::TAU;
 
@@ -53,7 +53,7 @@ impl Term {
         }
     }
 
-    /// What it multiplies.
+    /// Its regressor.
     pub fn value(self, x: f64, v: f64, a: f64) -> f64 {
         match self {
             Self::Mass => a,
@@ -80,9 +80,9 @@ impl Term {
 pub struct Record<'a> {
     /// Force on the structure, N.
     pub force: &'a [f64],
-    /// What was measured of the motion, SI.
+    /// The measured motion, SI.
     pub motion: &'a [f64],
-    /// Which quantity that is: displacement, velocity or acceleration.
+    /// Its quantity: displacement, velocity or acceleration.
     pub quantity: Quantity,
     /// Samples per second.
     pub rate_hz: f64,
@@ -93,11 +93,11 @@ pub struct Record<'a> {
 pub struct Options {
     /// The terms of the law.
     pub terms: Vec<Term>,
-    /// The mass, where it is known (kg): needed where no force acts.
+    /// The mass if it is known, kg. Required without a force.
     pub mass_kg: Option<f64>,
-    /// The band, Hz; `None` takes where the motion stands out of its noise.
+    /// The band, Hz; `None` takes the band in which the motion exceeds its noise.
     pub band_hz: Option<[f64; 2]>,
-    /// Left out at both ends, s.
+    /// Length left out at both ends, s.
     pub trim_s: f64,
 }
 
@@ -119,13 +119,13 @@ pub struct Surface {
     pub terms: Vec<Term>,
     /// Their coefficients, SI.
     pub theta: DVector<f64>,
-    /// Standard deviations: from the scatter of what is left, with its correlation in time.
+    /// Standard deviations from the residual, with its correlation in time.
     pub deviations: DVector<f64>,
-    /// Root mean square of what is left over that of the force (or of m q̈ where no force acts), within the band.
+    /// NRMSE of the force (of m q̈ without a force) within the band.
     pub force_error: f64,
-    /// The band that was used, Hz.
+    /// The band used, Hz.
     pub band_hz: [f64; 2],
-    /// Motion and f_r of the samples that were used.
+    /// Motion and f_r of the samples used.
     pub motion: Motion,
     /// f_r = f − m q̈, N.
     pub restoring_n: Vec<f64>,
@@ -154,7 +154,7 @@ pub enum SurfaceError {
     Undetermined,
 }
 
-/// Rounds of weighting by the receptance found before; the fourth moves nothing any more.
+/// Rounds of Sanathanan–Koerner weighting; the fourth changes nothing.
 const REWEIGHTINGS: usize = 4;
 
 /// In power: the motion must stand this far out of its noise to count for the band.
@@ -249,7 +249,7 @@ impl Record<'_> {
             right.norm()
         };
         let mut force_error = left.norm() / scale;
-        // A free record is one transient, which a weight as sharp as the resonance would smear over its ends.
+        // A free decay is one transient. A weight as sharp as the resonance would smear it over the ends of the record.
         if driven && terms.contains(&Term::Stiffness) {
             for _ in 0..REWEIGHTINGS {
                 let receptance = receptance(&terms, &theta, mass);
@@ -357,12 +357,12 @@ pub struct Slice {
 }
 
 impl Surface {
-    /// f_r over x where |v| is below `share` of its largest: stiffness. A small velocity that is left is regressed out.
+    /// The stiffness slice: f_r over x for |v| below `share` of its maximum. The remaining small velocity is regressed out.
     pub fn stiffness_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.x, &self.motion.v, &self.restoring_n, share)
     }
 
-    /// f_r over v where |x| is below `share` of its largest: damping.
+    /// The damping slice: f_r over v for |x| below `share` of its maximum.
     pub fn damping_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.v, &self.motion.x, &self.restoring_n, share)
     }

@@ -1,8 +1,8 @@
 //! Derivatives, integrals and weights of whole records by the discrete Fourier transform.
 //!
-//! A record is no period of anything: the line through its ends is taken off and the rest is turned about its end before it
-//! is transformed, so that neither value nor slope jumps. What is left of the ends is wrong over about one period of the
-//! lowest frequency that counts; callers leave it out.
+//! A record is not periodic. The line through its ends is subtracted, and the rest is continued by point reflection about its end,
+//! so that value and slope are continuous. An error remains over about one period of the lowest frequency at both ends; callers
+//! leave it out.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ pub struct Spectral {
     period: usize,
 }
 
-/// How a record goes on beyond its ends.
+/// Continuation of a record beyond its ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
     /// About its end points, the line through them taken off: value and slope are continuous.
@@ -148,7 +148,7 @@ fn above(frequency: f64, low: f64) -> f64 {
     }
 }
 
-/// Power over frequency in stretches of a four-hundredth of the record's lines, and the width of one in Hz.
+/// Power spectrum averaged over 1/400 of the record's lines, and the width of these intervals in Hz.
 fn smooth_power(samples: &[f64], rate_hz: f64) -> (Vec<f64>, f64) {
     let length = samples.len();
     // A Hann window: the ends of a record would else leak over the whole spectrum.
@@ -177,7 +177,7 @@ fn loudest(smooth: &[f64]) -> usize {
     loudest
 }
 
-/// The frequency at which a record is loudest, Hz, to about a four-hundredth of half its sample rate.
+/// The dominant frequency of a record, Hz, to about 1/400 of half its sample rate.
 pub fn loudest_hz(samples: &[f64], rate_hz: f64) -> f64 {
     let (smooth, width_hz) = smooth_power(samples, rate_hz);
     (loudest(&smooth) as f64 + 0.5) * width_hz

@@ -1,9 +1,9 @@
 //! Parameters of a law from measured periodic motions, by harmonic balance.
 //!
-//! The motion that the law predicts under the *measured* force is fitted to the measured motion. What is left is weighed
-//! with its covariance: noise of the motion, noise of the force and of the frequency carried through the law by its
-//! exact derivatives. Intervals are those of the normal distribution; where the law does not reach the noise they come
-//! from the scatter of the dwells themselves (sandwich).
+//! The motion that the law predicts under the *measured* force is fitted to the measured motion. The residual is weighted with its
+//! covariance: noise of the motion, and noise of force and frequency propagated through the exact derivatives of the law. Intervals
+//! are those of the normal distribution. If the law does not fit down to the noise, they come from the scatter between dwells
+//! (sandwich covariance).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -24,9 +24,9 @@ pub struct Fit {
     pub theta: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Sum of squares over degrees of freedom, in units of the noise: near 1 where the law explains the data.
+    /// χ² per degree of freedom: near 1 if the law explains the data.
     pub misfit: f64,
-    /// Root mean square of what is left over that of the data, at the fundamental.
+    /// NRMSE of the fundamental.
     pub relative_error: f64,
     /// True where the covariance is the sandwich.
     pub robust: bool,
@@ -145,7 +145,7 @@ impl Data<'_> {
         Some(self.solve(dwell, theta, &start)?.x)
     }
 
-    /// Root mean square of prediction less measurement over that of the measurement, at the fundamental.
+    /// NRMSE of the predicted fundamental.
     pub fn relative_error(&self, theta: &DVector<f64>) -> f64 {
         let (mut left, mut all) = (0.0, 0.0);
         for dwell in self.dwells {
@@ -155,7 +155,7 @@ impl Data<'_> {
             let predicted = self.predicted(dwell, theta);
             for dof in 0..self.law.dofs {
                 for place in [1, 2].map(|part| dof * self.grid.width() + part) {
-                    // No motion at all is predicted where there is none near the measured one.
+                    // Without a periodic motion near the measured one the prediction is zero.
                     let found = predicted.as_ref().map_or(0.0, |x| x[place]);
                     left += (found - measured[place]).powi(2);
                     all += measured[place].powi(2);

@@ -25,11 +25,11 @@ pub struct Spectra {
 /// How two records compare.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Comparison {
-    /// Mean square of the difference of the two receptances over its variance: about 1 to 3 of a linear structure.
+    /// Mean square of the difference of the two receptances over its variance: 1 to 3 for a linear structure.
     pub misfit: f64,
-    /// The largest difference as a share of the largest receptance.
+    /// Largest difference relative to the largest receptance.
     pub largest_change: f64,
-    /// True where nothing speaks against one linear structure.
+    /// True if both records are consistent with one linear structure.
     pub same: bool,
 }
 
@@ -66,7 +66,7 @@ impl Spectra {
         }
     }
 
-    /// From and to which frequency the force has its power: where it is above a tenth of its largest, smoothed.
+    /// The excited band: frequencies at which the smoothed force spectrum exceeds a tenth of its maximum.
     fn band_hz(&self) -> Option<[f64; 2]> {
         let width = (2 * R + 1) as usize;
         let power: Vec<f64> = self

@@ -1,4 +1,4 @@
-//! What a predicted steady motion leaves of a measured one, in units of its noise.
+//! Whitened residuals: measured minus predicted steady motion, in units of its noise.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -7,7 +7,7 @@ use crate::dwells::dwell::{Dwell, Line};
 use crate::nonlinear::harmonic_balance::Solution;
 use quietcut_model::structure::Direction;
 
-/// How degrees of freedom q are seen and driven: u = S q in `directions`, and forces on q are Sᵀ F.
+/// Output and input of the degrees of freedom q: u = S q in `directions`, and generalized forces Sᵀ F.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen<'a> {
     /// The directions of u.
@@ -51,10 +51,10 @@ impl Seen<'_> {
         moved
     }
 
-    /// Measured − predicted over its noise, and the derivative of the predicted by θ.
+    /// The whitened residual, measured − predicted, and the Jacobian of the prediction with respect to θ.
     ///
-    /// Noise of the motion, and noise of the force and of the frequency carried through the law by its derivatives. `None` where
-    /// the motion is singular, or nothing was measured.
+    /// The noise comprises that of the motion, and that of force and frequency propagated through the derivatives of the law.
+    /// `None` where the motion is singular, or nothing was measured.
     pub(crate) fn whitened(
         &self,
         dwell: &Dwell,

@@ -1,4 +1,4 @@
-//! Tests that can be done, and what each tells of the unknowns: its Fisher information.
+//! Possible tests, each with its Fisher information about the unknowns.
 
 use std::f64::consts::{FRAC_2_PI, PI};
 
@@ -24,15 +24,15 @@ const PHASES: usize = 90;
 /// Most speeds at which a limit may be bracketed.
 const BRACKETS: usize = 40;
 
-/// Something to do at the machine.
+/// A test at the machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Test {
-    /// Blows of a hammer at the tool tip at standstill, the acceleration measured in every direction there.
+    /// Hammer impacts at the tool tip at standstill, with the acceleration measured there in every direction.
     Hammer {
-        /// Where the hammer strikes to.
+        /// Direction of the impact.
         direction: String,
-        /// Number of blows.
+        /// Number of impacts.
         blows: usize,
     },
     /// A stable cut on a dynamometer.
@@ -66,7 +66,7 @@ pub(super) struct Candidate {
     pub(super) limit: Option<usize>,
 }
 
-/// All tests that are thought of.
+/// All candidate tests.
 pub(super) fn candidates(
     case: &Case,
     problem: &Problem,

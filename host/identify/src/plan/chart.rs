@@ -1,4 +1,4 @@
-//! How well the limits of a chart are known, given what is known of the parameters.
+//! Uncertainty of the limits of a chart, from that of the parameters.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -25,7 +25,7 @@ pub(super) struct KnownLimit {
 }
 
 impl KnownLimit {
-    /// `None` where nothing is lost, or the limit does not follow the unknowns.
+    /// `None` if there is no limit, or if it has no derivative with respect to the unknowns.
     ///
     /// Gradients are filled up with zeros to `size` unknowns: those that only tests see.
     pub(super) fn new(line: &SpeedLine, linearized: &Linearized, size: usize) -> Option<Self> {

@@ -1,15 +1,15 @@
-//! What the tests of a plan are like.
+//! Properties of the tests of a plan.
 
-/// What tests are like.
+/// Means: properties of the possible tests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Means {
     /// Width of the interval to which cuts bracket a limit, relative to it.
     pub bracket: f64,
     /// Standard deviation of a measured chatter frequency, relative to it.
     pub chatter_frequency: f64,
-    /// Blows of a hammer test.
+    /// Impacts of a hammer test.
     pub blows: usize,
-    /// Peak force of a blow, N.
+    /// Peak force of an impact, N.
     pub peak_n: f64,
     /// Noise of the accelerometer, g/√Hz.
     pub accelerometer_g_per_root_hertz: f64,

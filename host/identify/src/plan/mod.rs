@@ -1,9 +1,9 @@
-//! The fewest tests that make a chart trustworthy.
+//! The fewest tests that narrow the limits of a lobe chart to a given width.
 //!
-//! What is not known of a machine is a normal distribution over its parameters (`unknowns`). Exact derivatives make of it
-//! the distribution of every limit (`chart`), and of every test what it tells of the parameters: its Fisher information
-//! (`candidate`). Where tests add up, Λ = I + Σ J_t is the inverse of the covariance that they leave, in units of the deviations
-//! before them. `selection` looks for the cheapest set of tests with which all limits are known well enough.
+//! The uncertain parameters of a machine have a normal distribution (`unknowns`). Exact derivatives propagate it to every limit
+//! (`chart`) and give the Fisher information of every test (`candidate`). After a set of tests Λ = I + Σ J_t is the inverse
+//! covariance, in units of the prior standard deviations. `selection` searches for the cheapest set of tests after which all limits
+//! are narrow enough.
 
 mod candidate;
 mod chart;
@@ -29,7 +29,7 @@ use quietcut_stability::{CubicTerms, Linearized, Problem, SpeedLine, StabilityEr
 use selection::{Chosen, Selection};
 use unknowns::Unknowns;
 
-/// What is wanted, and with what it can be had.
+/// Request of a plan: required width, prior and means.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
     /// Spindle speeds of the chart, rev/min.
@@ -40,15 +40,15 @@ pub struct Request {
     pub samples: usize,
     /// Every limit is to have a 90 % interval no wider than this share of it.
     pub width: f64,
-    /// What is not known where the case does not say it.
+    /// Prior of the parameters, for a case that states no standard deviations.
     pub prior: Prior,
-    /// What tests are like.
+    /// Means: properties of the possible tests.
     pub means: Means,
     /// True where cubic terms of the structure are left out.
     pub linear: bool,
 }
 
-/// Why nothing can be planned.
+/// Why there is no plan.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// The case, or a line of the chart.
@@ -71,7 +71,7 @@ pub enum PlanError {
     NoDerivatives {
         /// The case file.
         case: String,
-        /// What is in the way.
+        /// The reason.
         what: &'static str,
     },
 }
@@ -108,20 +108,20 @@ pub struct Step {
     pub test: Test,
     /// Number of cuts, or 1.
     pub cuts_or_tests: usize,
-    /// What is known after it.
+    /// Width after it.
     pub after: Width,
 }
 
-/// What keeps a chart from becoming as narrow as wanted.
+/// Why the required width is not reached.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Obstacle {
-    /// What is known if every test is done a thousand times.
+    /// Width if every test is repeated a thousand times.
     pub at_best: Width,
-    /// What would narrow the widest interval most if it were known; empty where more tests than anyone does would suffice.
+    /// The unknowns whose knowledge would narrow the widest interval most. Empty if more repetitions would suffice.
     pub if_known: Vec<IfKnown>,
 }
 
-/// An unknown, and what its knowledge would be worth.
+/// An unknown, and the width if it were known.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IfKnown {
     /// The unknown.
@@ -133,13 +133,13 @@ pub struct IfKnown {
 /// A plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
-    /// The width that is wanted, percent.
+    /// The required width, percent.
     pub wanted_percent: f64,
     /// True where the tests reach it.
     pub reached: bool,
     /// Cuts and other tests, counted alike.
     pub cuts_and_tests: usize,
-    /// What is not known: names, with standard deviations in percent where they are assumed.
+    /// Names of the unknowns, with standard deviations in percent if they are assumed.
     pub unknowns: Vec<String>,
     /// True where the case says how well its parameters are known; else defaults are assumed.
     pub stated: bool,
@@ -147,7 +147,7 @@ pub struct Plan {
     pub before: Width,
     /// The tests, in the order in which to do them.
     pub tests: Vec<Step>,
-    /// What is known after all of them.
+    /// Width after all tests.
     pub after: Width,
     /// Why the width is not reached.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -158,10 +158,10 @@ pub struct Plan {
     pub chart: Vec<Speed>,
 }
 
-/// How often a test is repeated to see what tests can do at best.
+/// Repetitions of every test for the best possible width.
 const AT_BEST: f64 = 1000.0;
 
-/// The fewest tests with which the chart is as narrow as wanted; `progress` is told when a speed is done.
+/// The fewest tests with which the chart is as narrow as wanted; `progress` is called after each speed.
 ///
 /// Intervals are those of the linearized limits: of a machine whose parameters lie within a few deviations of the case.
 /// At each speed the lowest of several lobes counts.
@@ -175,7 +175,7 @@ pub fn plan(case: &Case, request: &Request, progress: impl Fn() + Sync) -> Resul
     Ok(basis.plan(request, &selection, &chosen))
 }
 
-/// What a plan is made from.
+/// The data of a plan.
 struct Basis {
     unknowns: Unknowns,
     chart: KnownChart,

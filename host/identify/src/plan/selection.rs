@@ -1,4 +1,4 @@
-//! Which tests to do: the fewest that make every limit as well known as wanted.
+//! The cheapest set of tests that narrows every limit to the required width.
 //!
 //! Tests are added one by one, each the one that takes most from the excess Σ max(0, (width/wanted)² − 1) for its cost;
 //! then tests are dropped and exchanged for cheaper ones while the width stays reached. Cuts that bracket a limit cost as
@@ -54,7 +54,7 @@ impl<'a> Selection<'a> {
         })
     }
 
-    /// True where every limit is known as well as wanted.
+    /// True if every limit has the required width.
     pub(super) fn is_reached(&self, information: &DMatrix<f64>) -> bool {
         self.excess(information) == 0.0
     }

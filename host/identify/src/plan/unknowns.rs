@@ -1,4 +1,4 @@
-//! What is not known: independent normal variables, each in units of its standard deviation.
+//! The unknowns: independent normal variables, each in units of its standard deviation.
 
 use std::f64::consts::TAU;
 
@@ -23,8 +23,8 @@ pub struct Prior {
 }
 
 impl Default for Prior {
-    /// What a model from a data sheet and a table of materials is worth: 1 % of frequency, 20 % of damping, 15 % of
-    /// stiffness and of cutting force.
+    /// The uncertainty of a model from data sheets and material tables: 1 % of frequency, 20 % of damping, 15 % of stiffness and of
+    /// cutting force.
     fn default() -> Self {
         Self {
             frequency: 0.01,
@@ -39,11 +39,11 @@ impl Default for Prior {
 /// standstill see, then the gains of hammer with accelerometer and of the dynamometer.
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
-    /// What limits depend on.
+    /// Variables that limits depend on.
     pub(super) variables: Vec<Variable>,
     /// How the structure differs at standstill.
     pub(super) standstill: Vec<Variable>,
-    /// What each is, standstill and gains included.
+    /// Names, standstill and gains included.
     pub(super) names: Vec<String>,
     /// True where the case states its deviations.
     pub(super) stated: bool,

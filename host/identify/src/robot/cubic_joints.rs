@@ -1,11 +1,11 @@
 //! Joints of a robot with cubic terms, from steady tones at several postures and force levels, by harmonic balance.
 //!
-//! In deviations q of the joint angles from a posture q₀, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = J(q₀)ᵀ F and u = J(q₀) q: a cubic
-//! term of one joint couples all directions of the tool, differently at every posture. Joint angles are not measured: they are
-//! those of the periodic motion that the parameters give under the measured force. What the tool then does is fitted to what
-//! it did, weighed as in [`steady_fit`](crate::nonlinear::steady_fit). A first guess comes from the receptances at the lowest force of every
-//! frequency, and then from the equivalent linearization of the joints at the measured amplitudes a_j of their angles:
-//! k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j².
+//! In deviations q of the joint angles from a posture q₀, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = J(q₀)ᵀ F and u = J(q₀) q: a
+//! cubic term of one joint couples all directions of the tool, differently at every posture. Joint angles are not measured: they
+//! are those of the periodic motion that the parameters give under the measured force. The predicted motion of the tool is fitted
+//! to the measured one, weighted as in [`steady_fit`](crate::nonlinear::steady_fit). A first guess comes from the receptances at
+//! the lowest force of every frequency, and then from the equivalent linearization of the joints at the measured amplitudes a_j of
+//! their angles: k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j².
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -38,15 +38,15 @@ pub struct PostureDwells {
 pub struct CubicJointFit {
     /// The robot; its posture is that of the start.
     pub robot: Robot,
-    /// What was fitted.
+    /// The fitted parameters.
     pub parameters: Vec<JointParameter>,
     /// Covariance of the parameters.
     pub covariance: DMatrix<f64>,
-    /// Sum of squares over degrees of freedom, in units of the noise.
+    /// χ² per degree of freedom.
     pub misfit: f64,
-    /// Root mean square of what is left over that of the motion, at the fundamental.
+    /// NRMSE of the fundamental of the motion.
     pub relative_error: f64,
-    /// True where the covariance is that of the scatter between dwells.
+    /// True if the covariance comes from the scatter between dwells.
     pub robust: bool,
     harmonics: usize,
 }
@@ -237,8 +237,8 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
 const RISES: u32 = 8;
 
 impl CubicJointFit {
-    /// What the tool does at a posture under the force F cos ωt, F in N: the fundamental of its motion, m, and the standard
-    /// deviation of the absolute value in every direction.
+    /// Predicted motion of the tool at a posture under the force F cos ωt, F in N: its fundamental, m, and the standard deviation
+    /// of its magnitude in every direction.
     ///
     /// The motion that is reached by a force that rises slowly. `None` where it ends before: a jump.
     pub fn response(

@@ -20,7 +20,7 @@ pub(super) struct Model<'a> {
     pub(super) grid: Grid,
 }
 
-/// A posture with what does not depend on the parameters.
+/// A posture with the quantities that do not depend on the parameters.
 pub(super) struct Placed {
     /// 3 × n.
     pub(super) jacobian: DMatrix<f64>,
@@ -194,8 +194,8 @@ impl<'a> Model<'a> {
         self.grid.solve(problem, &self.fundamental(&start)).ok()
     }
 
-    /// What the equivalent linearization at the measured amplitudes leaves of the measured motion, and the derivative of what it
-    /// predicts, by about as much as it may be wrong: flanks then count as much as peaks, and it is found from far away.
+    /// Residual and Jacobian of the equivalent linearization at the measured amplitudes, weighted with its approximation error.
+    /// Flanks then count as much as peaks, and the fit converges from a distant start.
     pub(super) fn linearized(
         &self,
         placed: &Placed,

@@ -2,7 +2,7 @@
 
 use quietcut_model::structure::Robot;
 
-/// What is fitted.
+/// A parameter of the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointParameter {
     /// Stiffness of a joint, from 0.
@@ -29,7 +29,7 @@ impl JointParameter {
         }
     }
 
-    /// The joint, from 0, that it belongs to in a robot of so many.
+    /// Index of its joint, from 0, in a robot with `joints` joints.
     pub fn joint(self, joints: usize) -> usize {
         match self {
             Self::Stiffness(joint)
@@ -40,12 +40,12 @@ impl JointParameter {
         }
     }
 
-    /// True for terms that do not act at vanishing force; they may be negative.
+    /// True for terms without effect at vanishing force; they may be negative.
     pub fn is_cubic(self) -> bool {
         matches!(self, Self::CubicStiffness(_) | Self::CubicDamping(_))
     }
 
-    /// The name for people, with the joint counted from 1.
+    /// The name for messages, with the joint counted from 1.
     pub fn name(self) -> String {
         match self {
             Self::Payload => format!("payload {}", self.key()),
@@ -71,7 +71,7 @@ impl JointParameter {
         self.slot(&mut robot.clone()).map_or(f64::NAN, |value| *value)
     }
 
-    /// Gives it another value.
+    /// Sets its value.
     pub(crate) fn set(self, robot: &mut Robot, value: f64) {
         if let Some(slot) = self.slot(robot) {
             *slot = value;

@@ -35,17 +35,17 @@ pub struct PostureFrf {
 pub struct JointFit {
     /// The robot; its posture is that of the start.
     pub robot: Robot,
-    /// What was fitted.
+    /// The fitted parameters.
     pub parameters: Vec<JointParameter>,
     /// Covariance of the logarithms of the parameters, from the scatter between receptances and their least error.
     pub covariance: DMatrix<f64>,
-    /// Sum of squares over degrees of freedom, in units of the errors of the receptances.
+    /// χ² per degree of freedom with the errors of the receptances.
     pub misfit: f64,
-    /// Root mean square of what is left over that of the receptances.
+    /// NRMSE of the receptances.
     pub relative_error: f64,
 }
 
-/// Why there is none.
+/// Why the fit gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum JointFitError {
     /// Angles for another number of joints.
@@ -78,7 +78,7 @@ const LEAST_ERROR: f64 = 3e-3;
 /// The lowest frequencies, as a share of that of the highest peak, are nearly static.
 const STATIC: f64 = 0.4;
 
-/// A posture with what does not depend on the parameters.
+/// A posture with the quantities that do not depend on the parameters.
 struct Placed<'a> {
     frf: &'a PostureFrf,
     jacobian: Matrix3xX<f64>,

@@ -1,4 +1,4 @@
-//! The joints of a robot from receptances at several postures.
+//! Joint stiffness and damping of a robot from tests at several postures.
 
 pub mod cubic_joints;
 mod cubic_model;

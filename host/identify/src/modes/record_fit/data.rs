@@ -1,4 +1,4 @@
-//! What does not change in a fit on whole records.
+//! The data of a fit on whole records.
 
 use num_complex::Complex64;
 
@@ -16,7 +16,7 @@ const LINES_MAX: usize = 200_000;
 /// Fewest lines of a record.
 const LINES_MIN: usize = 16;
 
-/// Everything that does not change in a fit.
+/// The data of a fit.
 pub(super) struct Data<'a> {
     pub(super) records: &'a [RecordSpectra],
     /// Response and force of each of the outside terms of the structure.
@@ -124,7 +124,7 @@ impl Data<'_> {
         self.records[record].responses.iter().map(of).collect()
     }
 
-    /// Directions that are both driven and seen, as indices of right and left shape.
+    /// Directions both excited and measured, as indices of right and left shape.
     pub(super) fn shared(&self, (rights, lefts): (usize, usize)) -> Vec<(usize, usize)> {
         let directions = |index: usize, of_response: bool| {
             self.axes.iter().zip(self.records).find_map(|(axes, record)| {

@@ -17,7 +17,7 @@ pub struct ChannelNoise {
     pub percent: f64,
 }
 
-/// Variances per line of the noise of one record.
+/// Noise variances per line of one record.
 #[derive(Clone, Debug)]
 pub(super) struct Variances {
     /// Of the sensors of responses.
