@@ -17,7 +17,7 @@
 //!     let r = hertz / 20.0;
 //!     (1e6 * Complex64::new(1.0 - r * r, 2.0 * 0.02 * r)).inv()
 //! };
-//! let frequency_hz: Vec<f64> = (40..=80).map(|line| 0.4 * f64::from(line)).collect();
+//! let frequency_hz: Vec<f64> = (150..=250).map(|line| 0.1 * f64::from(line)).collect();
 //! let entry = Frf {
 //!     response: Direction::X,
 //!     force: Direction::X,
@@ -26,8 +26,8 @@
 //! };
 //! let table = FrfTable::new(Path::new("one-mode"), frequency_hz, vec![entry])?;
 //!
-//! let between = Interpolation::new(&table)?.at(Complex64::from(20.1))[(0, 0)];
-//! assert!((between / receptance(20.1) - 1.0).norm() < 0.01);
+//! let between = Interpolation::new(&table)?.at(Complex64::from(20.05))[(0, 0)];
+//! assert!((between / receptance(20.05) - 1.0).norm() < 0.02);
 //! # Ok::<(), quietcut_frf::FrfError>(())
 //! ```
 //!

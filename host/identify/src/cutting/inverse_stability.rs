@@ -98,7 +98,7 @@ pub enum InverseError {
     NoModes,
     /// No structure within the prior explains the cuts.
     #[error(
-        "no structure that was thought possible explains the cuts: {0} of {1} are told wrongly by the best; another first guess, or other force coefficients, are needed"
+        "no structure within the prior explains the cuts: the best one misjudges {0} of {1}; another first guess, or other force coefficients, are needed"
     )]
     Unexplained(usize, usize),
     /// Stability cannot be computed.

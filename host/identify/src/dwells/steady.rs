@@ -65,7 +65,7 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
             dwells.extend(moving);
         } else if !moving.is_empty() {
             steady.warnings.push(format!(
-                "{name}: the motion of {} dwells still changes at their ends, and they are left out: near a jump a motion settles more slowly than elsewhere; dwell longer",
+                "{name}: the motion of {} dwells still changes at their ends, and they are left out; near a jump the motion settles more slowly than elsewhere: dwell longer",
                 moving.len()
             ));
         }
@@ -77,7 +77,7 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
         }
         if unsettled > 0 {
             steady.warnings.push(format!(
-                "{name}: {unsettled} dwells are too short to settle below the noise; what is left of their transients makes intervals too narrow: dwell longer"
+                "{name}: {unsettled} dwells are too short to settle below the noise; the residual transients make intervals too narrow; dwell longer"
             ));
         }
         steady.dwells.extend(dwells);

@@ -8,7 +8,7 @@ pub enum ModesError {
     Data(String),
     /// No pole is stable over the model order.
     #[error(
-        "no pole is stable over the orders of the model from {from_hz:.2} to {to_hz:.2} Hz ({rejected} poles were rejected); a band with a resonance, or better receptances, are needed"
+        "no pole is stable over the model order from {from_hz:.2} to {to_hz:.2} Hz ({rejected} poles were rejected); a band with a resonance, or better receptances, are needed"
     )]
     NoMode {
         /// First frequency, Hz.
@@ -19,7 +19,7 @@ pub enum ModesError {
         rejected: usize,
     },
     /// Fewer stable poles than requested modes.
-    #[error("{found} poles are stable over the orders of the model, but {wanted} modes are asked for")]
+    #[error("{found} poles are stable over the model order, but {wanted} modes are requested")]
     Fewer {
         /// Modes found.
         found: usize,

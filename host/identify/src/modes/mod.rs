@@ -76,7 +76,7 @@ pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, Mod
             });
         }
         for pole in starts.split_off(wanted) {
-            rejected.push(reject(pole, "weaker than the modes that were asked for".into()));
+            rejected.push(reject(pole, "weaker than the requested modes".into()));
         }
     }
     let [from_hz, to_hz] = data.band_hz();

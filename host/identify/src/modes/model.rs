@@ -43,7 +43,7 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     let mut warnings = Vec::new();
     if model.fit_error > GOOD_FIT {
         warnings.push(format!(
-            "{:.0} % of the receptances are left; more modes, a narrower band, or a linear structure are needed",
+            "the residual is {:.0} % of the receptances; more modes, a narrower band, or a linear structure are needed",
             100.0 * model.fit_error
         ));
     }
@@ -58,7 +58,7 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
         }
         if mode.damping_ratio_std > 0.1 * damping {
             warnings.push(format!(
-                "the damping of the mode at {hertz:.3} Hz is known to {:.0} % only (one standard deviation)",
+                "the standard deviation of the damping of the mode at {hertz:.3} Hz is {:.0} %",
                 100.0 * mode.damping_ratio_std / damping
             ));
         }
@@ -68,7 +68,7 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
         let deviation = pair[0].frequency_std_hz.hypot(pair[1].frequency_std_hz);
         if apart < 3.0 * deviation {
             warnings.push(format!(
-                "the modes at {:.3} and {:.3} Hz are not told apart by the data",
+                "the modes at {:.3} and {:.3} Hz are not separable in the data",
                 pair[0].mode.frequency_hz, pair[1].mode.frequency_hz
             ));
         }

@@ -290,7 +290,7 @@ fn what_holds_no_mode_is_refused() {
         ..Options::default()
     };
     let said = refused(&whole, None, &wanted);
-    assert!(said.contains("9 modes are asked for"), "{said}");
+    assert!(said.contains("9 modes are requested"), "{said}");
     let mut entries = whole.entries().to_vec();
     entries.remove(4);
     let holed = FrfTable::new(Path::new("a.csv"), whole.frequency_hz().to_vec(), entries).unwrap();

@@ -67,7 +67,7 @@ pub enum PlanError {
         depth_mm: f64,
     },
     /// A case without derivatives.
-    #[error("{case}: limits have no derivatives by what is not known: {what}")]
+    #[error("{case}: limits have no derivatives with respect to the unknowns: {what}")]
     NoDerivatives {
         /// The case file.
         case: String,
