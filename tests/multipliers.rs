@@ -3,11 +3,12 @@
 //! The references were computed by Chebyshev collocation of the monodromy operator and by a characteristic-matrix
 //! Newton, which agree to 2e-8.
 
-#![allow(clippy::expect_used)]
+#![allow(clippy::unwrap_used)]
 
 use quietcut::case::Case;
 use quietcut::simulate::{
-    Cutter, Cutting, Drive, Dynamics, Model, Motion, Passage, Regeneration, Settings, Spindle, Workspace,
+    Cutter, Cutting, Drive, Dynamics, Entry, Model, Motion, Passage, Regeneration, Settings, Spindle,
+    VirtualCut, Workspace,
 };
 use quietcut::stability::orbit::ForcedProblem;
 use quietcut::stability::{self, CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
