@@ -47,13 +47,13 @@ fn answer(
     let held_out = regression.residual(Subset::HeldOut);
     let count = regression.count(Subset::HeldOut) as f64;
     let whole = regression.residual(Subset::Whole);
-    let missed = Quality {
-        nrmse_heldout: regression.missed(study, Subset::HeldOut),
-        nrmse_whole: regression.missed(study, Subset::Whole),
+    let baseline_quality = Quality {
+        nrmse_heldout: regression.nrmse(study, Subset::HeldOut),
+        nrmse_whole: regression.nrmse(study, Subset::Whole),
     };
     let mut diagnosis = Diagnosis {
         outcome: Outcome::None,
-        baseline: missed,
+        baseline: baseline_quality,
         causes: Vec::new(),
         equivalent: Vec::new(),
         extended: None,
@@ -71,11 +71,11 @@ fn answer(
         acting: 0,
         views: residual_views(study, library, selection.best.as_ref()),
     };
-    if missed.nrmse_whole > UNLIKE_SEGMENTS * missed.nrmse_heldout {
+    if baseline_quality.nrmse_whole > UNLIKE_SEGMENTS * baseline_quality.nrmse_heldout {
         diagnosis.warnings.push(format!(
             "prediction error (NRMSE): {:.2} % on held-out segments, {:.2} % overall: most of the residual lies in the fitted segments, so that the held-out gain is of little value",
-            100.0 * missed.nrmse_heldout,
-            100.0 * missed.nrmse_whole
+            100.0 * baseline_quality.nrmse_heldout,
+            100.0 * baseline_quality.nrmse_whole
         ));
     }
     let (of_noise, of_excess) = criteria.excess(regression, selection.best.as_ref());
@@ -162,8 +162,8 @@ fn answer(
     }
     let share = |left: f64, there: f64| (left / there.max(f64::MIN_POSITIVE)).sqrt();
     diagnosis.extended = Some(Quality {
-        nrmse_heldout: missed.nrmse_heldout * share(left_held_out, held_out),
-        nrmse_whole: missed.nrmse_whole * share(best.fit.left, whole),
+        nrmse_heldout: baseline_quality.nrmse_heldout * share(left_held_out, held_out),
+        nrmse_whole: baseline_quality.nrmse_whole * share(best.fit.left, whole),
     });
     diagnosis.gain = Some(Gain::new(held_out, left_held_out, count));
     diagnosis

@@ -65,7 +65,7 @@ pub(crate) fn concluded(
     let mut diagnosis = conclude::conclude(&study, &beginnings, options, watch);
     drop(study);
     watch(Stage::Records);
-    let believed = Residual::of(case, &rest)?;
+    let baseline = Residual::of(case, &rest)?;
     let searched_s = beginnings
         .iter()
         .map(|record| record.len() as f64 / record.sample_rate_hz);
@@ -79,22 +79,26 @@ pub(crate) fn concluded(
         Outcome::None => case.clone(),
         _ => diagnosis.extended(case)?,
     };
-    let explained = Residual::of(&extended, &rest)?;
-    let beyond = explained.energy - explained.count;
-    if beyond > NOISE_TOLERANCE * explained.count
-        && beyond > UNEXPLAINED_OF_RESPONSE * (believed.energy - believed.count)
+    let extended_residual = Residual::of(&extended, &rest)?;
+    let beyond = extended_residual.energy - extended_residual.count;
+    if beyond > NOISE_TOLERANCE * extended_residual.count
+        && beyond > UNEXPLAINED_OF_RESPONSE * (baseline.energy - baseline.count)
     {
         return None;
     }
     // Nothing was fitted to the rest.
-    let quality = |missed: f64| Quality {
-        nrmse_heldout: missed,
-        nrmse_whole: missed,
+    let quality = |nrmse: f64| Quality {
+        nrmse_heldout: nrmse,
+        nrmse_whole: nrmse,
     };
-    diagnosis.baseline = quality(believed.missed);
+    diagnosis.baseline = quality(baseline.nrmse);
     if diagnosis.outcome != Outcome::None {
-        diagnosis.extended = Some(quality(explained.missed));
-        diagnosis.gain = Some(Gain::new(believed.energy, explained.energy, explained.count));
+        diagnosis.extended = Some(quality(extended_residual.nrmse));
+        diagnosis.gain = Some(Gain::new(
+            baseline.energy,
+            extended_residual.energy,
+            extended_residual.count,
+        ));
     }
     Some(diagnosis)
 }
@@ -106,7 +110,7 @@ struct Residual {
     /// Number of compared values.
     count: f64,
     /// NRMSE.
-    missed: f64,
+    nrmse: f64,
 }
 
 impl Residual {
@@ -116,7 +120,7 @@ impl Residual {
         Some(Self {
             energy: regression.residual(Subset::Whole),
             count: regression.count(Subset::Whole) as f64,
-            missed: regression.missed(&study, Subset::Whole),
+            nrmse: regression.nrmse(&study, Subset::Whole),
         })
     }
 }

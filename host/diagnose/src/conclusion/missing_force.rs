@@ -30,7 +30,7 @@ pub struct MissingForce {
     /// Static stiffness of the baseline along the axis, N/m; 0 without stiffness.
     pub stiffness: f64,
     /// Samples of a segment over which stiffness and damping are fitted.
-    stretch: usize,
+    segment: usize,
 }
 
 /// Stiffness and damping of the missing force in a segment, at its amplitude.
@@ -67,13 +67,13 @@ impl MissingForce {
         let at_rest = baseline.receptance.at(0.0)[(axis, axis)].re;
         // A record without oscillating modes has twenty segments.
         let duration_s = residual.len() as f64 / record.grid.rate_hz();
-        let stretch_s = baseline.lowest_hz().map_or(0.05 * duration_s, |hz| PERIODS / hz);
+        let segment_s = baseline.lowest_hz().map_or(0.05 * duration_s, |hz| PERIODS / hz);
         Some(Self {
             x,
             v,
             force_n,
             stiffness: if at_rest > 0.0 { at_rest.recip() } else { 0.0 },
-            stretch: ((stretch_s * record.grid.rate_hz()) as usize).max(16),
+            segment: ((segment_s * record.grid.rate_hz()) as usize).max(16),
         })
     }
 
@@ -81,9 +81,9 @@ impl MissingForce {
     pub fn at_amplitudes(&self) -> Vec<AtAmplitude> {
         let all: Vec<AtAmplitude> = self
             .x
-            .chunks_exact(self.stretch)
-            .zip(self.v.chunks_exact(self.stretch))
-            .zip(self.force_n.chunks_exact(self.stretch))
+            .chunks_exact(self.segment)
+            .zip(self.v.chunks_exact(self.segment))
+            .zip(self.force_n.chunks_exact(self.segment))
             .map(|((x, v), force)| {
                 let middle = |a: &[f64]| a.iter().sum::<f64>() / a.len() as f64;
                 let (x0, f0) = (middle(x), middle(force));

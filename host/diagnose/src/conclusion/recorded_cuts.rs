@@ -14,28 +14,28 @@ pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TestCut> {
         .iter()
         .filter(|recording| recording.sidecar.kind == Some(Kind::Cutting))
         .filter_map(|recording| {
-            let said = recording.sidecar.cut?;
+            let given = recording.sidecar.cut?;
             Some(TestCut {
-                rpm: said.spindle_rpm.filter(|_| is_on_chart(case, &said))?,
-                depth_mm: said.axial_depth_mm?,
+                rpm: given.spindle_rpm.filter(|_| is_on_chart(case, &given))?,
+                depth_mm: given.axial_depth_mm?,
                 outcome: outcome(recording, case.tool.as_ref().map(|tool| tool.teeth)),
             })
         })
         .collect()
 }
 
-fn is_on_chart(case: &Case, said: &RecordedCut) -> bool {
-    let Some(believed) = case.cut else { return false };
-    let near = |said: Option<f64>, believed: f64, apart: f64| {
-        said.is_none_or(|said| (said - believed).abs() <= apart)
+fn is_on_chart(case: &Case, given: &RecordedCut) -> bool {
+    let Some(baseline) = case.cut else { return false };
+    let near = |given: Option<f64>, baseline: f64, apart: f64| {
+        given.is_none_or(|given| (given - baseline).abs() <= apart)
     };
-    said.last_rpm.is_none()
-        && near(said.start_deg, believed.start_deg, SAME_IMMERSION_DEG)
-        && near(said.exit_deg, believed.exit_deg, SAME_IMMERSION_DEG)
+    given.last_rpm.is_none()
+        && near(given.start_deg, baseline.start_deg, SAME_IMMERSION_DEG)
+        && near(given.exit_deg, baseline.exit_deg, SAME_IMMERSION_DEG)
         && near(
-            said.feed_per_tooth_mm,
-            believed.feed_per_tooth_mm,
-            SAME_FEED * believed.feed_per_tooth_mm,
+            given.feed_per_tooth_mm,
+            baseline.feed_per_tooth_mm,
+            SAME_FEED * baseline.feed_per_tooth_mm,
         )
 }
 
@@ -56,17 +56,17 @@ fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
         return Outcome::Marginal;
     };
     let mut state = State::default();
-    let mut heard = Outcome::Marginal;
+    let mut detected = Outcome::Marginal;
     for (block, edges) in sensed.steps() {
         let report = monitor.step(&mut state, block, edges, None, None);
         match report.judgement.verdict {
             verdict if verdict.is_chatter() => return Outcome::Chatter,
-            Verdict::Stable | Verdict::Forced | Verdict::Runout => heard = Outcome::Stable,
+            Verdict::Stable | Verdict::Forced | Verdict::Runout => detected = Outcome::Stable,
             // Before the entry and after the exit of the tool.
             _ => {}
         }
     }
-    heard
+    detected
 }
 
 #[cfg(test)]

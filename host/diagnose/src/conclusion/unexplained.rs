@@ -7,7 +7,7 @@ use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
 /// Number of segments into which a record is divided.
-const STRETCHES: usize = 40;
+const SEGMENTS: usize = 40;
 /// Lines on each side of a peak of the spectrum that belong to it.
 const NEAR: usize = 8;
 
@@ -15,13 +15,14 @@ const NEAR: usize = 8;
 /// extension.
 pub(crate) fn describe(views: &[ResidualView]) -> String {
     let worst = views.iter().max_by(|a, b| {
-        let beside_noise = |view: &ResidualView| rms(left(view)) / view.deviation.max(f64::MIN_POSITIVE);
+        let beside_noise =
+            |view: &ResidualView| rms(residual_of(view)) / view.deviation.max(f64::MIN_POSITIVE);
         beside_noise(a).total_cmp(&beside_noise(b))
     });
     worst.map_or_else(String::new, of_channel)
 }
 
-fn left(view: &ResidualView) -> &[f64] {
+fn residual_of(view: &ResidualView) -> &[f64] {
     if view.left.is_empty() {
         &view.residual
     } else {
@@ -30,31 +31,31 @@ fn left(view: &ResidualView) -> &[f64] {
 }
 
 fn of_channel(view: &ResidualView) -> String {
-    let left = left(view);
-    let size = rms(left);
-    let mut said = format!(
+    let residual = residual_of(view);
+    let size = rms(residual);
+    let mut text = format!(
         "{} of {}: {size:.3e} {} RMS, {:.1} times its noise",
         view.channel,
         view.record,
         view.unit,
         size / view.deviation.max(f64::MIN_POSITIVE)
     );
-    if let Some((hz, share)) = peak(view, left) {
-        said += &format!("; largest at {hz:.3} Hz");
+    if let Some((hz, share)) = peak(view, residual) {
+        text += &format!("; largest at {hz:.3} Hz");
         if let Some(spindle_motion) = &view.spindle_motion {
-            said += &format!(", spindle order {:.2}", 60.0 * hz / spindle_motion.rpm);
+            text += &format!(", spindle order {:.2}", 60.0 * hz / spindle_motion.rpm);
         }
-        said += &format!(" ({:.0} % of the energy within a few lines)", 100.0 * share);
+        text += &format!(" ({:.0} % of the energy within a few lines)", 100.0 * share);
     }
-    let by_stretch = stretches(left);
-    let loudest = (0..by_stretch.len()).max_by(|a, b| by_stretch[*a].total_cmp(&by_stretch[*b]));
-    if let Some(loudest) = loudest {
-        let middle = (loudest as f64 + 0.5) * stretch(left) as f64 / view.rate_hz;
-        said += &format!(", largest at {middle:.2} s");
+    let by_segment = segment_energies(residual);
+    let largest = (0..by_segment.len()).max_by(|a, b| by_segment[*a].total_cmp(&by_segment[*b]));
+    if let Some(largest) = largest {
+        let middle = (largest as f64 + 0.5) * segment_length(residual) as f64 / view.rate_hz;
+        text += &format!(", largest at {middle:.2} s");
     }
-    said + &format!(
+    text + &format!(
         "; {:.0} % of the energy in the quarter of the record with the largest amplitude",
-        100.0 * where_it_moves_most(&by_stretch, &stretches(&view.measured))
+        100.0 * where_it_moves_most(&by_segment, &segment_energies(&view.measured))
     )
 }
 
@@ -75,14 +76,14 @@ fn peak(view: &ResidualView, samples: &[f64]) -> Option<(f64, f64)> {
     (whole > 0.0).then(|| (grid.omega(peak) / TAU, near / whole))
 }
 
-fn stretch(samples: &[f64]) -> usize {
-    samples.len().div_ceil(STRETCHES).max(1)
+fn segment_length(samples: &[f64]) -> usize {
+    samples.len().div_ceil(SEGMENTS).max(1)
 }
 
 /// Energy in each segment.
-fn stretches(samples: &[f64]) -> Vec<f64> {
+fn segment_energies(samples: &[f64]) -> Vec<f64> {
     samples
-        .chunks(stretch(samples))
+        .chunks(segment_length(samples))
         .map(|chunk| chunk.iter().map(|value| value * value).sum())
         .collect()
 }

@@ -35,7 +35,7 @@ pub(crate) struct OutputError<'a> {
     segments: Vec<Segment>,
     pub(crate) horizons: Vec<Vec<Segment>>,
     /// True if every record is a free decay.
-    pub(crate) is_let_go: bool,
+    pub(crate) is_free_decay: bool,
 }
 
 /// One column of the Jacobian: record, free parameter, values.
@@ -55,7 +55,7 @@ impl<'a> OutputError<'a> {
     pub(crate) fn new(study: &'a Study<'a>) -> Option<Self> {
         let closed = ClosedLoop::new(study)?;
         // The initial state of a free decay is among the parameters.
-        let unknown = |record: &crate::records::record::Record| {
+        let nuisance = |record: &crate::records::record::Record| {
             if starts_anywhere(record) {
                 Nuisance::Offsets
             } else {
@@ -67,16 +67,16 @@ impl<'a> OutputError<'a> {
                 .map(|index| {
                     let record = &study.records[index];
                     let count = (share * record.grid.count() as f64) as usize;
-                    Segment::new(study, index, 0..count.max(16), Subset::Whole, unknown(record))
+                    Segment::new(study, index, 0..count.max(16), Subset::Whole, nuisance(record))
                 })
                 .collect()
         };
         Some(Self {
             study,
             closed,
-            segments: split(study, unknown),
+            segments: split(study, nuisance),
             horizons: HORIZONS.map(horizon).into(),
-            is_let_go: study.records.iter().all(starts_anywhere),
+            is_free_decay: study.records.iter().all(starts_anywhere),
         })
     }
 

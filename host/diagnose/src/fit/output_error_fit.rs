@@ -69,7 +69,7 @@ impl ClosedFit for OutputError<'_> {
         }
         let found = self.search(&mut problem, &whole, start.clone(), ROUNDS, rival)?;
         let count = regression.count(Subset::Whole);
-        let found = self.looked_at_again(&mut problem, &whole, &start, found, (rival, count));
+        let found = self.restarted(&mut problem, &whole, &start, found, (rival, count));
         let slots: Vec<FreeParameter> = problem.slots.iter().map(|(slot, _)| *slot).collect();
         let covariance = by_choice(&slots, &found);
         self.accept(library, regression, model, found, covariance)

@@ -130,7 +130,7 @@ impl Regression {
                     .len()
                     .saturating_sub(self.columns.len())
                     .max(1);
-                left[segment.record] = self.left_of_segment(index) / free as f64;
+                left[segment.record] = self.residual_of_segment(index) / free as f64;
             }
         }
         let least = left.iter().copied().fold(f64::INFINITY, f64::min).max(1.0);
@@ -145,7 +145,7 @@ impl Regression {
     }
 
     /// χ² of one segment with all columns.
-    fn left_of_segment(&self, segment: usize) -> f64 {
+    fn residual_of_segment(&self, segment: usize) -> f64 {
         let residual = &self.residuals[segment];
         let mut columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[segment][..]).collect();
         columns.retain(|column| column.iter().any(|value| *value != 0.0));
@@ -253,7 +253,7 @@ impl Regression {
     }
 
     /// Prediction error (NRMSE) on a subset; all channels have equal weight.
-    pub(crate) fn missed(&self, study: &Study<'_>, subset: Subset) -> f64 {
+    pub(crate) fn nrmse(&self, study: &Study<'_>, subset: Subset) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
         for segment in self.segments.iter().filter(|segment| segment.subset == subset) {
             for channel in &study.records[segment.record].channels {

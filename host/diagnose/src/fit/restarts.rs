@@ -20,7 +20,7 @@ const ROUNDS_AT_FIRST: usize = 4;
 impl OutputError<'_> {
     /// The search result `found` from `start`, or a better one of a restart. `count` values are compared, and another candidate model has
     /// reached the χ² `rival`.
-    pub(crate) fn looked_at_again(
+    pub(crate) fn restarted(
         &self,
         problem: &mut FitProblem<'_>,
         segments: &[&Segment],
@@ -30,17 +30,17 @@ impl OutputError<'_> {
     ) -> SearchResult {
         let stuck = STUCK * count as f64;
         let is_simple = problem.choices.len() == 1 && problem.inner().count() <= FEW;
-        if self.is_let_go && found.left > stuck && is_simple {
-            found = self.elsewhere(problem, segments, start, found, rival);
+        if self.is_free_decay && found.left > stuck && is_simple {
+            found = self.restarted_elsewhere(problem, segments, start, found, rival);
         }
         if problem.least_step > LEAST_STEP && found.left > stuck && found.left < STUCK * rival {
-            found = self.beside(problem, segments, found, rival);
+            found = self.restarted_nearby(problem, segments, found, rival);
         }
         found
     }
 
     /// Restarts the search from the best point near its end: χ² is discontinuous where friction begins to slip.
-    fn beside(
+    fn restarted_nearby(
         &self,
         problem: &mut FitProblem<'_>,
         segments: &[&Segment],
@@ -67,7 +67,7 @@ impl OutputError<'_> {
     }
 
     /// The best of searches from other amplitudes. The phase of a free decay depends on them, and χ² has several minima.
-    fn elsewhere(
+    fn restarted_elsewhere(
         &self,
         problem: &mut FitProblem<'_>,
         segments: &[&Segment],

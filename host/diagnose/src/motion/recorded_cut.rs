@@ -40,13 +40,13 @@ pub(crate) struct RecordedCut {
 /// # Errors
 /// The case has no cut.
 pub(crate) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, DiagnoseError> {
-    let believed = case.cut()?;
-    let said = recording.sidecar.cut.unwrap_or_default();
+    let baseline = case.cut()?;
+    let given = recording.sidecar.cut.unwrap_or_default();
     Ok(Cut {
-        start_deg: said.start_deg.unwrap_or(believed.start_deg),
-        exit_deg: said.exit_deg.unwrap_or(believed.exit_deg),
-        feed_per_tooth_mm: said.feed_per_tooth_mm.unwrap_or(believed.feed_per_tooth_mm),
-        feed_direction_deg: believed.feed_direction_deg,
+        start_deg: given.start_deg.unwrap_or(baseline.start_deg),
+        exit_deg: given.exit_deg.unwrap_or(baseline.exit_deg),
+        feed_per_tooth_mm: given.feed_per_tooth_mm.unwrap_or(baseline.feed_per_tooth_mm),
+        feed_direction_deg: baseline.feed_direction_deg,
     })
 }
 
@@ -57,11 +57,11 @@ impl RecordedCut {
     /// No tool, material or cut in the case, no depth in the sidecar, no tachometer in the recording; or an extension that does not apply.
     pub(crate) fn new(case: &Case, effects: &Effects, recording: &Recording) -> Result<Self, DiagnoseError> {
         let (tool, material, cut) = (case.tool()?, case.material()?, cut_of(case, recording)?);
-        let said = recording.sidecar.cut.unwrap_or_default();
-        let depth_mm = said.axial_depth_mm.ok_or_else(|| {
+        let given = recording.sidecar.cut.unwrap_or_default();
+        let depth_mm = given.axial_depth_mm.ok_or_else(|| {
             recording.lacks("axial_depth_mm under [cut] in its sidecar (.toml), the axial depth of the cut")
         })?;
-        if let Some(teeth) = said.teeth.filter(|teeth| *teeth as usize != tool.teeth) {
+        if let Some(teeth) = given.teeth.filter(|teeth| *teeth as usize != tool.teeth) {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
@@ -75,7 +75,7 @@ impl RecordedCut {
             .and_then(|cutter| effects.cutter(cutter))
             .map_err(wrong)?;
         let spindle_motion = SpindleMotion::new(recording, effects.spindle(Spindle::new(1.0)).fluctuation())?;
-        if let Some(rpm) = said.spindle_rpm
+        if let Some(rpm) = given.spindle_rpm
             && (spindle_motion.rpm() / rpm - 1.0).abs() > SPEED_MISMATCH
         {
             return Err(DiagnoseError::record(

@@ -26,7 +26,7 @@ const SETTLED: f64 = 12.0;
 const WAITED: f64 = 4.0;
 
 /// A channel of motion in the records.
-pub(super) struct Heard {
+pub(super) struct MeasuredChannel {
     pub(super) name: String,
     quantity: Quantity,
     /// Standard deviation of its noise; 0 if unknown.
@@ -46,7 +46,7 @@ pub(super) struct CutSoFar {
 pub(super) struct Bench<'a> {
     pub(super) case: &'a Case,
     pub(super) baseline: Baseline<'a>,
-    pub(super) channels: Vec<Heard>,
+    pub(super) channels: Vec<MeasuredChannel>,
     /// Lowest and highest natural frequency, Hz.
     pub(super) modes_hz: [f64; 2],
     /// True if the force of a cut was measured.
@@ -67,7 +67,7 @@ impl<'a> Bench<'a> {
         let baseline = Baseline::new(case).ok()?;
         let modes_hz = [baseline.lowest_hz()?, highest_hz(&baseline)?];
         let [lowest_hz, highest_hz] = modes_hz;
-        let channels = heard(&baseline, recordings, views);
+        let channels = measured(&baseline, recordings, views);
         let rate_hz = SAMPLES_PER_PERIOD * highest_hz;
         let longest_s = recordings
             .iter()
@@ -113,9 +113,12 @@ impl<'a> Bench<'a> {
     /// Standard deviation of the noise of each reading.
     pub(super) fn deviations(&self, readings: &[Reading]) -> Vec<f64> {
         let of = |reading: &Reading| {
-            let heard = self.channels.iter().find(|heard| heard.name == reading.name);
-            let known = heard
-                .map(|heard| heard.deviation)
+            let measured = self
+                .channels
+                .iter()
+                .find(|measured| measured.name == reading.name);
+            let known = measured
+                .map(|measured| measured.deviation)
                 .filter(|deviation| *deviation > 0.0);
             known.unwrap_or_else(|| (ASSUMED_NOISE * rms(&reading.samples)).max(f64::MIN_POSITIVE))
         };
@@ -130,9 +133,9 @@ impl<'a> Bench<'a> {
     /// The quantities of the sensors, each once.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
         let mut all: Vec<Quantity> = Vec::new();
-        for heard in &self.channels {
-            if !all.contains(&heard.quantity) {
-                all.push(heard.quantity);
+        for measured in &self.channels {
+            if !all.contains(&measured.quantity) {
+                all.push(measured.quantity);
             }
         }
         all
@@ -162,12 +165,16 @@ fn peak(channel: &Channel) -> f64 {
 }
 
 /// The channels of motion, each name once.
-fn heard(baseline: &Baseline<'_>, recordings: &[Recording], views: &[ResidualView]) -> Vec<Heard> {
-    let mut all: Vec<Heard> = Vec::new();
+fn measured(
+    baseline: &Baseline<'_>,
+    recordings: &[Recording],
+    views: &[ResidualView],
+) -> Vec<MeasuredChannel> {
+    let mut all: Vec<MeasuredChannel> = Vec::new();
     for channel in channels_of(recordings.iter()) {
-        let is_known = all.iter().any(|heard| heard.name == channel.name);
+        let is_known = all.iter().any(|measured| measured.name == channel.name);
         if is_motion(channel.quantity) && !is_known && baseline.pickup(&channel.name).is_some() {
-            all.push(Heard {
+            all.push(MeasuredChannel {
                 name: channel.name.clone(),
                 quantity: channel.quantity,
                 deviation: deviation(views, &channel.name),

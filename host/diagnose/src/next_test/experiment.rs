@@ -149,12 +149,12 @@ impl Experiment {
         let second = self.recording(bench, &faultless)?;
         let mut all = Vec::new();
         for (recording, of) in [(&mounted, Of::Mounted), (&second, Of::Second)] {
-            for heard in &bench.channels {
+            for measured_channel in &bench.channels {
                 let channel = recording
                     .channels
                     .iter()
-                    .find(|channel| channel.name == heard.name)?;
-                all.push((heard.name.clone(), of, channel.samples.clone()));
+                    .find(|channel| channel.name == measured_channel.name)?;
+                all.push((measured_channel.name.clone(), of, channel.samples.clone()));
             }
         }
         if let Doing::Cut { .. } = self.doing {

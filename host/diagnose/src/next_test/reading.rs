@@ -45,7 +45,7 @@ impl Sensors {
 }
 
 impl Reading {
-    pub(super) fn is_heard(&self, sensors: Sensors) -> bool {
+    pub(super) fn is_read_by(&self, sensors: Sensors) -> bool {
         match self.of {
             Of::Mounted => true,
             Of::Second => sensors == Sensors::Second,

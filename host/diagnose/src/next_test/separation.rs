@@ -135,7 +135,7 @@ pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sen
 fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sensors) -> Difference {
     let deviations = bench.deviations(&truth.readings);
     let heard: Vec<usize> = (0..truth.readings.len())
-        .filter(|index| truth.readings[*index].is_heard(sensors))
+        .filter(|index| truth.readings[*index].is_read_by(sensors))
         .collect();
     let stacked = |a: &[Reading], b: &[Reading]| -> DVector<f64> {
         let values = heard.iter().flat_map(|&index| {

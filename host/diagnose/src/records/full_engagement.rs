@@ -39,10 +39,10 @@ pub(crate) fn in_full_engagement<'a>(
     case: &Case,
     recordings: &'a [Recording],
 ) -> Result<(Cow<'a, [Recording]>, Vec<String>), DiagnoseError> {
-    let mut said = Vec::new();
+    let mut remarks = Vec::new();
     let mut shortened = Cow::Borrowed(recordings);
     if !recordings.iter().any(is_of_a_cut) {
-        return Ok((shortened, said));
+        return Ok((shortened, remarks));
     }
     let baseline = Baseline::new(case)?;
     for (index, recording) in recordings.iter().enumerate() {
@@ -50,23 +50,23 @@ pub(crate) fn in_full_engagement<'a>(
             continue;
         };
         let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
-        let turns = (to_s - from_s) / SpindleMotion::new(recording, None)?.turn_s();
-        if turns < LEAST_ENGAGED_REVOLUTIONS {
+        let revolutions = (to_s - from_s) / SpindleMotion::new(recording, None)?.turn_s();
+        if revolutions < LEAST_ENGAGED_REVOLUTIONS {
             return Err(DiagnoseError::record(
                 &recording.path,
                 format!(
-                    "contains only {turns:.1} revolutions of full engagement (from {from_s:.3} s); at least \
+                    "contains only {revolutions:.1} revolutions of full engagement (from {from_s:.3} s); at least \
                      {LEAST_ENGAGED_REVOLUTIONS} are required"
                 ),
             ));
         }
-        said.push(format!(
+        remarks.push(format!(
             "{}: full engagement from {from_s:.3} to {to_s:.3} s is diagnosed; the rest is air, entry or exit of the tool",
             recording.path.display()
         ));
         shortened.to_mut()[index] = recording.part(range);
     }
-    Ok((shortened, said))
+    Ok((shortened, remarks))
 }
 
 fn is_of_a_cut(recording: &Recording) -> bool {
@@ -86,24 +86,24 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
         turn_s,
         &Forced::new(baseline, &cutter, turn_s),
     )?;
-    let cut = longest_gap(&levels.quiet(), levels.count)?;
-    let is_loud = |turn: &usize| levels.smallest(*turn) >= ENGAGED_LEVEL;
-    let first = cut.clone().find(is_loud)?;
-    let last = cut.clone().rev().find(is_loud)?;
+    let cut = longest_gap(&levels.in_air(), levels.count)?;
+    let is_engaged = |turn: &usize| levels.smallest(*turn) >= ENGAGED_LEVEL;
+    let first = cut.clone().find(is_engaged)?;
+    let last = cut.clone().rev().find(is_engaged)?;
     let by_diameter = Passage::way_in_s(&cutter, &Spindle::new(60.0 / turn_s)).ok();
-    let loud_after = ENGAGEMENT_AFTER_LEVEL * (first - cut.start) as f64;
-    let way = by_diameter.map_or(loud_after, |seconds| seconds / turn_s);
+    let engaged_after = ENGAGEMENT_AFTER_LEVEL * (first - cut.start) as f64;
+    let way = by_diameter.map_or(engaged_after, |seconds| seconds / turn_s);
     let from = match cut.start {
         0 => 0.0,
-        start => start as f64 + (ENTRY_MARGIN * way).max(loud_after) + 1.0,
+        start => start as f64 + (ENTRY_MARGIN * way).max(engaged_after) + 1.0,
     };
     // A recording may stop at the end of the cut, before the vibration has decayed. Chatter stays loud until the tool has left.
     let to = if cut.end == levels.count && cut.end - last <= LEAST_AIR_AT_ENDS {
         f64::INFINITY
     } else {
-        let loud_before = ENGAGEMENT_AFTER_LEVEL * (cut.end - 1 - last) as f64;
+        let engaged_before = ENGAGEMENT_AFTER_LEVEL * (cut.end - 1 - last) as f64;
         let out = if levels.chatters { ENTRY_MARGIN } else { EXIT_SHARE };
-        cut.end as f64 - (out * way).max(loud_before) - 1.0
+        cut.end as f64 - (out * way).max(engaged_before) - 1.0
     };
     let sample =
         |turn: f64| ((turn * turn_s * recording.sample_rate_hz).max(0.0) as usize).min(recording.len());
@@ -217,15 +217,17 @@ impl Levels {
                 continue;
             };
             let noise = floor_between_lines(&channel.samples, rms(&channel.samples));
-            let turns: Vec<f64> = (0..count)
+            let revolutions: Vec<f64> = (0..count)
                 .map(|turn| [turn, turn + 1].map(|turn| (turn as f64 * per_turn) as usize))
                 .map(|[from, to]| deviation(&channel.samples[from..to], noise))
                 .collect();
-            let (usual, fed) = (median(&mut turns.clone()), forced.level(&pickup, rate_hz));
+            let (usual, fed) = (median(&mut revolutions.clone()), forced.level(&pickup, rate_hz));
             let in_cut = usual.min(fed);
             if in_cut > AIR_OVER_NOISE * noise {
                 levels.chatters |= usual > CHATTER_LEVEL * fed;
-                levels.of.push(turns.iter().map(|level| level / in_cut).collect());
+                levels
+                    .of
+                    .push(revolutions.iter().map(|level| level / in_cut).collect());
                 levels.noise.push(noise / in_cut);
             }
         }
@@ -237,7 +239,7 @@ impl Levels {
     }
 
     /// The ranges of revolutions in air.
-    fn quiet(&self) -> Vec<Range<usize>> {
+    fn in_air(&self) -> Vec<Range<usize>> {
         let mut stretches = Vec::new();
         let mut turn = 0;
         while turn < self.count {

@@ -145,7 +145,7 @@ impl<'a> SelectionCriteria<'a> {
     }
 
     /// True if the residual of the best simulation of `found` resembles a further cause, although that of `best` is close to noise.
-    fn asks_for_more(
+    fn resembles_further_cause(
         &self,
         library: &mut Library,
         regression: &mut Regression,
@@ -234,9 +234,9 @@ pub(crate) fn select(
     for (index, most) in SIMULATED.into_iter().enumerate() {
         let size = index + 1;
         // A residual below half of the noise floor contains nothing to explain.
-        let silent =
+        let is_noise =
             regression.residual(Subset::Whole) < NOTHING_TO_EXPLAIN * regression.count(Subset::Whole) as f64;
-        if silent {
+        if is_noise {
             break;
         }
         let enough = size > 1 && criteria.is_enough(regression, selection.best.as_ref());
@@ -244,10 +244,10 @@ pub(crate) fn select(
         let mut imitated = None;
         if enough {
             let Some(best) = &selection.best else { break };
-            let asked = criteria.asks_for_more(library, regression, best, &fewer);
-            imitated = (!asked && size == 2 && best.parameter_count > size && criteria.closed.is_some())
+            let resembles = criteria.resembles_further_cause(library, regression, best, &fewer);
+            imitated = (!resembles && size == 2 && best.parameter_count > size && criteria.closed.is_some())
                 .then(|| best.clone());
-            if !asked && imitated.is_none() {
+            if !resembles && imitated.is_none() {
                 break;
             }
         }
@@ -281,7 +281,7 @@ pub(crate) fn select(
             criteria.polish(library, regression, &mut found, inflation);
         }
         let inflation = criteria.inflation(regression, found.first());
-        tell(criteria, library, regression, &found, inflation);
+        log_best(criteria, library, regression, &found, inflation);
         let Some(best) = found.first() else { break };
         let best = simplest(criteria, regression, &found, best);
         let best = &criteria.pruned(library, regression, best);
@@ -336,7 +336,7 @@ fn is_rival(library: &Library, best: &CandidateModel, other: &CandidateModel) ->
     other.parameter_count == best.parameter_count && !library.are_at_same_locations(best, other)
 }
 
-fn tell(
+fn log_best(
     criteria: &SelectionCriteria<'_>,
     library: &Library,
     regression: &Regression,
