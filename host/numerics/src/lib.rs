@@ -4,3 +4,6 @@ pub mod complex_eigenvalues;
 pub mod crossing;
 pub mod dormand_prince;
 pub mod eigenvalues;
+pub mod least_squares;
+pub mod singular_values;
+pub mod statistics;

@@ -7,6 +7,8 @@ use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use num_complex::Complex64;
 
+use super::{EigenvalueError, size_of};
+
 /// Iterations for one eigenvalue after which the matrix is given up; three are usual, and at 10, 20, … an exceptional
 /// shift breaks cycles.
 const ITERATIONS_MAX: usize = 90;
@@ -14,11 +16,12 @@ const ITERATIONS_MAX: usize = 90;
 /// All eigenvalues, in no order; complex ones in exact pairs, real ones with imaginary part zero.
 ///
 /// Backward stable: they are those of a matrix that differs by a few rounding errors of the norm (after
-/// balancing). `None` where an entry is not finite or the iteration does not converge.
-pub fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex64>> {
-    if matrix.iter().any(|entry| !entry.is_finite()) {
-        return None;
-    }
+/// balancing).
+///
+/// # Errors
+/// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
+pub fn of_real(mut matrix: DMatrix<f64>) -> Result<Vec<Complex64>, EigenvalueError> {
+    size_of(&matrix)?;
     let unit = unit(matrix.amax());
     matrix /= unit;
     balance_parlett_reinsch(&mut matrix);
@@ -32,7 +35,7 @@ pub fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex64>> {
     for value in &mut found {
         *value *= unit;
     }
-    Some(found)
+    Ok(found)
 }
 
 /// A power of two near the largest entry where squares of entries would leave the range of numbers, else 1: balancing would not
@@ -105,7 +108,7 @@ impl Rows {
     }
 
     /// The QR iteration on a Hessenberg matrix, deflating from the end.
-    fn iterate(mut self) -> Option<Vec<Complex64>> {
+    fn iterate(mut self) -> Result<Vec<Complex64>, EigenvalueError> {
         let n = self.size;
         let norm: f64 = self.entries.iter().map(|entry| entry.abs()).sum();
         let mut found = Vec::with_capacity(n);
@@ -128,7 +131,7 @@ impl Rows {
                 continue;
             }
             if iterations == ITERATIONS_MAX {
-                return None;
+                return Err(EigenvalueError::NotConverged { size: n, iterations });
             }
             let corner = self.at(last, last);
             let mut shift = Shift {
@@ -151,7 +154,7 @@ impl Rows {
             iterations += 1;
             self.sweep(first, last, shift);
         }
-        Some(found)
+        Ok(found)
     }
 
     /// The first row of the unreduced block that ends at `last`.
@@ -340,7 +343,7 @@ mod tests {
         for size in [1, 2, 3, 4, 5, 8, 13, 40] {
             for _ in 0..20 {
                 let matrix = DMatrix::from_fn(size, size, |_, _| rng.random_range(-1.0..1.0));
-                let ours = sorted(eigenvalues(matrix.clone()).unwrap());
+                let ours = sorted(of_real(matrix.clone()).unwrap());
                 let theirs = sorted(matrix.complex_eigenvalues().iter().copied().collect());
                 for (a, b) in ours.iter().zip(&theirs) {
                     // Backward error 1e-15 times the norm, times the condition of the eigenvalues (seen: below 1e4).
@@ -354,7 +357,7 @@ mod tests {
     fn cycles_are_broken_and_wide_scales_kept() {
         // A cyclic permutation: unshifted and doubly shifted QR stand still on it.
         let cyclic = DMatrix::from_fn(6, 6, |i, j| f64::from(u8::from(i == (j + 1) % 6)));
-        for eigenvalue in eigenvalues(cyclic).unwrap() {
+        for eigenvalue in of_real(cyclic).unwrap() {
             assert!((eigenvalue.norm() - 1.0).abs() < 1e-12);
         }
         // Triangular with entries of 1e8 beside eigenvalues from 1e-6 to 1: only balancing keeps the small ones.
@@ -363,20 +366,20 @@ mod tests {
             std::cmp::Ordering::Equal => 0.01_f64.powi(i as i32),
             std::cmp::Ordering::Greater => 0.0,
         });
-        let found = sorted(eigenvalues(wide).unwrap());
+        let found = sorted(of_real(wide).unwrap());
         for (found, expected) in found.iter().zip([1e-6, 1e-4, 1e-2, 1.0]) {
             assert!((found - expected).norm() < 1e-9 * expected, "{found}");
         }
         // Squares of the entries are no numbers.
         for unit in [1e-250, 1e250] {
             let far = DMatrix::from_row_slice(2, 2, &[0.0, unit, -unit, unit * 1e-40]);
-            for eigenvalue in eigenvalues(far).unwrap() {
+            for eigenvalue in of_real(far).unwrap() {
                 assert!((eigenvalue.norm() / unit - 1.0).abs() < 1e-12);
             }
         }
-        assert!(eigenvalues(DMatrix::from_element(2, 2, f64::NAN)).is_none());
+        assert!(of_real(DMatrix::from_element(2, 2, f64::NAN)).is_err());
         assert!(
-            eigenvalues(DMatrix::zeros(3, 3))
+            of_real(DMatrix::zeros(3, 3))
                 .unwrap()
                 .iter()
                 .all(|value| *value == Complex64::ZERO)

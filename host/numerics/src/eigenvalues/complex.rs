@@ -1,0 +1,297 @@
+//! Eigenvalues of complex matrices: all of a small one, the largest of a large one.
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::{EigenvalueError, size_of};
+
+/// Iterations for one eigenvalue after which a matrix is given up; two or three are usual, and at 10, 20, … an
+/// exceptional shift breaks cycles.
+const ITERATIONS_MAX: usize = 90;
+
+/// Matrices up to this size are solved whole.
+const WHOLE: usize = 20;
+
+/// Relative change of an eigenvalue from one look to the next below which it has settled.
+const SETTLED: f64 = 1e-11;
+
+/// All eigenvalues, in no order, backward stable.
+///
+/// # Errors
+/// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
+pub fn of_complex(matrix: DMatrix<Complex64>) -> Result<Vec<Complex64>, EigenvalueError> {
+    match size_of(&matrix)? {
+        0 => Ok(Vec::new()),
+        1 => Ok(vec![matrix[(0, 0)]]),
+        2 => Ok(pair(&matrix, 0).to_vec()),
+        _ => of_hessenberg(matrix.hessenberg().unpack_h()),
+    }
+}
+
+/// Eigenvalues of absolute value `floor` and above, and possibly smaller ones, largest first.
+///
+/// Small matrices are solved whole; of large ones a Krylov space is built until the eigenvalues in question no longer
+/// move: at the latest it is the whole space.
+///
+/// # Errors
+/// The matrix is not square, has an entry that is not finite, or the iteration exceeds its bound.
+pub fn dominant(matrix: &DMatrix<Complex64>, floor: f64) -> Result<Vec<Complex64>, EigenvalueError> {
+    let size = size_of(matrix)?;
+    if size <= WHOLE {
+        return of_complex(matrix.clone()).map(sorted);
+    }
+    let mut krylov = Krylov::new(size);
+    let mut last: Vec<Complex64> = Vec::new();
+    for dimension in 1..=size {
+        let is_complete = krylov.extend(matrix).ok_or(EigenvalueError::NotFinite { size })?;
+        if is_complete || dimension == size {
+            return of_hessenberg(krylov.projected()).map(sorted);
+        }
+        if dimension < 12 || dimension % 4 != 0 {
+            continue;
+        }
+        let mut found = sorted(of_hessenberg(krylov.projected())?);
+        found.retain(|value| value.norm() >= floor);
+        let settled = found.len() == last.len()
+            && found.iter().all(|value| {
+                last.iter()
+                    .any(|before| (value - before).norm() <= SETTLED * value.norm())
+            });
+        if settled {
+            return Ok(found);
+        }
+        last = found;
+    }
+    of_complex(matrix.clone()).map(sorted)
+}
+
+fn sorted(mut values: Vec<Complex64>) -> Vec<Complex64> {
+    values.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
+    values
+}
+
+/// The Arnoldi process.
+struct Krylov {
+    basis: Vec<DVector<Complex64>>,
+    /// Column j: the coefficients of M q_j.
+    columns: Vec<Vec<Complex64>>,
+}
+
+impl Krylov {
+    fn new(size: usize) -> Self {
+        // A start with a part in every direction, no two alike: an invariant subspace is not hit by accident.
+        let start = DVector::from_fn(size, |i, _| Complex64::cis(1.0 + 2.399_963 * (i * i) as f64));
+        let norm = start.norm();
+        Self {
+            basis: vec![start.unscale(norm)],
+            columns: Vec::new(),
+        }
+    }
+
+    /// One more dimension; true where the space is invariant.
+    fn extend(&mut self, matrix: &DMatrix<Complex64>) -> Option<bool> {
+        let mut next = matrix * self.basis.last()?;
+        let size = next.norm();
+        let mut column = vec![Complex64::ZERO; self.basis.len()];
+        // Twice: once leaves rounding that makes spurious copies.
+        for _ in 0..2 {
+            for (vector, coefficient) in self.basis.iter().zip(&mut column) {
+                let part = vector.dotc(&next);
+                *coefficient += part;
+                next.axpy(-part, vector, Complex64::ONE);
+            }
+        }
+        let rest = next.norm();
+        if !rest.is_finite() {
+            return None;
+        }
+        column.push(Complex64::from(rest));
+        self.columns.push(column);
+        let is_complete = rest <= 1e-15 * size;
+        if !is_complete {
+            self.basis.push(next.unscale(rest));
+        }
+        Some(is_complete)
+    }
+
+    /// The matrix in the basis, a Hessenberg matrix.
+    fn projected(&self) -> DMatrix<Complex64> {
+        let size = self.columns.len();
+        DMatrix::from_fn(size, size, |i, j| {
+            self.columns[j].get(i).copied().unwrap_or(Complex64::ZERO)
+        })
+    }
+}
+
+/// Both eigenvalues of the 2 × 2 block that starts at (first, first).
+fn pair(m: &DMatrix<Complex64>, first: usize) -> [Complex64; 2] {
+    let (a, b) = (m[(first, first)], m[(first, first + 1)]);
+    let (c, d) = (m[(first + 1, first)], m[(first + 1, first + 1)]);
+    let (mean, half) = ((a + d) * 0.5, (a - d) * 0.5);
+    let root = (half * half + b * c).sqrt();
+    // The larger one without cancellation, the other from the determinant.
+    let large = if (mean.conj() * root).re >= 0.0 {
+        mean + root
+    } else {
+        mean - root
+    };
+    let small = if large == Complex64::ZERO {
+        Complex64::ZERO
+    } else {
+        (a * d - b * c) / large
+    };
+    [large, small]
+}
+
+/// QR iteration with single shifts on a Hessenberg matrix, deflating from the end.
+fn of_hessenberg(mut m: DMatrix<Complex64>) -> Result<Vec<Complex64>, EigenvalueError> {
+    let mut found = Vec::with_capacity(m.nrows());
+    let norm = m.norm();
+    let mut active = m.nrows();
+    let mut iterations = 0;
+    while active > 0 {
+        let last = active - 1;
+        let first = (1..=last)
+            .rev()
+            .find(|&i| {
+                let beside = m[(i, i)].l1_norm() + m[(i - 1, i - 1)].l1_norm();
+                let scale = if beside > 0.0 { beside } else { norm };
+                m[(i, i - 1)].l1_norm() <= f64::EPSILON * scale
+            })
+            .unwrap_or(0);
+        if first == last {
+            found.push(m[(last, last)]);
+            active -= 1;
+            iterations = 0;
+            continue;
+        }
+        if iterations == ITERATIONS_MAX {
+            let size = m.nrows();
+            return Err(EigenvalueError::NotConverged { size, iterations });
+        }
+        let shift = if iterations % 10 == 9 {
+            m[(last, last)] + m[(last, last - 1)].norm()
+        } else {
+            let corner = m[(last, last)];
+            let [p, q] = pair(&m, last - 1);
+            if (p - corner).norm() < (q - corner).norm() {
+                p
+            } else {
+                q
+            }
+        };
+        sweep(&mut m, first, last, shift);
+        iterations += 1;
+    }
+    Ok(found)
+}
+
+/// One QR step with a shift on the rows and columns `first..=last`: R Q + shift of (M − shift) = Q R.
+fn sweep(m: &mut DMatrix<Complex64>, first: usize, last: usize, shift: Complex64) {
+    for i in first..=last {
+        m[(i, i)] -= shift;
+    }
+    let mut rotations = Vec::with_capacity(last - first);
+    for k in first..last {
+        let (a, b) = (m[(k, k)], m[(k + 1, k)]);
+        let size = a.norm().hypot(b.norm());
+        let (c, s) = if size > 0.0 {
+            (a / size, b / size)
+        } else {
+            (Complex64::ONE, Complex64::ZERO)
+        };
+        for j in k..=last {
+            let (x, y) = (m[(k, j)], m[(k + 1, j)]);
+            m[(k, j)] = c.conj() * x + s.conj() * y;
+            m[(k + 1, j)] = c * y - s * x;
+        }
+        rotations.push((c, s));
+    }
+    for (k, (c, s)) in (first..last).zip(rotations) {
+        for i in first..=(k + 1).min(last) {
+            let (x, y) = (m[(i, k)], m[(i, k + 1)]);
+            m[(i, k)] = x * c + y * s;
+            m[(i, k + 1)] = y * c.conj() - x * s.conj();
+        }
+    }
+    for i in first..=last {
+        m[(i, i)] += shift;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A matrix with known eigenvalues: a triangular one in another basis.
+    fn known(values: &[Complex64]) -> DMatrix<Complex64> {
+        let size = values.len();
+        let triangular = DMatrix::from_fn(size, size, |i, j| {
+            if i == j {
+                values[i]
+            } else if i < j {
+                Complex64::new(0.1, 0.05) * values[j].norm()
+            } else {
+                Complex64::ZERO
+            }
+        });
+        let basis = DMatrix::from_fn(size, size, |i, j| {
+            Complex64::cis((i * j) as f64 * 2.0 * std::f64::consts::PI / size as f64)
+        })
+        .unscale((size as f64).sqrt());
+        &basis * triangular * basis.adjoint()
+    }
+
+    fn worst(found: &[Complex64], expected: &[Complex64]) -> f64 {
+        expected
+            .iter()
+            .map(|value| {
+                found
+                    .iter()
+                    .map(|other| (other - value).norm())
+                    .fold(f64::INFINITY, f64::min)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn all_eigenvalues_of_small_matrices() {
+        for size in 1..=12 {
+            let values: Vec<_> = (0..size)
+                .map(|i| Complex64::from_polar(1.0 + i as f64, 2.4 * i as f64))
+                .collect();
+            let found = of_complex(known(&values)).unwrap();
+            assert_eq!(found.len(), size);
+            // Condition of the eigenvalues: a few times the off-diagonal part.
+            assert!(worst(&found, &values) < 1e-12 * size as f64, "{size}");
+        }
+    }
+
+    #[test]
+    fn a_cyclic_permutation_and_a_double_eigenvalue() {
+        let cyclic = DMatrix::from_fn(5, 5, |i, j| Complex64::from(f64::from((i + 1) % 5 == j)));
+        let roots: Vec<_> = (0..5)
+            .map(|k| Complex64::cis(f64::from(k) * std::f64::consts::TAU / 5.0))
+            .collect();
+        assert!(worst(&of_complex(cyclic).unwrap(), &roots) < 1e-13);
+        let zero = DMatrix::<Complex64>::zeros(4, 4);
+        assert_eq!(of_complex(zero).unwrap(), vec![Complex64::ZERO; 4]);
+        let mut infinite = DMatrix::<Complex64>::zeros(4, 4);
+        infinite[(1, 2)].im = f64::INFINITY;
+        assert!(of_complex(infinite).is_err());
+    }
+
+    #[test]
+    fn the_largest_of_a_large_matrix() {
+        // Falling as those of a loop over harmonics do, in pairs of nearly equal size.
+        let values: Vec<_> = (0..90)
+            .map(|i| Complex64::from_polar(1.0 / (1.0 + f64::from(i / 2)).powi(2), 1.1 * f64::from(i)))
+            .collect();
+        let floor = 1e-2;
+        let found = dominant(&known(&values), floor).unwrap();
+        let expected: Vec<_> = values.into_iter().filter(|value| value.norm() >= floor).collect();
+        let relevant = found.iter().filter(|value| value.norm() >= floor).count();
+        assert_eq!(relevant, expected.len());
+        assert!(worst(&found, &expected) < 1e-10);
+    }
+}

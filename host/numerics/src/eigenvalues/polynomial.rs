@@ -1,0 +1,28 @@
+//! Roots of a polynomial: eigenvalues of its companion matrix.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use super::{EigenvalueError, of_complex};
+
+/// The roots of Σₖ cₖ zᵏ, in no order, from the coefficients c₀ … cₙ in rising powers.
+///
+/// Leading zeros are dropped: the number of roots is the degree. The roots are the eigenvalues of the companion matrix and
+/// therefore exact for a polynomial whose coefficients differ by a few rounding errors of the largest one (Edelman and
+/// Murakami, Math. Comp. 64 (1995) 763).
+///
+/// # Errors
+/// A coefficient, or its ratio to the leading one, is not finite, or the QR iteration exceeds its bound.
+pub fn polynomial_roots(coefficients: &[Complex64]) -> Result<Vec<Complex64>, EigenvalueError> {
+    let Some(degree) = coefficients.iter().rposition(|c| *c != Complex64::ZERO) else {
+        return Ok(Vec::new());
+    };
+    let leading = coefficients[degree];
+    of_complex(DMatrix::from_fn(degree, degree, |i, j| {
+        if j + 1 == degree {
+            -coefficients[i] / leading
+        } else {
+            Complex64::from(f64::from(u8::from(i == j + 1)))
+        }
+    }))
+}

@@ -1,0 +1,222 @@
+//! Linear least squares with weights and a prior.
+
+use nalgebra::{ColPivQR, DMatrix, DVector};
+
+use super::LeastSquaresError;
+
+/// Pivots below this share of the first one are rounding: nothing is determined below the rounding of the data.
+const RANK_TOLERANCE: f64 = 1e-12;
+
+/// min over x of Σᵢ wᵢ (aᵢᵀx − bᵢ)² + Σⱼ pⱼ (xⱼ − x₀ⱼ)², with A of m rows and n columns.
+///
+/// Weights are inverse variances: with wᵢ = 1/σᵢ² the [`LinearFit::covariance`] is that of the parameters.
+///
+/// ```
+/// use nalgebra::{DMatrix, DVector};
+/// use quietcut_numerics::least_squares::LinearProblem;
+///
+/// // A line through (0, 1), (1, 3), (2, 5).
+/// let matrix = DMatrix::from_row_slice(3, 2, &[1.0, 0.0, 1.0, 1.0, 1.0, 2.0]);
+/// let right = DVector::from_vec(vec![1.0, 3.0, 5.0]);
+/// let fit = LinearProblem::new(&matrix, &right).solve()?;
+/// assert!((fit.parameters[1] - 2.0).abs() < 1e-12);
+/// # Ok::<(), quietcut_numerics::least_squares::LeastSquaresError>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct LinearProblem<'a> {
+    pub(super) matrix: &'a DMatrix<f64>,
+    pub(super) right: &'a DVector<f64>,
+    pub(super) weights: Option<&'a DVector<f64>>,
+    prior: Option<[&'a DVector<f64>; 2]>,
+}
+
+/// The solution of a [`LinearProblem`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearFit {
+    /// x, n entries.
+    pub parameters: DVector<f64>,
+    /// (AᵀWA + P)⁻¹, n × n: the covariance where the weights are inverse variances; else times [`Self::variance`].
+    pub covariance: DMatrix<f64>,
+    /// Σᵢ wᵢ (aᵢᵀx − bᵢ)², without the prior.
+    pub sum_of_squares: f64,
+    /// Rows with a weight above zero, less parameters.
+    pub degrees_of_freedom: usize,
+    /// The first pivot over the last one, of the scaled columns: the condition number within a factor of √n as a rule.
+    pub condition: f64,
+}
+
+impl LinearFit {
+    /// The variance of a residual of weight 1, from the residuals; infinite without degrees of freedom.
+    pub fn variance(&self) -> f64 {
+        self.sum_of_squares / self.degrees_of_freedom as f64
+    }
+}
+
+impl<'a> LinearProblem<'a> {
+    /// A x = b with unit weights and without a prior.
+    pub fn new(matrix: &'a DMatrix<f64>, right: &'a DVector<f64>) -> Self {
+        Self {
+            matrix,
+            right,
+            weights: None,
+            prior: None,
+        }
+    }
+
+    /// With weights wᵢ ≥ 0, m entries.
+    #[must_use]
+    pub fn with_weights(self, weights: &'a DVector<f64>) -> Self {
+        Self {
+            weights: Some(weights),
+            ..self
+        }
+    }
+
+    /// With a prior mean x₀ and inverse variances pⱼ ≥ 0, n entries each; a mean of 0 is a ridge.
+    #[must_use]
+    pub fn with_prior(self, mean: &'a DVector<f64>, inverse_variances: &'a DVector<f64>) -> Self {
+        Self {
+            prior: Some([mean, inverse_variances]),
+            ..self
+        }
+    }
+
+    /// The least sum of squares, by Householder QR with column pivoting of the scaled columns (Golub and Van Loan, *Matrix
+    /// Computations*, 4th edition, 5.4.2).
+    ///
+    /// # Errors
+    /// See [`LeastSquaresError`].
+    pub fn solve(&self) -> Result<LinearFit, LeastSquaresError> {
+        self.check()?;
+        let (mut stacked, mut target) = self.rows();
+        let parameters = stacked.ncols();
+        if parameters == 0 {
+            return Ok(self.fit(DVector::zeros(0), DMatrix::zeros(0, 0), 1.0));
+        }
+        let lengths = DVector::from_iterator(parameters, stacked.column_iter().map(|column| column.norm()));
+        let empty: Vec<usize> = (0..parameters).filter(|&j| lengths[j] <= 0.0).collect();
+        if !empty.is_empty() || stacked.nrows() < parameters {
+            return Err(LeastSquaresError::RankDeficient {
+                rank: stacked.nrows().min(parameters - empty.len()),
+                parameters,
+                undetermined: empty,
+            });
+        }
+        for (mut column, length) in stacked.column_iter_mut().zip(lengths.iter()) {
+            column /= *length;
+        }
+        let decomposed = ColPivQR::new(stacked);
+        let triangle = decomposed.r();
+        let pivots = triangle.diagonal().abs();
+        let order = self.order_of(&decomposed, parameters);
+        let rank = pivots
+            .iter()
+            .take_while(|pivot| **pivot > RANK_TOLERANCE * pivots[0])
+            .count();
+        let deficient = || LeastSquaresError::RankDeficient {
+            rank,
+            parameters,
+            undetermined: order[rank.min(parameters)..].to_vec(),
+        };
+        if rank < parameters {
+            return Err(deficient());
+        }
+        decomposed.q_tr_mul(&mut target);
+        let head = target.rows(0, parameters).into_owned();
+        let solution = triangle.solve_upper_triangular(&head).ok_or_else(deficient)?;
+        let inverse = triangle
+            .solve_upper_triangular(&DMatrix::identity(parameters, parameters))
+            .ok_or_else(deficient)?;
+        let permuted = &inverse * inverse.transpose();
+        let mut x = DVector::zeros(parameters);
+        let mut covariance = DMatrix::zeros(parameters, parameters);
+        for (i, &row) in order.iter().enumerate() {
+            x[row] = solution[i] / lengths[row];
+            for (j, &column) in order.iter().enumerate() {
+                covariance[(row, column)] = permuted[(i, j)] / (lengths[row] * lengths[column]);
+            }
+        }
+        Ok(self.fit(x, covariance, pivots[0] / pivots[parameters - 1]))
+    }
+
+    /// The columns in the order of their pivots.
+    fn order_of(&self, decomposed: &ColPivQR<f64, nalgebra::Dyn, nalgebra::Dyn>, count: usize) -> Vec<usize> {
+        let mut indices = nalgebra::RowDVector::from_fn(count, |_, j| j);
+        decomposed.p().permute_columns(&mut indices);
+        indices.iter().copied().collect()
+    }
+
+    fn fit(&self, parameters: DVector<f64>, covariance: DMatrix<f64>, condition: f64) -> LinearFit {
+        let residual = self.matrix * &parameters - self.right;
+        let weight = |i: usize| self.weights.map_or(1.0, |weights| weights[i]);
+        let used = (0..self.right.len()).filter(|&i| weight(i) > 0.0).count();
+        let squares = residual.iter().enumerate().map(|(i, r)| weight(i) * r * r);
+        LinearFit {
+            sum_of_squares: squares.sum(),
+            degrees_of_freedom: used.saturating_sub(parameters.len()),
+            parameters,
+            covariance,
+            condition,
+        }
+    }
+
+    /// √W A and √W b, with the rows of the prior below.
+    fn rows(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let (rows, columns) = self.matrix.shape();
+        let (mut matrix, mut right) = (self.matrix.clone(), self.right.clone());
+        if let Some(weights) = self.weights {
+            for (i, weight) in weights.iter().enumerate() {
+                matrix.row_mut(i).scale_mut(weight.sqrt());
+                right[i] *= weight.sqrt();
+            }
+        }
+        if let Some([mean, inverse_variances]) = self.prior {
+            matrix = matrix.resize_vertically(rows + columns, 0.0);
+            right = right.resize_vertically(rows + columns, 0.0);
+            for (j, inverse_variance) in inverse_variances.iter().enumerate() {
+                matrix[(rows + j, j)] = inverse_variance.sqrt();
+                right[rows + j] = inverse_variance.sqrt() * mean[j];
+            }
+        }
+        (matrix, right)
+    }
+
+    fn check(&self) -> Result<(), LeastSquaresError> {
+        let (rows, columns) = self.matrix.shape();
+        let mut vectors = vec![("the right side", self.right, rows)];
+        vectors.extend(
+            self.weights
+                .map(|weights| ("the vector of weights", weights, rows)),
+        );
+        if let Some([mean, inverse_variances]) = self.prior {
+            vectors.push(("the mean of the prior", mean, columns));
+            vectors.push((
+                "the vector of inverse variances of the prior",
+                inverse_variances,
+                columns,
+            ));
+        }
+        for (what, vector, expected) in vectors {
+            let found = vector.len();
+            if found != expected {
+                return Err(LeastSquaresError::Shape {
+                    what,
+                    found,
+                    expected,
+                });
+            }
+            // A negative weight has no root.
+            let is_weight = !std::ptr::eq(vector, self.right) && what.starts_with("the vector");
+            if vector
+                .iter()
+                .any(|entry| !entry.is_finite() || (is_weight && *entry < 0.0))
+            {
+                return Err(LeastSquaresError::NotFinite { what });
+            }
+        }
+        if self.matrix.iter().any(|entry| !entry.is_finite()) {
+            return Err(LeastSquaresError::NotFinite { what: "the matrix" });
+        }
+        Ok(())
+    }
+}

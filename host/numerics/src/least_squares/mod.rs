@@ -1,0 +1,57 @@
+//! Least squares: linear, robust, from normal equations, and nonlinear.
+//!
+//! | problem | entry | method |
+//! |---|---|---|
+//! | min ‖W(A x − b)‖² + ‖P(x − x₀)‖² | [`LinearProblem`] | column scaling, Householder QR with column pivoting |
+//! | min Σ ρ(rᵢ) with outliers | [`LinearProblem::solve_robust`] | iteratively reweighted, Huber or Tukey |
+//! | AᵀA x = Aᵀb that was summed | [`solve_normal_equations`] | diagonal scaling, Cholesky |
+//! | min ‖r(θ)‖² | [`LevenbergMarquardt`] | Levenberg–Marquardt with the reason to stop |
+//!
+//! Columns are scaled to length 1 first: parameters of one fit differ by many powers of ten. A rank is therefore independent of
+//! the units of the parameters.
+
+mod levenberg_marquardt;
+mod linear;
+mod normal_equations;
+mod robust;
+
+pub use levenberg_marquardt::{LevenbergMarquardt, Linearization, Minimum, Residuals, Stop};
+pub use linear::{LinearFit, LinearProblem};
+pub use normal_equations::{invert_normal_equations, solve_normal_equations};
+pub use robust::{Loss, RobustFit};
+
+/// Why a least-squares problem has no solution.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LeastSquaresError {
+    /// Matrix, right side, weights or prior do not fit together.
+    #[error("{what} has {found} entries instead of {expected}")]
+    Shape {
+        /// The vector or matrix.
+        what: &'static str,
+        /// Its entries, or rows.
+        found: usize,
+        /// The entries, or rows, that fit.
+        expected: usize,
+    },
+    /// An entry is infinite or not a number.
+    #[error("{what} has an entry that is not finite; check the data for gaps, overflow and division by zero")]
+    NotFinite {
+        /// The vector or matrix.
+        what: &'static str,
+    },
+    /// The data do not determine all parameters.
+    #[error(
+        "the data determine {rank} of {parameters} parameters; record data of another kind, or leave out the parameters with the indices {undetermined:?}"
+    )]
+    RankDeficient {
+        /// Independent columns.
+        rank: usize,
+        /// Columns.
+        parameters: usize,
+        /// Columns that depend on the others, from 0, as the pivoting finds them.
+        undetermined: Vec<usize>,
+    },
+}
+
+#[cfg(test)]
+mod tests;

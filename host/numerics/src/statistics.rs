@@ -1,0 +1,400 @@
+//! Quantiles of the normal, Student's, χ² and F distributions, and intervals of a proportion.
+//!
+//! A quantile inverts its distribution function by bracketing and bisection of a monotone function, refined by Newton: it
+//! returns for every argument. Continued fractions and series of the incomplete gamma and beta functions: Press et al., *Numerical
+//! Recipes*, 3rd edition, 6.2 and 6.4 (Lentz's method).
+
+use std::f64::consts::{PI, SQRT_2};
+
+/// Half the width of a two-sided 90 % interval of a normal distribution, in standard deviations: Φ⁻¹(0.95).
+pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_7;
+
+/// Relative change at which a series or a continued fraction ends.
+const SETTLED: f64 = 1e-16;
+
+/// Terms of a series or a continued fraction; √(degrees of freedom) times a few are needed.
+const TERMS_MAX: usize = 100_000;
+
+/// Φ(x): the probability that a standard normal variable stays below x.
+pub fn normal_probability(x: f64) -> f64 {
+    0.5 * libm::erfc(-x / SQRT_2)
+}
+
+/// Φ⁻¹: the number below which a standard normal variable stays with probability `share`, to 1e-12.
+///
+/// Shares outside of 0 … 1 count as the nearest one that has a finite quantile.
+pub fn normal_quantile(share: f64) -> f64 {
+    // Tails are lighter than a double can hold from 1e-300 on.
+    let share = share.clamp(1e-300, 1.0 - f64::EPSILON);
+    // By symmetry the lower half is enough, where erfc keeps its relative precision.
+    if share > 0.5 {
+        return -normal_quantile(1.0 - share);
+    }
+    // Start: the tail bound; then Halley, which triples the digits.
+    let mut x = -(-2.0 * (2.0 * share).ln()).sqrt();
+    for _ in 0..8 {
+        let density = (-0.5 * x * x).exp() / (2.0 * PI).sqrt();
+        let excess = (0.5 * libm::erfc(-x / SQRT_2) - share) / density;
+        let step = excess / (1.0 + 0.5 * x * excess);
+        x -= step;
+        if step.abs() < 1e-13 * x.abs().max(1.0) {
+            break;
+        }
+    }
+    x
+}
+
+/// The probability that |t| of Student's distribution with ν degrees of freedom stays below `t`: 1 − I_{ν/(ν + t²)}(ν/2, 1/2).
+pub fn student_two_sided_probability(t: f64, freedoms: f64) -> f64 {
+    // The other half of the beta function: no cancellation for small t.
+    incomplete_beta(0.5, 0.5 * freedoms, t * t / (freedoms + t * t))
+}
+
+/// Half the width of the two-sided interval that holds a Student variable with probability `share`, to 1e-10.
+///
+/// Infinite without degrees of freedom.
+pub fn student_two_sided_quantile(share: f64, freedoms: f64) -> f64 {
+    if freedoms <= 0.0 {
+        return f64::INFINITY;
+    }
+    quantile(share, |t| student_two_sided_probability(t, freedoms))
+}
+
+/// The factor from a standard deviation to half a 90 % interval where the deviation comes from `freedoms` degrees of freedom.
+pub fn student_ninety_percent(freedoms: usize) -> f64 {
+    student_two_sided_quantile(0.9, freedoms as f64)
+}
+
+/// The probability that χ² with ν degrees of freedom stays below x: P(ν/2, x/2).
+pub fn chi_squared_probability(x: f64, freedoms: f64) -> f64 {
+    incomplete_gamma(0.5 * freedoms, 0.5 * x)
+}
+
+/// The number below which χ² with ν degrees of freedom stays with probability `share`, to 1e-10 of it.
+pub fn chi_squared_quantile(share: f64, freedoms: f64) -> f64 {
+    quantile(share, |x| chi_squared_probability(x, freedoms))
+}
+
+/// The probability that F with (ν₁, ν₂) degrees of freedom stays below x: I_{ν₁x/(ν₁x + ν₂)}(ν₁/2, ν₂/2).
+pub fn f_probability(x: f64, [above, below]: [f64; 2]) -> f64 {
+    incomplete_beta(0.5 * above, 0.5 * below, above * x / (above * x + below))
+}
+
+/// The number below which F with (ν₁, ν₂) degrees of freedom stays with probability `share`, to 1e-10 of it.
+pub fn f_quantile(share: f64, freedoms: [f64; 2]) -> f64 {
+    quantile(share, |x| f_probability(x, freedoms))
+}
+
+/// The number below which Hotelling's T² of a mean of `samples` vectors of `dimension` entries stays with probability `share`:
+/// p(n − 1)/(n − p) F_{p, n − p}.
+///
+/// Infinite where there are not more samples than entries.
+pub fn hotelling_quantile(share: f64, dimension: usize, samples: usize) -> f64 {
+    if samples <= dimension {
+        return f64::INFINITY;
+    }
+    let (p, n) = (dimension as f64, samples as f64);
+    p * (n - 1.0) / (n - p) * f_quantile(share, [p, n - p])
+}
+
+/// The exact two-sided interval of a probability of which `hits` of `trials` are known (Clopper and Pearson, Biometrika 26
+/// (1934) 404).
+pub fn binomial_interval(share: f64, hits: usize, trials: usize) -> [f64; 2] {
+    let tail = 0.5 * (1.0 - share);
+    let (k, n) = (hits.min(trials) as f64, trials as f64);
+    let end = |share: f64, a: f64, b: f64| bisect(share, [0.0, 1.0], |x| incomplete_beta(a, b, x));
+    let low = if k == 0.0 { 0.0 } else { end(tail, k, n - k + 1.0) };
+    let high = if k == n {
+        1.0
+    } else {
+        end(1.0 - tail, k + 1.0, n - k)
+    };
+    [low, high]
+}
+
+/// The quantile of a sorted sample, linear between the order statistics at (i + 1/2)/n (Hazen); `None` of an empty one.
+pub fn sample_quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let position = (share * sorted.len() as f64 - 0.5).max(0.0);
+    let (below, rest) = (position.floor() as usize, position.fract());
+    let at = |index: usize| sorted.get(index).or(sorted.last()).copied();
+    let (low, high) = (at(below)?, at(below + 1)?);
+    // Beside an infinite neighbour an order statistic keeps its value.
+    Some(if rest == 0.0 {
+        low
+    } else {
+        low + (high - low) * rest
+    })
+}
+
+/// Inverts a distribution function on 0 … ∞.
+fn quantile(share: f64, probability: impl Fn(f64) -> f64) -> f64 {
+    if share.is_nan() {
+        return f64::NAN;
+    }
+    if share <= 0.0 {
+        return 0.0;
+    }
+    let mut high = 1.0;
+    while probability(high) < share {
+        high *= 2.0;
+        if high > 1e200 {
+            return f64::INFINITY;
+        }
+    }
+    let mut low = 0.5 * high;
+    while low > 1e-200 && probability(low) > share {
+        (low, high) = (0.5 * low, low);
+    }
+    bisect(share, [low, high], probability)
+}
+
+/// Halves a bracket of a rising function until neighbouring numbers are reached.
+fn bisect(share: f64, [mut low, mut high]: [f64; 2], probability: impl Fn(f64) -> f64) -> f64 {
+    // 1 100 halvings exhaust the range of exponents; 60 are usual.
+    for _ in 0..1100 {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if probability(middle) < share {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// P(a, x), the regularized lower incomplete gamma function.
+fn incomplete_gamma(a: f64, x: f64) -> f64 {
+    if x <= 0.0 {
+        return 0.0;
+    }
+    if x.is_infinite() {
+        return 1.0;
+    }
+    let factor = (a * x.ln() - x - libm::lgamma(a)).exp();
+    if x < a + 1.0 {
+        let (mut term, mut sum) = (1.0 / a, 1.0 / a);
+        for k in 1..TERMS_MAX {
+            term *= x / (a + k as f64);
+            sum += term;
+            if term < SETTLED * sum {
+                break;
+            }
+        }
+        return factor * sum;
+    }
+    let step = |k: usize| -> [f64; 2] {
+        let k = k as f64;
+        [k * (a - k), x + 2.0 * k + 1.0 - a]
+    };
+    1.0 - factor / continued_fraction(x + 1.0 - a, step)
+}
+
+/// I_x(a, b), the regularized incomplete beta function.
+fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
+    if x <= 0.0 || x >= 1.0 || x.is_nan() {
+        return x.clamp(0.0, 1.0);
+    }
+    // The fraction converges fast on the near side of the mean.
+    if x > (a + 1.0) / (a + b + 2.0) {
+        return 1.0 - incomplete_beta(b, a, 1.0 - x);
+    }
+    let factor = (a * x.ln() + b * (-x).ln_1p() - log_beta(a, b)).exp() / a;
+    let step = |k: usize| -> [f64; 2] {
+        let m = (k / 2) as f64;
+        let numerator = if k % 2 == 0 {
+            m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m))
+        } else {
+            -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0))
+        };
+        [numerator, 1.0]
+    };
+    factor / continued_fraction(1.0, step)
+}
+
+/// ln B(a, b) = ln Γ(a) + ln Γ(b) − ln Γ(a + b).
+///
+/// Of large arguments the logarithms cancel; Stirling's series of the difference does not (Abramowitz & Stegun 6.1.41).
+fn log_beta(a: f64, b: f64) -> f64 {
+    let (small, large) = (a.min(b), a.max(b));
+    // From 20 on four terms of the series are exact to 1e-14.
+    if large < 20.0 {
+        return libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
+    }
+    let rest = |z: f64| {
+        (1.0 / 12.0 - (1.0 / 360.0 - (1.0 / 1260.0 - 1.0 / (1680.0 * z * z)) / (z * z)) / (z * z)) / z
+    };
+    let ratio = (large - 0.5) * (small / large).ln_1p() + small * (large + small).ln() - small
+        + rest(large + small)
+        - rest(large);
+    libm::lgamma(small) - ratio
+}
+
+/// b₀ + a₁/(b₁ + a₂/(b₂ + …)) by Lentz's method, from [a_k, b_k].
+fn continued_fraction(first: f64, step: impl Fn(usize) -> [f64; 2]) -> f64 {
+    let tiny = |value: f64| if value.abs() < 1e-300 { 1e-300 } else { value };
+    let mut value = tiny(first);
+    let (mut c, mut d) = (value, 0.0);
+    for k in 1..TERMS_MAX {
+        let [a, b] = step(k);
+        d = 1.0 / tiny(b + a * d);
+        c = tiny(b + a / c);
+        value *= c * d;
+        if (c * d - 1.0).abs() < SETTLED {
+            break;
+        }
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    #[test]
+    fn normal_quantiles_are_those_of_the_tables() {
+        // Abramowitz & Stegun, table 26.5.
+        for (share, x) in [
+            (0.05, -1.644_853_626_951_473),
+            (0.5, 0.0),
+            (0.95, NINETY_PERCENT),
+            (0.975, 1.959_963_984_540_054),
+            (1e-6, -4.753_424_308_822_899),
+            (0.3, -0.524_400_512_708_041),
+        ] {
+            assert!((normal_quantile(share) - x).abs() < 1e-11, "{share}");
+        }
+    }
+
+    #[test]
+    fn student_quantiles_are_those_of_the_tables() {
+        // Abramowitz & Stegun, table 26.10, A = 0.9; ν = 1 and 2 in closed form.
+        assert!((student_ninety_percent(1) - (0.45 * PI).tan()).abs() < 1e-9);
+        let two = (2.0 * 0.9_f64.powi(2) / (1.0 - 0.9_f64.powi(2))).sqrt();
+        assert!((student_ninety_percent(2) - two).abs() < 1e-10);
+        for (freedoms, quantile) in [
+            (3, 2.353),
+            (4, 2.132),
+            (5, 2.015),
+            (10, 1.812),
+            (30, 1.697),
+            (120, 1.658),
+        ] {
+            assert!(
+                (student_ninety_percent(freedoms) - quantile).abs() < 6e-4,
+                "{freedoms}"
+            );
+        }
+        assert_eq!(student_ninety_percent(0), f64::INFINITY);
+        assert!((student_ninety_percent(100_000_000) - NINETY_PERCENT).abs() < 1e-7);
+    }
+
+    #[test]
+    fn chi_squared_quantiles_are_those_of_the_tables() {
+        // With two degrees of freedom −2 ln(1 − p); else Abramowitz & Stegun, table 26.8.
+        for share in [1e-6, 0.1, 0.5, 0.999] {
+            let exact = -2.0 * f64::ln_1p(-share);
+            assert!(
+                (chi_squared_quantile(share, 2.0) / exact - 1.0).abs() < 1e-9,
+                "{share}"
+            );
+        }
+        for (share, freedoms, x) in [
+            (0.95, 1.0, 3.841_46),
+            (0.99, 5.0, 15.086_3),
+            (0.05, 10.0, 3.940_30),
+            (0.975, 30.0, 46.979_2),
+            (0.95, 100.0, 124.342),
+        ] {
+            assert!(
+                (chi_squared_quantile(share, freedoms) / x - 1.0).abs() < 4e-6,
+                "{share} {freedoms}"
+            );
+        }
+    }
+
+    #[test]
+    fn f_quantiles_are_those_of_the_tables() {
+        // Abramowitz & Stegun, table 26.9.
+        for (share, freedoms, x) in [
+            (0.95, [1.0, 1.0], 161.4),
+            (0.95, [5.0, 10.0], 3.33),
+            (0.99, [3.0, 20.0], 4.94),
+            (0.90, [2.0, 60.0], 2.39),
+        ] {
+            assert!(
+                (f_quantile(share, freedoms) / x - 1.0).abs() < 2e-3,
+                "{freedoms:?}"
+            );
+        }
+        // t² is F with one degree of freedom above.
+        let t = student_two_sided_quantile(0.9, 7.0);
+        assert!((f_quantile(0.9, [1.0, 7.0]) - t * t).abs() < 1e-9);
+        assert!((hotelling_quantile(0.9, 1, 8) - t * t).abs() < 1e-9);
+        assert_eq!(hotelling_quantile(0.9, 3, 3), f64::INFINITY);
+    }
+
+    #[test]
+    fn binomial_intervals_hold_the_tail_that_they_are_made_for() {
+        // 0 of n: 1 − (α/2)^(1/n).
+        let [low, high] = binomial_interval(0.9, 0, 20);
+        assert_eq!(low, 0.0);
+        assert!((high - (1.0 - 0.05_f64.powf(1.0 / 20.0))).abs() < 1e-12);
+        let seed = 23;
+        println!("seed {seed}");
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        for _ in 0..50 {
+            let trials = rng.random_range(1..40_usize);
+            let hits = rng.random_range(0..=trials);
+            let [low, high] = binomial_interval(0.9, hits, trials);
+            // Independently: the sums of the binomial distribution.
+            let tail = |p: f64, range: std::ops::RangeInclusive<usize>| -> f64 {
+                let term = |k: usize| {
+                    let ways: f64 = (0..k).map(|i| (trials - i) as f64 / (i + 1) as f64).product();
+                    ways * p.powi(k as i32) * (1.0 - p).powi((trials - k) as i32)
+                };
+                range.map(term).sum()
+            };
+            if hits > 0 {
+                assert!((tail(low, hits..=trials) - 0.05).abs() < 1e-9, "{hits}/{trials}");
+            }
+            if hits < trials {
+                assert!((tail(high, 0..=hits) - 0.05).abs() < 1e-9, "{hits}/{trials}");
+            }
+        }
+    }
+
+    #[test]
+    fn quantiles_invert_their_probabilities() {
+        let seed = 29;
+        println!("seed {seed}");
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        for _ in 0..200 {
+            let share: f64 = rng.random_range(0.001..0.999);
+            let freedoms: f64 = rng.random_range(0.3..300.0);
+            let other: f64 = rng.random_range(0.3..300.0);
+            let back = [
+                normal_probability(normal_quantile(share)),
+                student_two_sided_probability(student_two_sided_quantile(share, freedoms), freedoms),
+                chi_squared_probability(chi_squared_quantile(share, freedoms), freedoms),
+                f_probability(f_quantile(share, [freedoms, other]), [freedoms, other]),
+            ];
+            for back in back {
+                assert!((back - share).abs() < 1e-11, "{share} {freedoms} {other} {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn sample_quantiles_interpolate() {
+        assert_eq!(sample_quantile(&[], 0.5), None);
+        assert_eq!(sample_quantile(&[3.0], 0.2), Some(3.0));
+        assert_eq!(sample_quantile(&[1.0, 2.0, 4.0, 8.0], 0.5), Some(3.0));
+        assert_eq!(sample_quantile(&[1.0, f64::INFINITY], 0.25), Some(1.0));
+        assert_eq!(sample_quantile(&[1.0, 2.0], 1.0), Some(2.0));
+    }
+}
