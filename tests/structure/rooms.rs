@@ -45,6 +45,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     (
         "quietcut-identify",
         &[
+            "criteria",
             "least_squares",
             "student",
             "modes",

@@ -44,6 +44,7 @@
 
 pub mod ambient;
 pub mod case_file;
+mod criteria;
 pub mod cutting;
 pub mod dwells;
 mod least_squares;

@@ -13,6 +13,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::recording::Ambient;
+use crate::criteria::{LARGEST_AMBIENT_DAMPING, SAME_MODE};
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 
@@ -74,12 +75,6 @@ const PERIODS: f64 = 1.5;
 /// Step along the move of a block: small beside the scatter of the mean, large beside rounding.
 const STEP: f64 = 1e-3;
 
-/// A mode stays where it is when it moves by less than this share, or this many deviations, as the order grows.
-const STAYS: (f64, f64) = (0.01, 3.0);
-
-/// The largest damping ratio of a mode: what decays faster is the shape of the noise.
-const LARGEST_DAMPING: f64 = 0.3;
-
 /// The modes of a record in a band, Hz.
 ///
 /// # Errors
@@ -124,7 +119,7 @@ pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientMo
         .filter(|mode| {
             larger.iter().any(|pole| {
                 let moved = (pole.norm() / TAU - mode.frequency_hz).abs();
-                moved < STAYS.0 * mode.frequency_hz || moved < STAYS.1 * mode.frequency_deviation_hz
+                moved < SAME_MODE.0 * mode.frequency_hz || moved < SAME_MODE.1 * mode.frequency_deviation_hz
             })
         })
         .collect();
@@ -212,7 +207,7 @@ impl Record {
         let [low_hz, high_hz] = self.band_hz;
         let is_mode = |pole: &Complex64| {
             let (hz, damping) = (pole.norm() / TAU, -pole.re / pole.norm());
-            (low_hz..=high_hz).contains(&hz) && damping > 0.0 && damping < LARGEST_DAMPING
+            (low_hz..=high_hz).contains(&hz) && damping > 0.0 && damping < LARGEST_AMBIENT_DAMPING
         };
         let mut poles: Vec<Complex64> = self.poles(&self.mean, order).unwrap_or_default();
         poles.retain(is_mode);

@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
+use crate::criteria::SAME_FEED;
 use crate::cutting::chip::{Chip, chips};
 use crate::cutting::force_test::CuttingTest;
 use crate::cutting::prepared_test::{Prepared, prepared};
@@ -28,9 +29,6 @@ pub const KEYS: [&str; 6] = [
     "kre_n_per_mm",
     "kae_n_per_mm",
 ];
-
-/// Feeds that differ by less than this are one.
-const SAME_FEED: f64 = 0.02;
 
 /// A value with its standard deviation; the half-width of the 90 % interval is 1.645 standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]

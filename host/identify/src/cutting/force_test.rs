@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
+use crate::criteria::{ENGAGED_SHARE, LEAST_REVOLUTIONS};
 use quietcut_model::structure::feed_axes;
 use quietcut_recording::{Quantity, Recording, RecordingError, SpindleAngle};
 
@@ -44,12 +45,6 @@ pub struct Setup {
     /// Begin and end of full engagement, s; `None` derives them from the force.
     pub full_cut_s: Option<[f64; 2]>,
 }
-
-/// Fewest revolutions in full cut.
-const REVOLUTIONS: usize = 4;
-
-/// Force of a revolution as a share of that of full cut, above which the tool is in.
-const INSIDE: f64 = 0.9;
 
 impl CuttingTest {
     /// The test of a recording.
@@ -113,7 +108,7 @@ impl CuttingTest {
         test.find_full_cut(window).ok_or_else(|| RecordingError::Content {
             path: recording.path.clone(),
             what: format!(
-                "fewer than {REVOLUTIONS} whole revolutions in full cut; record longer, or say from when to when the tool is in full cut (--cut-s)"
+                "fewer than {LEAST_REVOLUTIONS} whole revolutions in full cut; record longer, or say from when to when the tool is in full cut (--cut-s)"
             ),
         })?;
         Ok(test)
@@ -165,10 +160,10 @@ impl CuttingTest {
             let full = *sorted.get(3 * sorted.len() / 4)?;
             let above = |share: f64| sizes.iter().position(|size| *size > share * full);
             let below = |share: f64| sizes.iter().rposition(|size| *size > share * full);
-            let (rise, fall) = (above(INSIDE)?, below(INSIDE)?);
+            let (rise, fall) = (above(ENGAGED_SHARE)?, below(ENGAGED_SHARE)?);
             // From a tenth to nine tenths; half of that again takes the last tenth four times over, on a straight way.
-            let way_in = rise - above(1.0 - INSIDE)?;
-            let way_out = below(1.0 - INSIDE)? - fall;
+            let way_in = rise - above(1.0 - ENGAGED_SHARE)?;
+            let way_out = below(1.0 - ENGAGED_SHARE)? - fall;
             let beyond = |way: usize| if way > 0 { way / 2 + 2 } else { 0 };
             let from = rise + beyond(way_in);
             let to = fall.checked_sub(beyond(way_out))?;
@@ -177,6 +172,6 @@ impl CuttingTest {
             }
             self.full_cut = [revolutions[from][0], revolutions[to][1]];
         }
-        (self.revolutions().len() >= REVOLUTIONS).then_some(())
+        (self.revolutions().len() >= LEAST_REVOLUTIONS).then_some(())
     }
 }

@@ -15,6 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
+use crate::criteria::{CERTAIN_DEVIATIONS, MISJUDGED_SHARE};
 use crate::cutting::observed_cut::ObservedCut;
 use crate::modes::IdentifiedMode;
 use crate::modes::shape::{normalize, rank_one};
@@ -114,12 +115,6 @@ const EFFECTIVE: f64 = 0.5;
 
 /// Moves of every particle after each step, and after the last one.
 const MOVES: [usize; 2] = [2, 4];
-
-/// ln |μ| changes by about its share of the depth, at most a few times as much: beyond so many errors of depth a verdict is sure.
-const SURE: f64 = 12.0;
-
-/// Share of cuts that are told wrongly for reasons of their own.
-const WRONG: f64 = 1e-3;
 
 /// The structures: logarithms of factors on the first guess, three for each mode.
 struct Family<'a> {
@@ -263,7 +258,7 @@ impl Family<'_> {
                 return (f64::NEG_INFINITY, self.cuts.len());
             };
             let high_growth = high.multiplier_abs.ln();
-            let deviations = if high_growth.abs() > SURE * self.errors.depth {
+            let deviations = if high_growth.abs() > CERTAIN_DEVIATIONS * self.errors.depth {
                 high_growth.signum() * f64::INFINITY
             } else {
                 let Ok(low) = point(&problem, cut.rpm, cut.depth_mm / step) else {
@@ -275,12 +270,12 @@ impl Family<'_> {
                 0.5 * (low_growth + high_growth) / slope
             };
             let toward = if cut.chatters { deviations } else { -deviations };
-            sum += (WRONG + (1.0 - 2.0 * WRONG) * normal_share(toward)).ln();
+            sum += (MISJUDGED_SHARE + (1.0 - 2.0 * MISJUDGED_SHARE) * normal_share(toward)).ln();
             wrong += usize::from(toward < -3.0);
             if let (Some(measured), Some(predicted)) = (cut.chatter_hz, high.chatter_hz) {
                 let off = (measured / predicted - 1.0) / self.errors.frequency;
                 let density = (-0.5 * off * off).exp();
-                sum += (WRONG * self.errors.frequency + (1.0 - WRONG) * density).ln();
+                sum += (MISJUDGED_SHARE * self.errors.frequency + (1.0 - MISJUDGED_SHARE) * density).ln();
                 wrong += usize::from(off.abs() > 4.0 && toward >= -3.0);
             }
         }

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
+use crate::criteria::{LEAST_DWELL_PERIODS, STEADY_CHANGE, STEADY_DEVIATIONS};
 use crate::dwells::dwell::{Dwell, Stretch, direction_of, pool_variances, stretches};
 use quietcut_recording::Recording;
 
@@ -27,9 +28,6 @@ pub struct Steady {
     /// For people.
     pub warnings: Vec<String>,
 }
-
-/// Fewest periods of a dwell.
-const PERIODS: f64 = 10.0;
 
 /// Every dwell of every recording, with `harmonics` harmonics.
 pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) -> Steady {
@@ -98,7 +96,7 @@ struct Settled {
 /// periods.
 fn settled(recording: &Recording, stretch: Stretch, harmonics: usize, settling: Settling) -> Option<Settled> {
     let (dwell, whole) = first_settled(recording, stretch, harmonics, settling)?;
-    let least = (PERIODS * recording.sample_rate_hz / stretch.frequency_hz).ceil() as usize;
+    let least = (LEAST_DWELL_PERIODS * recording.sample_rate_hz / stretch.frequency_hz).ceil() as usize;
     let last = |samples: usize| Stretch {
         from: stretch.to - samples,
         ..stretch
@@ -131,13 +129,6 @@ fn settled(recording: &Recording, stretch: Stretch, harmonics: usize, settling: 
     }
 }
 
-/// A motion whose fundamental differs by less than this share between the halves of a dwell is still: transients that are left of
-/// it move parameters by less than noise of a percent does.
-const STILL: f64 = 1e-3;
-
-/// Chance differs by more than so many deviations once in ten thousand times.
-const CHANCE: f64 = 4.0;
-
 /// True where no motion changes from the first half of a dwell to the second.
 fn is_still(recording: &Recording, part: Stretch, dwell: &Dwell) -> bool {
     let middle = (part.from + part.to) / 2;
@@ -160,7 +151,7 @@ fn is_still(recording: &Recording, part: Stretch, dwell: &Dwell) -> bool {
         let turned = line.amplitude(1)
             * dwell.omega_variance.sqrt()
             * (0.5 * dwell.samples as f64 / recording.sample_rate_hz);
-        change < (STILL * line.amplitude(1)).max(CHANCE * noise.hypot(turned))
+        change < (STEADY_CHANGE * line.amplitude(1)).max(STEADY_DEVIATIONS * noise.hypot(turned))
     })
 }
 
@@ -186,7 +177,7 @@ fn first_settled(
     settling: Settling,
 ) -> Option<(Dwell, bool)> {
     let count = (stretch.to - stretch.from) as f64;
-    let least = PERIODS * recording.sample_rate_hz / stretch.frequency_hz;
+    let least = LEAST_DWELL_PERIODS * recording.sample_rate_hz / stretch.frequency_hz;
     let from = |seconds: f64| Stretch {
         from: stretch.from + (seconds * recording.sample_rate_hz).ceil() as usize,
         ..stretch

@@ -37,7 +37,9 @@ use num_complex::Complex64;
 use model::warnings;
 use pole_residue::PoleResidue;
 use refinement::Refined;
-use rejected::{OVERDAMPED, reject};
+use rejected::reject;
+
+use crate::criteria::{LEAST_RESIDUE_SIGNIFICANCE, OVERDAMPED};
 
 /// Options of the identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,9 +58,6 @@ impl Default for Options {
         }
     }
 }
-
-/// A mode whose residue is less than so many of its standard deviations is not there.
-const SEEN: f64 = 3.0;
 
 /// Identifies the modes of receptances.
 ///
@@ -111,8 +110,8 @@ fn spurious(refined: &Refined, [from_hz, to_hz]: [f64; 2]) -> Option<(usize, Str
             format!("damping ratio {damping:.2} after refinement: no resonance")
         } else if !(from_hz..=to_hz).contains(&hertz) {
             format!("outside the band from {from_hz:.2} to {to_hz:.2} Hz after refinement")
-        } else if significance < SEEN {
-            format!("its residue is {significance:.1} standard deviations; {SEEN} are needed")
+        } else if significance < LEAST_RESIDUE_SIGNIFICANCE {
+            format!("its residue is {significance:.1} standard deviations; {LEAST_RESIDUE_SIGNIFICANCE} are needed")
         } else {
             return None;
         };

@@ -6,6 +6,7 @@ use super::mode::IdentifiedMode;
 use super::rejected::Rejected;
 use super::shape;
 use super::stabilization::Stabilization;
+use crate::criteria::{LARGEST_FIT_ERROR, LINES_PER_HALF_POWER_WIDTH};
 use quietcut_model::structure::Direction;
 
 /// The result.
@@ -32,16 +33,10 @@ pub struct ModalModel {
     pub warnings: Vec<String>,
 }
 
-/// Part of the receptances that may be left of a good fit.
-const GOOD_FIT: f64 = 0.1;
-
-/// Fewest lines within the width of a resonance, 2ζf, for its damping to be measured rather than extrapolated.
-const LINES_PER_WIDTH: f64 = 3.0;
-
 /// Warnings about quantities that lines of this spacing determine poorly.
 pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     let mut warnings = Vec::new();
-    if model.fit_error > GOOD_FIT {
+    if model.fit_error > LARGEST_FIT_ERROR {
         warnings.push(format!(
             "the residual is {:.0} % of the receptances; more modes, a narrower band, or a linear structure are needed",
             100.0 * model.fit_error
@@ -51,7 +46,7 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
         let (hertz, damping) = (mode.mode.frequency_hz, mode.mode.damping_ratio);
         let width_hz = 2.0 * damping * hertz;
         let lines = width_hz / spacing_hz;
-        if lines < LINES_PER_WIDTH {
+        if lines < LINES_PER_HALF_POWER_WIDTH {
             warnings.push(format!(
                 "{lines:.1} lines within the width of the mode at {hertz:.3} Hz ({width_hz:.3} Hz); a finer resolution is needed for its damping"
             ));

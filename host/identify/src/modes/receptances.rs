@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::error::ModesError;
+use crate::criteria::{LEAST_LINES, LEAST_RELATIVE_DEVIATION};
 use quietcut_frf::FrfTable;
 use quietcut_model::structure::Direction;
 
@@ -29,12 +30,6 @@ pub struct Receptances {
 /// Lines on each side over which variances are averaged: one from a handful of averages scatters by half of itself.
 const NEIGHBOURS: usize = 4;
 
-/// A deviation below this part of a receptance's root mean square is taken for that: nothing is measured better.
-const LEAST_DEVIATION: f64 = 1e-5;
-
-/// Fewest lines for a fit.
-const LINES_MIN: usize = 16;
-
 impl Receptances {
     /// The receptances of a table from `band_hz[0]` to `band_hz[1]`.
     ///
@@ -55,9 +50,9 @@ impl Receptances {
                 hertz > 0.0 && (from_hz..=to_hz).contains(&hertz)
             })
             .collect();
-        if lines.len() < LINES_MIN {
+        if lines.len() < LEAST_LINES {
             return Err(ModesError::Data(format!(
-                "{} frequencies lie in the band; at least {LINES_MIN} are needed",
+                "{} frequencies lie in the band; at least {LEAST_LINES} are needed",
                 lines.len()
             )));
         }
@@ -101,7 +96,7 @@ impl Receptances {
 
     /// First and last frequency, Hz.
     pub fn band_hz(&self) -> [f64; 2] {
-        // There are at least LINES_MIN lines.
+        // There are at least LEAST_LINES lines.
         [
             self.frequency_hz[0],
             self.frequency_hz[self.frequency_hz.len() - 1],
@@ -165,7 +160,7 @@ impl Receptances {
     fn smoothed(&self, index: usize, stated: &[f64]) -> Vec<f64> {
         let values = &self.values[index];
         let power: f64 = values.iter().map(|value| value.norm_sqr()).sum::<f64>() / values.len() as f64;
-        let least = LEAST_DEVIATION * power.sqrt();
+        let least = LEAST_RELATIVE_DEVIATION * power.sqrt();
         (0..stated.len())
             .map(|k| {
                 let near = &stated[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(stated.len())];

@@ -13,9 +13,6 @@ pub struct Rejected {
     pub why: String,
 }
 
-/// Damping ratios from here on are no resonance: what bends the receptances so slowly is the residual of other modes.
-pub(super) const OVERDAMPED: f64 = 0.5;
-
 pub(super) fn reject(pole: Complex64, why: String) -> Rejected {
     Rejected {
         frequency_hz: pole.norm() / std::f64::consts::TAU,

@@ -7,21 +7,11 @@ use std::f64::consts::TAU;
 use super::denominator;
 use super::error::ModesError;
 use super::receptances::Receptances;
-use super::rejected::{OVERDAMPED, Rejected, reject};
+use super::rejected::{Rejected, reject};
+use crate::criteria::{
+    LEAST_HEIGHT, LEAST_ORDERS, ORDERS_SHARE, OVERDAMPED, SAME_DAMPING, SAME_FREQUENCY, SAME_SHAPE,
+};
 use quietcut_frf::rational_fit::residues;
-
-/// A pole is the same as one of the order before within these parts of frequency and damping ratio, and this modal
-/// assurance criterion of the residues.
-const SAME_FREQUENCY: f64 = 0.01;
-const SAME_DAMPING: f64 = 0.1;
-const SAME_SHAPE: f64 = 0.95;
-
-/// Orders in a row over which a pole must come again, as a part of all orders, and at least.
-const ORDERS_PART: f64 = 0.25;
-const ORDERS_MIN: usize = 4;
-
-/// Part of the largest height of a mode below which a stable pole counts as none.
-const WEAK: f64 = 3e-3;
 
 /// A pole of a model of some order.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,9 +81,9 @@ impl Stabilization {
 pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stabilization, ModesError> {
     let lines = data.frequency_hz.len();
     let highest = highest_order.min((lines - 1) / 3);
-    if highest <= ORDERS_MIN {
+    if highest <= LEAST_ORDERS {
         return Err(ModesError::Data(format!(
-            "order {highest} is the highest that {lines} frequencies and --order allow; more than {ORDERS_MIN} are needed"
+            "order {highest} is the highest that {lines} frequencies and --order allow; more than {LEAST_ORDERS} are needed"
         )));
     }
     let [from_hz, to_hz] = data.band_hz();
@@ -207,7 +197,7 @@ fn connect(now: &mut [Candidate], before: &[Candidate], lines: &mut usize) {
 
 /// Takes the long and strong lines: of each the pole that moved least.
 fn select(found: &mut Stabilization, lines: usize) {
-    let needed = ((ORDERS_PART * found.highest_order as f64).ceil() as usize).max(ORDERS_MIN);
+    let needed = ((ORDERS_SHARE * found.highest_order as f64).ceil() as usize).max(LEAST_ORDERS);
     let mut of_line: Vec<Vec<&Candidate>> = vec![Vec::new(); lines];
     for candidate in &found.candidates {
         of_line[candidate.line].push(candidate);
@@ -247,7 +237,7 @@ fn select(found: &mut Stabilization, lines: usize) {
     kept.sort_by(|a, b| b.height.total_cmp(&a.height));
     let highest = kept.first().map_or(0.0, |candidate| candidate.height);
     for candidate in kept {
-        if candidate.height > WEAK * highest {
+        if candidate.height > LEAST_HEIGHT * highest {
             found.selected.push(candidate.pole);
         } else {
             let part = 100.0 * candidate.height / highest;
@@ -255,7 +245,7 @@ fn select(found: &mut Stabilization, lines: usize) {
                 candidate.pole,
                 format!(
                     "{part:.2} % of the strongest mode; {:.1} % are needed",
-                    100.0 * WEAK
+                    100.0 * LEAST_HEIGHT
                 ),
             ));
         }

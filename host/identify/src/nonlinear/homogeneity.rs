@@ -1,5 +1,6 @@
 //! Homogeneity at constant frequency: does the response follow a rising force in proportion (thesis section 4.2.3)?
 
+use crate::criteria::{LEAST_REGION_POINTS, REGION_EVIDENCE};
 /// A range of force in which the response is proportional to the force.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Region {
@@ -58,22 +59,16 @@ pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
     (regions, jumps)
 }
 
-/// By how much the sum of squares over the noise must fall for a line to be two.
-const EVIDENCE: f64 = 50.0;
-
-/// Least points of a region.
-const REGION: usize = 6;
-
 fn split_line(points: &[(f64, f64)], from: usize, to: usize, noise: f64, cuts: &mut Vec<usize>) {
-    if to < from + 2 * REGION {
+    if to < from + 2 * LEAST_REGION_POINTS {
         return;
     }
     let whole = misfit(&points[from..to]);
-    let best = (from + REGION..=to - REGION)
+    let best = (from + LEAST_REGION_POINTS..=to - LEAST_REGION_POINTS)
         .map(|cut| (misfit(&points[from..cut]) + misfit(&points[cut..to]), cut))
         .min_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((sum, cut)) = best
-        && (whole - sum) / (noise * noise) > EVIDENCE
+        && (whole - sum) / (noise * noise) > REGION_EVIDENCE
     {
         cuts.push(cut);
         split_line(points, from, cut, noise, cuts);
@@ -87,7 +82,7 @@ fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
     while index + 1 < cuts.len() {
         let (from, cut, to) = (cuts[index - 1], cuts[index], cuts[index + 1]);
         let gain = misfit(&points[from..to]) - misfit(&points[from..cut]) - misfit(&points[cut..to]);
-        if gain <= EVIDENCE * noise * noise {
+        if gain <= REGION_EVIDENCE * noise * noise {
             cuts.remove(index);
         } else {
             index += 1;

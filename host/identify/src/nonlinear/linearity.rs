@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use crate::criteria::{EXPLAINED_SHARE, KIND_EVIDENCE};
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::{Dwell, Line};
 use crate::nonlinear::describing::{self, Kind};
@@ -67,13 +68,6 @@ struct Point {
     /// Variance of real or imaginary part.
     variance: f64,
 }
-
-/// By how much a sum of squares must fall per parameter to name a kind. Chance lets it fall by 25 in 6e-7 of cases.
-const EVIDENCE: f64 = 25.0;
-
-/// A choice that leaves less than this share of what the level does to F/X explains it: a describing function leaves out
-/// higher harmonics, and is wrong by up to a tenth of its effect.
-const EXPLAINED: f64 = 0.01;
 
 /// Tests dwells with force and motion in one direction.
 ///
@@ -247,13 +241,13 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
             sum: base.sum_of_squares(&candidate.features),
         })
         .collect();
-    all.retain(|choice| nothing.sum - choice.sum > EVIDENCE * choice.parameters as f64);
+    all.retain(|choice| nothing.sum - choice.sum > KIND_EVIDENCE * choice.parameters as f64);
     for (i, a) in candidates.iter().enumerate() {
         for b in candidates[i + 1..].iter().filter(|b| a.goes_with(b)) {
             let features: Vec<_> = a.features.iter().chain(&b.features).cloned().collect();
             let sum = base.sum_of_squares(&features);
             let needs = |other: &Candidate, parameters: usize| {
-                base.sum_of_squares(&other.features) - sum > EVIDENCE * parameters as f64
+                base.sum_of_squares(&other.features) - sum > KIND_EVIDENCE * parameters as f64
             };
             if needs(a, b.parameters) && needs(b, a.parameters) {
                 all.push(Choice {
@@ -270,7 +264,7 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
     };
     // Of the sets that explain all but a small share, or about as much as the best, the one with the fewest parameters; among
     // equals the best fit.
-    let enough = (least.sum + EVIDENCE).max(EXPLAINED * nothing.sum);
+    let enough = (least.sum + KIND_EVIDENCE).max(EXPLAINED_SHARE * nothing.sum);
     all.into_iter()
         .filter(|choice| choice.sum <= enough)
         .min_by_key(|choice| choice.parameters)

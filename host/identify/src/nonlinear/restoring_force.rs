@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::criteria::BAND_SIGNAL_TO_NOISE;
 use crate::least_squares::{scaled_inverse, scaled_least_squares};
 use crate::nonlinear::spectrum::{Spectral, band_of, loudest_hz};
 use crate::student::NINETY_PERCENT;
@@ -157,9 +158,6 @@ pub enum SurfaceError {
 /// Rounds of Sanathanan–Koerner weighting; the fourth changes nothing.
 const REWEIGHTINGS: usize = 4;
 
-/// In power: the motion must stand this far out of its noise to count for the band.
-const MARGIN: f64 = 1e3;
-
 impl Record<'_> {
     /// The motion within `band_hz`.
     pub fn motion(&self, band_hz: [f64; 2]) -> Motion {
@@ -184,7 +182,7 @@ impl Record<'_> {
     pub fn surface(&self, options: &Options) -> Result<Surface, SurfaceError> {
         let mut band_hz = options
             .band_hz
-            .unwrap_or_else(|| band_of(self.motion, self.rate_hz, MARGIN));
+            .unwrap_or_else(|| band_of(self.motion, self.rate_hz, BAND_SIGNAL_TO_NOISE));
         let loudest_hz = loudest_hz(self.motion, self.rate_hz);
         // Noise that is integrated has no end towards frequency 0.
         let integrated = matches!(self.quantity, Quantity::Velocity | Quantity::Acceleration);

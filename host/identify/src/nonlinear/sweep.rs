@@ -9,6 +9,8 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
+use crate::criteria::{LEAST_SWEEP_CHANGE, SWEEP_MISFIT};
+
 /// Lines on either side.
 const R: i64 = 7;
 /// Complex unknowns of a fit.
@@ -41,12 +43,6 @@ struct Local {
     /// Variance of H over that.
     gain: f64,
 }
-
-/// Above this misfit two records are not those of one linear structure. The misfit of a linear one scatters to about 5: its
-/// variances come from nine degrees of freedom a line and leave the noise of the force out.
-const MISFIT: f64 = 20.0;
-/// And differences below this share of the peak are nothing that a sweep can be relied on for.
-const CHANGE: f64 = 0.005;
 
 impl Spectra {
     /// The spectra of force (N) and displacement, velocity or acceleration, at `rate_hz`.
@@ -152,6 +148,6 @@ pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
     Some(Comparison {
         misfit,
         largest_change,
-        same: misfit < MISFIT || largest_change < CHANGE,
+        same: misfit < SWEEP_MISFIT || largest_change < LEAST_SWEEP_CHANGE,
     })
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::criteria::NEVER_LOWEST;
 use crate::student::NINETY_PERCENT;
 use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine};
@@ -11,9 +12,6 @@ const LOBES: usize = 4;
 
 /// Points of the distribution of several lobes: a power of 2.
 const POINTS: u32 = 256;
-
-/// A lobe farther above the lowest than so many deviations of their distance never is the lowest.
-const FAR: f64 = 4.0;
 
 /// The first limit at a speed, as the lowest of several planes over the unknowns.
 #[derive(Clone, Debug)]
@@ -54,7 +52,7 @@ impl KnownLimit {
     fn rivals(&self, roots: &[DVector<f64>]) -> Vec<usize> {
         let is_near = |index: &usize| {
             let apart = self.planes[*index].depth_mm - self.depth_mm();
-            apart <= FAR * (&roots[*index] - &roots[0]).norm()
+            apart <= NEVER_LOWEST * (&roots[*index] - &roots[0]).norm()
         };
         (0..self.planes.len())
             .filter(|index| *index == 0 || is_near(index))

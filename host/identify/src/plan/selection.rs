@@ -9,12 +9,7 @@ use rayon::prelude::*;
 
 use super::candidate::{Candidate, Test};
 use super::chart::KnownChart;
-
-/// More tests than anyone does.
-const MOST: usize = 30;
-
-/// A test that takes less than this share of the excess is not worth it.
-const WORTH: f64 = 1e-3;
+use crate::criteria::{LEAST_GAIN, MOST_TESTS};
 
 /// A test that is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +115,7 @@ impl<'a> Selection<'a> {
         let mut order = Vec::new();
         let mut information = self.nothing.clone();
         let mut excess = self.excess(&information);
-        while excess > 0.0 && order.len() < MOST {
+        while excess > 0.0 && order.len() < MOST_TESTS {
             let gains: Vec<(f64, f64)> = (0..self.candidates.len())
                 .into_par_iter()
                 .map(|candidate| {
@@ -131,7 +126,7 @@ impl<'a> Selection<'a> {
                 })
                 .collect();
             let best = (0..gains.len()).max_by(|&a, &b| gains[a].0.total_cmp(&gains[b].0).then(b.cmp(&a)));
-            let Some(best) = best.filter(|&best| excess - gains[best].1 > WORTH * excess) else {
+            let Some(best) = best.filter(|&best| excess - gains[best].1 > LEAST_GAIN * excess) else {
                 break;
             };
             order.push(best);

@@ -14,12 +14,13 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use crate::criteria::LINEARIZATION_ERROR;
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use crate::least_squares::{Normal, Spread, minimum, nearer};
 use crate::nonlinear::harmonic_balance::Problem;
 use crate::nonlinear::law::Extra;
-use crate::robot::cubic_model::{AXES, LINEARIZED, Model, Placed};
+use crate::robot::cubic_model::{AXES, Model, Placed};
 use crate::robot::joints::{self, JointFitError, JointParameter, PostureFrf};
 use quietcut_frf::{Frf, FrfTable};
 use quietcut_model::structure::{Direction, Robot};
@@ -211,7 +212,7 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
             let noise = (line.variance * dwell.gram_inverse[(1, 1)]).sqrt() / per_force.norm();
             let receptance = line.phasor(1) / per_force;
             // At the lowest force, too, joints are not quite linear.
-            Some((receptance, noise.hypot(LINEARIZED * receptance.norm())))
+            Some((receptance, noise.hypot(LINEARIZATION_ERROR * receptance.norm())))
         };
         if let Some(found) = kept.iter().map(of_dwell).collect::<Option<Vec<_>>>() {
             let (receptance, noise) = found.into_iter().unzip();

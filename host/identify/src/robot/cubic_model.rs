@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 use num_complex::Complex64;
 
+use crate::criteria::LINEARIZATION_ERROR;
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::{Dwell, Line};
 use crate::nonlinear::harmonic_balance::{Grid, Problem, Solution};
@@ -54,9 +55,6 @@ impl Placed {
 fn dynamic(matrix: &Matrix3xX<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(3, matrix.ncols(), |i, j| matrix[(i, j)])
 }
-
-/// The equivalent linearization leaves out harmonics and is wrong by about this share.
-pub(super) const LINEARIZED: f64 = 0.1;
 
 /// Axis, fundamental of the displacement, m, and its deviation, of every channel.
 pub(super) fn displacements(dwell: &Dwell) -> Vec<(usize, Complex64, f64)> {
@@ -233,7 +231,7 @@ impl<'a> Model<'a> {
             let moved: Complex64 = (0..q.len())
                 .map(|joint| q[joint] * placed.jacobian[(axis, joint)])
                 .sum();
-            let weight = 1.0 / noise.hypot(LINEARIZED * measured.norm());
+            let weight = 1.0 / noise.hypot(LINEARIZATION_ERROR * measured.norm());
             let left = (measured - moved) * weight;
             (residual[2 * row], residual[2 * row + 1]) = (left.re, left.im);
             for (column, parameter) in self.law.parameters.iter().enumerate() {

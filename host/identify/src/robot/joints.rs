@@ -13,6 +13,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 pub use super::joint_parameter::JointParameter;
+use crate::criteria::{LEAST_RELATIVE_ERROR, NEARLY_STATIC};
 use crate::least_squares::{FitError, scaled_inverse, scaled_least_squares, scaled_solve};
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
@@ -70,13 +71,6 @@ pub enum JointFitError {
     #[error(transparent)]
     Tones(#[from] FitError),
 }
-
-/// Receptances are never known better than this share of them: noise of the force in H1, sensors, windows, sample rates. No
-/// scatter shows an error that all have in common.
-const LEAST_ERROR: f64 = 3e-3;
-
-/// The lowest frequencies, as a share of that of the highest peak, are nearly static.
-const STATIC: f64 = 0.4;
 
 /// A posture with the quantities that do not depend on the parameters.
 struct Placed<'a> {
@@ -184,7 +178,7 @@ impl JointFit {
                     .map(|slope| (h.conj() * slope[(i, j)]).re / h.norm().max(f64::MIN_POSITIVE)),
             );
             let scatter = gradient.dot(&(&self.covariance * &gradient)).max(0.0);
-            (scatter + (LEAST_ERROR * h.norm()).powi(2)).sqrt()
+            (scatter + (LEAST_RELATIVE_ERROR * h.norm()).powi(2)).sqrt()
         });
         Some((model.receptance, deviation))
     }
@@ -217,7 +211,9 @@ fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
             let around =
                 &deviation[line.saturating_sub(NEIGHBOURS)..deviation.len().min(line + NEIGHBOURS + 1)];
             let variance = around.iter().map(|error| error * error).sum::<f64>() / around.len() as f64;
-            let error = variance.sqrt().max(LEAST_ERROR * receptance[line].norm());
+            let error = variance
+                .sqrt()
+                .max(LEAST_RELATIVE_ERROR * receptance[line].norm());
             if error > 0.0 { 1.0 / error } else { 0.0 }
         })
         .collect()
@@ -238,12 +234,12 @@ fn first_guess(robot: &mut Robot, placed: &[Placed<'_>]) {
         };
         let frequencies = table.frequency_hz();
         let peak = (0..frequencies.len()).max_by(|&a, &b| size(a).total_cmp(&size(b)));
-        let Some(last) = peak.map(|peak| STATIC * frequencies[peak]) else {
+        let Some(last) = peak.map(|peak| NEARLY_STATIC * frequencies[peak]) else {
             continue;
         };
         for (line, frequency) in frequencies.iter().enumerate().filter(|(_, f)| **f <= last) {
             // Below a resonance receptance has grown by 1/(1 − r²) of the static one.
-            let grown = 1.0 / (1.0 - (STATIC * frequency / last).powi(2));
+            let grown = 1.0 / (1.0 - (NEARLY_STATIC * frequency / last).powi(2));
             for (entry, deviation) in table.entries().iter().zip(&posture.frf.deviation) {
                 let (Some(i), Some(j)) = (entry.response.axis(), entry.force.axis()) else {
                     continue;
@@ -296,7 +292,7 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     Ok(JointFit {
         robot,
         // What scales all receptances scales all parameters.
-        covariance: scatter.add_scalar(LEAST_ERROR * LEAST_ERROR),
+        covariance: scatter.add_scalar(LEAST_RELATIVE_ERROR * LEAST_RELATIVE_ERROR),
         parameters,
         misfit,
         relative_error: (normal.left / normal.all.max(f64::MIN_POSITIVE)).sqrt(),

@@ -4,17 +4,12 @@ use num_complex::Complex64;
 
 use super::unknowns::{SMOOTH, Transient, Unknowns};
 use super::variances::{ChannelNoise, Variances};
+use crate::criteria::{LEAST_RECORD_LINES, MOST_RECORD_LINES};
 use crate::modes::error::ModesError;
 use crate::modes::model::ModalModel;
 use crate::modes::pole_residue::{PoleResidue, Shaped};
 use quietcut_frf::{ChannelLines, RecordSpectra};
 use quietcut_model::structure::Direction;
-
-/// Lines of all records from which on a fit would take minutes.
-const LINES_MAX: usize = 200_000;
-
-/// Fewest lines of a record.
-const LINES_MIN: usize = 16;
 
 /// The data of a fit.
 pub(super) struct Data<'a> {
@@ -30,9 +25,9 @@ pub(super) struct Data<'a> {
 impl<'a> Data<'a> {
     pub(super) fn new(model: &ModalModel, records: &'a [RecordSpectra]) -> Result<Self, ModesError> {
         let lines: usize = records.iter().map(|record| record.frequency_hz.len()).sum();
-        if lines > LINES_MAX {
+        if lines > MOST_RECORD_LINES {
             return Err(ModesError::Data(format!(
-                "the records have {lines} lines in the band, at most {LINES_MAX} can be fitted; give a narrower --band-hz about the modes"
+                "the records have {lines} lines in the band, at most {MOST_RECORD_LINES} can be fitted; give a narrower --band-hz about the modes"
             )));
         }
         let index = |all: &[Direction], channels: &[ChannelLines]| -> Option<Vec<usize>> {
@@ -51,9 +46,9 @@ impl<'a> Data<'a> {
                     record.path.display()
                 )));
             };
-            if record.frequency_hz.len() < LINES_MIN {
+            if record.frequency_hz.len() < LEAST_RECORD_LINES {
                 return Err(ModesError::Data(format!(
-                    "{} has {} lines in the band; at least {LINES_MIN} are needed",
+                    "{} has {} lines in the band; at least {LEAST_RECORD_LINES} are needed",
                     record.path.display(),
                     record.frequency_hz.len()
                 )));

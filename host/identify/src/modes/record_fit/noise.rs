@@ -11,6 +11,7 @@ use super::data::Data;
 use super::line::{Line, gain};
 use super::unknowns::{Transient, Unknowns};
 use super::variances::Variances;
+use crate::criteria::LEAST_RELATIVE_NOISE;
 use quietcut_frf::ChannelLines;
 
 /// Steps of scoring in one round.
@@ -18,9 +19,6 @@ const STEPS: usize = 10;
 
 /// The least that a step leaves of a variance.
 const SHRINK: f64 = 0.1;
-
-/// Noise below this part of a channel's root mean square is taken for that: nothing is measured better.
-const LEAST: f64 = 1e-5;
 
 /// Lines of a band over which forces are looked at together. Of so many the least eigenvalue of the noise of three channels
 /// is hardly ever below [`EIGENVALUE`] of its variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
@@ -62,7 +60,7 @@ pub(super) fn start(data: &Data<'_>, record: usize, unknowns: &Unknowns) -> Vari
 }
 
 fn least(channel: &ChannelLines) -> f64 {
-    (LEAST * channel.root_mean_square).powi(2)
+    (LEAST_RELATIVE_NOISE * channel.root_mean_square).powi(2)
 }
 
 /// The least that the noise of a force can be: its plateau, where it has one.
