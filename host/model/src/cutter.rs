@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+pub use super::immersion::Immersion;
+
 use super::force_law::ForceLaw;
 use crate::ModelError;
 use crate::milling::{Cut, Material, Runout, Tool};
@@ -48,15 +50,6 @@ pub struct Tooth {
     pub pitch_rad: f64,
     /// How far the tool feeds while it turns by that angle, m.
     pub feed_m: f64,
-}
-
-/// A place on the arc of the cut.
-#[derive(Clone, Copy, Debug)]
-pub struct Immersion {
-    /// sin φ: how much of the feed lies along the chip.
-    pub sin: f64,
-    /// Radially outwards, in the machine's x and y.
-    pub(super) outward: [f64; 2],
 }
 
 impl Cutter {

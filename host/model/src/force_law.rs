@@ -1,6 +1,6 @@
 //! How hard a chip pushes an edge, and how the flank behind the edge is damped.
 
-use super::cutter::Immersion;
+use super::immersion::Immersion;
 use crate::milling::Material;
 
 /// The force on an edge of axial depth b with the chip thickness h (thesis eqs 3.2 to 3.4): tangential, radial and axial
