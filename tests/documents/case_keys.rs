@@ -9,7 +9,7 @@ use quietcut::simulate::Effects;
 use quietcut::simulate::effect::ALL;
 use quietcut::simulate::effect::table::markdown;
 use quietcut_tests::command::folder;
-use quietcut_tests::documents::text;
+use quietcut_tests::documents::{assert_generated, text};
 
 const PAGE: &str = "host/CASE.md";
 
@@ -98,11 +98,7 @@ fn the_page_has_every_key_of_a_sidecar() {
 
 #[test]
 fn the_page_has_every_extension_with_an_example_that_reads() {
-    let table = markdown();
-    assert!(
-        text(PAGE).contains(&table),
-        "the table under [extension.NAME] in {PAGE} is not that of the specifications; it must be\n{table}"
-    );
+    assert_generated(PAGE, Some("extensions"), &markdown());
     for spec in ALL {
         let case = |more: &str| {
             let text = format!("[extension.{}]\n{}\n{more}\n", spec.name, spec.example);
