@@ -14,7 +14,6 @@ const STILL_THERE: &[(&str, &str)] = &[
     ("quietcut-core", "monitor.rs"),
     ("quietcut-core", "stroboscope/exponential.rs"),
     ("quietcut-firmware", "storage.rs"),
-    ("quietcut-model", "case/mod.rs"),
     ("quietcut-diagnose", "candidates/process.rs"),
     ("quietcut-diagnose", "candidates/restoring.rs"),
     ("quietcut-diagnose", "candidates/sensor.rs"),

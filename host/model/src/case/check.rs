@@ -13,7 +13,27 @@ use toml::Spanned;
 use super::file::{CaseFile, Number};
 use super::{Case, CaseError, Deviation, Parameter, Posture};
 
-pub(super) fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
+impl Case {
+    /// Reads a case file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not TOML, has a key that does not belong or lacks one that does, or has a
+    /// value that no machine, tool or cut can have.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, CaseError> {
+        let path = path.as_ref();
+        Self::parse(path, &quietcut_recording::file::read_text(path)?)
+    }
+
+    /// A case from the text of a case file; `path` is for its name and for messages.
+    ///
+    /// # Errors
+    /// As [`Case::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, CaseError> {
+        case(path, text)
+    }
+}
+
+fn case(path: &Path, text: &str) -> Result<Case, CaseError> {
     let file: CaseFile = toml::from_str(text).map_err(|error| syntax(path, text, &error))?;
     let mut check = Check {
         path,

@@ -9,10 +9,11 @@ mod deviation;
 mod error;
 mod file;
 mod limits;
+mod parameter_value;
 mod posture;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 pub use deviation::{Deviation, Parameter};
 pub use error::CaseError;
@@ -51,24 +52,6 @@ pub struct Case {
 }
 
 impl Case {
-    /// Reads a case file.
-    ///
-    /// # Errors
-    /// The file cannot be read, is not TOML, has a key that does not belong or lacks one that does, or has a
-    /// value that no machine, tool or cut can have.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, CaseError> {
-        let path = path.as_ref();
-        Self::parse(path, &quietcut_recording::file::read_text(path)?)
-    }
-
-    /// A case from the text of a case file; `path` is for its name and for messages.
-    ///
-    /// # Errors
-    /// As [`Case::read`].
-    pub fn parse(path: &Path, text: &str) -> Result<Self, CaseError> {
-        check::case(path, text)
-    }
-
     /// The structure.
     ///
     /// # Errors

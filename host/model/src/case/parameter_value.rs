@@ -1,0 +1,115 @@
+//! The value of a parameter in a case, and its change.
+
+use num_complex::Complex64;
+
+use super::Case;
+use super::deviation::Parameter;
+use crate::structure::{Form, Joint, Matrices, Mode};
+
+impl Parameter {
+    /// The value of the parameter in a case; `None` where the case has no such thing.
+    pub fn value(self, case: &Case) -> Option<f64> {
+        // Looking at a value and changing it must not be two lists: a copy is looked at.
+        self.slot(&mut case.clone()).map(|value| *value)
+    }
+
+    /// Changes the value of the parameter in a case.
+    ///
+    /// Start and exit angle stay within 0 to 180 degrees, outside of which a tooth cuts no chip. False where the case
+    /// has no such thing, or no machine, tool or cut has the value that comes out.
+    pub fn shift(self, case: &mut Case, by: f64) -> bool {
+        let Some(value) = self.slot(case) else {
+            return false;
+        };
+        *value += by;
+        match self {
+            Self::Start | Self::Exit => {
+                *value = value.clamp(0.0, 180.0);
+                case.cut.is_some_and(|cut| cut.start_deg < cut.exit_deg)
+            }
+            Self::Frequency(_) | Self::Ktc | Self::JointStiffness(_) | Self::LinkMass(_) => *value > 0.0,
+            Self::JointDamping(_) => *value >= 0.0,
+            Self::DampingRatio(_) => (0.0..1.0).contains(value),
+            Self::EdgeAngle => *value > 0.0 && *value <= 90.0,
+            Self::FeedPerTooth | Self::RunoutOffset => *value >= 0.0,
+            _ => true,
+        }
+    }
+
+    fn slot(self, case: &mut Case) -> Option<&mut f64> {
+        match self {
+            Self::Mass(..)
+            | Self::Damping(..)
+            | Self::Stiffness(..)
+            | Self::CubicDamping(..)
+            | Self::CubicStiffness(..) => match &mut case.structure.as_mut()?.form {
+                Form::Matrices(matrices) => self.of_matrices(matrices),
+                Form::Modes(_) | Form::Joints(_) => None,
+            },
+            Self::Frequency(mode)
+            | Self::DampingRatio(mode)
+            | Self::Left(mode, ..)
+            | Self::Right(mode, ..) => match &mut case.structure.as_mut()?.form {
+                Form::Modes(modes) => self.of_mode(modes.get_mut(mode)?),
+                Form::Matrices(_) | Form::Joints(_) => None,
+            },
+            Self::JointStiffness(joint)
+            | Self::JointDamping(joint)
+            | Self::JointCubicStiffness(joint)
+            | Self::JointCubicDamping(joint)
+            | Self::LinkMass(joint) => match &mut case.structure.as_mut()?.form {
+                Form::Joints(robot) => self.of_joint(robot.joints.get_mut(joint)?),
+                Form::Matrices(_) | Form::Modes(_) => None,
+            },
+            Self::EdgeAngle => Some(&mut case.tool.as_mut()?.edge_angle_deg),
+            Self::RunoutOffset => Some(&mut case.tool.as_mut()?.runout.as_mut()?.offset_um),
+            Self::RunoutAngle => Some(&mut case.tool.as_mut()?.runout.as_mut()?.angle_deg),
+            Self::Ktc => Some(&mut case.material.as_mut()?.ktc_mpa),
+            Self::Krc => Some(&mut case.material.as_mut()?.krc_mpa),
+            Self::Kac => Some(&mut case.material.as_mut()?.kac_mpa),
+            Self::Kte => Some(&mut case.material.as_mut()?.kte_n_per_mm),
+            Self::Kre => Some(&mut case.material.as_mut()?.kre_n_per_mm),
+            Self::Kae => Some(&mut case.material.as_mut()?.kae_n_per_mm),
+            Self::Start => Some(&mut case.cut.as_mut()?.start_deg),
+            Self::Exit => Some(&mut case.cut.as_mut()?.exit_deg),
+            Self::FeedPerTooth => Some(&mut case.cut.as_mut()?.feed_per_tooth_mm),
+            Self::FeedDirection => Some(&mut case.cut.as_mut()?.feed_direction_deg),
+        }
+    }
+
+    fn of_matrices(self, matrices: &mut Matrices) -> Option<&mut f64> {
+        match self {
+            Self::Mass(i, j) => matrices.mass.get_mut((i, j)),
+            Self::Damping(i, j) => matrices.damping.get_mut((i, j)),
+            Self::Stiffness(i, j) => matrices.stiffness.get_mut((i, j)),
+            Self::CubicDamping(i, j) => matrices.cubic_damping.as_mut()?.get_mut((i, j)),
+            Self::CubicStiffness(i, j) => matrices.cubic_stiffness.as_mut()?.get_mut((i, j)),
+            _ => None,
+        }
+    }
+
+    fn of_joint(self, joint: &mut Joint) -> Option<&mut f64> {
+        match self {
+            Self::JointStiffness(_) => Some(&mut joint.stiffness_nm_per_rad),
+            Self::JointDamping(_) => Some(&mut joint.damping_nms_per_rad),
+            Self::JointCubicStiffness(_) => Some(&mut joint.cubic_stiffness_nm_per_rad3),
+            Self::JointCubicDamping(_) => Some(&mut joint.cubic_damping_nms3_per_rad3),
+            Self::LinkMass(_) => Some(&mut joint.mass_kg),
+            _ => None,
+        }
+    }
+
+    fn of_mode(self, mode: &mut Mode) -> Option<&mut f64> {
+        match self {
+            Self::Frequency(_) => Some(&mut mode.frequency_hz),
+            Self::DampingRatio(_) => Some(&mut mode.damping_ratio),
+            Self::Left(_, entry, imaginary) => part_of(mode.left.get_mut(entry)?, imaginary),
+            Self::Right(_, entry, imaginary) => part_of(mode.right.get_mut(entry)?, imaginary),
+            _ => None,
+        }
+    }
+}
+
+fn part_of(entry: &mut Complex64, imaginary: bool) -> Option<&mut f64> {
+    Some(if imaginary { &mut entry.im } else { &mut entry.re })
+}
