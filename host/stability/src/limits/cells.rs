@@ -258,7 +258,7 @@ impl<S: Spectrum> Column<S> {
     }
 }
 
-/// What following multipliers from one sample to the next came to.
+/// Result of following multipliers from one sample to the next.
 enum Followed {
     /// The cells are filled.
     Filled,

@@ -8,19 +8,19 @@ use super::point::CutStability;
 use super::speed_line::SpeedLine;
 use crate::error::StabilityError;
 
-/// A way to tell where a cut is stable. A value of it holds what it judges: a problem, or a table of receptances.
+/// A method that computes where a cut is stable. Its value holds the problem, or a table of receptances.
 ///
 /// Whoever makes one refuses a case for which the method is not defined, with the reason.
 pub trait Method: Sync {
     /// Its name in answers and captions.
     fn name(&self) -> &'static str;
 
-    /// What the method cannot see, in words that follow "blind to"; `None` for one that sees all of linear stability.
+    /// The effects that the method neglects, in words that follow "blind to"; `None` for a method that covers all of linear stability.
     fn blind_to(&self) -> Option<&'static str> {
         None
     }
 
-    /// What its answers depend on beside the case, such as a number of steps; `None` where there is nothing.
+    /// Settings that its results depend on beside the case, such as a number of steps; `None` where there are none.
     fn settings(&self) -> Option<String> {
         None
     }
@@ -72,7 +72,7 @@ pub trait Method: Sync {
         lines.into_iter().collect()
     }
 }
-/// What every answer says of the method that it comes from.
+/// Label of a result: the method, its settings and its limits.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Label {
     /// [`Method::name`].

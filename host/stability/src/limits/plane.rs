@@ -1,4 +1,4 @@
-//! Limits as planes over the variables of a case: what exact derivatives say of every loss of stability.
+//! Limits as planes over the variables of a case, from exact derivatives at every loss of stability.
 
 use std::f64::consts::TAU;
 

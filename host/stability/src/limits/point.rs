@@ -1,4 +1,4 @@
-//! The dominant multiplier at one speed and depth, with its error.
+//! The dominant Floquet multiplier (characteristic multiplier) at one speed and depth, with its error.
 
 use num_complex::Complex64;
 use serde::Serialize;
@@ -15,7 +15,7 @@ use crate::spectrum::stability_loss::StabilityLoss;
 use crate::spectrum::verdict::Verdict;
 use crate::spectrum::winding::Search;
 
-/// What is known of one working point.
+/// Stability of one cut: its dominant Floquet multiplier with the stated error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CutStability {
     /// Spindle speed, rev/min.
@@ -30,7 +30,7 @@ pub struct CutStability {
     /// An estimate of the error of the multiplier, from a second, finer collocation. Where the multipliers of nearly one size are
     /// too many to tell which is the largest, how much larger or, below 0.27, how different the largest may be.
     pub error: f64,
-    /// What follows; unstable also where it is certain that this multiplier lies outside and a larger one is not excluded.
+    /// The verdict that follows; unstable also where it is certain that this multiplier lies outside and a larger one is not excluded.
     pub verdict: Verdict,
     /// How the dominant multiplier leaves, or would leave, the unit circle.
     pub kind: StabilityLoss,

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::spread::LimitSpread;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// A crossing of the unit circle.
+/// A stability switch: a depth at which a Floquet multiplier crosses the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Switch {
     /// Axial depth, mm.
@@ -21,7 +21,7 @@ pub struct Switch {
     pub chatter_hz: Option<f64>,
 }
 
-/// Where stability is first lost.
+/// Stability limit: the depth at which stability is first lost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limit {
     /// Axial depth, mm.
@@ -35,7 +35,7 @@ pub struct Limit {
     pub chatter_hz: Option<f64>,
 }
 
-/// What is known of all depths at one speed.
+/// Stability at one speed: limits, crossings and stable depths.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpeedLine {
     /// Spindle speed, rev/min.

@@ -49,7 +49,7 @@ impl Percentile {
     }
 }
 
-/// What is known of the limit at one speed.
+/// Spread of the first limit at one speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitSpread {
     /// Of the first limit.

@@ -1,4 +1,4 @@
-//! What deviations of the parameters make of a limit: its distribution, and the probability that a cut is stable.
+//! Distribution of a limit under deviations of the parameters, and the probability that a cut is stable.
 //!
 //! Limits have cusps where lobes cross, and islands come and go: linearization alone is wrong there. So machines are drawn
 //! from the distribution of the parameters and the first limit of each is computed, by the method itself. Exact derivatives

@@ -1,4 +1,4 @@
-//! All that is written into a table.
+//! The content of a table as bytes.
 
 use quietcut_core::lobes::{
     Additions, Content, InterpolationError, IntervalSlopes, Layer, LayerMode, LobeTable, encode_with,
@@ -21,7 +21,7 @@ pub(super) fn towards<'a>(table: &LobeTable<'a>, direction_deg: Option<f64>) -> 
     }
 }
 
-/// All that is written.
+/// Content of a table.
 pub(super) struct Table<'a> {
     pub(super) first: &'a Case,
     pub(super) families: &'a [Family],

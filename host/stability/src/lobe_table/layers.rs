@@ -32,7 +32,7 @@ const LAYERS_MAX: usize = 12;
 /// Where the draws begin that percentiles are computed with.
 const SEED: u64 = 1;
 
-/// What a layer is computed from.
+/// The method and the case of one layer.
 pub(super) struct Family {
     pub(super) method: Box<dyn Method>,
     /// The linear problem, with the mean pitch: the method's own where the structure is linear and the teeth stand evenly.
@@ -205,7 +205,7 @@ fn depends_on_feed(case: &Case) -> bool {
     case.axial_depth_modulation() || needs_orbit(case)
 }
 
-/// A place where a table is checked: a layer, or half way between two that lookups interpolate between.
+/// The layers between which a table is checked: one layer, or half way between two that lookups interpolate between.
 pub(super) struct CheckedLayers {
     pub(super) family: Family,
     /// Index of the layer, or of both.
@@ -248,7 +248,7 @@ fn nearest(families: &[Family], index: usize, distance: impl Fn(&Family) -> Opti
         .map(|(other, _)| other)
 }
 
-/// What layers a case is divided into.
+/// Feeds and feed directions of the layers of a case.
 #[derive(Clone)]
 struct Division {
     feeds_mm: Vec<f64>,

@@ -1,6 +1,6 @@
-//! What a table is to cover.
+//! The request for a table: speeds, depths and layers.
 
-/// What a table is to cover; what is not said is chosen from the first case.
+/// Speeds, depths and layers of a table; values that are not set follow from the first case.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableRequest {
     /// Slowest and fastest spindle speed, rev/min; default the machine's limits, else 1/2 to 5 teeth per

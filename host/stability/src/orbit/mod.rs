@@ -1,4 +1,4 @@
-//! Forced periodic orbits of the cut and what becomes of them.
+//! Forced periodic orbits of the cut, their Floquet multipliers (characteristic multipliers), and branches of orbits.
 //!
 //! With the delay equal to the tooth period, u = u_τ holds on an orbit of that period: the regenerative force
 //! vanishes, and the orbit is that of an ordinary differential equation under the forces of feed and edges.

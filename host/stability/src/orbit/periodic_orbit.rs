@@ -30,7 +30,7 @@ pub enum OrbitError {
     },
 }
 
-/// An orbit, by what it is at the start of the period, where a tooth enters.
+/// A periodic orbit, by its state at the start of the period, where a tooth enters.
 #[derive(Clone, Debug)]
 pub struct Orbit {
     /// Axial depth, m.
@@ -285,7 +285,7 @@ fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
     DMatrix::from_column_slice(order, nodes, values.as_slice())
 }
 
-/// What states and depth are divided by before lengths along a branch are taken.
+/// Scales of state and depth in lengths along a branch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) state: f64,

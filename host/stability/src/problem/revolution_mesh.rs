@@ -37,7 +37,7 @@ impl Fineness {
     };
 }
 
-/// What becomes of the times at which no tooth cuts.
+/// Treatment of the times at which no tooth cuts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flight {
     /// Each is one subinterval without nodes of use: the structure's own motion is known in closed form.

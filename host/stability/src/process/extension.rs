@@ -1,4 +1,4 @@
-//! What the extensions of a case make of its structure and its cutting process.
+//! Structure and cutting process of a case with its extensions.
 
 use std::sync::Arc;
 
@@ -86,7 +86,7 @@ pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
     Ok(teeth.iter().map(|tooth| tooth.radial_m).collect())
 }
 
-/// What acts about a forced orbit: smooth terms, the chip law, the damping of the flank.
+/// The terms that act about a forced orbit: smooth terms, the chip law, process damping.
 ///
 /// # Errors
 /// An extension that the case cannot have.

@@ -1,4 +1,4 @@
-//! What following multipliers along the depth needs to know of them.
+//! The interface through which multipliers are followed along the depth.
 
 use num_complex::Complex64;
 

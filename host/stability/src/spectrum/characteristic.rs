@@ -35,7 +35,7 @@ pub(crate) struct Characteristic {
     flight: Vec<f64>,
 }
 
-/// Room for an evaluation, to be used again and again.
+/// Workspace of an evaluation, reused between evaluations.
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace {
     value: Vec<Complex64>,
@@ -45,7 +45,7 @@ pub(crate) struct Workspace {
     product: Vec<Complex64>,
 }
 
-/// What is known of F = det(Φ − μI) at a point: derivatives of ln F.
+/// Logarithmic derivatives of F = det(Φ − μI) at a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Logarithmic {
     /// ∂ ln F/∂μ.
@@ -83,7 +83,7 @@ impl Characteristic {
         16.0 * entries as f64 + 32.0 * n.powi(3) * (self.elements.len() as f64 + 3.0)
     }
 
-    /// Room for evaluations.
+    /// A workspace for evaluations.
     pub(crate) fn workspace(&self) -> Workspace {
         let zero = vec![Complex64::ZERO; self.order * self.order];
         Workspace {

@@ -154,7 +154,7 @@ pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Optio
     found.is_settled.then_some(found.dominant.eigenvalues)
 }
 
-/// What block Arnoldi arrived at.
+/// Result of block Arnoldi.
 struct ArnoldiResult {
     dominant: Dominant,
     is_settled: bool,

@@ -18,7 +18,7 @@ pub(crate) trait PeriodMap: LinearMap {
     fn chatter_hz(&self, multiplier: Complex64, vector: &nalgebra::DVector<Complex64>) -> Option<f64>;
 }
 
-/// What a map says of all multipliers at one depth.
+/// All multipliers of the map at one depth.
 struct Known {
     depth_m: f64,
     dominant: Dominant,

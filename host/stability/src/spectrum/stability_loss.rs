@@ -1,13 +1,13 @@
-//! How a multiplier leaves the unit circle.
+//! How a Floquet multiplier leaves the unit circle.
 
 use num_complex::Complex64;
 use serde::Serialize;
 
-/// How a multiplier leaves the unit circle.
+/// How a Floquet multiplier leaves the unit circle: the kind of bifurcation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StabilityLoss {
-    /// As a complex pair: chatter with a frequency of its own (secondary Hopf, torus).
+    /// As a complex pair: chatter with a frequency of its own (Neimark–Sacker, secondary Hopf, torus).
     Hopf,
     /// Through −1: period doubling.
     Flip,

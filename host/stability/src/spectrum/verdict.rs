@@ -1,8 +1,8 @@
-//! What a multiplier and its error say of the cut.
+//! The verdict on a cut, from its dominant Floquet multiplier and the error of it.
 
 use serde::Serialize;
 
-/// What a multiplier and its error say.
+/// Verdict on a cut, from |μ| and its error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {

@@ -31,7 +31,7 @@ const CANDIDATES_MAX: usize = 6;
 /// The most multipliers that are looked for one by one.
 const ROOTS_MAX: usize = 12;
 
-/// What is known of the largest multiplier.
+/// The largest multiplier found, and a radius beyond which there is none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beyond {
     /// The largest that was found, if it is larger than [`WOUND`]; of a pair the upper one.
