@@ -21,7 +21,7 @@ use quietcut_core::checksum::crc32;
 use quietcut_core::lobes::Header;
 use quietcut_core::lobes::format::HEADER_LENGTH;
 
-use super::{ERASED, MAX_WRITE_SIZE};
+use super::memory::{ERASED, MAX_WRITE_SIZE};
 
 const MAGIC: [u8; 4] = *b"QCUP";
 const RECORD_LENGTH: usize = MAGIC.len() + HEADER_LENGTH + 4;

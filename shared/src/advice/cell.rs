@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::DEPTH_MARGIN;
+use super::margins::DEPTH_MARGIN;
 use crate::lobes::{CutLobes, FEW, Interval};
 
 /// What a cell is for the depth of a cut with its margin.

@@ -3,9 +3,9 @@
 use heapless::{Deque, Vec};
 
 use super::cell::largest_possible_mm;
+use super::margins::{BETTER, DEPTH_MARGIN, SPEED_BAND};
 use super::quiet::{Direction, Quiet};
 use super::rule::ratio;
-use super::{BETTER, DEPTH_MARGIN, SPEED_BAND};
 use crate::units::{Millimeters, Rpm};
 
 /// Of smaller depths at other speeds that differ by less than this factor the one at the nearer speed is taken.

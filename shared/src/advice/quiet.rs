@@ -1,8 +1,8 @@
 //! Where the table is quiet: stable with margin in depth over a band of speed.
 
 use super::cell::{Cell, Node};
+use super::margins::{DEPTH_MARGIN, SPEED_BAND};
 use super::rule::ratio;
-use super::{DEPTH_MARGIN, SPEED_BAND};
 use crate::lobes::{CutLobes, LobeTable, NotKnown};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::WorkingPoint;

@@ -1,6 +1,6 @@
 //! The tooth-passing rule: a quiet speed from nothing but the chatter frequency.
 
-use super::SPEED_BAND;
+use super::margins::SPEED_BAND;
 use crate::units::{Hertz, Rpm};
 use crate::working_point::Tool;
 

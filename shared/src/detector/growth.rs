@@ -3,14 +3,16 @@
 mod alternating;
 mod fast;
 mod slow;
+mod steadiness;
 
 use crate::detector::finding::{Finding, Kind, Multiplier};
 use crate::math::sqrt;
-use crate::stroboscope::{Stroboscope, Window};
+use crate::stroboscope::Stroboscope;
 use crate::synchronous::{Average, CHANNELS, Passing, SLOTS};
 use alternating::AlternatingGrowth;
 use fast::Predictions;
 use slow::SlowGrowth;
+use steadiness::LIKELY;
 
 /// How closely a passing is looked at: what that costs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -23,13 +25,6 @@ pub enum Look {
     Close,
 }
 
-/// No |μ| is stated sharper than this: the cut itself does not stay the same to more.
-const LEAST_DEVIATION: f32 = 5e-4;
-/// Standard deviations for what is no alarm.
-const LIKELY: f32 = 2.0;
-/// The forced orbit may move by this part of itself within a window, or by this part of the deviation.
-const STEADY: f32 = 0.15;
-const STEADY_AGAINST_DEVIATION: f32 = 0.3;
 /// Passings that differ from those of the turn before by so many times the usual mean an entry, an exit, a blow.
 const EVENT: f32 = 5.0;
 /// |μ| of growth that linear prediction may call where the fit of slow growth sees that angle too: this one e-folds in 33 passings, and
@@ -227,17 +222,4 @@ impl Growth {
         // A flip is told by what alternates.
         slow.filter(|_| growing.is_none_or(|growing| growing.kind == Kind::Hopf))
     }
-}
-
-/// Whether the forced orbit stays where it is within a window.
-fn is_steady(window: &Window<'_>, forced: f32, deviation: f32, noise: f32) -> bool {
-    let drift = window.drift();
-    let bound = (STEADY * forced).max(STEADY_AGAINST_DEVIATION * deviation);
-    drift * drift < bound * bound + chance(noise, window.length() / 2)
-}
-
-/// Square of the difference of two means of so many passings that noise alone exceeds about never: of 24 channels
-/// the mean square is within 2 of 1.
-fn chance(noise: f32, passings: usize) -> f32 {
-    2.0 * 2.0 * noise / passings.max(1) as f32
 }

@@ -1,12 +1,36 @@
 //! What must be true of the entries of a table, whoever made it.
 
-use super::additions::check_additions;
-use super::format::{MAX_INTERVALS, saturate};
+use super::bytes::saturate;
+use super::format::{HEADER_LENGTH, Header, MAX_INTERVALS};
+use super::shape::Shape;
 use super::{IMMERSION_TOLERANCE, LobeTable, TableError, Validity};
 use crate::units::{Degrees, Rpm};
 
+impl<'a> LobeTable<'a> {
+    /// The table in `bytes`, which must be exactly one table, after checking all of it: header, CRC-32 and every entry.
+    ///
+    /// Cost: one pass over the bytes for the CRC and one over the entries.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let header = Header::read(bytes)?;
+        header.check(bytes)?;
+        let shape = Shape::read(bytes)?;
+        let table = Self {
+            bytes,
+            shape,
+            feed_direction: None,
+        };
+        table.check_entries()?;
+        Ok(table)
+    }
+
+    /// Refuses entries that no table may have, as [`parse`](Self::parse) does: for a table whose CRC is known to be right.
+    pub fn check_entries(&self) -> Result<(), TableError> {
+        check_entries(self)
+    }
+}
+
 /// Checks every speed, layer, column and interval.
-pub(super) fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
+fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
     check_speeds(table.speeds())?;
     check_layers(
         table
@@ -119,4 +143,53 @@ pub(super) fn interval_order(layer: usize, speed: usize, interval: usize) -> Tab
 fn is_near(a: &Validity, b: &Validity) -> bool {
     let tolerance = 2.0 * IMMERSION_TOLERANCE.0;
     (a.start.0 - b.start.0).abs() <= tolerance && (a.exit.0 - b.exit.0).abs() <= tolerance
+}
+
+/// Checks all that schema 2 adds: every number finite, errors and modes in their range.
+fn check_additions(table: &LobeTable<'_>) -> Result<(), TableError> {
+    let LobeTable { bytes, shape, .. } = table;
+    for layer in 0..shape.layers {
+        shape.feed_direction(bytes, layer)?;
+        for mode in 0..shape.modes {
+            let is_mode = shape.layer_mode(bytes, layer, mode).is_some_and(|mode| {
+                mode.frequency.0 > 0.0
+                    && mode.frequency.0.is_finite()
+                    && (0.0..1.0).contains(&mode.damping_ratio)
+            });
+            if !is_mode {
+                return Err(TableError::Mode {
+                    layer: saturate(layer),
+                    mode: saturate(mode),
+                });
+            }
+        }
+    }
+    if shape.error_given {
+        let error = shape.interpolation_error(bytes).ok_or(TableError::TooShort {
+            needed: HEADER_LENGTH as u32,
+            found: saturate(bytes.len()),
+        })?;
+        let is_error = error.depth.0 >= 0.0 && error.depth.0.is_finite() && (0.0..1.0).contains(&error.speed);
+        if !is_error {
+            return Err(TableError::InterpolationError {
+                depth: error.depth,
+                speed: error.speed,
+            });
+        }
+    }
+    if shape.modes > 0 {
+        for index in 0..shape.intervals {
+            let is_finite = shape.interval_slopes(bytes, index).is_some_and(|slopes| {
+                let ends = [slopes.from, slopes.to];
+                ends.iter()
+                    .all(|end| end.numbers(shape.modes).all(f32::is_finite))
+            });
+            if !is_finite {
+                return Err(TableError::Slopes {
+                    index: saturate(index),
+                });
+            }
+        }
+    }
+    Ok(())
 }

@@ -1,8 +1,8 @@
 //! The lobes of one cut: the layers of a table between which its feed lies.
 
 use super::{
-    Column, FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE, Interval,
-    LobeTable, NotKnown,
+    Answer, Column, FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE,
+    Interval, LobeTable, NotKnown,
 };
 use crate::units::{Degrees, Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
@@ -112,6 +112,26 @@ impl<'a> CutLobes<'a> {
             Ok(Between { below, weight })
         } else {
             Err(NotKnown::Damaged)
+        }
+    }
+}
+
+impl<'a> LobeTable<'a> {
+    /// The columns of one cut; its axial depth is not used.
+    pub fn cut(&self, working_point: &WorkingPoint) -> Result<CutLobes<'a>, NotKnown> {
+        CutLobes::new(*self, working_point)
+    }
+
+    /// The column at any speed and working point; its axial depth is not used.
+    pub fn column(&self, speed: Rpm, working_point: &WorkingPoint) -> Result<Column, NotKnown> {
+        self.cut(working_point)?.column(speed)
+    }
+
+    /// What the table says of the cut at `speed`.
+    pub fn lookup(&self, speed: Rpm, working_point: &WorkingPoint) -> Answer {
+        match self.column(speed, working_point) {
+            Ok(column) => column.at(working_point.axial_depth),
+            Err(why) => Answer::NotKnown(why),
         }
     }
 }

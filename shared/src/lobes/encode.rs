@@ -1,11 +1,13 @@
 //! Content to the bytes of a table, into the caller's buffer.
 
-use super::additions::{Additions, ERROR_GIVEN, MODES_SHIFT, direction_code};
+use super::additions::{Additions, direction_code};
+use super::bytes::saturate;
 use super::check::{check_layers, check_speeds, interval_order};
 use super::format::{
-    HEADER_LENGTH, Header, MAX_INTERVALS, NAME_CAPACITY, SCHEMA, SCHEMA_PLAIN, STEPS, Shape, kind_code,
-    saturate,
+    ERROR_GIVEN, HEADER_LENGTH, Header, MAX_INTERVALS, MODES_SHIFT, NAME_CAPACITY, SCHEMA, SCHEMA_PLAIN,
+    STEPS,
 };
+use super::shape::{Shape, kind_code};
 use super::{Interval, LobeTable, TableError, Validity, half};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::Limits;

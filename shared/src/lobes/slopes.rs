@@ -5,7 +5,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Column, Interval, LobeTable};
 use crate::units::{Hertz, Millimeters};
 
 /// The most modes of a table whose derivatives are kept: those that matter most.
@@ -120,59 +119,4 @@ pub fn corrected_limit(
         return limit;
     }
     Millimeters(f32::min(f32::max(moved_mm, from.0), to.0))
-}
-
-impl LobeTable<'_> {
-    /// The modes of a layer whose derivatives the table has, in the order of the derivatives; none where it has none.
-    pub fn modes(&self, layer: usize) -> impl ExactSizeIterator<Item = LayerMode> + '_ {
-        (0..self.shape.modes).map(move |mode| {
-            self.shape
-                .layer_mode(self.bytes, layer, mode)
-                .unwrap_or(LayerMode {
-                    frequency: Hertz(f32::NAN),
-                    damping_ratio: f32::NAN,
-                })
-        })
-    }
-
-    /// Derivatives of an interval of a layer at one speed of the grid, counted as they are stored; `None` where the table
-    /// has none or no such interval.
-    pub fn slopes(&self, layer: usize, speed_index: usize, interval: usize) -> Option<IntervalSlopes> {
-        let range = self.shape.column_range(self.bytes, layer, speed_index)?;
-        let index = range
-            .start
-            .checked_add(interval)
-            .filter(|index| *index < range.end)?;
-        self.shape.interval_slopes(self.bytes, index)
-    }
-
-    /// The entries of one layer at one speed of the grid, corrected by what was learned; as [`entry`](Self::entry) where the
-    /// table has no derivatives.
-    ///
-    /// Ends at the first and last depth of the table stay. An interval whose ends meet is gone; one that reaches the one before
-    /// begins where that ends.
-    pub fn corrected_entry(&self, layer: usize, speed_index: usize, learned: &Learned) -> Option<Column> {
-        let mut column = self.empty_column();
-        let depths = self.depths();
-        let mut end = depths.0;
-        for (index, interval) in self.intervals(layer, speed_index).ok()?.enumerate() {
-            let interval = interval.ok()?;
-            let slopes = self.slopes(layer, speed_index, index).unwrap_or_default();
-            let stays = |depth: Millimeters| depth.0 <= depths.0.0 || depth.0 >= depths.1.0;
-            let moved = |depth: Millimeters, slopes: &Slopes| {
-                if stays(depth) {
-                    depth
-                } else {
-                    corrected_limit(depth, slopes, learned, depths)
-                }
-            };
-            let from = Millimeters(f32::max(moved(interval.from, &slopes.from).0, end.0));
-            let to = moved(interval.to, &slopes.to);
-            if from < to {
-                column.push(Interval { from, to, ..interval });
-                end = to;
-            }
-        }
-        Some(column)
-    }
 }

@@ -20,46 +20,27 @@
 use super::Window;
 use super::shape::strongest;
 use crate::math::{exp, sqrt};
-use crate::stroboscope::CAPACITY;
 use crate::synchronous::{CHANNELS, MAX_CLASSES, Passing};
 
+mod column;
 mod fit;
+mod guess;
 mod nuisance;
+
+pub use guess::{ANGLES, Guess};
 
 use fit::{Fit, turning};
 use nuisance::Nuisance;
 
 /// The shortest window that is looked at.
 pub const LEAST_LENGTH: usize = 40;
-/// The angles in turns that are looked at: nearer to 0 a forced orbit that moves is seen, nearer to a half turn a
-/// flip, of which [`Window::alternation`] tells.
-pub const ANGLES: (f32, f32) = (0.03, 0.485);
 /// Steps of Gauss and Newton at most.
 const STEPS: usize = 2;
-/// Steps shorter than these are not taken: over the longest window they come to 3 % of the amplitude and 0.04 rad.
-const SHORTEST_STEP: (f32, f32) = (5e-4, 1e-4);
 /// Degrees of the Legendre polynomials that tell of wandering, and the factor from their variance to that of the growth.
 const WANDERING_DEGREES: core::ops::RangeInclusive<usize> = 2..=5;
 const WANDERING: f32 = 1.1;
 /// Growth of fewer standard deviations of white noise than this is not looked at more closely.
 const LOOK_CLOSER: f32 = 4.0;
-
-/// A deviation from where the fit starts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Guess {
-    /// ln|μ| per tooth period.
-    pub rate: f32,
-    /// arg μ in turns.
-    pub angle_turns: f32,
-}
-
-impl Guess {
-    /// Whether a step from here to there is not worth while.
-    fn is_near(&self, other: Self) -> bool {
-        (self.rate - other.rate).abs() < SHORTEST_STEP.0
-            && (self.angle_turns - other.angle_turns).abs() < SHORTEST_STEP.1
-    }
-}
 
 /// What came out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,12 +62,6 @@ impl Exponential {
     pub fn cycles(&self) -> Option<f32> {
         strongest(&self.shape, self.angle_turns)
     }
-}
-
-type Column = [f32; CAPACITY];
-
-fn dot(a: &Column, b: &Column) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Legendre polynomials of degree 0 to 5 at a row, of square sum 1 over the rows (to a part of n²/length²).

@@ -1,5 +1,6 @@
 //! Growth of what alternates from tooth to tooth, where runout may alternate too.
 
+use super::steadiness::{LEAST_DEVIATION, STEADY, chance, is_steady};
 use crate::detector::finding::{Kind, Multiplier};
 use crate::stroboscope::{Alternation, Stroboscope, Window};
 use crate::synchronous::CHANNELS;
@@ -69,7 +70,7 @@ impl AlternatingGrowth {
         Alternating {
             growing: grows.filter(|_| self.looks >= LOOKS).map(|a| Multiplier {
                 abs: a.multiplier_abs,
-                deviation: ((a.multiplier_abs - a.least) / SURE).max(super::LEAST_DEVIATION),
+                deviation: ((a.multiplier_abs - a.least) / SURE).max(LEAST_DEVIATION),
                 angle_turns: 0.5,
                 kind: Kind::Flip,
                 level,
@@ -94,7 +95,7 @@ fn trusted(stroboscope: &Stroboscope, forced: f32, noise: f32) -> Option<Alterna
         let alternation = window.alternation(noise, SURE)?;
         (alternation.correlation < CORRELATED
             && alternation.change * alternation.change > noise / CHANNELS as f32
-            && super::is_steady(&window, forced, 0.0, noise)
+            && is_steady(&window, forced, 0.0, noise)
             && is_still_there(&window, forced, noise))
         .then_some(alternation)
     };
@@ -111,6 +112,6 @@ fn trusted(stroboscope: &Stroboscope, forced: f32, noise: f32) -> Option<Alterna
 
 /// Whether the forced orbit still is where it was a turn ago.
 fn is_still_there(window: &Window<'_>, forced: f32, noise: f32) -> bool {
-    let (drift, bound) = (window.recent_drift(), super::STEADY * forced);
-    drift * drift < bound * bound + super::chance(noise, window.classes())
+    let (drift, bound) = (window.recent_drift(), STEADY * forced);
+    drift * drift < bound * bound + chance(noise, window.classes())
 }

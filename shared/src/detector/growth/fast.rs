@@ -1,5 +1,6 @@
 //! Growth that linear prediction over a few passings sees.
 
+use super::steadiness::{LEAST_DEVIATION, LIKELY, is_steady};
 use crate::detector::finding::{Kind, Multiplier};
 use crate::math::sqrt;
 use crate::stroboscope::{CAPACITY, Plan, Prediction, Stroboscope};
@@ -80,13 +81,13 @@ impl Predictions {
                 best = Some(prediction);
             }
             let surely = prediction.multiplier_abs - SURE * prediction.deviation;
-            if surely > 1.0 && super::is_steady(&window, forced, prediction.level, noise) {
+            if surely > 1.0 && is_steady(&window, forced, prediction.level, noise) {
                 growing = Some(prediction);
-                if plan.window >= CLASS_WINDOW && super::is_steady(&window, forced, 0.0, noise) {
+                if plan.window >= CLASS_WINDOW && is_steady(&window, forced, 0.0, noise) {
                     steadily = Some(prediction);
                 }
             }
-            let likely = prediction.multiplier_abs - super::LIKELY * prediction.deviation;
+            let likely = prediction.multiplier_abs - LIKELY * prediction.deviation;
             if plan.window == CAPACITY && likely > PERSISTENT {
                 persistent = Some(prediction);
             }
@@ -114,7 +115,7 @@ fn multiplier(stroboscope: &Stroboscope, prediction: &Prediction, noise: f32) ->
     };
     Multiplier {
         abs: prediction.multiplier_abs,
-        deviation: prediction.deviation.max(super::LEAST_DEVIATION),
+        deviation: prediction.deviation.max(LEAST_DEVIATION),
         angle_turns,
         kind: if angle_turns > 0.5 - FLIP_ANGLE {
             Kind::Flip

@@ -1,5 +1,6 @@
 //! Slow growth, which noise hides from passing to passing: seen over the whole window, twice, and larger the second time.
 
+use super::steadiness::LEAST_DEVIATION;
 use crate::detector::finding::{Kind, Multiplier};
 use crate::math::exp;
 use crate::stroboscope::exponential::ANGLES;
@@ -107,7 +108,7 @@ fn multiplier(found: &Exponential) -> Multiplier {
     let abs = exp(found.rate);
     Multiplier {
         abs,
-        deviation: (abs * found.rate / found.certainty).max(super::LEAST_DEVIATION),
+        deviation: (abs * found.rate / found.certainty).max(LEAST_DEVIATION),
         angle_turns: found.angle_turns,
         kind: Kind::Hopf,
         level: found.level,

@@ -1,7 +1,8 @@
 //! The fit for a given rate and angle, and the step to better ones.
 
+use super::column::{Column, dot};
+use super::guess::{ANGLES, Guess};
 use super::nuisance::Nuisance;
-use super::{ANGLES, Column, Guess, dot};
 use crate::math::{exp, sin_cos_turns, sqrt};
 use crate::stroboscope::{CAPACITY, Window};
 use crate::synchronous::CHANNELS;

@@ -1,6 +1,6 @@
 //! What is constant in a class, and a line: taken off all that is fitted.
 
-use super::{Column, dot};
+use super::column::{Column, dot};
 use crate::stroboscope::{CAPACITY, Window};
 
 /// What is constant in a class, and a line: taken off every column.

@@ -1,0 +1,69 @@
+//! The slots of the memory, and how they are read, erased and written.
+
+use quietcut_core::lobes::Header;
+use quietcut_core::protocol::Refusal;
+use quietcut_core::protocol::message::SLOTS;
+
+use super::TableMemory;
+use super::contents::Contents;
+use super::journal::Journal;
+use super::progress::Progress;
+
+/// The table slots of a device.
+pub struct Storage<M> {
+    pub(super) memory: M,
+    pub(super) contents: [Contents; SLOTS],
+    pub(super) in_use: Option<usize>,
+    pub(super) upload: Option<Progress>,
+}
+
+impl<M: TableMemory> Storage<M> {
+    pub(super) const PAGE: u32 = M::ERASE_SIZE as u32;
+
+    /// The most bytes of a table.
+    pub fn slot_capacity(&self) -> u32 {
+        self.slot_length().saturating_sub(Self::PAGE)
+    }
+
+    fn slot_length(&self) -> u32 {
+        let length = (self.memory.capacity() / SLOTS) as u32;
+        length - length % Self::PAGE
+    }
+
+    pub(super) fn start_of(&self, slot: usize) -> u32 {
+        slot as u32 * self.slot_length()
+    }
+
+    pub(super) fn journal(&self, slot: usize) -> Journal<M> {
+        Journal::new(self.start_of(slot) + self.slot_capacity(), self.slot_capacity())
+    }
+
+    /// The bytes of a slot before the journal.
+    pub(super) fn slot_bytes(&self, slot: usize) -> &[u8] {
+        let start = self.start_of(slot) as usize;
+        let end = start + self.slot_capacity() as usize;
+        self.memory.mapped().get(start..end).unwrap_or_default()
+    }
+
+    /// The table in a slot, as long as its header says.
+    pub(super) fn table_bytes(&self, slot: usize) -> Option<&[u8]> {
+        let bytes = self.slot_bytes(slot);
+        let header = Header::read(bytes).ok()?;
+        bytes.get(..header.length as usize)
+    }
+
+    pub(super) fn erase(&mut self, from: u32, length: u32) -> Result<(), Refusal> {
+        self.memory.erase(from, from + length).map_err(|_| Refusal::Flash)
+    }
+
+    /// Writes and reads back.
+    pub(super) fn write(&mut self, offset: u32, words: &[u8]) -> Result<(), Refusal> {
+        self.memory.write(offset, words).map_err(|_| Refusal::Flash)?;
+        let range = offset as usize..offset as usize + words.len();
+        if self.memory.mapped().get(range) == Some(words) {
+            Ok(())
+        } else {
+            Err(Refusal::Flash)
+        }
+    }
+}

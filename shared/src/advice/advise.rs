@@ -1,0 +1,212 @@
+//! From the verdict to the next speed or depth: the table first, the tooth-passing rule where it does not help.
+
+use super::proposal::{Action, Advice, Obstacle, Source};
+use super::quiet::Quiet;
+use super::rule::tooth_passing_speed;
+use crate::detector::{Judgement, Verdict};
+use crate::lobes::{Answer, Kind, LobeTable, NotKnown};
+use crate::units::Rpm;
+use crate::working_point::{Limits, Tool, WorkingPoint};
+
+/// What to do next.
+///
+/// `speed` is the present spindle speed; `limits` are joined with those of the table, if it has any. Where no chatter is
+/// heard the answer is [`Action::Keep`]. The advised point is never one that the table calls unstable.
+///
+/// Cost: one pass over the entries of the table for this cut, and the interpolation of some columns where stability
+/// changes; nearest speeds come first, so that most calls are far cheaper. Call it when something has changed, not for
+/// every block.
+pub fn advise(
+    judgement: &Judgement,
+    speed: Rpm,
+    table: Option<&LobeTable<'_>>,
+    working_point: Option<&WorkingPoint>,
+    limits: Option<&Limits>,
+    tool: &Tool,
+) -> Advice {
+    let told = working_point.map(|point| point.axial_depth);
+    let keep = Advice {
+        action: Action::Keep,
+        speed,
+        depth: told,
+        source: if table.is_some() {
+            Source::Table
+        } else {
+            Source::ToothPassingRule
+        },
+        assumed: None,
+        obstacle: None,
+    };
+    if !judgement.verdict.is_chatter() {
+        return keep;
+    }
+    // Written so that NaN is refused too.
+    if !(speed.0 > 0.0 && speed.0.is_finite()) {
+        return Advice {
+            action: Action::NotKnown,
+            obstacle: Some(Obstacle::Speed),
+            ..keep
+        };
+    }
+    let range = speed_range(limits, table);
+    let cut = match cut_in_table(judgement, speed, table, working_point, tool) {
+        Ok(cut) => cut,
+        Err(obstacle) => {
+            return by_rule(
+                judgement,
+                tool,
+                range,
+                None,
+                Advice {
+                    obstacle: Some(obstacle),
+                    ..keep
+                },
+            );
+        }
+    };
+    let keep = Advice {
+        assumed: working_point.is_none().then_some(cut.at),
+        ..keep
+    };
+    match by_table(&cut, speed, range, keep) {
+        Ok(advice) => advice,
+        Err(obstacle) => by_rule(
+            judgement,
+            tool,
+            range,
+            Some(&cut),
+            Advice {
+                obstacle: Some(obstacle),
+                ..keep
+            },
+        ),
+    }
+}
+
+/// A cut that a table knows something of.
+struct Cut<'t> {
+    table: &'t LobeTable<'t>,
+    at: WorkingPoint,
+}
+
+/// The cut as told or assumed, if the table knows it at any speed.
+fn cut_in_table<'t>(
+    judgement: &Judgement,
+    speed: Rpm,
+    table: Option<&'t LobeTable<'t>>,
+    working_point: Option<&WorkingPoint>,
+    tool: &Tool,
+) -> Result<Cut<'t>, Obstacle> {
+    let table = table.ok_or(Obstacle::NoTable)?;
+    if table.teeth() != tool.teeth {
+        let mismatch = NotKnown::Teeth {
+            asked: tool.teeth,
+            table: table.teeth(),
+        };
+        return Err(Obstacle::Table(mismatch));
+    }
+    let at = match working_point {
+        Some(point) => *point,
+        None => assumed_point(judgement, speed, table)?,
+    };
+    // Another speed may be known where the present one lies outside; all else is the same at every speed.
+    let first = table.speed(0).ok_or(Obstacle::Table(NotKnown::Damaged))?;
+    match table.lookup(first, &at) {
+        Answer::NotKnown(why) if why != NotKnown::Undecided => Err(Obstacle::Table(why)),
+        _ => Ok(Cut { table, at }),
+    }
+}
+
+/// The first layer of the table at the least depth where it has the chatter that is heard, or any chatter.
+fn assumed_point(judgement: &Judgement, speed: Rpm, table: &LobeTable<'_>) -> Result<WorkingPoint, Obstacle> {
+    let layer = table.layers().next().ok_or(Obstacle::Table(NotKnown::Damaged))?;
+    let mut at = WorkingPoint {
+        axial_depth: table.depths().0,
+        start: layer.start,
+        exit: layer.exit,
+        feed_per_tooth: layer.feed_from,
+        posture: layer.posture,
+    };
+    let column = table.column(speed, &at).map_err(Obstacle::Table)?;
+    let heard = match judgement.verdict {
+        Verdict::PeriodDoubling => Kind::Flip,
+        _ => Kind::Hopf,
+    };
+    let mut unstable = column.intervals().iter().filter(|i| i.kind != Kind::Undecided);
+    let same_kind = unstable.clone().find(|i| i.kind == heard);
+    at.axial_depth = same_kind.or(unstable.next()).ok_or(Obstacle::Contradicted)?.from;
+    Ok(at)
+}
+
+/// The speeds that both the machine and the table's machine allow.
+fn speed_range(limits: Option<&Limits>, table: Option<&LobeTable<'_>>) -> (f32, f32) {
+    let of_table = table.and_then(LobeTable::limits);
+    limits
+        .into_iter()
+        .chain(&of_table)
+        .fold((0.0, f32::INFINITY), |(from, to), limits| {
+            (f32::max(from, limits.rpm_min.0), f32::min(to, limits.rpm_max.0))
+        })
+}
+
+fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Result<Advice, Obstacle> {
+    let quiet = Quiet::new(cut.table, &cut.at, range).map_err(Obstacle::Table)?;
+    if let Some(quiet_speed) = quiet.nearest_speed(speed) {
+        if quiet_speed == speed {
+            return Err(Obstacle::Contradicted);
+        }
+        return Ok(Advice {
+            action: Action::Speed,
+            speed: quiet_speed,
+            ..keep
+        });
+    }
+    let (speed, depth) = quiet.largest_depth(speed).ok_or(Obstacle::NothingStable)?;
+    Ok(Advice {
+        action: Action::Depth,
+        speed,
+        depth: Some(depth),
+        ..keep
+    })
+}
+
+fn by_rule(
+    judgement: &Judgement,
+    tool: &Tool,
+    (from_rpm, to_rpm): (f32, f32),
+    cut: Option<&Cut<'_>>,
+    keep: Advice,
+) -> Advice {
+    let keep = Advice {
+        source: Source::ToothPassingRule,
+        ..keep
+    };
+    let Some(chatter) = judgement
+        .chatter
+        .filter(|hertz| hertz.0 > 0.0 && hertz.0.is_finite())
+    else {
+        return Advice {
+            action: Action::NotKnown,
+            obstacle: Some(Obstacle::ChatterFrequency),
+            ..keep
+        };
+    };
+    let is_admissible = |candidate: Rpm| {
+        let is_unstable =
+            |cut: &Cut<'_>| matches!(cut.table.lookup(candidate, &cut.at), Answer::Unstable { .. });
+        (from_rpm..=to_rpm).contains(&candidate.0) && !cut.is_some_and(is_unstable)
+    };
+    match tooth_passing_speed(keep.speed, chatter, tool, is_admissible) {
+        Some(speed) => Advice {
+            action: Action::Speed,
+            speed,
+            ..keep
+        },
+        None => Advice {
+            action: Action::Depth,
+            depth: None,
+            obstacle: Some(Obstacle::NoSpeedWithinLimits),
+            ..keep
+        },
+    }
+}

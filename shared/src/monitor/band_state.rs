@@ -1,0 +1,120 @@
+//! What the pipeline knows of one band.
+
+use crate::decimation::Sample;
+use crate::detector::growth::Growth;
+use crate::detector::tone::{Background, Tone};
+use crate::peaks::Rotation;
+use crate::spectrum::{Overlap, PowerSpectrum};
+use crate::synchronous::SamplerState;
+use crate::units::Hertz;
+
+/// One band on its way from samples to findings.
+#[derive(Clone, Debug)]
+pub(super) struct Path<const POINTS: usize, const BINS: usize> {
+    pub(super) overlap: Overlap<POINTS>,
+    pub(super) power: [f32; BINS],
+    /// Width of a bin of the newest spectrum; 0 before the first.
+    pub(super) bin: Hertz,
+    /// The newest block completed a spectrum.
+    pub(super) fresh: bool,
+    pub(super) background: Background<BINS>,
+    pub(super) tone: Option<Tone>,
+    pub(super) sampler: SamplerState,
+    pub(super) growth: Growth,
+    /// The newest block completed a passing.
+    pub(super) passed: bool,
+    /// Root mean square of the sensor's noise in one channel of a passing, in m/s².
+    pub(super) floor: f32,
+    /// Samples of the band since the growth was last looked at.
+    pub(super) since_look: u32,
+}
+
+impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
+    pub(super) const fn new() -> Self {
+        Self {
+            overlap: Overlap::new(),
+            power: [0.0; BINS],
+            bin: Hertz(0.0),
+            fresh: false,
+            background: Background::new(),
+            tone: None,
+            sampler: SamplerState::new(),
+            growth: Growth::new(1),
+            passed: false,
+            floor: 0.0,
+            since_look: 0,
+        }
+    }
+
+    /// Knows nothing again. What is only read where it was written since stays as it is.
+    pub(super) fn reset(&mut self) {
+        let Self {
+            overlap,
+            power: _,
+            bin,
+            fresh,
+            background,
+            tone,
+            sampler,
+            growth,
+            passed,
+            floor,
+            since_look,
+        } = self;
+        overlap.reset();
+        *bin = Hertz(0.0);
+        background.reset();
+        *sampler = SamplerState::new();
+        growth.reset();
+        (*fresh, *tone, *passed, *floor, *since_look) = (false, None, false, 0.0, 0);
+    }
+
+    /// Takes a sample towards the next spectrum, one of which is due every `hop` samples.
+    pub(super) fn take(&mut self, sample: Sample, hop: usize) {
+        self.fresh |= self.overlap.push(sample, hop);
+        self.since_look = self.since_look.saturating_add(1);
+    }
+
+    /// Forgets the signal, but not what is usual.
+    pub(super) fn interrupt(&mut self) {
+        self.overlap.reset();
+        self.tone = None;
+        self.interrupt_angles();
+    }
+
+    /// Forgets what was sampled at angles.
+    pub(super) fn interrupt_angles(&mut self) {
+        self.sampler = SamplerState::new();
+        self.growth.reset();
+    }
+
+    pub(super) fn spectrum(&self) -> Option<PowerSpectrum<'_>> {
+        (self.bin.0 > 0.0).then_some(PowerSpectrum {
+            power: &self.power,
+            bin: self.bin,
+        })
+    }
+}
+
+/// Goes on with the tone of a fresh spectrum, and with the background where there is no chatter.
+pub(super) fn follow_tone<const POINTS: usize, const BINS: usize>(
+    path: &mut Path<POINTS, BINS>,
+    rotation: Option<Rotation>,
+    (from, to): (Hertz, Hertz),
+    chatter: bool,
+    work: &mut [f32],
+) {
+    let spectrum = PowerSpectrum {
+        power: &path.power,
+        bin: path.bin,
+    };
+    let found = if path.background.is_learnt() {
+        path.background.new_tone(&spectrum, rotation, from, to, work)
+    } else {
+        None
+    };
+    path.tone = Tone::follow(path.tone, found, &spectrum);
+    if !chatter {
+        path.background.learn(&path.power);
+    }
+}

@@ -1,0 +1,88 @@
+//! The verdict on a block, and the advice that follows from it.
+
+use super::pipeline::Monitor;
+use super::settings::Settings;
+use super::state::{Advised, State};
+use crate::advice::{self, Advice};
+use crate::detector::Judgement;
+use crate::detector::evidence::Evidence;
+use crate::detector::finding::Finding;
+use crate::detector::growth::Growth;
+use crate::lobes::LobeTable;
+use crate::units::Rpm;
+use crate::working_point::WorkingPoint;
+
+/// A speed that changes by more than this part per turn makes passings that cannot be compared.
+const LARGEST_CHANGE_PER_TURN: f32 = 0.02;
+/// So many clipped or lost samples, as a part of all, and nothing else can be said.
+const LARGEST_DAMAGE: f32 = 0.05;
+/// Advice is given anew where the speed has moved by this part.
+const ADVICE_SPEED_STEP: f32 = 0.002;
+/// Or the chatter frequency by this part.
+const ADVICE_FREQUENCY_STEP: f32 = 0.005;
+
+impl Monitor {
+    pub(super) fn judge(&self, state: &mut State, speed: Option<Rpm>) -> Judgement {
+        let change = state.tachometer.change_per_turn().unwrap_or(0.0);
+        let sampled = self.tachometer.is_some();
+        let finding = |growth: &Growth| -> Option<Finding> {
+            Some(*growth.finding()).filter(|finding| sampled && finding.passings > 0)
+        };
+        let (structure, tool) = (finding(&state.structure.growth), finding(&state.tool.growth));
+        let evidence = Evidence {
+            speed: speed.map(Rpm::to_hertz),
+            changing: change.abs() > LARGEST_CHANGE_PER_TURN,
+            damaged: state.damage > LARGEST_DAMAGE,
+            teeth: self.settings.tool.teeth,
+            findings: [structure.as_ref(), tool.as_ref()],
+            new_passings: [state.structure.passed, state.tool.passed],
+            floors: [state.structure.floor, state.tool.floor],
+            spectra: [state.structure.spectrum(), state.tool.spectrum()],
+            tones: [state.structure.tone.as_ref(), state.tool.tone.as_ref()],
+            heard: state.tool.background.is_learnt(),
+            new_spectra: [state.structure.fresh, state.tool.fresh],
+        };
+        state.detector.step(&evidence)
+    }
+
+    /// Advice, given anew where something has changed.
+    pub(super) fn advise(
+        &self,
+        state: &mut State,
+        judgement: &Judgement,
+        speed: Rpm,
+        table: Option<&LobeTable<'_>>,
+        working_point: Option<&WorkingPoint>,
+    ) -> Option<Advice> {
+        let table_crc = table.and_then(|table| Some(table.header().ok()?.crc));
+        let feed_direction = table.and_then(LobeTable::asked_direction);
+        let moved = |a: f32, b: f32, step: f32| (a - b).abs() > step * b.abs();
+        let same = state.advice.as_ref().filter(|advised| {
+            let chatter = match (advised.chatter, judgement.chatter) {
+                (Some(a), Some(b)) => !moved(a.0, b.0, ADVICE_FREQUENCY_STEP),
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            advised.verdict == judgement.verdict
+                && chatter
+                && !moved(advised.speed.0, speed.0, ADVICE_SPEED_STEP)
+                && advised.working_point.as_ref() == working_point
+                && advised.table == table_crc
+                && advised.feed_direction == feed_direction
+        });
+        if let Some(advised) = same {
+            return Some(advised.advice);
+        }
+        let Settings { limits, tool, .. } = &self.settings;
+        let advice = advice::advise(judgement, speed, table, working_point, limits.as_ref(), tool);
+        state.advice = Some(Advised {
+            advice,
+            verdict: judgement.verdict,
+            chatter: judgement.chatter,
+            speed,
+            working_point: working_point.copied(),
+            table: table_crc,
+            feed_direction,
+        });
+        Some(advice)
+    }
+}
