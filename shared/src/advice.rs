@@ -15,7 +15,7 @@ mod cell;
 mod depth;
 mod margins;
 mod proposal;
-mod quiet;
+mod quiet_speed_search;
 mod rule;
 
 pub use advise::advise;

@@ -21,7 +21,7 @@
 //!   [`FEED_DIRECTION_SPAN`] apart and their feeds need no interpolation. A direction that was not told is that of the layers where
 //!   they have only one.
 //! - *Immersion and posture*: never interpolated. Immersion may differ by [`IMMERSION_TOLERANCE`], posture must be the same.
-//! - Outside, the answer is [`Answer::NotKnown`] with the reason, never a guess.
+//! - Outside, the answer is [`TabulatedStability::NotKnown`] with the reason, never a guess.
 //!
 //! A table may say how large the [`InterpolationError`] is, and how its limits move with what the device learns:
 //! [`LobeTable::slopes`], [`corrected_limit`].
@@ -33,7 +33,6 @@
 //! [`format`] documents the bytes.
 
 mod additions;
-mod answer;
 mod bytes;
 mod check;
 mod column;
@@ -48,19 +47,20 @@ mod interval;
 mod shape;
 mod slopes;
 mod table;
+mod tabulated_stability;
 mod tolerance;
 mod validity;
 
 pub use additions::{Additions, InterpolationError};
-pub use answer::{Answer, NotKnown};
 pub use column::Column;
 pub use cut::CutLobes;
 pub(crate) use cut::FEW;
 pub use encode::{Content, Layer, encode, encode_with, encoded_length, encoded_length_with};
 pub use error::TableError;
 pub use header::Header;
-pub use interval::{Interval, Kind};
+pub use interval::{Interval, IntervalKind};
 pub use slopes::{IntervalSlopes, LayerMode, Learned, MODES_MAX, Slopes, corrected_limit};
 pub use table::LobeTable;
+pub use tabulated_stability::{NotKnown, TabulatedStability};
 pub use tolerance::{FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE};
 pub use validity::Validity;

@@ -10,7 +10,7 @@ use quietcut_core::advice::{
     Action, Advice, DEPTH_MARGIN, MAX_LOBE, Obstacle, SPEED_BAND, Source, advise, tooth_passing_speed,
 };
 use quietcut_core::detector::{Judgement, Reason, Verdict};
-use quietcut_core::lobes::{Answer, Interval, Kind, LobeTable, NotKnown};
+use quietcut_core::lobes::{Interval, IntervalKind, LobeTable, NotKnown, TabulatedStability};
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::{Limits, Tool, WorkingPoint};
 use support::{Owned, acetal, interval, table, validity, working_point};
@@ -62,7 +62,7 @@ fn table_of(columns: &[(f32, Vec<Interval>)]) -> Vec<u8> {
 
 /// Hopf from a limit that rises linearly with the speed: 1 mm at 1 000, 3 mm at 2 000 rev/min.
 fn ramp() -> Vec<u8> {
-    let above = |from_mm| vec![interval(from_mm, 6.0, Kind::Hopf, 30.0)];
+    let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
     table_of(&[(1000.0, above(1.0)), (2000.0, above(3.0))])
 }
 
@@ -120,7 +120,7 @@ fn the_nearest_speed_that_is_stable_with_margin() {
 
 #[test]
 fn the_nearer_of_two_pockets_wins() {
-    let above = |from_mm| vec![interval(from_mm, 6.0, Kind::Hopf, 30.0)];
+    let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
     // Pockets of 3 mm around 1 000 and 1 300 rev/min, 1 mm between and beside them.
     let pockets = [
         900.0, 949.0, 950.0, 1050.0, 1051.0, 1249.0, 1250.0, 1350.0, 1351.0, 1400.0,
@@ -154,7 +154,7 @@ fn at_the_limit_of_the_machine_the_band_ends() {
 
 #[test]
 fn a_narrow_pocket_is_no_advice() {
-    let above = |from_mm| vec![interval(from_mm, 6.0, Kind::Hopf, 30.0)];
+    let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
     // 10 rev/min wide at 1 000: half of the band.
     let speeds = [900.0, 994.0, 995.0, 1005.0, 1006.0, 1100.0];
     let columns: Vec<_> = speeds
@@ -170,10 +170,10 @@ fn a_narrow_pocket_is_no_advice() {
 #[test]
 fn a_pocket_above_a_flip_island_is_used() {
     let island = vec![
-        interval(1.5, 2.0, Kind::Flip, 17.0),
-        interval(3.0, 6.0, Kind::Hopf, 19.0),
+        interval(1.5, 2.0, IntervalKind::Flip, 17.0),
+        interval(3.0, 6.0, IntervalKind::Hopf, 19.0),
     ];
-    let hopf_from = |from_mm| vec![interval(from_mm, 6.0, Kind::Hopf, 19.0)];
+    let hopf_from = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 19.0)];
     let bytes = table_of(&[
         (900.0, hopf_from(1.0)),
         (1000.0, hopf_from(1.0)),
@@ -195,7 +195,7 @@ fn a_pocket_above_a_flip_island_is_used() {
 
 #[test]
 fn a_smaller_depth_elsewhere_must_earn_the_change() {
-    let above = |from_mm| vec![interval(from_mm, 6.0, Kind::Hopf, 30.0)];
+    let above = |from_mm| vec![interval(from_mm, 6.0, IntervalKind::Hopf, 30.0)];
     let far_limit = |mm| {
         let far = [(1060.0, above(mm)), (1100.0, above(mm))];
         let bytes = table_of(&[&[(1000.0, above(1.0)), (1040.0, above(1.0))], far.as_slice()].concat());
@@ -213,9 +213,9 @@ fn a_smaller_depth_elsewhere_must_earn_the_change() {
 #[test]
 fn undecided_depths_are_not_advised() {
     let bytes = table_of(&[
-        (1000.0, vec![interval(1.0, 6.0, Kind::Hopf, 30.0)]),
-        (1200.0, vec![interval(0.0, 6.0, Kind::Undecided, 0.0)]),
-        (1400.0, vec![interval(0.0, 6.0, Kind::Undecided, 0.0)]),
+        (1000.0, vec![interval(1.0, 6.0, IntervalKind::Hopf, 30.0)]),
+        (1200.0, vec![interval(0.0, 6.0, IntervalKind::Undecided, 0.0)]),
+        (1400.0, vec![interval(0.0, 6.0, IntervalKind::Undecided, 0.0)]),
         (1400.5, vec![]),
         (1600.0, vec![]),
     ]);
@@ -304,7 +304,7 @@ fn without_a_working_point_it_says_what_it_assumes() {
     assert_eq!((assumed.feed_per_tooth, assumed.posture), (Millimeters(0.15), 0));
     let answer = table.lookup(flip.speed, &assumed);
     assert!(
-        matches!(answer, Answer::Stable { margin } if margin.0 >= 0.999 * DEPTH_MARGIN * 1.327),
+        matches!(answer, TabulatedStability::Stable { margin } if margin.0 >= 0.999 * DEPTH_MARGIN * 1.327),
         "{answer:?}"
     );
     assert_near(
@@ -472,7 +472,7 @@ proptest! {
             Action::Keep | Action::NotKnown => return Ok(()),
         }
         let answer = table.lookup(advice.speed, &at);
-        prop_assert!(!matches!(answer, Answer::Unstable { .. }), "{advice:?} {answer:?}");
+        prop_assert!(!matches!(answer, TabulatedStability::Unstable { .. }), "{advice:?} {answer:?}");
         if advice.source == Source::Table {
             // Margin in depth and band in speed, but for rounding; the band is cut off at the limits.
             let range = limits.into_iter().chain(of_table).fold((0.0, f32::INFINITY), |(from, to), limits| {
@@ -484,7 +484,7 @@ proptest! {
                 for factor in [1.0 - 0.999 * DEPTH_MARGIN, 1.0, 1.0 + 0.999 * DEPTH_MARGIN] {
                     let near = WorkingPoint { axial_depth: Millimeters(factor * at.axial_depth.0), ..at };
                     let answer = table.lookup(Rpm(rpm), &near);
-                    prop_assert!(matches!(answer, Answer::Stable { .. }), "{rpm} {near:?}: {advice:?} {answer:?}");
+                    prop_assert!(matches!(answer, TabulatedStability::Stable { .. }), "{rpm} {near:?}: {advice:?} {answer:?}");
                 }
             }
         }

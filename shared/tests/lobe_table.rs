@@ -7,15 +7,18 @@ use proptest::prelude::*;
 use quietcut_core::checksum::crc32;
 use quietcut_core::lobes::format::{HEADER_LENGTH, MAX_INTERVALS};
 use quietcut_core::lobes::{
-    Answer, Column, Content, Header, Interval, Kind, Layer, LobeTable, NotKnown, TableError, encode,
-    encoded_length,
+    Column, Content, Header, Interval, IntervalKind, Layer, LobeTable, NotKnown, TableError,
+    TabulatedStability, encode, encoded_length,
 };
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
 use support::{LIMITS, Owned, acetal, interval, table, validity, working_point};
 
 fn is_stable(column: &Column, depth_mm: f32) -> bool {
-    matches!(column.at(Millimeters(depth_mm)), Answer::Stable { .. })
+    matches!(
+        column.at(Millimeters(depth_mm)),
+        TabulatedStability::Stable { .. }
+    )
 }
 
 proptest! {
@@ -120,7 +123,7 @@ proptest! {
     fn a_limit_moves_monotonously_between_its_neighbours(
         limits_mm in prop::array::uniform4(0.5_f32..5.0), steps in prop::collection::vec(0.0_f32..1.0, 2..20),
     ) {
-        let columns = limits_mm.map(|mm| vec![interval(mm, 6.0, Kind::Hopf, 20.0 * mm)]);
+        let columns = limits_mm.map(|mm| vec![interval(mm, 6.0, IntervalKind::Hopf, 20.0 * mm)]);
         let [a, b, c, d] = columns;
         let content = Owned {
             limits: LIMITS,
@@ -314,7 +317,14 @@ fn content_that_is_no_table_is_refused() {
     );
     let many = |c: &mut Owned| {
         c.layers[0].1[4] = (0..13_u8)
-            .map(|k| interval(f32::from(k) / 4.0, f32::from(k) / 4.0 + 0.1, Kind::Fold, 0.0))
+            .map(|k| {
+                interval(
+                    f32::from(k) / 4.0,
+                    f32::from(k) / 4.0 + 0.1,
+                    IntervalKind::Fold,
+                    0.0,
+                )
+            })
             .collect();
     };
     assert_eq!(
@@ -359,18 +369,26 @@ fn content_that_is_no_table_is_refused() {
 #[test]
 fn an_interval_thinner_than_a_step_is_kept() {
     let mut content = acetal();
-    let sliver = |from_mm: f32, to_mm: f32| interval(from_mm, to_mm, Kind::Flip, 17.0);
+    let sliver = |from_mm: f32, to_mm: f32| interval(from_mm, to_mm, IntervalKind::Flip, 17.0);
     content.layers[0].1[0] = vec![
-        interval(1.0, 2.0, Kind::Hopf, 20.0),
+        interval(1.0, 2.0, IntervalKind::Hopf, 20.0),
         sliver(2.0, 2.000_001),
-        interval(3.0, 5.999_99, Kind::Hopf, 20.0),
+        interval(3.0, 5.999_99, IntervalKind::Hopf, 20.0),
         sliver(5.999_99, 6.0),
     ];
     let bytes = content.encode().unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
     let entry = table.entry(0, 0).unwrap();
-    let kinds: Vec<Kind> = entry.intervals().iter().map(|i| i.kind).collect();
-    assert_eq!(kinds, [Kind::Hopf, Kind::Flip, Kind::Hopf, Kind::Flip]);
+    let kinds: Vec<IntervalKind> = entry.intervals().iter().map(|i| i.kind).collect();
+    assert_eq!(
+        kinds,
+        [
+            IntervalKind::Hopf,
+            IntervalKind::Flip,
+            IntervalKind::Hopf,
+            IntervalKind::Flip
+        ]
+    );
 }
 
 #[test]
@@ -392,9 +410,9 @@ fn the_generation_of_a_slot_is_under_the_checksum() {
 #[test]
 fn six_layers_of_six_hundred_speeds_take_about_a_hundred_kilobytes() {
     let island = [
-        interval(1.0, 1.2, Kind::Flip, 17.0),
-        interval(1.4, 1.6, Kind::Fold, 17.0),
-        interval(2.0, 6.0, Kind::Hopf, 19.0),
+        interval(1.0, 1.2, IntervalKind::Flip, 17.0),
+        interval(1.4, 1.6, IntervalKind::Fold, 17.0),
+        interval(2.0, 6.0, IntervalKind::Hopf, 19.0),
     ];
     let columns = vec![island.to_vec(); 600];
     let content = Owned {
@@ -415,8 +433,8 @@ fn six_layers_of_six_hundred_speeds_take_about_a_hundred_kilobytes() {
 /// Rounding to a step of 6 mm/65 535.
 const STEP_MM: f32 = 1e-4;
 
-fn assert_unstable(answer: Answer, expected: Kind, hz: f32, depth_margin_mm: f32) {
-    let Answer::Unstable {
+fn assert_unstable(answer: TabulatedStability, expected: IntervalKind, hz: f32, depth_margin_mm: f32) {
+    let TabulatedStability::Unstable {
         kind,
         chatter,
         margin,
@@ -438,15 +456,17 @@ fn a_flip_island_at_a_speed_of_the_grid() {
     let table = LobeTable::parse(&bytes).unwrap();
     let at = |depth_mm| table.lookup(Rpm(1036.0), &working_point(&validity(0.15), depth_mm));
     let assert_stable = |depth_mm: f32, margin_mm: f32| match at(depth_mm) {
-        Answer::Stable { margin } => assert!((margin.0 - margin_mm).abs() < 2.0 * STEP_MM, "{margin}"),
+        TabulatedStability::Stable { margin } => {
+            assert!((margin.0 - margin_mm).abs() < 2.0 * STEP_MM, "{margin}")
+        }
         other => panic!("{other:?}"),
     };
     assert_stable(0.0, 1.575);
     assert_stable(1.5, 0.075);
-    assert_unstable(at(1.6), Kind::Flip, 17.27, 0.025);
+    assert_unstable(at(1.6), IntervalKind::Flip, 17.27, 0.025);
     assert_stable(2.4, 0.066);
-    assert_unstable(at(3.0), Kind::Hopf, 19.0, 0.288);
-    assert_unstable(at(6.0), Kind::Hopf, 19.0, 0.0);
+    assert_unstable(at(3.0), IntervalKind::Hopf, 19.0, 0.288);
+    assert_unstable(at(6.0), IntervalKind::Hopf, 19.0, 0.0);
     let column = table
         .column(Rpm(1036.0), &working_point(&validity(0.15), 0.0))
         .unwrap();
@@ -466,7 +486,7 @@ fn kinds_that_touch_are_one_unstable_range() {
     let table = LobeTable::parse(&bytes).unwrap();
     // 4.0 mm at 1 045 rev/min is a flip; above 4.023 it is a Hopf, so the nearest stable depth is 1.327.
     let answer = table.lookup(Rpm(1045.0), &working_point(&validity(0.15), 4.0));
-    assert_unstable(answer, Kind::Flip, 17.42, 2.0);
+    assert_unstable(answer, IntervalKind::Flip, 17.42, 2.0);
 }
 
 #[test]
@@ -475,13 +495,31 @@ fn between_a_flip_island_and_none_the_island_stays() {
     let table = LobeTable::parse(&bytes).unwrap();
     // Between 900 (Hopf from 1.723) and 1 036 (flip 1.575 to 2.334, Hopf from 2.712): unstable where either is.
     let at = |depth_mm| table.lookup(Rpm(1000.0), &working_point(&validity(0.15), depth_mm));
-    assert!(matches!(at(1.5), Answer::Stable { .. }));
-    assert!(matches!(at(1.6), Answer::Unstable { kind: Kind::Flip, .. }));
-    assert!(matches!(at(2.5), Answer::Unstable { kind: Kind::Hopf, .. }));
+    assert!(matches!(at(1.5), TabulatedStability::Stable { .. }));
+    assert!(matches!(
+        at(1.6),
+        TabulatedStability::Unstable {
+            kind: IntervalKind::Flip,
+            ..
+        }
+    ));
+    assert!(matches!(
+        at(2.5),
+        TabulatedStability::Unstable {
+            kind: IntervalKind::Hopf,
+            ..
+        }
+    ));
     // Between 1 100 (Hopf from 2.223) and 3 000 (nothing): the same.
     let at = |depth_mm| table.lookup(Rpm(2999.0), &working_point(&validity(0.15), depth_mm));
-    assert!(matches!(at(2.2), Answer::Stable { .. }));
-    assert!(matches!(at(2.3), Answer::Unstable { kind: Kind::Hopf, .. }));
+    assert!(matches!(at(2.2), TabulatedStability::Stable { .. }));
+    assert!(matches!(
+        at(2.3),
+        TabulatedStability::Unstable {
+            kind: IntervalKind::Hopf,
+            ..
+        }
+    ));
 }
 
 #[test]
@@ -499,7 +537,7 @@ fn outside_of_the_table_the_answer_is_not_known() {
     let table = LobeTable::parse(&bytes).unwrap();
     let base = working_point(&validity(0.15), 1.0);
     let ask = |rpm, at| match table.lookup(Rpm(rpm), &at) {
-        Answer::NotKnown(why) => Some(why),
+        TabulatedStability::NotKnown(why) => Some(why),
         _ => None,
     };
     assert_eq!(ask(1000.0, base), None);
@@ -580,17 +618,20 @@ fn outside_of_the_table_the_answer_is_not_known() {
 #[test]
 fn an_undecided_depth_is_not_known() {
     let mut content = acetal();
-    content.layers[0].1[3] = vec![interval(0.0, 6.0, Kind::Undecided, 0.0)];
-    content.layers[0].1[0].insert(0, interval(1.7, 1.723, Kind::Undecided, 0.0));
+    content.layers[0].1[3] = vec![interval(0.0, 6.0, IntervalKind::Undecided, 0.0)];
+    content.layers[0].1[0].insert(0, interval(1.7, 1.723, IntervalKind::Undecided, 0.0));
     let bytes = content.encode().unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
     let ask = |rpm, depth_mm| table.lookup(Rpm(rpm), &working_point(&validity(0.15), depth_mm));
-    let undecided = Answer::NotKnown(NotKnown::Undecided);
+    let undecided = TabulatedStability::NotKnown(NotKnown::Undecided);
     assert_eq!(ask(1100.0, 1.0), undecided);
     assert_eq!(ask(900.0, 1.71), undecided);
     assert!(matches!(
         ask(900.0, 1.8),
-        Answer::Unstable { kind: Kind::Hopf, .. }
+        TabulatedStability::Unstable {
+            kind: IntervalKind::Hopf,
+            ..
+        }
     ));
     // Stable in one neighbour, undecided in the other: not known.
     assert_eq!(ask(1090.0, 1.0), undecided);
@@ -606,7 +647,7 @@ fn a_full_column_grows_to_the_unstable_side() {
                 interval(
                     f32::from(k) * 0.4 + shift_mm,
                     f32::from(k) * 0.4 + shift_mm + 0.05,
-                    Kind::Flip,
+                    IntervalKind::Flip,
                     10.0 + f32::from(k),
                 )
             })
@@ -632,7 +673,10 @@ fn a_full_column_grows_to_the_unstable_side() {
                 ..working_point(&validity(0.1), middle_mm)
             };
             assert!(
-                matches!(table.lookup(Rpm(1050.0), &at), Answer::Unstable { .. }),
+                matches!(
+                    table.lookup(Rpm(1050.0), &at),
+                    TabulatedStability::Unstable { .. }
+                ),
                 "{middle_mm}"
             );
         }

@@ -9,8 +9,8 @@ use proptest::prelude::*;
 use quietcut_core::checksum::crc32;
 use quietcut_core::lobes::format::{SCHEMA, SCHEMA_PLAIN};
 use quietcut_core::lobes::{
-    Additions, Answer, FEED_DIRECTION_SPAN, InterpolationError, IntervalSlopes, Kind, LayerMode, Learned,
-    LobeTable, MODES_MAX, NotKnown, Slopes, TableError, corrected_limit,
+    Additions, FEED_DIRECTION_SPAN, InterpolationError, IntervalKind, IntervalSlopes, LayerMode, Learned,
+    LobeTable, MODES_MAX, NotKnown, Slopes, TableError, TabulatedStability, corrected_limit,
 };
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
@@ -327,7 +327,7 @@ fn a_corrected_entry_moves_its_ends_and_keeps_their_order() {
     };
     let closed = table.corrected_entry(0, 1, &away).unwrap();
     assert_eq!(closed.intervals().len(), 1);
-    assert_eq!(closed.intervals()[0].kind, Kind::Hopf);
+    assert_eq!(closed.intervals()[0].kind, IntervalKind::Hopf);
     // A table without derivatives is what it is.
     let plain = acetal().encode().unwrap();
     let plain = LobeTable::parse(&plain).unwrap();
@@ -357,7 +357,7 @@ fn directed(directions: &[Option<f32>], feeds: &[f32]) -> Vec<u8> {
             let limit_mm = 1.0 + direction.unwrap_or(0.0) * 0.01 + feed;
             (
                 validity(feed),
-                vec![vec![interval(limit_mm, 6.0, Kind::Hopf, 17.0)]],
+                vec![vec![interval(limit_mm, 6.0, IntervalKind::Hopf, 17.0)]],
             )
         })
         .collect();
@@ -428,11 +428,11 @@ fn a_direction_that_was_not_told_is_the_only_one_or_not_known() {
     let ask = |bytes: &[u8]| LobeTable::parse(bytes).unwrap().lookup(Rpm(900.0), &at);
     assert!(matches!(
         ask(&directed(&[Some(30.0)], &[0.0])),
-        Answer::Stable { .. }
+        TabulatedStability::Stable { .. }
     ));
     assert!(matches!(
         ask(&directed(&[Some(30.0), Some(60.0)], &[0.0])),
-        Answer::NotKnown(NotKnown::FeedDirectionNotTold)
+        TabulatedStability::NotKnown(NotKnown::FeedDirectionNotTold)
     ));
     // A layer for any direction answers for all of them.
     let any = directed(&[None], &[0.0]);

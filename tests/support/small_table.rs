@@ -2,7 +2,7 @@
 // Some test crates include this file as a private module.
 #![allow(unreachable_pub, clippy::expect_used)]
 
-use quietcut_core::lobes::{Content, Interval, Kind, Layer, Validity, encode, encoded_length};
+use quietcut_core::lobes::{Content, Interval, IntervalKind, Layer, Validity, encode, encoded_length};
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 
 /// A table with a Hopf limit at this depth from 600 rev/min on, 10 rev/min apart: `speeds` gives its length.
@@ -10,7 +10,7 @@ pub fn table(name: &str, limit_mm: f32, speeds: u16) -> Vec<u8> {
     let hopf = [Interval {
         from: Millimeters(limit_mm),
         to: Millimeters(6.0),
-        kind: Kind::Hopf,
+        kind: IntervalKind::Hopf,
         chatter: Hertz(17.4),
     }];
     let speeds: Vec<Rpm> = (0..speeds).map(|k| Rpm(600.0 + 10.0 * f32::from(k))).collect();

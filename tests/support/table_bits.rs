@@ -3,7 +3,9 @@
 
 use quietcut_core::advice::{Action, Advice, advise};
 use quietcut_core::detector::{Judgement, Reason, Verdict};
-use quietcut_core::lobes::{Answer, Content, Interval, Kind, Layer, LobeTable, Validity, encode};
+use quietcut_core::lobes::{
+    Content, Interval, IntervalKind, Layer, LobeTable, TabulatedStability, Validity, encode,
+};
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
 use quietcut_core::working_point::{Tool, WorkingPoint};
 
@@ -24,7 +26,7 @@ impl Memory {
         let nothing = Interval {
             from: Millimeters(0.0),
             to: Millimeters(0.0),
-            kind: Kind::Hopf,
+            kind: IntervalKind::Hopf,
             chatter: Hertz(0.0),
         };
         Self {
@@ -46,9 +48,9 @@ impl Memory {
                 chatter: Hertz(17.0 + depth_of_lobe),
             };
             *column = [
-                interval(0.8 * limit_mm, 0.81 * limit_mm, Kind::Flip),
-                interval(0.9 * limit_mm, 0.91 * limit_mm, Kind::Fold),
-                interval(limit_mm, 6.0, Kind::Hopf),
+                interval(0.8 * limit_mm, 0.81 * limit_mm, IntervalKind::Flip),
+                interval(0.9 * limit_mm, 0.91 * limit_mm, IntervalKind::Fold),
+                interval(limit_mm, 6.0, IntervalKind::Hopf),
             ];
         }
         let mut columns: [&[Interval]; SPEEDS] = [&[]; SPEEDS];
@@ -128,8 +130,8 @@ pub fn of_table(table: &LobeTable<'_>) -> u32 {
         let rpm = 601.0 + 35.7 * f32::from(step);
         for depth_mm in [0.42, 1.1, 3.0] {
             match table.lookup(Rpm(rpm), &cut(depth_mm)) {
-                Answer::Stable { margin } => word(margin.0.to_bits()),
-                Answer::Unstable {
+                TabulatedStability::Stable { margin } => word(margin.0.to_bits()),
+                TabulatedStability::Unstable {
                     kind,
                     chatter,
                     margin,
@@ -138,7 +140,7 @@ pub fn of_table(table: &LobeTable<'_>) -> u32 {
                     word(chatter.0.to_bits());
                     word(margin.0.to_bits());
                 }
-                Answer::NotKnown(_) => word(u32::MAX),
+                TabulatedStability::NotKnown(_) => word(u32::MAX),
             }
             if step % 10 == 0 {
                 let advice = advice(table, rpm, depth_mm);

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use quietcut_core::lobes::{IntervalSlopes, Kind, LobeTable};
+use quietcut_core::lobes::{IntervalKind, IntervalSlopes, LobeTable};
 use serde::Serialize;
 
 use super::{Error, Output, Range};
@@ -253,12 +253,12 @@ fn percent(text: &str) -> Result<f64, String> {
     }
 }
 
-fn kind_name(kind: Kind) -> &'static str {
+fn kind_name(kind: IntervalKind) -> &'static str {
     match kind {
-        Kind::Hopf => "hopf",
-        Kind::Flip => "flip",
-        Kind::Fold => "fold",
-        Kind::Undecided => "undecided",
+        IntervalKind::Hopf => "hopf",
+        IntervalKind::Flip => "flip",
+        IntervalKind::Fold => "fold",
+        IntervalKind::Undecided => "undecided",
     }
 }
 

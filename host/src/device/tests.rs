@@ -7,7 +7,7 @@ use std::time::Duration;
 use heapless::String;
 use quietcut_core::acceleration::Block;
 use quietcut_core::detector::{Judgement, Reason, Verdict};
-use quietcut_core::lobes::{self, Content, Header, Interval, Kind, Layer, LobeTable, Validity};
+use quietcut_core::lobes::{self, Content, Header, Interval, IntervalKind, Layer, LobeTable, Validity};
 use quietcut_core::monitor::Report;
 use quietcut_core::protocol::{
     Decoder, FrameError, Info, MAX_FRAME, Refusal, Reply, Request, Response, Sequence, Slot, Upload, VERSION,
@@ -351,7 +351,7 @@ fn table_bytes() -> Vec<u8> {
     let interval = Interval {
         from: Millimeters(1.0),
         to: Millimeters(4.0),
-        kind: Kind::Hopf,
+        kind: IntervalKind::Hopf,
         chatter: Hertz(17.0),
     };
     let columns: Vec<&[Interval]> = speeds.iter().map(|_| std::slice::from_ref(&interval)).collect();

@@ -51,13 +51,13 @@ impl Column {
         let undecided = entry
             .intervals()
             .iter()
-            .filter(|interval| interval.kind == lobes::Kind::Undecided);
+            .filter(|interval| interval.kind == lobes::IntervalKind::Undecided);
         let first_limit = entry.first_limit().and_then(|interval| {
             let kind = match interval.kind {
-                lobes::Kind::Hopf => LimitKind::Hopf,
-                lobes::Kind::Flip => LimitKind::Flip,
-                lobes::Kind::Fold => LimitKind::Fold,
-                lobes::Kind::Undecided => return None,
+                lobes::IntervalKind::Hopf => LimitKind::Hopf,
+                lobes::IntervalKind::Flip => LimitKind::Flip,
+                lobes::IntervalKind::Fold => LimitKind::Fold,
+                lobes::IntervalKind::Undecided => return None,
             };
             Some(FirstLimit {
                 depth_mm: f64::from(interval.from.0),
@@ -371,7 +371,7 @@ mod tests {
 
     #[test]
     fn a_table_is_drawn_as_the_device_has_it() {
-        use quietcut_core::lobes::{Content, Interval, Kind, Layer, Validity, encode};
+        use quietcut_core::lobes::{Content, Interval, IntervalKind, Layer, Validity, encode};
         use quietcut_core::units::{Degrees, Hertz};
 
         let interval = |from: f32, to: f32, kind| Interval {
@@ -381,8 +381,11 @@ mod tests {
             chatter: Hertz(17.0),
         };
         let columns = [
-            &[interval(1.5, 2.25, Kind::Flip), interval(2.75, 4.0, Kind::Hopf)][..],
-            &[interval(0.0, 4.0, Kind::Undecided)][..],
+            &[
+                interval(1.5, 2.25, IntervalKind::Flip),
+                interval(2.75, 4.0, IntervalKind::Hopf),
+            ][..],
+            &[interval(0.0, 4.0, IntervalKind::Undecided)][..],
         ];
         let validity = Validity {
             feed_from: Millimeters(0.15),

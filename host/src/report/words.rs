@@ -179,12 +179,12 @@ pub fn obstacle(obstacle: &Obstacle) -> String {
 }
 
 /// How stability is lost.
-pub fn limit(kind: lobes::Kind) -> &'static str {
+pub fn limit(kind: lobes::IntervalKind) -> &'static str {
     match kind {
-        lobes::Kind::Hopf => "chatter at a frequency of its own (Hopf)",
-        lobes::Kind::Flip => "chatter at every second tooth (period doubling)",
-        lobes::Kind::Fold => "the forced vibration jumps (fold)",
-        lobes::Kind::Undecided => "the computation could not decide",
+        lobes::IntervalKind::Hopf => "chatter at a frequency of its own (Hopf)",
+        lobes::IntervalKind::Flip => "chatter at every second tooth (period doubling)",
+        lobes::IntervalKind::Fold => "the forced vibration jumps (fold)",
+        lobes::IntervalKind::Undecided => "the computation could not decide",
     }
 }
 

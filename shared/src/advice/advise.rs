@@ -1,10 +1,10 @@
 //! From the verdict to the next speed or depth: the table first, the tooth-passing rule where it does not help.
 
 use super::proposal::{Action, Advice, Obstacle, Source};
-use super::quiet::Quiet;
+use super::quiet_speed_search::QuietSpeedSearch;
 use super::rule::tooth_passing_speed;
 use crate::detector::{Judgement, Verdict};
-use crate::lobes::{Answer, Kind, LobeTable, NotKnown};
+use crate::lobes::{IntervalKind, LobeTable, NotKnown, TabulatedStability};
 use crate::units::Rpm;
 use crate::working_point::{Limits, Tool, WorkingPoint};
 
@@ -112,7 +112,7 @@ fn cut_in_table<'t>(
     // Another speed may be known where the present one lies outside; all else is the same at every speed.
     let first = table.speed(0).ok_or(Obstacle::Table(NotKnown::Damaged))?;
     match table.lookup(first, &at) {
-        Answer::NotKnown(why) if why != NotKnown::Undecided => Err(Obstacle::Table(why)),
+        TabulatedStability::NotKnown(why) if why != NotKnown::Undecided => Err(Obstacle::Table(why)),
         _ => Ok(Cut { table, at }),
     }
 }
@@ -129,10 +129,13 @@ fn assumed_point(judgement: &Judgement, speed: Rpm, table: &LobeTable<'_>) -> Re
     };
     let column = table.column(speed, &at).map_err(Obstacle::Table)?;
     let heard = match judgement.verdict {
-        Verdict::PeriodDoubling => Kind::Flip,
-        _ => Kind::Hopf,
+        Verdict::PeriodDoubling => IntervalKind::Flip,
+        _ => IntervalKind::Hopf,
     };
-    let mut unstable = column.intervals().iter().filter(|i| i.kind != Kind::Undecided);
+    let mut unstable = column
+        .intervals()
+        .iter()
+        .filter(|i| i.kind != IntervalKind::Undecided);
     let same_kind = unstable.clone().find(|i| i.kind == heard);
     at.axial_depth = same_kind.or(unstable.next()).ok_or(Obstacle::Contradicted)?.from;
     Ok(at)
@@ -150,7 +153,7 @@ fn speed_range(limits: Option<&Limits>, table: Option<&LobeTable<'_>>) -> (f32, 
 }
 
 fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Result<Advice, Obstacle> {
-    let quiet = Quiet::new(cut.table, &cut.at, range).map_err(Obstacle::Table)?;
+    let quiet = QuietSpeedSearch::new(cut.table, &cut.at, range).map_err(Obstacle::Table)?;
     if let Some(quiet_speed) = quiet.nearest_speed(speed) {
         if quiet_speed == speed {
             return Err(Obstacle::Contradicted);
@@ -192,8 +195,12 @@ fn by_rule(
         };
     };
     let is_admissible = |candidate: Rpm| {
-        let is_unstable =
-            |cut: &Cut<'_>| matches!(cut.table.lookup(candidate, &cut.at), Answer::Unstable { .. });
+        let is_unstable = |cut: &Cut<'_>| {
+            matches!(
+                cut.table.lookup(candidate, &cut.at),
+                TabulatedStability::Unstable { .. }
+            )
+        };
         (from_rpm..=to_rpm).contains(&candidate.0) && !cut.is_some_and(is_unstable)
     };
     match tooth_passing_speed(keep.speed, chatter, tool, is_admissible) {

@@ -4,7 +4,7 @@ use heapless::{Deque, Vec};
 
 use super::cell::largest_possible_mm;
 use super::margins::{BETTER, DEPTH_MARGIN, SPEED_BAND};
-use super::quiet::{Direction, Quiet};
+use super::quiet_speed_search::{Direction, QuietSpeedSearch};
 use super::rule::ratio;
 use crate::units::{Millimeters, Rpm};
 
@@ -24,7 +24,7 @@ struct Promise {
     depth_mm: f32,
 }
 
-impl Quiet<'_> {
+impl QuietSpeedSearch<'_> {
     /// The largest quiet depth up to that of the cut that was found, and the speed for it: the present one unless another
     /// is better.
     ///

@@ -11,7 +11,7 @@
 
 use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, Multiplier};
-use crate::detector::held::{Held, confidence};
+use crate::detector::latched_chatter::{LatchedChatter, confidence};
 use crate::detector::lone_tone::tone_alone;
 use crate::detector::presence::Presence;
 use crate::detector::{Judgement, Reason, Verdict};
@@ -33,7 +33,7 @@ const SETTLED: u32 = 24;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detector {
     presence: [Presence; BANDS],
-    held: Option<Held>,
+    held: Option<LatchedChatter>,
     /// Passings since the tool entered, as far as it is known.
     cut_passings: u32,
     /// The alternating part was seen dying, or standing, since the tool entered.
@@ -144,7 +144,7 @@ impl Detector {
                     .held
                     .is_none_or(|held| held.by_tone || held.is_other(&multiplier, reason, finding));
                 if newly {
-                    self.held = Some(Held::new(multiplier, reason, finding, band, evidence));
+                    self.held = Some(LatchedChatter::new(multiplier, reason, finding, band, evidence));
                 }
             }
         }

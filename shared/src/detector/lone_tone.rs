@@ -3,7 +3,7 @@
 use crate::detector::Reason;
 use crate::detector::evidence::{BANDS, Evidence};
 use crate::detector::finding::{Finding, Kind};
-use crate::detector::held::{Held, LAST_GROWTH};
+use crate::detector::latched_chatter::{LAST_GROWTH, LatchedChatter};
 use crate::detector::tone::Tone;
 
 /// A residual of this part of the forced vibration that nothing explains is chatter, where a tone is in it.
@@ -15,7 +15,7 @@ const SETTLED: u32 = 24;
 
 /// Chatter as the spectrum tells it: where nothing can be sampled at fixed angles, or where that sees a residual that no few multipliers
 /// explain, as of a cut that is far over the limit.
-pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<Held> {
+pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<LatchedChatter> {
     evidence.speed?;
     for band in 0..BANDS {
         let Some(tone) = evidence.tones[band].filter(|tone| tone.share >= TONE_SHARE) else {
@@ -32,7 +32,7 @@ pub(super) fn tone_alone(evidence: &Evidence<'_>) -> Option<Held> {
         if !heard {
             continue;
         }
-        return Some(Held {
+        return Some(LatchedChatter {
             kind: kind_of(tone, evidence),
             band,
             by_tone: true,

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::{Answer, Interval, Kind, NotKnown};
+use super::{Interval, IntervalKind, NotKnown, TabulatedStability};
 use crate::units::{Hertz, Millimeters};
 
 /// Intervals of a column after joining up to four columns; more are merged to the unstable side.
@@ -80,10 +80,10 @@ impl Column {
     }
 
     /// What this column says of a depth.
-    pub fn at(&self, depth: Millimeters) -> Answer {
+    pub fn at(&self, depth: Millimeters) -> TabulatedStability {
         // Written so that NaN lands here too.
         if !(depth.0 >= self.depth_from_mm && depth.0 <= self.depth_to_mm) {
-            return Answer::NotKnown(NotKnown::Depth {
+            return TabulatedStability::NotKnown(NotKnown::Depth {
                 asked: depth,
                 from: Millimeters(self.depth_from_mm),
                 to: Millimeters(self.depth_to_mm),
@@ -91,15 +91,15 @@ impl Column {
         }
         let hit = self.intervals.iter().position(|i| self.covers(i, depth.0));
         let Some((index, interval)) = hit.and_then(|index| Some((index, self.intervals.get(index)?))) else {
-            return Answer::Stable {
+            return TabulatedStability::Stable {
                 margin: Millimeters(self.distance_to_unstable_mm(depth.0)),
             };
         };
-        if interval.kind == Kind::Undecided {
-            return Answer::NotKnown(NotKnown::Undecided);
+        if interval.kind == IntervalKind::Undecided {
+            return TabulatedStability::NotKnown(NotKnown::Undecided);
         }
         let (from_mm, to_mm) = self.unstable_range_mm(index, interval);
-        Answer::Unstable {
+        TabulatedStability::Unstable {
             kind: interval.kind,
             chatter: interval.chatter,
             margin: Millimeters(f32::min(depth.0 - from_mm, to_mm - depth.0)),

@@ -1,8 +1,8 @@
 //! The lobes of one cut: the layers of a table between which its feed lies.
 
 use super::{
-    Answer, Column, FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE,
-    Interval, LobeTable, NotKnown,
+    Column, FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE, Interval,
+    LobeTable, NotKnown, TabulatedStability,
 };
 use crate::units::{Degrees, Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
@@ -128,10 +128,10 @@ impl<'a> LobeTable<'a> {
     }
 
     /// What the table says of the cut at `speed`.
-    pub fn lookup(&self, speed: Rpm, working_point: &WorkingPoint) -> Answer {
+    pub fn lookup(&self, speed: Rpm, working_point: &WorkingPoint) -> TabulatedStability {
         match self.column(speed, working_point) {
             Ok(column) => column.at(working_point.axial_depth),
-            Err(why) => Answer::NotKnown(why),
+            Err(why) => TabulatedStability::NotKnown(why),
         }
     }
 }

@@ -37,7 +37,7 @@ pub struct Layer<'a> {
     /// What it holds for.
     pub validity: Validity,
     /// Per speed the depths that are not stable, ascending and without overlaps; a speed that could not be
-    /// computed has one interval over all depths of kind [`Undecided`](super::Kind::Undecided).
+    /// computed has one interval over all depths of kind [`Undecided`](super::IntervalKind::Undecided).
     pub columns: &'a [&'a [Interval]],
 }
 

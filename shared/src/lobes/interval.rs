@@ -9,7 +9,7 @@ use crate::units::{Hertz, Millimeters};
 /// Multipliers are those over a tooth period; of a tool with teeth at unequal pitch over a revolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Kind {
+pub enum IntervalKind {
     /// Chatter at a frequency of its own: a complex pair of multipliers outside the unit circle.
     Hopf,
     /// Chatter with twice the tooth period: a multiplier below −1.
@@ -31,7 +31,7 @@ pub struct Interval {
     /// The first depth that is stable again, or the last depth of the table.
     pub to: Millimeters,
     /// What it is.
-    pub kind: Kind,
+    pub kind: IntervalKind,
     /// The chatter frequency; 0 where it is not known.
     pub chatter: Hertz,
 }

@@ -10,7 +10,7 @@ use super::format::{
 };
 use super::half;
 use super::slopes::{IntervalSlopes, LayerMode, MODES_MAX, Slopes};
-use super::{Interval, Kind, TableError, Validity};
+use super::{Interval, IntervalKind, TableError, Validity};
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::Limits;
 
@@ -313,21 +313,21 @@ fn check_flags(flags: u16, is_extended: bool) -> Result<(), TableError> {
     Ok(())
 }
 
-pub(super) fn kind_code(kind: Kind) -> u8 {
+pub(super) fn kind_code(kind: IntervalKind) -> u8 {
     match kind {
-        Kind::Hopf => 0,
-        Kind::Flip => 1,
-        Kind::Fold => 2,
-        Kind::Undecided => 3,
+        IntervalKind::Hopf => 0,
+        IntervalKind::Flip => 1,
+        IntervalKind::Fold => 2,
+        IntervalKind::Undecided => 3,
     }
 }
 
-fn kind_of(code: u8) -> Option<Kind> {
+fn kind_of(code: u8) -> Option<IntervalKind> {
     Some(match code {
-        0 => Kind::Hopf,
-        1 => Kind::Flip,
-        2 => Kind::Fold,
-        3 => Kind::Undecided,
+        0 => IntervalKind::Hopf,
+        1 => IntervalKind::Flip,
+        2 => IntervalKind::Fold,
+        3 => IntervalKind::Undecided,
         _ => return None,
     })
 }

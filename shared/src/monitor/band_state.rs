@@ -10,7 +10,7 @@ use crate::units::Hertz;
 
 /// One band on its way from samples to findings.
 #[derive(Clone, Debug)]
-pub(super) struct Path<const POINTS: usize, const BINS: usize> {
+pub(super) struct BandState<const POINTS: usize, const BINS: usize> {
     pub(super) overlap: Overlap<POINTS>,
     pub(super) power: [f32; BINS],
     /// Width of a bin of the newest spectrum; 0 before the first.
@@ -29,7 +29,7 @@ pub(super) struct Path<const POINTS: usize, const BINS: usize> {
     pub(super) since_look: u32,
 }
 
-impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
+impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
     pub(super) const fn new() -> Self {
         Self {
             overlap: Overlap::new(),
@@ -98,23 +98,23 @@ impl<const POINTS: usize, const BINS: usize> Path<POINTS, BINS> {
 
 /// Goes on with the tone of a fresh spectrum, and with the background where there is no chatter.
 pub(super) fn follow_tone<const POINTS: usize, const BINS: usize>(
-    path: &mut Path<POINTS, BINS>,
+    band: &mut BandState<POINTS, BINS>,
     rotation: Option<Rotation>,
     (from, to): (Hertz, Hertz),
     chatter: bool,
     work: &mut [f32],
 ) {
     let spectrum = PowerSpectrum {
-        power: &path.power,
-        bin: path.bin,
+        power: &band.power,
+        bin: band.bin,
     };
-    let found = if path.background.is_learnt() {
-        path.background.new_tone(&spectrum, rotation, from, to, work)
+    let found = if band.background.is_learnt() {
+        band.background.new_tone(&spectrum, rotation, from, to, work)
     } else {
         None
     };
-    path.tone = Tone::follow(path.tone, found, &spectrum);
+    band.tone = Tone::follow(band.tone, found, &spectrum);
     if !chatter {
-        path.background.learn(&path.power);
+        band.background.learn(&band.power);
     }
 }

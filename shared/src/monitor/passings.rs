@@ -2,7 +2,7 @@
 
 use super::Band;
 use super::angles::Angles;
-use super::band_state::Path;
+use super::band_state::BandState;
 use super::pipeline::Monitor;
 use super::state::State;
 use super::strobe::show;
@@ -30,8 +30,8 @@ impl Monitor {
     }
 
     pub(super) fn take_tool(&self, state: &mut State, sample: Sample, n: usize, angles: Option<&Angles>) {
-        let path = &mut state.tool;
-        path.take(sample, TOOL_HOP);
+        let band = &mut state.tool;
+        band.take(sample, TOOL_HOP);
         let Some(angles) =
             angles.filter(|a| self.can_sample(a, self.decimation.tool_divisor(), TOOL_SAMPLES_PER_TOOTH))
         else {
@@ -43,19 +43,19 @@ impl Monitor {
         };
         let angle = angles.at(n, self.decimation.tool_delay());
         let unit = self.unit();
-        let Some(passed) = sampler.step(&mut path.sampler, sample.map(|x| x as f32 * unit), angle) else {
+        let Some(passed) = sampler.step(&mut band.sampler, sample.map(|x| x as f32 * unit), angle) else {
             return;
         };
         let rate = self.settings.sensor.nominal_rate.0 / self.decimation.tool_divisor() as f32;
         let noise = self.noise_density() * 0.5 * rate;
         // Not closely: samples between the samples are as good as a cubic, and what that leaves of the forced vibration turns by the samples per
         // tooth period, a tone that beats with its own harmonics.
-        let look = if path.since_look >= LOOK_SAMPLES {
+        let look = if band.since_look >= LOOK_SAMPLES {
             Look::Quick
         } else {
             Look::None
         };
-        self.take_passing(path, &passed, noise, look);
+        self.take_passing(band, &passed, noise, look);
         // Slower teeth than the structure band needs are shown from there.
         if !self.can_sample(
             angles,
@@ -73,8 +73,8 @@ impl Monitor {
         n: usize,
         angles: Option<&Angles>,
     ) {
-        let path = &mut state.structure;
-        path.take(sample, STRUCTURE_HOP);
+        let band = &mut state.structure;
+        band.take(sample, STRUCTURE_HOP);
         let divisor = self.decimation.structure_divisor();
         let Some(angles) = angles.filter(|a| self.can_sample(a, divisor, STRUCTURE_SAMPLES_PER_TOOTH)) else {
             return;
@@ -85,26 +85,26 @@ impl Monitor {
         };
         let angle = angles.at(n, self.decimation.structure_delay());
         let unit = self.unit();
-        let Some(passed) = sampler.step(&mut path.sampler, sample.map(|x| x as f32 * unit), angle) else {
+        let Some(passed) = sampler.step(&mut band.sampler, sample.map(|x| x as f32 * unit), angle) else {
             return;
         };
         // A mean over w seconds lets 1/(2w) Hz of the noise through.
         let rate = self.settings.sensor.nominal_rate.0;
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
-        self.take_passing(path, &passed, noise, Look::Close);
+        self.take_passing(band, &passed, noise, Look::Close);
         show(&mut state.strobes, Band::Structure, &passed);
     }
 
     fn take_passing<const POINTS: usize, const BINS: usize>(
         &self,
-        path: &mut Path<POINTS, BINS>,
+        band: &mut BandState<POINTS, BINS>,
         passed: &Passed,
         noise: f32,
         look: Look,
     ) {
-        path.floor = math::sqrt(noise);
-        path.growth.push(
+        band.floor = math::sqrt(noise);
+        band.growth.push(
             passed.tooth,
             &passed.passing,
             noise,
@@ -113,8 +113,8 @@ impl Monitor {
         );
         if look >= Look::Quick {
             // Without a look there is nothing new to judge.
-            path.passed = true;
-            path.since_look = 0;
+            band.passed = true;
+            band.since_look = 0;
         }
     }
 }

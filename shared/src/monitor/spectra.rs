@@ -33,32 +33,32 @@ impl Monitor {
         let chatter = state.detector.is_chatter();
         if state.tool.fresh {
             let band_rate = Hertz(rate.0 / self.decimation.tool_divisor() as f32);
-            let path = &mut state.tool;
+            let band = &mut state.tool;
             let spectrum = tool_spectrum(
-                &path.overlap,
+                &band.overlap,
                 &AXES,
                 band_rate,
                 unit,
                 &mut state.tool_work,
-                &mut path.power,
+                &mut band.power,
             );
-            path.bin = spectrum.bin;
+            band.bin = spectrum.bin;
             if measured.is_none() {
                 state.heard_speed = self.hear_speed(&spectrum);
             }
         }
         if state.structure.fresh {
             let band_rate = Hertz(rate.0 / self.decimation.structure_divisor() as f32);
-            let path = &mut state.structure;
+            let band = &mut state.structure;
             let spectrum = structure_spectrum(
-                &path.overlap,
+                &band.overlap,
                 &AXES,
                 band_rate,
                 unit,
                 &mut state.work,
-                &mut path.power,
+                &mut band.power,
             );
-            path.bin = spectrum.bin;
+            band.bin = spectrum.bin;
         }
         if measured.is_some() {
             state.heard_speed = None;

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::band_state::Path;
+use super::band_state::BandState;
 use super::{Band, MAX_BLOCK_STROBES, Strobe};
 use crate::acceleration::SampleClockState;
 use crate::advice::Advice;
@@ -23,8 +23,8 @@ pub struct State {
     /// Times the tachometer had lost its lock when the angles were last taken from it.
     pub(super) losses: u32,
     pub(super) decimation: decimation::State,
-    pub(super) structure: Path<STRUCTURE_POINTS, STRUCTURE_BINS>,
-    pub(super) tool: Path<TOOL_POINTS, TOOL_BINS>,
+    pub(super) structure: BandState<STRUCTURE_POINTS, STRUCTURE_BINS>,
+    pub(super) tool: BandState<TOOL_POINTS, TOOL_BINS>,
     pub(super) tool_work: [i32; TOOL_POINTS],
     pub(super) work: [f32; STRUCTURE_POINTS],
     /// Part of the samples that were clipped or lost lately.
@@ -64,8 +64,8 @@ impl State {
             tachometer: TachometerState::new(),
             losses: 0,
             decimation: decimation::State::new(),
-            structure: Path::new(),
-            tool: Path::new(),
+            structure: BandState::new(),
+            tool: BandState::new(),
             tool_work: [0; TOOL_POINTS],
             work: [0.0; STRUCTURE_POINTS],
             damage: 0.0,

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use quietcut_core::lobes::{
-    Additions, Content, Interval, Kind, Layer, LobeTable, TableError, Validity, encode_with,
+    Additions, Content, Interval, IntervalKind, Layer, LobeTable, TableError, Validity, encode_with,
     encoded_length_with,
 };
 use quietcut_core::units::{Degrees, Hertz, Millimeters, Rpm};
@@ -101,7 +101,7 @@ pub(crate) fn working_point(validity: &Validity, depth_mm: f32) -> WorkingPoint 
     }
 }
 
-pub(crate) fn interval(from_mm: f32, to_mm: f32, kind: Kind, chatter_hz: f32) -> Interval {
+pub(crate) fn interval(from_mm: f32, to_mm: f32, kind: IntervalKind, chatter_hz: f32) -> Interval {
     Interval {
         from: Millimeters(from_mm),
         to: Millimeters(to_mm),
@@ -112,16 +112,16 @@ pub(crate) fn interval(from_mm: f32, to_mm: f32, kind: Kind, chatter_hz: f32) ->
 
 /// Half-immersion down-milling of acetal near its flip notch: values of the case `kuka-kr90-acetal`, rounded.
 pub(crate) fn acetal() -> Owned {
-    let hopf = |from_mm, chatter_hz| interval(from_mm, 6.0, Kind::Hopf, chatter_hz);
+    let hopf = |from_mm, chatter_hz| interval(from_mm, 6.0, IntervalKind::Hopf, chatter_hz);
     let columns = vec![
         vec![hopf(1.723, 17.4)],
         vec![
-            interval(1.575, 2.334, Kind::Flip, 17.27),
-            interval(2.712, 6.0, Kind::Hopf, 19.0),
+            interval(1.575, 2.334, IntervalKind::Flip, 17.27),
+            interval(2.712, 6.0, IntervalKind::Hopf, 19.0),
         ],
         vec![
-            interval(1.327, 4.023, Kind::Flip, 17.42),
-            interval(4.023, 6.0, Kind::Hopf, 19.2),
+            interval(1.327, 4.023, IntervalKind::Flip, 17.42),
+            interval(4.023, 6.0, IntervalKind::Hopf, 19.2),
         ],
         vec![hopf(2.223, 20.0)],
         vec![],
@@ -135,12 +135,12 @@ pub(crate) fn acetal() -> Owned {
     }
 }
 
-pub(crate) fn kind() -> impl Strategy<Value = Kind> {
+pub(crate) fn kind() -> impl Strategy<Value = IntervalKind> {
     prop_oneof![
-        Just(Kind::Hopf),
-        Just(Kind::Flip),
-        Just(Kind::Fold),
-        Just(Kind::Undecided)
+        Just(IntervalKind::Hopf),
+        Just(IntervalKind::Flip),
+        Just(IntervalKind::Fold),
+        Just(IntervalKind::Undecided)
     ]
 }
 

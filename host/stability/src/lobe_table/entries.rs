@@ -1,6 +1,6 @@
 //! The entries of a column: a line of the method as the table wants it.
 
-use quietcut_core::lobes::{Interval, Kind as TableKind, format::MAX_INTERVALS};
+use quietcut_core::lobes::{Interval, IntervalKind, format::MAX_INTERVALS};
 use quietcut_core::units::{Hertz, Millimeters};
 
 use crate::limits::speed_line::SpeedLine;
@@ -47,8 +47,8 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
             let is_jump = line.bistable_mm.iter().any(|interval| interval[0] == from_mm);
             let kind = match switch {
                 Some(switch) => table_kind(switch.kind),
-                None if is_jump => TableKind::Fold,
-                None => TableKind::Undecided,
+                None if is_jump => IntervalKind::Fold,
+                None => IntervalKind::Undecided,
             };
             entries.push(Entry {
                 interval: Interval {
@@ -111,10 +111,10 @@ fn limited(mut entries: Vec<Entry>) -> Vec<Entry> {
     entries
 }
 
-fn table_kind(kind: StabilityLoss) -> TableKind {
+fn table_kind(kind: StabilityLoss) -> IntervalKind {
     match kind {
-        StabilityLoss::Hopf => TableKind::Hopf,
-        StabilityLoss::Flip => TableKind::Flip,
-        StabilityLoss::Fold => TableKind::Fold,
+        StabilityLoss::Hopf => IntervalKind::Hopf,
+        StabilityLoss::Flip => IntervalKind::Flip,
+        StabilityLoss::Fold => IntervalKind::Fold,
     }
 }

@@ -1,4 +1,4 @@
-use quietcut_core::lobes::{Answer, LobeTable};
+use quietcut_core::lobes::{LobeTable, TabulatedStability};
 use quietcut_core::units::{Degrees, Millimeters, Rpm};
 use quietcut_core::working_point::WorkingPoint;
 use rand::{RngExt, SeedableRng};
@@ -150,7 +150,7 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
             let depth: f64 = rng.random_range(0.0..depth_mm);
             let told = matches!(
                 table.lookup(Rpm(line.rpm as f32), &point(&case, depth, 0.15)),
-                Answer::Stable { .. }
+                TabulatedStability::Stable { .. }
             );
             let near_mm = line
                 .switches
@@ -343,7 +343,7 @@ fn entries_take_others_in_and_keep_their_kind() {
         from_mm,
         to_mm,
     };
-    use quietcut_core::lobes::Kind::{Flip, Hopf};
+    use quietcut_core::lobes::IntervalKind::{Flip, Hopf};
     let own = [entry(1.0, 2.0, Flip), entry(3.0, 4.0, Hopf)];
     let others = [entry(0.5, 3.5, Hopf), entry(4.5, 5.0, Flip)];
     let all = entries::with_all_of(&own, &others);
@@ -583,5 +583,5 @@ fn two_stable_orbits_are_not_surely_stable() {
     let entries = entries::unstable(&line, 4.0);
     assert_eq!(entries.len(), 1);
     assert_eq!((entries[0].from_mm, entries[0].to_mm), (2.0, 3.0));
-    assert_eq!(entries[0].interval.kind, quietcut_core::lobes::Kind::Fold);
+    assert_eq!(entries[0].interval.kind, quietcut_core::lobes::IntervalKind::Fold);
 }

@@ -357,7 +357,7 @@ fn a_chart_is_the_same_for_any_number_of_threads_and_refinement_finds_the_notch(
 fn the_lobe_table_says_what_the_direct_solution_says() {
     use crate::lobe_table::TableRequest;
     use crate::lobe_table::build_table;
-    use quietcut_core::lobes::{Answer, LobeTable};
+    use quietcut_core::lobes::{LobeTable, TabulatedStability};
     use quietcut_core::units::{Degrees, Millimeters, Rpm};
     use quietcut_core::working_point::WorkingPoint;
 
@@ -393,12 +393,12 @@ fn the_lobe_table_says_what_the_direct_solution_says() {
     }
     let at = |rpm: f32, depth_mm: f64| table.lookup(Rpm(rpm), &working_point(depth_mm));
     assert!(
-        matches!(at(1045.0, 2.0), Answer::Unstable { .. }),
+        matches!(at(1045.0, 2.0), TabulatedStability::Unstable { .. }),
         "{:?}",
         at(1045.0, 2.0)
     );
     assert!(
-        matches!(at(1480.0, 2.0), Answer::Stable { .. }),
+        matches!(at(1480.0, 2.0), TabulatedStability::Stable { .. }),
         "{:?}",
         at(1480.0, 2.0)
     );

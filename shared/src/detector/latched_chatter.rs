@@ -21,7 +21,7 @@ const SAME_TONE: f32 = 0.05;
 
 /// Chatter that was found and is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Held {
+pub(super) struct LatchedChatter {
     pub(super) kind: Kind,
     pub(super) band: usize,
     /// True where a tone alone told it, without samples at fixed angles.
@@ -38,7 +38,7 @@ pub(super) struct Held {
     pub(super) reason: Reason,
 }
 
-impl Held {
+impl LatchedChatter {
     /// Chatter that the passings of a band tell.
     pub(super) fn new(
         multiplier: Multiplier,

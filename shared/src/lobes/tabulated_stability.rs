@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Kind;
+use super::IntervalKind;
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 
 /// Why a table has no answer.
@@ -71,7 +71,7 @@ pub enum NotKnown {
 /// What the table says of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Answer {
+pub enum TabulatedStability {
     /// Disturbances die out.
     Stable {
         /// Distance in depth to the nearest depth that is not stable, or to the end of the table.
@@ -80,7 +80,7 @@ pub enum Answer {
     /// The cut chatters.
     Unstable {
         /// The kind of the loss of stability.
-        kind: Kind,
+        kind: IntervalKind,
         /// The chatter frequency; 0 where it is not known.
         chatter: Hertz,
         /// Distance in depth to the nearest stable depth, or to the end of the table.

@@ -36,7 +36,7 @@ impl Direction {
 }
 
 /// A search for quiet points of one cut.
-pub(super) struct Quiet<'t> {
+pub(super) struct QuietSpeedSearch<'t> {
     pub(super) table: &'t LobeTable<'t>,
     pub(super) cut: CutLobes<'t>,
     pub(super) depth_mm: f32,
@@ -47,7 +47,7 @@ pub(super) struct Quiet<'t> {
     pub(super) known_rpm: (f32, f32),
 }
 
-impl<'t> Quiet<'t> {
+impl<'t> QuietSpeedSearch<'t> {
     /// A search within the range of speeds of the machine.
     ///
     /// # Errors
@@ -186,7 +186,7 @@ impl<'t> Quiet<'t> {
 
 /// A run of stable speeds on a walk: as soon as it is as wide as the band around a speed, that speed is quiet.
 struct Run<'q, 't> {
-    quiet: &'q Quiet<'t>,
+    quiet: &'q QuietSpeedSearch<'t>,
     direction: Direction,
     /// Where the walk is for: no speed before it is looked for.
     speed: Rpm,
@@ -204,7 +204,7 @@ impl Run<'_, '_> {
     fn go_on(&mut self, from_rpm: f32, to_rpm: f32) -> Option<Rpm> {
         let start_rpm = *self.start_rpm.get_or_insert(from_rpm);
         let centre_rpm = self.centre_rpm(start_rpm);
-        let Quiet {
+        let QuietSpeedSearch {
             machine_rpm,
             known_rpm,
             ..
