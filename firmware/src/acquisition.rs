@@ -1,9 +1,7 @@
-//! From the sensor's queue to blocks: numbers every sample, says when the first of each block was
-//! taken, and counts what was clipped or lost.
+//! Acquisition: from the sensor's queue to blocks with sequence number, time stamp, and numbers of clipped and lost samples.
 //!
-//! The time stamp comes from the sensor's watermark line, caught by the device's timer: the line
-//! rises when the queue comes to hold W samples, so that the rise belongs to the W-th sample after
-//! the last one read. The sensor's true period is fitted to these stamps.
+//! The device's timer captures the rise of the sensor's watermark line. The line rises when the queue reaches W samples, so the
+//! time belongs to the W-th sample after the last one read. The sensor's true sample period is fitted to these stamps.
 
 use quietcut_core::acceleration::{Block, is_clipped};
 use quietcut_core::event_clock::{EventClock, EventClockState};
@@ -11,35 +9,35 @@ use quietcut_core::units::Nanoseconds;
 
 use crate::accelerometer::{Accelerometer, Queue};
 
-/// Stamps after which one weighs 1/e: 0.6 s of blocks of 64 at 26 667 Hz.
+/// Number of stamps after which the weight of a stamp has decayed to 1/e: 0.6 s of blocks of 64 samples at 26 667 Hz. Unfounded.
 const CLOCK_MEMORY_STAMPS: f32 = 256.0;
 
-/// The true rate lies within this fraction of the nominal one: data sheets allow 3 %.
+/// Largest relative deviation of the true sample rate from the nominal one: data sheets allow 3 %, and the bound is wider.
 const RATE_TOLERANCE: f32 = 0.05;
 
-/// Standard deviation of a stamp before any was seen: some ticks of the device's timer.
+/// Initial estimate of the stamps' standard deviation: some ticks of the device's timer. Unfounded.
 const STAMP_JITTER_NS: f32 = 100.0;
 
-/// Makes blocks of one accelerometer.
+/// The acquisition of one accelerometer.
 pub struct Acquisition<A> {
     accelerometer: A,
     clock: EventClock,
     nominal_period_ns: f32,
-    /// The line through the stamps; its newest event is sample number [`Self::stamped_sample`].
+    /// The line fitted to the stamps; its newest event is sample number [`Self::stamped_sample`].
     line: Option<EventClockState>,
     stamped_sample: u64,
-    /// Number of the sample that is read next, when none is lost.
+    /// Number of the next sample, if none is lost.
     next_sample: u64,
-    /// True where samples were lost that no one counted: after a restart of the sensor.
+    /// True after a restart of the sensor: the number of samples lost meanwhile is not counted by the sensor.
     uncounted: bool,
-    /// Samples that the last read left in the queue.
+    /// Number of samples left in the queue after the last read.
     left: u16,
     block: Block,
     next_sequence: u32,
 }
 
 impl<A: Accelerometer> Acquisition<A> {
-    /// Blocks of this sensor; nothing is sent to it before [`start`](Self::start).
+    /// Prepares the acquisition; nothing is sent to the sensor before [`start`](Self::start).
     pub fn new(accelerometer: A) -> Self {
         let nominal_period_ns = 1e9 / accelerometer.sensor().nominal_rate.0;
         Self {
@@ -64,7 +62,7 @@ impl<A: Accelerometer> Acquisition<A> {
         &mut self.accelerometer
     }
 
-    /// Starts the sensor, or starts it again after an error: what is lost meanwhile is counted by the clock.
+    /// Starts the sensor, or restarts it after an error. The samples lost meanwhile are estimated from the clock.
     ///
     /// # Errors
     /// Those of the sensor.
@@ -75,19 +73,19 @@ impl<A: Accelerometer> Acquisition<A> {
         Ok(())
     }
 
-    /// True where the last read left so many samples that the line has not fallen, and will not rise again:
-    /// the next read must not wait for it.
+    /// True if the last read left at least the watermark in the queue. The line then stays high, and the next read must not wait for
+    /// its rise.
     pub fn is_behind(&self) -> bool {
         self.left >= self.accelerometer.watermark()
     }
 
-    /// Reads the next block; `None` where the queue is empty.
+    /// Reads the next block; `None` if the queue is empty.
     ///
-    /// `now` is the time just before the call. `rise` is when the watermark line rose since the
-    /// read before had ended: a rise *during* a read belongs to no known sample and must be dropped.
+    /// `now` is the time just before the call. `rise` is the time of the line's rise after the end of the preceding read. A rise
+    /// *during* a read belongs to no known sample and must be discarded by the caller.
     ///
     /// # Errors
-    /// Those of the sensor. It must then be started again.
+    /// Those of the sensor, which must then be restarted.
     pub fn read(&mut self, rise: Option<Nanoseconds>, now: Nanoseconds) -> Result<Option<&Block>, A::Error> {
         let queue = self.accelerometer.read(&mut self.block.counts)?;
         let count = self.block.counts.len();
@@ -116,7 +114,7 @@ impl<A: Accelerometer> Acquisition<A> {
         Ok(Some(&self.block))
     }
 
-    /// Takes the stamp of the sample that raised the line.
+    /// Updates the clock with the time stamp of the sample that raised the line.
     fn observe(&mut self, rise: Nanoseconds) {
         let sample = self.next_sample + u64::from(self.accelerometer.watermark()) - 1;
         match &mut self.line {
@@ -135,41 +133,41 @@ impl<A: Accelerometer> Acquisition<A> {
         self.stamped_sample = sample;
     }
 
-    /// Samples lost between the last one read and the first of this block.
+    /// Number of samples lost between the last one read and the first of this block.
     ///
-    /// The sensor's own count is exact but comes round soon; the clock says how often it did.
+    /// The sensor's count is exact modulo a small number. The clock gives the multiple of it.
     fn lost(&self, queue: Queue, now: Nanoseconds) -> u32 {
         let gap = queue.gap.filter(|_| !self.uncounted);
         let remainder = gap.map_or(0, |gap| i64::from(gap.remainder));
         if !(queue.overrun || self.uncounted || remainder != 0) {
             return 0;
         }
-        // An overrun alone does not say so: one between status and samples was counted in the read before.
+        // An overrun without a gap gives 0: an overrun between the reads of status and samples was counted in the preceding read.
         let Some(line) = &self.line else {
             return remainder as u32;
         };
-        // Whole samples since the stamped one, the newest in the queue among them.
+        // Number of the newest sample in the queue, from the whole sample periods since the stamped sample.
         let newest = self.stamped_sample as i64 + line.events_to(now) as i64;
         let lost = newest + 1 - i64::from(queue.level) - self.next_sample as i64;
         let lost = match gap {
             None => lost,
             Some(gap) => {
                 let modulus = i64::from(gap.modulus).max(1);
-                // The nearest number with this remainder.
+                // The number closest to the clock's estimate that has this remainder.
                 lost - (lost - remainder + modulus / 2).rem_euclid(modulus) + modulus / 2
             }
         };
         lost.max(remainder).try_into().unwrap_or(u32::MAX)
     }
 
-    /// When sample number `first` was taken.
+    /// Time at which sample number `first` was taken.
     fn time_of(&self, first: u64, rise: Option<Nanoseconds>, queue: Queue, now: Nanoseconds) -> Nanoseconds {
         let before = |time: Nanoseconds, samples: f32, period_ns: f32| {
             Nanoseconds(time.0.saturating_sub((samples * period_ns) as u64))
         };
         match (&self.line, rise) {
             (None, _) => before(now, f32::from(queue.level), self.nominal_period_ns),
-            // The stamp itself, so that its jitter is the same in every block and no fit is fitted again.
+            // From the stamp itself, not from the fit: the sample clock of the signal chain fits the block times again.
             (Some(line), Some(rise)) if first <= self.stamped_sample => {
                 before(rise, (self.stamped_sample - first) as f32, line.period_ns())
             }

@@ -1,11 +1,11 @@
-//! What a device assumes until a host tells it otherwise.
+//! The settings of a device until a host changes them.
 
 use quietcut_core::acceleration::Sensor;
 use quietcut_core::monitor::Settings;
 use quietcut_core::tachometer::Wheel;
 use quietcut_core::working_point::Tool;
 
-/// A tool of four teeth, one mark on the spindle, no limits.
+/// Default settings: a tool of four teeth, a tachometer with one mark per revolution, no speed limits.
 pub const fn settings(sensor: Sensor) -> Settings {
     Settings {
         sensor,

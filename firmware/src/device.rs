@@ -1,19 +1,20 @@
-//! The device: pipeline, table slots and link to the host, without pins.
+//! The device without pins: signal chain, table slots and link to the host.
 //!
-//! A board, the emulator and the host's simulated port all drive the same [`Device`]:
+//! Boards, the emulator and the host's simulated port all drive the same [`Device`]:
 //!
 //! ```text
 //! loop {
 //!     if let Some((block, edges)) = the sensor has a block { device.take(block, edges) }
-//!     device.poll(&mut line)?;              // or receive / outgoing / sent, where bytes come from elsewhere
+//!     device.poll(&mut line)?;              // or receive, outgoing and sent, if the caller moves the bytes
 //! }
 //! ```
 //!
-//! Nothing here waits, but for the flash: a request of an upload holds the device up for as long as a page takes to be erased.
-//! A board with a sensor takes the blocks that came meanwhile, and only [`flush`](Device::flush)es between them, before it
-//! [`poll`](Device::poll)s for the next request: so an upload takes longer, and no sample is lost.
-//! The requests of the host are done one at a time, in order; see [`quietcut_core::protocol`]. While the host feeds
-//! blocks, those of the sensor are passed over.
+//! Only the flash makes the device wait: a request of an upload may take as long as a page erase. A board with a sensor then first
+//! takes all waiting blocks, with only [`flush`](Device::flush) between them, before it [`poll`](Device::poll)s for the next request.
+//! The upload is slower then, but no sample is lost.
+//!
+//! Requests of the host are done one at a time, in order; see [`quietcut_core::protocol`]. While the host feeds blocks, those of the
+//! sensor are ignored.
 
 mod outbox;
 
@@ -34,22 +35,22 @@ use crate::link::{Line, Link};
 use crate::storage::{Storage, TableMemory};
 use outbox::Outbox;
 
-/// The device's clock, the one that stamps samples and edges.
+/// The clock that stamps samples and tachometer edges.
 pub trait Clock {
     /// Time since the start.
     fn now(&self) -> Nanoseconds;
 }
 
-/// What a board says of itself.
+/// Identity of a board.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
-    /// Its name; at most 24 bytes.
+    /// Name of the board; at most 24 bytes.
     pub board: &'static str,
-    /// Its accelerometer; `None` where it has none and is fed.
+    /// The accelerometer; `None` if the host feeds the samples.
     pub sensor: Option<Sensor>,
 }
 
-/// A chatter monitor.
+/// A chatter monitor: signal chain, table slots and link to the host.
 pub struct Device<'a, M, C> {
     identity: Identity,
     clock: C,
@@ -62,37 +63,37 @@ pub struct Device<'a, M, C> {
     session: Session,
     outbox: Outbox,
     subscription: Subscription,
-    /// What was last told to a subscriber of changes.
-    told: Option<Said>,
-    /// Edges from the host for its next block.
+    /// The last report sent to a subscriber of changes.
+    last_sent: Option<ReportKey>,
+    /// Tachometer edges from the host for its next block.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
     is_fed: bool,
     blocks: u32,
     clipped: u32,
     lost: u32,
-    /// Bytes read from the line that could not be taken yet.
+    /// Bytes read from the line and not yet processed.
     input: Vec<u8, 64>,
 }
 
-/// What of a report a subscriber of changes wants to hear of.
-type Said = (Verdict, Reason, Option<Advice>);
+/// The parts of a report whose change is sent to a subscriber of changes.
+type ReportKey = (Verdict, Reason, Option<Advice>);
 
-/// The requests of one host.
+/// The session of one host.
 #[derive(Default)]
 struct Session {
     is_open: bool,
     requests: Sequence,
-    /// The request done last and its reply: a host that missed the reply sends the request again.
+    /// Sequence number and reply of the last request, for a host that did not receive the reply and repeats the request.
     last: Option<(u16, Reply)>,
 }
 
 impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
-    /// A device with these settings; `state` is reset.
+    /// Creates a device and resets `state`.
     ///
-    /// The state is lent, since it is large: a board has it in its own memory from the start.
+    /// The state is borrowed because it is large: a board keeps it in static memory.
     ///
     /// # Errors
-    /// Settings that cannot be.
+    /// Invalid settings.
     pub fn new(
         identity: Identity,
         settings: Settings,
@@ -112,7 +113,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
             session: Session::default(),
             outbox: Outbox::default(),
             subscription: Subscription::default(),
-            told: None,
+            last_sent: None,
             edges: Vec::new(),
             is_fed: false,
             blocks: 0,
@@ -124,9 +125,9 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         Ok(device)
     }
 
-    /// Takes a block of the sensor, with the tachometer edges up to its end that were in no block before.
+    /// Processes a block of the sensor, with the new tachometer edges up to its end.
     ///
-    /// Does nothing while the host feeds.
+    /// The block is ignored while the host feeds.
     pub fn take(&mut self, block: &Block, edges: &[Edge]) {
         if !self.is_fed {
             self.step(block, edges);
@@ -134,8 +135,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as much as the line takes, and receives until a request is done; true where there was something to do: then call it
-    /// again.
+    /// Sends as much as the line accepts, and receives until one request is done. Returns true if it did anything: call it again
+    /// then.
     ///
     /// # Errors
     /// Those of the line.
@@ -158,7 +159,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as much as the line takes, and receives nothing.
+    /// Sends as much as the line accepts, and receives nothing.
     ///
     /// # Errors
     /// Those of the line.
@@ -169,14 +170,14 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         Ok(())
     }
 
-    /// Takes bytes from the host and does what they ask; how many were taken.
+    /// Processes bytes from the host and returns how many it took.
     ///
-    /// Not all are taken while earlier replies wait to be sent: call it again with the rest.
+    /// While earlier replies wait to be sent it does not take all: call it again with the rest.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
         loop {
             self.pump();
-            // One frame for the reply, one for what is said of a frame that cannot be read.
+            // Room for two frames: a reply, and the refusal of an unreadable frame.
             if self.link.room() < 2 || self.outbox.has_reply() {
                 return taken;
             }
@@ -192,12 +193,12 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Bytes for the host, or the first part of them.
+    /// Bytes to be sent to the host, or the first part of them.
     pub fn outgoing(&self) -> &[u8] {
         self.link.outgoing()
     }
 
-    /// Takes away the first `count` bytes of [`outgoing`](Self::outgoing): they are sent.
+    /// Removes the first `count` bytes of [`outgoing`](Self::outgoing), after they were sent.
     pub fn sent(&mut self, count: usize) {
         self.link.sent(count);
         self.pump();
@@ -208,24 +209,24 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         &self.storage
     }
 
-    /// The flash memory, when the device is no longer needed.
+    /// Returns the flash memory and drops the device.
     pub fn into_memory(self) -> M {
         self.storage.into_memory()
     }
 
-    /// Sends what waits, as far as there is room.
+    /// Moves waiting messages to the link, as far as it has room.
     fn pump(&mut self) {
         if let Some(reply) = self.outbox.pump(&mut self.link, self.state) {
             self.session.last = Some(reply);
         }
     }
 
-    /// Forgets what the pipeline has learned.
+    /// Resets the signal chain and discards waiting messages.
     fn restart(&mut self) {
         self.state.reset();
         self.outbox.clear();
         self.edges.clear();
-        self.told = None;
+        self.last_sent = None;
         (self.clipped, self.lost) = (0, 0);
     }
 
@@ -254,13 +255,13 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
             Reports::None => false,
             Reports::All => true,
             Reports::Changes => {
-                let said = Some((report.judgement.verdict, report.judgement.reason, report.advice));
-                core::mem::replace(&mut self.told, said) != said
+                let current = Some((report.judgement.verdict, report.judgement.reason, report.advice));
+                core::mem::replace(&mut self.last_sent, current) != current
             }
         }
     }
 
-    /// Does a request, or says why not.
+    /// Performs a request and queues its reply or refusal.
     fn answer(&mut self, sequence: u16, request: Request) {
         if request == Request::Hello {
             self.begin_session(sequence);
@@ -284,7 +285,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// A host says hello: what the one before wanted is over.
+    /// Begins a session with a host: resets subscription and feed of the preceding session.
     fn begin_session(&mut self, sequence: u16) {
         self.session = Session {
             is_open: true,
@@ -313,7 +314,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
             Request::FeedDirection => return Ok(Reply::FeedDirection(self.feed_direction)),
             Request::Subscribe(subscription) => {
                 self.subscription = subscription;
-                self.told = None;
+                self.last_sent = None;
             }
             Request::UploadBegin(header) => return self.storage.begin(header).map(Reply::Upload),
             Request::UploadChunk { offset, data } => {
@@ -347,7 +348,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     fn feed(&mut self, block: &Block) {
         let edges = core::mem::take(&mut self.edges);
         if !self.is_fed {
-            // What the sensor said is another story.
+            // Samples of the sensor and of the host must not mix.
             self.restart();
             self.is_fed = true;
         }
@@ -382,7 +383,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     }
 }
 
-/// Refuses a working point that no cut can have.
+/// Checks a working point: depth and feed at least 0, entry angle below exit angle.
 fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal> {
     let Some(cut) = point else { return Ok(None) };
     let is_length = |mm: f32| mm >= 0.0 && mm.is_finite();
@@ -398,10 +399,10 @@ fn checked(point: Option<WorkingPoint>) -> Result<Option<WorkingPoint>, Refusal>
     }
 }
 
-/// Refuses a feed direction that is no angle.
+/// Checks that a feed direction is an angle from −360° to 360°.
 fn checked_direction(direction: Option<Degrees>) -> Result<Option<Degrees>, Refusal> {
     match direction {
-        // Written so that NaN is refused too.
+        // The negated comparison also refuses NaN.
         Some(direction) if !(-360.0..=360.0).contains(&direction.0) => Err(Refusal::FeedDirection(direction)),
         _ => Ok(direction),
     }

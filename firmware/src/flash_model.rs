@@ -1,7 +1,7 @@
-//! Flash in ordinary memory, as strict as the real one, whose power can be cut.
+//! A model of flash memory with the restrictions of real flash, whose power can be cut.
 //!
-//! For tests and for the simulated device of the host. A page is erased to ones, a word may be written once
-//! after that; what is not aligned, out of bounds or written twice is an error.
+//! It serves tests and the simulated device of the host. An erase sets all bits of a page. A word may be written once after each
+//! erase. Unaligned access, access out of bounds and a second write are errors.
 
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
@@ -9,18 +9,18 @@ use embedded_storage::nor_flash::{
 
 use crate::storage::TableMemory;
 
-/// Flash of words of `WRITE` and pages of `ERASE` bytes in the memory `B`.
+/// Flash with words of `WRITE` bytes and pages of `ERASE` bytes, stored in `B`.
 #[derive(Clone, Debug)]
 pub struct FlashModel<B, const WRITE: usize, const ERASE: usize> {
     bytes: B,
     power: Power,
 }
 
-/// How long power lasts.
+/// State of the power supply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Power {
     On,
-    /// Power fails within the operation behind this many more; what it leaves depends on the noise.
+    /// Power fails during an operation, after this number of complete ones. The seed `noise` determines the bits left behind.
     FailsAfter {
         operations: u32,
         noise: u64,
@@ -28,13 +28,13 @@ enum Power {
     Off,
 }
 
-/// What becomes of an operation.
+/// Outcome of an operation.
 enum Fate {
     Done,
     Cut(Noise),
 }
 
-/// What a loss of power leaves in a word or a page: pseudo-random bits (xorshift64).
+/// Pseudo-random bits (xorshift64) that a loss of power leaves in a word or page.
 struct Noise(u64);
 
 impl Noise {
@@ -45,7 +45,7 @@ impl Noise {
         self.0
     }
 
-    /// A value of any size, below `bound`.
+    /// A value below `bound`; 0 if `bound` is 0.
     fn below(&mut self, bound: usize) -> usize {
         if bound == 0 {
             0
@@ -54,7 +54,7 @@ impl Noise {
         }
     }
 
-    /// A byte on its way from one value to another: as before, as wanted, or any bits between.
+    /// A byte after an interrupted change: the old value, the new value, or a mixture of their bits.
     fn between(&mut self, before: u8, wanted: u8) -> u8 {
         match self.below(3) {
             0 => before,
@@ -68,7 +68,7 @@ impl Noise {
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> FlashModel<B, WRITE, ERASE> {
-    /// Flash with this content; new flash is all ones.
+    /// Flash with this content; erased flash is all ones.
     pub const fn new(bytes: B) -> Self {
         Self {
             bytes,
@@ -76,25 +76,25 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> Flash
         }
     }
 
-    /// Lets the power fail within the operation (a write or an erase) behind the next `operations`.
+    /// Lets the power fail during a write or an erase, after the next `operations` complete ones.
     ///
-    /// What that one leaves behind follows from `noise`: words before the cut are done, the one it falls into may hold any bits
-    /// between before and after, those behind are untouched; of a page that is being erased every byte may be anything.
-    /// Later operations fail.
+    /// The seed `noise` determines what the interrupted operation leaves behind. A write leaves the words before the cut written, one word
+    /// with a mixture of old and new bits, and the rest unchanged. An erase leaves any value in every byte of the page. All later
+    /// operations fail.
     pub fn fail_after(&mut self, operations: u32, noise: u64) {
-        // Xorshift stands still at 0.
+        // Xorshift cannot leave the state 0.
         self.power = Power::FailsAfter {
             operations,
             noise: noise.max(1),
         };
     }
 
-    /// True once the power has failed.
+    /// True after the power has failed.
     pub fn is_off(&self) -> bool {
         self.power == Power::Off
     }
 
-    /// The content, which outlives a loss of power.
+    /// The content, also after a loss of power.
     pub fn into_bytes(self) -> B {
         self.bytes
     }
@@ -161,7 +161,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> NorFl
                 Ok(())
             }
             Fate::Cut(mut noise) => {
-                // Any content, or one that still looks as before.
+                // Random content; in one of four cases the old content.
                 let is_as_before = noise.below(4) == 0;
                 for byte in bytes.iter_mut().filter(|_| !is_as_before) {
                     *byte = match noise.below(2) {

@@ -1,4 +1,4 @@
-//! Frames to and from the host, over bytes that come and go without waiting.
+//! The device's end of the line: frames to and from the host, without blocking.
 
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::Deque;
@@ -6,10 +6,10 @@ use quietcut_core::protocol::{
     Decoder, FrameError, FrameErrors, MAX_FRAME, Request, Response, Sequence, encode,
 };
 
-/// Bytes that wait to be sent: a few of the longest frames.
+/// Capacity in bytes of the output queue: four frames of the largest length.
 const OUTGOING: usize = 4 * MAX_FRAME;
 
-/// A request with its sequence number, or why a frame is none.
+/// A request with its sequence number, or the reason why a frame is refused.
 pub type Received = Result<(u16, Request), FrameError>;
 
 /// The device's end of the line.
@@ -28,7 +28,7 @@ impl Default for Link {
 }
 
 impl Link {
-    /// A line on which nothing was said yet.
+    /// A line before the first byte.
     pub const fn new() -> Self {
         Self {
             decoder: Decoder::new(),
@@ -49,7 +49,8 @@ impl Link {
         }
     }
 
-    /// Takes bytes up to the end of the first frame in them: how many were taken, and what came of it.
+    /// Processes bytes up to the end of the first frame. Returns the number of bytes taken, and the request or refusal if a frame
+    /// is complete.
     pub fn receive(&mut self, bytes: &[u8]) -> (usize, Option<Received>) {
         for (index, &byte) in bytes.iter().enumerate() {
             let Some(result) = self.decoder.push(byte) else {
@@ -65,27 +66,27 @@ impl Link {
         (bytes.len(), None)
     }
 
-    /// Counts a frame that was read and cannot be used.
+    /// Counts a frame that was readable and refused later.
     pub fn count(&mut self, error: &FrameError) {
         self.errors.count(error);
     }
 
-    /// Frames received that could be read.
+    /// Number of readable frames received.
     pub fn frames(&self) -> u32 {
         self.frames
     }
 
-    /// Frames received that could not be used.
+    /// Numbers of refused frames.
     pub fn errors(&self) -> &FrameErrors {
         &self.errors
     }
 
-    /// Number of frames of any length that can be sent now.
+    /// Number of frames of the largest length that fit into the output queue.
     pub fn room(&self) -> usize {
         (OUTGOING - self.outgoing.len()) / MAX_FRAME
     }
 
-    /// Puts a frame behind the bytes that wait to be sent; false where there is no room.
+    /// Appends a frame to the output queue. Returns false if there is no room.
     pub fn send(&mut self, response: &Response) -> bool {
         let mut buffer = [0; MAX_FRAME];
         if self.room() == 0 {
@@ -97,7 +98,7 @@ impl Link {
         frame.iter().all(|&byte| self.outgoing.push_back(byte).is_ok())
     }
 
-    /// Bytes that wait to be sent, or the first part of them.
+    /// The output queue, or the first part of it.
     pub fn outgoing(&self) -> &[u8] {
         match self.outgoing.as_slices() {
             ([], second) => second,
@@ -105,14 +106,14 @@ impl Link {
         }
     }
 
-    /// Takes away the first `count` bytes of [`outgoing`](Self::outgoing): they are sent.
+    /// Removes the first `count` bytes of [`outgoing`](Self::outgoing), after they were sent.
     pub fn sent(&mut self, count: usize) {
         for _ in 0..count {
             self.outgoing.pop_front();
         }
     }
 
-    /// Sends as much as the line takes without waiting; true where it took something.
+    /// Sends as much as the line accepts without blocking. Returns true if it accepted anything.
     ///
     /// # Errors
     /// Those of the line.
@@ -130,7 +131,7 @@ impl Link {
     }
 }
 
-/// A line of bytes that never makes its user wait.
+/// A non-blocking byte stream in both directions.
 pub trait Line: Read + ReadReady + Write + WriteReady {}
 
 impl<T: Read + ReadReady + Write + WriteReady> Line for T {}

@@ -1,49 +1,48 @@
-//! Simulated signals for the emulated board: what a virtual spindle sends in place of sensor and tachometer.
+//! Simulated signals for the emulated board, in place of sensor and tachometer.
 //!
-//! The emulated board has no sensor bus. Its third serial port takes [`Stimulus`] messages, each in
-//! postcard, framed by COBS with a closing zero, and answers each with one byte: [`TAKEN`] once the
-//! message has gone through the whole pipeline, [`REFUSED`] where it cannot be read.
+//! The emulated board has no sensor bus. Its third serial port receives [`Stimulus`] messages in postcard, framed by COBS with a
+//! closing zero. It answers each with one byte: [`TAKEN`] after the signal chain has processed the message, [`REFUSED`] if
+//! it is unreadable.
 //!
-//! Long recordings go through the board's memory instead: the host writes stimuli back to back,
-//! without frames, from [`STORE_OFFSET`] on, and sends one [`Stimulus::Stored`].
+//! Long recordings use the board's memory instead: the host writes stimuli without frames one after the other, beginning at
+//! [`STORE_OFFSET`], and sends one [`Stimulus::Stored`].
 
 use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
 use serde::{Deserialize, Serialize};
 
-/// The most bytes of one framed stimulus: 64 samples of three axes at 3 bytes each, the head of the
-/// block, and what the frame adds.
+/// Largest length of a framed stimulus in bytes: 64 samples of three axes at 3 bytes each, the head of the block, and the frame.
 pub const MAX_FRAME_BYTES: usize = 640;
 
-/// Answer to a stimulus that was taken.
+/// Answer to a processed stimulus.
 pub const TAKEN: u8 = 0x06;
 
-/// Answer to a stimulus that could not be read, or does not fit the memory.
+/// Answer to a stimulus that is unreadable or exceeds the memory.
 pub const REFUSED: u8 = 0x15;
 
-/// Bytes of the emulated flash for lobe tables, at the start of the board's lasting memory.
+/// Size in bytes of the emulated flash for lobe tables, at the start of the board's non-volatile memory.
 pub const FLASH_BYTES: usize = 256 * 1024;
 
-/// Where stored stimuli begin in the board's lasting memory.
+/// Offset of stored stimuli in the board's non-volatile memory.
 pub const STORE_OFFSET: usize = 1024 * 1024;
 
-/// Bytes of the board's lasting memory.
+/// Size of the board's non-volatile memory in bytes.
 pub const MEMORY_BYTES: usize = 16 * 1024 * 1024;
 
-/// What a virtual spindle says.
+/// A message of the simulated spindle.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-// Blocks are by far the most common: a box would need an allocator, and nothing holds many of these.
+// A box would need an allocator. Most messages are blocks, and few are held at a time.
 #[allow(clippy::large_enum_variant)]
 pub enum Stimulus {
     /// Samples of the accelerometer.
     Block(Block),
     /// A rising edge of the tachometer.
     Edge(Edge),
-    /// This many bytes of stimuli stand in the board's memory.
+    /// Stimuli are stored in the board's memory.
     Stored {
-        /// Bytes from [`STORE_OFFSET`] on.
+        /// Length in bytes, from [`STORE_OFFSET`] on.
         bytes: u32,
     },
-    /// Asks the board to log how deep its stack went, and how long its blocks took.
+    /// Requests a log entry with the largest stack depth and the processing times of blocks.
     AskCost,
 }

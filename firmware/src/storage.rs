@@ -1,4 +1,4 @@
-//! Lobe tables in flash: two slots, so that power may fail at any moment and a whole table is left.
+//! Lobe tables in flash. Of two slots one always holds a complete table, so power may fail at any moment.
 //!
 //! The memory is divided into two equal slots. A slot is
 //!
@@ -7,15 +7,16 @@
 //!   32 bytes, written last                       one page
 //! ```
 //!
-//! and what stands before the journal is a table, byte for byte as [`quietcut_core::lobes::format`] has it, but with a
-//! generation of its own. At the start the valid table with the newest generation is taken into use, so the order of an
-//! upload is: erase the *other* slot and write the payload, page by page from the header's on, check it, write the header.
-//! Until the last word of the header stands, the slot is not valid and the old table stays.
+//! The bytes before the journal are a table as specified in [`quietcut_core::lobes::format`], with a generation number of the
+//! device. At start-up the valid table with the newest generation is in use.
 //!
-//! The journal remembers across a power cut which table was on its way and how far it was: an upload goes on at the
-//! page it had reached.
+//! An upload goes to the slot that is *not* in use, in this order: erase and write page by page, check the CRC and the entries, write the
+//! header. The slot becomes valid with the last word of its header. Until then the old table stays in use.
 //!
-//! No request erases more than one page, so that none holds the device up for longer than that takes.
+//! The journal stores which table is being uploaded and how many bytes are written. After a loss of power the upload continues
+//! at the last complete page.
+//!
+//! No request erases more than one page, so that the time of a page erase bounds the time of every request.
 
 mod contents;
 mod examination;

@@ -1,5 +1,5 @@
-//! Raw acceleration: blocks of counts with sequence number, time stamp, clips and gaps, and the
-//! sensor's clock fitted against the device's.
+//! Raw acceleration: blocks of counts with sequence number, time stamp, and numbers of clipped and lost samples. The sample clock of
+//! the sensor is fitted to the time stamps of the device.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -7,35 +7,35 @@ use serde::{Deserialize, Serialize};
 use crate::event_clock::{EventClock, EventClockState, Observation};
 use crate::units::{Hertz, Nanoseconds};
 
-/// The most samples in one block.
+/// Largest number of samples in one block.
 pub const MAX_BLOCK_SAMPLES: usize = 64;
 
 /// Raw counts of the three axes x, y, z of the sensor at one instant.
 pub type Counts = [i16; 3];
 
-/// A block of consecutive samples as they come from the sensor.
+/// A block of consecutive samples of the sensor.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Block {
-    /// Counts up by one per block; a jump means lost blocks.
+    /// Sequence number, incremented by one per block; a jump means lost blocks.
     pub sequence: u32,
-    /// When the first sample of the block was taken, on the device's clock.
+    /// Time of the first sample of the block, on the device's clock.
     pub time: Nanoseconds,
-    /// Samples that the sensor or the link lost between the block before and this one.
+    /// Number of samples lost between the preceding block and this one.
     pub lost: u32,
-    /// Samples of this block in which at least one axis stood at the end of its range.
+    /// Number of samples of this block in which at least one axis is at an end of its range.
     pub clipped: u16,
     /// The samples, oldest first.
     pub counts: Vec<Counts, MAX_BLOCK_SAMPLES>,
 }
 
-/// What is known of the accelerometer.
+/// The properties of the accelerometer that the signal chain uses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
-    /// The rate the sensor is meant to have; the true one is fitted from the time stamps.
+    /// Nominal sample rate; the true rate is fitted to the time stamps.
     pub nominal_rate: Hertz,
     /// Acceleration of one count, in m/s².
     pub meters_per_second2_per_count: f32,
-    /// White noise of one axis, in m/s² per √Hz: below it nothing is a signal.
+    /// White noise of one axis, in m/s² per √Hz.
     pub noise_meters_per_second2_per_root_hertz: f32,
 }
 
@@ -47,7 +47,7 @@ impl Sensor {
         noise_meters_per_second2_per_root_hertz: 75e-6 * 9.806_65,
     };
 
-    /// The clock that follows the true sample rate of this sensor.
+    /// The estimator of this sensor's true sample rate.
     pub fn clock(&self) -> SampleClock {
         let period_ns = 1e9 / self.nominal_rate.0;
         SampleClock {
@@ -60,61 +60,61 @@ impl Sensor {
     }
 }
 
-/// True where one axis stands at an end of the 16-bit range.
+/// True if at least one axis is at an end of the 16-bit range.
 pub fn is_clipped(counts: Counts) -> bool {
     counts.iter().any(|&c| c == i16::MAX || c == i16::MIN)
 }
 
-/// The sensor's rate is believed within this fraction of the nominal one: data sheets allow 3 %, and the
-/// fit must not stand at the edge of it.
+/// Largest relative deviation of the fitted sample rate from the nominal one. Data sheets allow 3 %; the bound is wider so that the
+/// fit does not end on it.
 const RATE_TOLERANCE: f32 = 0.05;
-/// Blocks after which a stamp weighs 1/e: 0.6 s of full blocks at 26 667 Hz. Long against jitter, short
-/// against the warming-up of the sensor's oscillator.
+/// Number of blocks after which the weight of a time stamp has decayed to 1/e: 0.6 s of full blocks at 26 667 Hz. That averages the
+/// jitter and follows the thermal drift of the sensor's oscillator. Unfounded.
 const CLOCK_MEMORY_BLOCKS: f32 = 256.0;
-/// Jitter of the stamps expected before any was seen: the latency of an interrupt.
+/// Initial estimate of the time stamps' standard deviation: the latency of an interrupt. Unfounded.
 const STAMP_JITTER_NS: f32 = 10_000.0;
-/// A gap of more samples than this is not counted over: the stream begins anew.
+/// Longest gap, in samples, whose length is estimated. After a longer one the stream starts again. Unfounded.
 const LONGEST_COUNTED_GAP: f32 = 20_000.0;
 
-/// Numbers the samples of a stream of blocks and says when each was taken.
+/// Estimator of the time of each sample.
 ///
-/// The sample clock of the sensor is off by up to a few percent, and the blocks are stamped by the
-/// device's clock with jitter. `t(n) = a + b·n` is fitted to the stamps of the first samples of the blocks.
+/// The sensor's clock deviates by up to a few percent, and the device stamps the blocks with jitter. The line `t(n) = a + b·n` is fitted
+/// to the time stamps of the blocks' first samples (n the number of the sample, b the sample period).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleClock {
     nominal_period_ns: f32,
     line: EventClock,
 }
 
-/// Where the [`SampleClock`] stands.
+/// State of a [`SampleClock`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleClockState {
     line: Option<EventClockState>,
-    /// Sequence number the next block should have.
+    /// Expected sequence number of the next block.
     next_sequence: u32,
-    /// Samples of the block before.
+    /// Number of samples of the preceding block.
     block_samples: u32,
-    /// Samples with a clipped axis since the start.
+    /// Number of samples with a clipped axis since the start.
     clipped: u32,
-    /// Samples lost since the start, as far as they could be counted.
+    /// Number of lost samples since the start, as far as countable.
     lost: u32,
-    /// Times the stream was broken.
+    /// Number of gaps in the stream.
     gaps: u32,
 }
 
-/// How a block follows the one before.
+/// Relation of a block to the preceding one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuity {
-    /// Its first sample is the next one.
+    /// No sample is missing between them.
     Contiguous,
-    /// This many samples are missing before its first one.
+    /// This number of samples is missing between them.
     Gap(u32),
-    /// The first block, or one whose distance to the one before cannot be counted.
+    /// The first block, or a block after a gap of unknown length.
     Restarted,
 }
 
 impl SampleClock {
-    /// Takes note of a block.
+    /// Processes a block.
     pub fn observe(&self, state: &mut SampleClockState, block: &Block) -> Continuity {
         let continuity = self.follow(state, block);
         match continuity {
@@ -145,7 +145,7 @@ impl SampleClock {
         continuity
     }
 
-    /// Continues the line with a block, where its distance to the one before can be counted.
+    /// Continues the fitted line with a block, if the number of samples since the preceding one is known.
     fn follow(&self, state: &mut SampleClockState, block: &Block) -> Continuity {
         let Some(line) = &mut state.line else {
             return Continuity::Restarted;
@@ -153,7 +153,8 @@ impl SampleClock {
         let lost = if block.sequence == state.next_sequence {
             block.lost
         } else {
-            // Lost blocks say nothing of their lengths: the clock does, while its error stays below half a sample.
+            // The lengths of lost blocks are unknown. The fitted clock gives the number of samples, as long as its error is below half
+            // a sample.
             let samples = line.events_to(block.time) - state.block_samples as f32;
             let error_ns2 = line.variance_at_ns2(samples);
             let half_ns = 0.5 * line.period_ns();
@@ -186,12 +187,12 @@ impl SampleClockState {
         }
     }
 
-    /// Fitted time of sample number `n` of the newest block; 0 is its first.
+    /// Fitted time of sample `n` of the newest block, counted from 0.
     pub fn time_of(&self, n: u32) -> Option<Nanoseconds> {
         self.time_at(n as f32)
     }
 
-    /// Fitted time `samples` (which may be a fraction, or negative) after the first sample of the newest block.
+    /// Fitted time at `samples` sample periods after the first sample of the newest block; fractions and negative values are allowed.
     pub fn time_at(&self, samples: f32) -> Option<Nanoseconds> {
         self.line.map(|line| line.time_at(samples))
     }
@@ -201,17 +202,17 @@ impl SampleClockState {
         self.line.map(|line| Hertz(1e9 / line.period_ns()))
     }
 
-    /// Samples clipped since the start.
+    /// Number of clipped samples since the start.
     pub fn clipped(&self) -> u32 {
         self.clipped
     }
 
-    /// Samples lost since the start, as far as they could be counted.
+    /// Number of lost samples since the start, as far as countable.
     pub fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// Times the stream was broken since the start.
+    /// Number of gaps in the stream since the start.
     pub fn gaps(&self) -> u32 {
         self.gaps
     }

@@ -1,14 +1,18 @@
-//! Verdict, table and limits of the machine to the next speed or depth.
+//! Advice: the next spindle speed or axial depth, from the verdict, the lobe table and the limits of the machine.
 //!
-//! With a table: the speed nearest in relative change that is *quiet* at the present depth, that is, stable for
-//! all depths within [`DEPTH_MARGIN`] and all speeds within [`SPEED_BAND`] of it. Where there is none: the largest quiet
-//! depth at the present speed, or at another one where it is [`BETTER`] times that.
+//! A point (speed, depth) is *quiet* if the table is stable at all depths within [`DEPTH_MARGIN`] and at all speeds within
+//! [`SPEED_BAND`] of it. Advice follows this order:
 //!
-//! Without a table, or where it knows nothing of the cut, or where it contradicts what is heard: the tooth-passing rule,
-//! [`tooth_passing_speed`]. Advice says which of the two it rests on, and why not on the better one.
+//! 1. *Table, same depth*: the quiet speed with the smallest relative change from the present speed.
+//! 2. *Table, smaller depth*: the largest quiet depth at the present speed. Another speed is advised only if its quiet depth is
+//!    larger by the factor [`BETTER`].
+//! 3. *Tooth-passing rule* ([`tooth_passing_speed`]): used without a table, for a cut outside the table, and if the table
+//!    contradicts the detected chatter.
 //!
-//! Without a working point the first layer of the table is assumed, and the least depth at which the table has the
-//! chatter that is heard: a cut that chatters is at least that deep. Deeper cuts take a second step.
+//! [`Advice::source`] names the source, [`Advice::obstacle`] the reason why no better source was used.
+//!
+//! If no working point is set, advice assumes the first layer of the table and the smallest depth at which the table has
+//! chatter of the detected kind. The real cut is at least that deep, so a deeper cut may need a second step.
 
 mod advise;
 mod cell;

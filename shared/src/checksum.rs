@@ -4,9 +4,9 @@ use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 
 const CRC_32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// CRC-32 (ISO-HDLC, the one of zip and Ethernet) of several pieces, as if they stood one behind the other.
+/// CRC-32 (ISO-HDLC, as in zip and Ethernet) of the concatenation of several byte slices.
 ///
-/// It finds every single flipped bit and every burst of up to 32 bits.
+/// It detects every single-bit error and every error burst of up to 32 bits.
 pub fn crc32<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> u32 {
     let mut crc = Crc32::new();
     for piece in pieces {
@@ -15,7 +15,7 @@ pub fn crc32<'a>(pieces: impl IntoIterator<Item = &'a [u8]>) -> u32 {
     crc.value()
 }
 
-/// A CRC-32 under way: of bytes that come piece by piece.
+/// An incremental CRC-32.
 #[derive(Clone)]
 pub struct Crc32(Digest<'static, u32, Table<1>>);
 
@@ -26,13 +26,13 @@ impl Default for Crc32 {
 }
 
 impl Crc32 {
-    /// Of nothing yet.
+    /// The CRC-32 before the first byte.
     pub fn new() -> Self {
         static ENGINE: Crc<u32, Table<1>> = CRC_32;
         Self(ENGINE.digest())
     }
 
-    /// Takes the bytes that follow.
+    /// Appends bytes.
     pub fn update(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
     }

@@ -1,17 +1,17 @@
-//! Half-band cascade: one stream of counts in, the tool band and the structure band out.
+//! Decimation by a cascade of half-band filters: from raw counts to the tool band and the structure band.
 //!
 //! | band | flat | rate |
 //! |---|---|---|
-//! | tool | to 5 kHz | the input halved as often as it still holds 5 kHz; slower inputs as they are |
-//! | structure | to 400 Hz | the input halved to the smallest rate of at least 1 600 Hz |
+//! | tool | to 5 kHz | input rate halved as often as 5 kHz allows; slower inputs are not decimated |
+//! | structure | to 400 Hz | input rate halved to the smallest rate of at least 1 600 Hz |
 //!
-//! Every stage is a symmetric half-band filter: y\[n\] = Σ h\[i\]·x\[2n − i\], i = 0 … 4m − 2, whose odd taps but the middle
-//! one vanish. The taps are a Kaiser-windowed sinc, computed at compile time. What folds back into the flat
-//! band is at least 90 dB down, the ripple is below 0.001 dB, and gain at 0 Hz is exactly 1. The bands keep their
-//! upper ends with a sample clock up to 3 % slow.
+//! Every stage is a symmetric half-band filter: y\[n\] = Σ h\[i\]·x\[2n − i\], i = 0 … 4m − 2, whose odd taps vanish except
+//! the middle one. The taps are a Kaiser-windowed sinc, computed at compile time. Aliases in the flat
+//! band are attenuated by at least 90 dB, the ripple is below 0.001 dB, and the gain at 0 Hz is exactly 1. The bands reach their
+//! upper ends also with a sample clock that is up to 3 % slow.
 //!
-//! Samples are fixed point with [`FRACTION_BITS`] bits below one count. A stage sums its products in 64 bits without
-//! error and rounds once.
+//! Samples are fixed-point numbers with [`FRACTION_BITS`] fractional bits per count. A stage sums its products exactly in 64 bits and
+//! rounds once.
 
 use crate::acceleration::Counts;
 use crate::units::Hertz;
@@ -19,27 +19,27 @@ use crate::units::Hertz;
 /// Three axes x, y, z at one instant, in units of 2^−[`FRACTION_BITS`] counts.
 pub type Sample = [i32; 3];
 
-/// Bits below one count.
+/// Number of fractional bits per count.
 ///
-/// With them a full-scale count is 2²⁷; of the 4 bits left above one holds the overshoot of any input, less than
-/// twice full scale in both bands, and one the sum of two samples.
+/// Full scale is 2²⁷. Of the 4 bits above it, one holds the overshoot of the filters, less than twice full scale in both bands, and
+/// one the sum of two samples.
 pub const FRACTION_BITS: u32 = 12;
 
-/// Slowest input rate.
+/// Smallest input rate.
 pub const MIN_RATE: Hertz = Hertz(1_000.0);
-/// Fastest input rate.
+/// Largest input rate.
 pub const MAX_RATE: Hertz = Hertz(102_400.0);
 /// Upper end of the tool band.
 pub const TOOL_BAND: Hertz = Hertz(5_000.0);
 /// Upper end of the structure band.
 pub const STRUCTURE_BAND: Hertz = Hertz(400.0);
 
-/// To this fraction of its input rate the sharp filter is flat.
+/// Upper end of the sharp filter's flat band, as a fraction of its input rate.
 const SHARP_FLAT: f32 = 0.195;
-/// To this fraction of its input rate the medium filter is flat.
+/// Upper end of the medium filter's flat band, as a fraction of its input rate.
 const MEDIUM_FLAT: f32 = 0.13;
 
-/// Rate of an input that the cascade does not take.
+/// An input rate outside the supported range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RateOutOfRange(pub Hertz);
@@ -100,12 +100,12 @@ const fn bessel_i0(square: f64) -> f64 {
     sum
 }
 
-/// Length of a half-band filter with this many taps on a side.
+/// Length of a half-band filter with `side` non-zero taps on each side.
 const fn length(side: usize) -> usize {
     4 * side - 1
 }
 
-/// Input samples by which the middle tap of a filter lags its newest one.
+/// Group delay of a filter in input samples: the distance of its middle tap from the newest sample.
 const fn delay(side: usize) -> u32 {
     2 * side as u32 - 1
 }
@@ -161,13 +161,13 @@ impl<const LENGTH: usize> Stage<LENGTH> {
             return None;
         }
         let window = self.samples.as_flattened().get(newest + 1..)?.first_chunk()?;
-        // Hidden from the compiler, which takes a product with a known number apart into slower ones.
+        // `black_box` keeps the compiler from replacing products with constants by slower shifts and sums.
         let taps = core::hint::black_box(taps);
         Some([0, 1, 2].map(|axis| filter::<LENGTH, SIDE>(window, axis, taps)))
     }
 }
 
-/// Σ of the taps times one axis of the window, whose middle has the tap ½.
+/// Filter output of one axis: Σ taps × window, with the middle tap ½.
 #[inline(always)]
 fn filter<const LENGTH: usize, const SIDE: usize>(
     window: &[Sample; LENGTH],
@@ -178,7 +178,7 @@ fn filter<const LENGTH: usize, const SIDE: usize>(
     let middle = LENGTH / 2;
     let mut sum = (i64::from(window[middle][axis]) << 30) + (1 << 30);
     for (j, &tap) in taps.iter().enumerate() {
-        // Every second neighbour of the middle, going outwards.
+        // Only every second neighbour of the middle has a non-zero tap.
         let pair = window[middle - 1 - 2 * j][axis] + window[middle + 1 + 2 * j][axis];
         sum += i64::from(pair) * i64::from(tap);
     }
@@ -189,15 +189,15 @@ fn filter<const LENGTH: usize, const SIDE: usize>(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Decimation {
-    /// Halvings with the medium filter to the tool band, 0 to 2.
+    /// Number of halvings with the medium filter before the tool band, 0 to 2.
     medium_halvings: u8,
-    /// Whether one with the sharp filter follows.
+    /// True if one halving with the sharp filter follows.
     sharp_halving: bool,
-    /// Halvings from the tool band to the structure band, 0 to 4: the easy filter, at last the medium one.
+    /// Number of halvings from the tool band to the structure band, 0 to 4. The last uses the medium filter, all others the easy one.
     structure_halvings: u8,
 }
 
-/// What the cascade remembers.
+/// State of the cascade: the samples in its filters.
 #[derive(Clone, Debug)]
 pub struct State {
     medium: [Stage<{ length(MEDIUM_SIDE) }>; 2],
@@ -207,7 +207,7 @@ pub struct State {
 }
 
 impl State {
-    /// Before the first sample.
+    /// The initial state.
     pub const fn new() -> Self {
         Self {
             medium: [const { Stage::new() }; 2],
@@ -217,7 +217,7 @@ impl State {
         }
     }
 
-    /// Forgets the past, after a gap: the next sample counts as the first.
+    /// Resets to the initial state, after a gap.
     pub fn reset(&mut self) {
         *self = Self::new();
     }
@@ -229,17 +229,17 @@ impl Default for State {
     }
 }
 
-/// What one input sample brought out.
+/// The output for one input sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Output {
-    /// The next sample of the tool band.
+    /// A sample of the tool band, if one is due.
     pub tool: Option<Sample>,
-    /// The next sample of the structure band.
+    /// A sample of the structure band, if one is due.
     pub structure: Option<Sample>,
 }
 
 impl Decimation {
-    /// The cascade for inputs of this nominal rate.
+    /// Configures the cascade for a nominal input rate.
     pub fn new(nominal_rate: Hertz) -> Result<Self, RateOutOfRange> {
         if !(MIN_RATE.0..=MAX_RATE.0).contains(&nominal_rate.0) {
             return Err(RateOutOfRange(nominal_rate));
@@ -272,7 +272,7 @@ impl Decimation {
 
     /// Group delay of the tool band in input samples, at all frequencies.
     ///
-    /// The output that comes with input sample i shows the signal as it was at input sample i − delay.
+    /// The output with input sample i corresponds to the signal at input sample i − delay.
     pub fn tool_delay(&self) -> u32 {
         let medium = delay(MEDIUM_SIDE) * ((1 << self.medium_halvings) - 1);
         let sharp = if self.sharp_halving {
@@ -292,7 +292,7 @@ impl Decimation {
         self.tool_delay() + self.tool_divisor() * after_tool_band
     }
 
-    /// Takes one sample of the sensor.
+    /// Processes one sample of the sensor.
     pub fn step(&self, state: &mut State, counts: Counts) -> Output {
         let mut tool = Some(counts.map(|c| i32::from(c) << FRACTION_BITS));
         for stage in state.medium.iter_mut().take(self.medium_halvings.into()) {

@@ -1,28 +1,27 @@
-//! A train of numbered, time-stamped events: when was number n, and which number is it now?
+//! Estimator of the time of numbered events from time stamps with jitter.
 //!
-//! Samples of the accelerometer and positions of the tachometer wheel are both events that come
-//! at a nearly constant rate, are numbered exactly, and carry time stamps with jitter. The model is
-//! `t(n) = a + b·n`; `a` and `b` follow the stamps by recursive least squares with fading memory:
-//! a stamp that is `memory` observations old weighs 1/e of the newest.
+//! Samples of the accelerometer and positions of the tachometer wheel are such events: their rate is nearly constant, their
+//! numbers are exact, their time stamps have jitter. The model is `t(n) = a + b·n`. Recursive least squares with exponential
+//! forgetting estimates `a` and `b`: a stamp that is `memory` observations old has the weight 1/e.
 
 use serde::{Deserialize, Serialize};
 
 use crate::math::sqrt;
 use crate::units::Nanoseconds;
 
-/// How an [`EventClock`] follows its stamps.
+/// Settings of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EventClock {
-    /// Observations after which a stamp weighs 1/e. At least 2.
+    /// Number of observations after which the weight of a stamp has decayed to 1/e. At least 2.
     pub memory: f32,
-    /// How uncertain the first guess of the period is, in standard deviations of one stamp per event.
+    /// Standard deviation of the initial period, in units of the standard deviation of one stamp.
     pub period_uncertainty: f32,
 }
 
-/// What an [`EventClock`] has learnt.
+/// State of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventClockState {
-    /// Number of the newest event that was observed.
+    /// Number of the newest observed event.
     index: u64,
     /// Fitted time of that event.
     time_ns: u64,
@@ -34,46 +33,46 @@ pub struct EventClockState {
     covariance: [f32; 3],
     /// Variance of the stamps about the line, in ns².
     variance_ns2: f32,
-    /// The deviation before, in units of one stamp.
+    /// The preceding deviation in ns, normalized to the variance of one stamp.
     previous_ns: f32,
-    /// Running mean of the deviations: not zero where the line is bent.
+    /// Running mean of the deviations; not zero if the rate changes.
     bias_ns: f32,
-    /// Stamps in a row that were too far from the line.
+    /// Number of consecutive outliers.
     strayed: u8,
     /// Observations since the start.
     observations: u32,
 }
 
-/// What one observation was.
+/// Classification of one observation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Observation {
-    /// On the line.
+    /// The stamp agrees with the line.
     Fitted,
-    /// The last few all lie to one side: the rate is changing. The line goes on from this stamp and may turn freely.
+    /// The last deviations have the same sign: the rate is changing. The line continues from this stamp with an uncertain period.
     Bent,
-    /// Too far from the line; counted with the weight of the largest plausible deviation.
+    /// An outlier. Its deviation is reduced below the largest plausible one.
     Strayed,
-    /// So many strayed that the line was begun anew through this stamp and the one before.
+    /// Too many consecutive outliers: the line starts again through this stamp and the preceding one.
     Restarted,
 }
 
-/// Deviations beyond this many standard deviations are not believed: for white jitter one stamp in 16 000.
+/// Threshold of outliers, in standard deviations. Normal jitter exceeds it once in 16 000 stamps.
 const BELIEVED_DEVIATIONS: f32 = 4.0;
-/// After this many disbelieved stamps in a row it is the line that is wrong.
+/// Number of consecutive outliers after which the line starts again. Unfounded.
 const STRAYED_AT_MOST: u8 = 4;
-/// Variance follows the stamps with this memory, in observations.
+/// Memory of the variance estimate, in observations. Unfounded.
 const VARIANCE_MEMORY: f32 = 96.0;
-/// The running mean of deviations follows each by this part; its standard deviation is then 0.38 of theirs.
+/// Gain of the running mean of deviations. Its standard deviation is then √(0.25/1.75) = 0.38 of a single deviation's.
 const BIAS_FOLLOWS: f32 = 0.25;
-/// A deviation counts for the mean with at most this many standard deviations: one or two outliers bend nothing.
+/// Bound of a deviation in the running mean, in standard deviations, so that one or two outliers are no rate change.
 const BIAS_BELIEVES: f32 = 3.0;
-/// A mean of this many standard deviations, five of its own, is not chance.
+/// Threshold of a rate change: running mean in standard deviations of one stamp. It is 5 of the mean's own standard deviations.
 const BENT: f32 = 2.0;
-/// The clock's own resolution, below which no variance is believed, in ns.
+/// Lower bound of the standard deviation in ns: the resolution of the clock.
 const RESOLUTION_NS: f32 = 20.0;
 
 impl EventClock {
-    /// Begins at event 0, stamped `time`, with a first guess of the period and of the standard deviation of a stamp.
+    /// Starts at event 0 with time stamp `time`, and initial estimates of the period and of the stamps' standard deviation.
     pub fn start(&self, time: Nanoseconds, period_ns: f32, jitter_ns: f32) -> EventClockState {
         EventClockState {
             index: 0,
@@ -93,7 +92,7 @@ impl EventClock {
         [1.0, 0.0, self.period_uncertainty * self.period_uncertainty]
     }
 
-    /// Takes the stamp of the event `steps` after the newest one.
+    /// Processes the time stamp of the event that is `steps` after the newest one.
     pub fn observe(&self, state: &mut EventClockState, steps: u32, stamp: Nanoseconds) -> Observation {
         let dn = steps as f32;
         let predicted_ns = state.time_ns.saturating_add((dn * state.period_ns) as u64);
@@ -112,7 +111,7 @@ impl EventClock {
         let bound_ns2 = BELIEVED_DEVIATIONS * BELIEVED_DEVIATIONS * state.variance_ns2 * scale;
         let square_ns2 = deviation_ns * deviation_ns;
         let strays = square_ns2 > bound_ns2;
-        // A disbelieved deviation keeps its sign and shrinks to the bound: bound²/deviation is below it.
+        // An outlier keeps its sign and is reduced to bound²/deviation, which is below the bound.
         let believed_ns = if strays {
             deviation_ns * (bound_ns2 / square_ns2)
         } else {
@@ -127,7 +126,7 @@ impl EventClock {
             if restarts {
                 state.period_ns = difference_ns(stamp.0, before_ns) / dn;
             }
-            // The period is now known no better than from this stamp and the one before.
+            // Uncertainty of a period that is estimated from two stamps only.
             state.covariance = [1.0, 0.0, 2.0 / (dn * dn)];
             (state.strayed, state.bias_ns, state.previous_ns) = (0, 0.0, 0.0);
             return if restarts {
@@ -149,10 +148,10 @@ impl EventClock {
 }
 
 impl EventClockState {
-    /// Takes a deviation in units of one stamp; true where the last few lie to one side.
+    /// Updates the variance with a normalized deviation. Returns true if the last deviations show a rate change.
     ///
-    /// The variance is half the mean square of *differences* of deviations: a line that lags behind a
-    /// changing rate has a bias, and that must not pass for jitter.
+    /// The variance is half the mean square of the *differences* of consecutive deviations. During a rate change the deviations have a
+    /// bias, which the differences remove.
     fn learn_jitter(&mut self, deviation_ns: f32) -> bool {
         let difference_ns = deviation_ns - self.previous_ns;
         self.previous_ns = deviation_ns;
@@ -164,7 +163,7 @@ impl EventClockState {
         } else {
             VARIANCE_MEMORY
         };
-        // 3/(n + 2): the guess made before the first stamp is soon forgotten.
+        // The gain 3/(n + 2) lets the initial estimate decay quickly.
         self.variance_ns2 += (0.5 * difference_ns * difference_ns - self.variance_ns2) * 3.0 / (memory + 2.0);
         if self.variance_ns2 < RESOLUTION_NS * RESOLUTION_NS {
             self.variance_ns2 = RESOLUTION_NS * RESOLUTION_NS;
@@ -172,7 +171,7 @@ impl EventClockState {
         self.observations > 4 && self.bias_ns * self.bias_ns > BENT * BENT * self.variance_ns2
     }
 
-    /// Number of the newest event that was observed.
+    /// Number of the newest observed event.
     pub fn index(&self) -> u64 {
         self.index
     }
@@ -187,7 +186,7 @@ impl EventClockState {
         self.period_ns
     }
 
-    /// Stamps taken since the start.
+    /// Number of observations since the start.
     pub fn observations(&self) -> u32 {
         self.observations
     }
@@ -197,25 +196,25 @@ impl EventClockState {
         self.variance_ns2
     }
 
-    /// Variance of the fitted time `events` after the newest, in ns²: grows with the distance.
+    /// Variance of the fitted time at `events` after the newest event, in ns². It grows with the distance.
     pub fn variance_at_ns2(&self, events: f32) -> f32 {
         let [aa, ab, bb] = self.covariance;
         self.variance_ns2 * (aa + events * (2.0 * ab + events * bb))
     }
 
-    /// Fitted time of the event `events` after (before, where negative) the newest.
+    /// Fitted time at `events` after the newest event; fractions and negative values are allowed.
     ///
-    /// `events` may be a fraction. The result carries the rounding of one `f32` product: 6e-8 of the distance.
+    /// The rounding error is that of one `f32` product: 6e-8 of the distance.
     pub fn time_at(&self, events: f32) -> Nanoseconds {
         Nanoseconds(offset_ns(self.time_ns, events * self.period_ns))
     }
 
-    /// Events from the newest one to `time`; negative before it.
+    /// Number of events from the newest one to `time`; negative before it.
     pub fn events_to(&self, time: Nanoseconds) -> f32 {
         difference_ns(time.0, self.time_ns) / self.period_ns
     }
 
-    /// Keeps the period within bounds that are known from elsewhere.
+    /// Clamps the period to given bounds.
     pub fn limit_period(&mut self, least_ns: f32, most_ns: f32) {
         self.period_ns = self.period_ns.clamp(least_ns, most_ns);
     }

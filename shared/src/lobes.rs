@@ -1,8 +1,8 @@
-//! The lobe table: where this machine is stable.
+//! The lobe table: stability lobes of one machine and tool.
 //!
 //! A table holds, for layers of feed per tooth, immersion and posture and for a grid of spindle speeds, the
-//! depths of cut that are *not* stable. It is a `.qct` file on the host and the same bytes in the device's flash;
-//! [`LobeTable`] reads it where it lies, without a copy.
+//! depth intervals that are *not* stable. It is a `.qct` file on the host and the same bytes in the device's flash;
+//! [`LobeTable`] reads these bytes in place, without a copy.
 //!
 //! ```text
 //! depth │      ▓▓▓▓▓ Hopf ▓▓▓▓▓▓        one column: [ flip 1.58 .. 2.33 ) [ Hopf 2.71 .. end of the table ]
@@ -12,25 +12,24 @@
 //!       └───────┬┬──────────────── speed
 //! ```
 //!
-//! What the table answers for a point between its entries:
-//! - *Speed*: the two neighbouring columns are joined. Where they have the same sequence of overlapping intervals of the
-//!   same kinds, ends and chatter frequencies are interpolated linearly; where they differ (an island begins, a
-//!   kind changes), a depth is unstable where it is unstable in either column.
-//! - *Feed per tooth*: the same between the two neighbouring layers. A layer may hold for a range of feeds.
-//! - *Feed direction*: where layers are for some directions, the same between the two around it, if they are at most
-//!   [`FEED_DIRECTION_SPAN`] apart and their feeds need no interpolation. A direction that was not told is that of the layers where
-//!   they have only one.
-//! - *Immersion and posture*: never interpolated. Immersion may differ by [`IMMERSION_TOLERANCE`], posture must be the same.
-//! - Outside, the answer is [`TabulatedStability::NotKnown`] with the reason, never a guess.
+//! Lookup between the entries:
+//! - *Speed*: the two neighbouring columns are combined. If they have the same sequence of overlapping intervals of the
+//!   same kinds, interval ends and chatter frequencies are interpolated linearly. If they differ (an island begins, the
+//!   kind changes), a depth is unstable if it is unstable in either column.
+//! - *Feed per tooth*: the same rule between the two neighbouring layers. A layer may be valid for a range of feeds.
+//! - *Feed direction*: layers may be valid for one direction only. Between two such directions the same rule applies, if they are at most
+//!   [`FEED_DIRECTION_SPAN`] apart and the feed needs no interpolation. If no direction is set and all layers have the same
+//!   one, that direction is assumed.
+//! - *Immersion and posture*: never interpolated. Immersion angles may differ by [`IMMERSION_TOLERANCE`]; the posture must be equal.
+//! - *Outside the table*: the result is [`TabulatedStability::NotKnown`] with the reason; nothing is extrapolated.
 //!
-//! A table may say how large the [`InterpolationError`] is, and how its limits move with what the device learns:
-//! [`LobeTable::slopes`], [`corrected_limit`].
+//! A table may contain a bound of its [`InterpolationError`], and the derivatives of its limits by modal parameters and cutting
+//! force ([`LobeTable::slopes`]), from which [`corrected_limit`] follows.
 //!
-//! Linear interpolation lies above a limit that is convex between two grid speeds by up to h²·b″/8 (h the
-//! step of the grid, b″ the curvature of the limit): who computes a table chooses the grid so that this is small
-//! against the margin of [`advice`](crate::advice).
+//! Between two grid speeds, linear interpolation exceeds a convex limit b(n) by up to h²·b″/8 (h the speed step, b″ the
+//! second derivative by speed). The speed grid of a table must keep this small against the margin of [`advice`](crate::advice).
 //!
-//! [`format`] documents the bytes.
+//! [`format`] specifies the bytes.
 
 mod additions;
 mod bytes;

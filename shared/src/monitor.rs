@@ -1,4 +1,7 @@
-//! Block in, report out: the pipeline that all callers use.
+//! The signal chain as one step: a block of samples in, a report out.
+//!
+//! Firmware, emulator and host all call [`Monitor::step`]. The files stand in the order of the data: samples and angles,
+//! spectra, verdict and advice. [`Monitor`] is constant; everything learned is in [`State`].
 
 mod angles;
 mod band;

@@ -10,25 +10,25 @@ use crate::units::{Hertz, MetersPerSecond2};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Peak {
-    /// Its frequency.
+    /// Frequency of the tone.
     pub frequency: Hertz,
-    /// Its amplitude, zero to peak; over several axes the root of the sum of squares.
+    /// Zero-to-peak amplitude; over several axes the root of the sum of squares.
     pub amplitude: MetersPerSecond2,
-    /// Power of its highest bin over the median of the bins around: how far it stands out of the noise.
+    /// Ratio of the highest bin's power to the median power of the bins around it.
     pub snr: f32,
 }
 
-/// What the spindle does while a spectrum is taken.
+/// Rotation of the spindle during a spectrum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotation {
     /// Revolutions per second.
     pub frequency: Hertz,
-    /// The most by which that may be wrong or may change within a block.
+    /// Largest error or change of that frequency within the spectrum.
     pub uncertainty: Hertz,
 }
 
-/// The strongest tone that the spindle does not explain.
+/// The strongest tone that is no harmonic of the spindle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NonHarmonic {
@@ -40,30 +40,30 @@ pub struct NonHarmonic {
     pub orders_off: f32,
 }
 
-/// Answer to the search for a tone that is no harmonic.
+/// Result of the search for a tone that is no harmonic of the spindle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Search {
-    /// There is one.
+    /// A tone was found.
     Found(NonHarmonic),
-    /// There is none between the limits of the search, up to the given frequency.
+    /// No tone was found up to the given frequency.
     Nothing {
-        /// Above it harmonics and other tones cannot be told apart.
+        /// Above this frequency harmonics and other tones cannot be distinguished.
         resolved_to: Hertz,
     },
-    /// The harmonics lie too close for this spectrum to see anything between them.
+    /// The harmonics are too close for the resolution of this spectrum.
     Unresolved,
 }
 
-/// Bins on both sides of a peak whose median is the noise floor.
+/// Number of bins on each side of a peak whose median is the noise floor. Unfounded.
 const FLOOR_HALF_WIDTH: usize = 64;
-/// Bins on both sides of a peak that belong to it.
+/// Number of bins on each side of a peak that belong to it: the main lobe of the Hann window and one more.
 const LOBE_HALF_WIDTH: usize = 3;
-/// A tone stands out of the noise floor by at least this factor of power, 14 dB: a bin of noise alone does so once in 3·10⁷.
+/// Smallest ratio of a tone's power to the noise floor: 14 dB. A bin of white noise exceeds it once in 3·10⁷.
 pub const MIN_SNR: f32 = 25.0;
-/// A tone within this distance of a harmonic is one: their main lobes cannot be told apart below it.
+/// Distance in bins within which a tone counts as the harmonic: closer main lobes cannot be separated.
 const HARMONIC_BINS: f32 = 1.0;
-/// The search considers this many local maxima, strongest first.
+/// Number of local maxima, strongest first, that the search considers. Unfounded.
 const CANDIDATES: usize = 32;
 
 impl PowerSpectrum<'_> {
@@ -93,9 +93,9 @@ impl PowerSpectrum<'_> {
         (k as f32 + offset, root * root)
     }
 
-    /// Median power of the bins around bin `k` without the bins of the peak itself.
+    /// Noise floor at bin `k`: the median power of the bins around the peak.
     ///
-    /// Tones do not move it while they fill less than half of these bins.
+    /// Other tones do not change it while they cover less than half of these bins.
     pub fn noise_floor(&self, k: usize) -> f32 {
         let mut around = [0u32; 2 * FLOOR_HALF_WIDTH];
         let below = k.saturating_sub(FLOOR_HALF_WIDTH)..k.saturating_sub(LOBE_HALF_WIDTH);
@@ -103,7 +103,7 @@ impl PowerSpectrum<'_> {
         let bins = below.chain(above).filter_map(|i| self.power.get(i));
         let mut count = 0;
         for (slot, power) in around.iter_mut().zip(bins) {
-            // The bits of numbers that are not negative are in the numbers' order.
+            // The bit patterns of non-negative floats sort like the floats.
             *slot = power.to_bits();
             count += 1;
         }
@@ -127,7 +127,7 @@ impl PowerSpectrum<'_> {
     /// Local maxima between two frequencies, strongest first, at most [`CANDIDATES`].
     fn maxima(&self, from: Hertz, to: Hertz) -> Vec<usize, CANDIDATES> {
         let mut found: Vec<usize, CANDIDATES> = Vec::new();
-        // Bins 0 and 1 hold what the removal of the mean left.
+        // Bins 0 and 1 hold the residual of the mean removal.
         let first = ((from.0 / self.bin.0) as usize).max(2);
         let end = ((to.0 / self.bin.0) as usize)
             .saturating_add(2)
@@ -142,21 +142,21 @@ impl PowerSpectrum<'_> {
                 if found.is_full() && place < CANDIDATES {
                     found.pop();
                 }
-                // Full and weaker than all: not among the strongest.
+                // If the list is full, a weaker maximum is dropped.
                 let _ = found.insert(place, k);
             }
         }
         found
     }
 
-    /// Mean square in (m/s²)² of what lies within the main lobe around a frequency: of a tone there, as long as it stands alone.
+    /// Mean square in (m/s²)² within the main lobe around a frequency: that of an isolated tone there.
     pub fn mean_square_near(&self, frequency: Hertz) -> f32 {
         let centre = math::round(frequency.0 / self.bin.0).max(0.0) as usize;
         let lobe = centre.saturating_sub(2)..=centre + 2;
         lobe.map(|k| self.at(k)).sum::<f32>() / HANN_NOISE_BINS
     }
 
-    /// The strongest tone between two frequencies, where one stands out by [`MIN_SNR`].
+    /// The strongest tone between two frequencies, if it exceeds the noise floor by [`MIN_SNR`].
     pub fn dominant(&self, from: Hertz, to: Hertz) -> Option<Peak> {
         let strongest = *self.maxima(from, to).first()?;
         Some(self.peak(strongest)).filter(|peak| peak.snr >= MIN_SNR)
@@ -164,15 +164,15 @@ impl PowerSpectrum<'_> {
 
     /// The strongest tone between two frequencies that is no harmonic of the spindle.
     ///
-    /// A tone counts as harmonic n of the spindle where it is within n·uncertainty plus one bin of it. A local maximum is passed
-    /// over where stronger ones near it explain it by the side lobes of the window.
+    /// A tone counts as harmonic n of the spindle if it lies within n·uncertainty plus one bin of it. A local maximum is skipped if it
+    /// is explained by the window's side lobes of stronger maxima.
     pub fn dominant_non_harmonic(&self, rotation: Rotation, from: Hertz, to: Hertz) -> Search {
         let Rotation {
             frequency,
             uncertainty,
         } = rotation;
         let width = HARMONIC_BINS * self.bin.0;
-        // Between two harmonics some room must be left: a quarter of their distance.
+        // A quarter of the distance between two harmonics must remain outside their tolerances.
         let highest_order = (0.375 * frequency.0 - width) / uncertainty.0.max(1e-6 * frequency.0.abs());
         let resolved_to = Hertz((highest_order * frequency.0).min(to.0));
         if !(highest_order >= 1.0 && resolved_to.0 > from.0) {
@@ -202,7 +202,7 @@ impl PowerSpectrum<'_> {
         Search::Nothing { resolved_to }
     }
 
-    /// Whether the side lobes of stronger maxima explain half or more of the amplitude in bin `k`.
+    /// True if side lobes of stronger maxima explain at least half of the amplitude in bin `k`.
     fn is_side_lobe(&self, k: usize, stronger: &[usize]) -> bool {
         let leaked: f32 = stronger
             .iter()

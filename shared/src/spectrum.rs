@@ -2,7 +2,7 @@
 //!
 //! | band | points | transform |
 //! |---|---|---|
-//! | tool | 1024 | the fixed-point one of [`fft`] |
+//! | tool | 1024 | fixed point, [`fft`] |
 //! | structure | 2048 | microfft, single precision |
 //!
 //! **Units.** `power[k]` is in (m/s²)². A tone of amplitude A in the middle of bin k gives A²/2 there, its mean square. White
@@ -12,7 +12,7 @@
 //! lobe −31 dB, falling by 18 dB per octave. It is applied to the spectrum, as X\[k\]/2 − (X\[k−1\] + X\[k+1\])/4: the same
 //! values without a table.
 //!
-//! The mean of each block is taken away first, so that gravity costs no resolution.
+//! The mean of each block is subtracted first, so that gravity does not reduce the resolution.
 
 use crate::decimation::Sample;
 use crate::fft;
@@ -36,7 +36,7 @@ pub const HANN_NOISE_BINS: f32 = 1.5;
 pub struct Overlap<const N: usize> {
     ring: [Sample; N],
     next: usize,
-    /// Samples until the next block is due.
+    /// Number of samples until the next block is due.
     missing: usize,
 }
 
@@ -50,12 +50,13 @@ impl<const N: usize> Overlap<N> {
         }
     }
 
-    /// Forgets the past, after a gap.
+    /// Discards all samples, after a gap.
     pub fn reset(&mut self) {
         (self.next, self.missing) = (0, N);
     }
 
-    /// Takes a sample; true where a block of N is complete and `hop` samples (at least 1) have come since the one before.
+    /// Takes a sample. Returns true if a block of N samples is complete and at least `hop` samples have come since the preceding
+    /// block.
     pub fn push(&mut self, sample: Sample, hop: usize) -> bool {
         if let Some(slot) = self.ring.get_mut(self.next) {
             *slot = sample;
@@ -69,7 +70,7 @@ impl<const N: usize> Overlap<N> {
         true
     }
 
-    /// The block's values of one axis (0, 1, 2 for x, y, z), oldest first.
+    /// The values of one axis (0, 1, 2 for x, y, z), oldest first.
     fn axis(&self, axis: usize) -> impl Iterator<Item = i32> {
         let (newer, older) = self.ring.split_at(self.next.min(N));
         older
@@ -166,14 +167,14 @@ fn add_power(bins: impl Iterator<Item = [f32; 2]>, unit: f32, power: &mut [f32])
     let (mut before, mut here) = ([0.0; 2], [dc, 0.0]);
     let last = power.len() - 1;
     for (k, slot) in power.iter_mut().enumerate() {
-        // Beyond its ends the spectrum of real values goes on mirrored and conjugate.
+        // Beyond its ends the spectrum of a real signal is mirrored and conjugate.
         let after = following.next().unwrap_or(conjugate(before));
         if k == 0 {
             before = conjugate(after);
         }
         let re = 0.5 * here[0] - 0.25 * (before[0] + after[0]);
         let im = 0.5 * here[1] - 0.25 * (before[1] + after[1]);
-        // At both ends there is no second half whose power joins.
+        // The bins at 0 Hz and at half the sample rate have no mirrored partner.
         let fold = if k == 0 || k == last { 0.5 } else { 1.0 };
         *slot += fold * scale * (re * re + im * im);
         (before, here) = (here, after);

@@ -1,14 +1,14 @@
-//! Samples at fixed angles of the spindle, their average over the revolution, and what is left over.
+//! Resampling at fixed spindle angles, and the synchronous average with its residual.
 //!
-//! A tooth period (one tooth pitch of the spindle) is divided into [`SLOTS`] equal angles. [`Sampler`] turns the samples of a band, which
-//! are equally spaced in time, into one [`Passing`] per tooth period: three axes at each slot. The passings of one tooth, once per
-//! revolution, belong to one *class*; [`Average`] keeps the mean of each class and splits the signal:
+//! A tooth period (one tooth pitch of the spindle) is divided into [`SLOTS`] equal angles. [`Sampler`] converts the samples of a band, which
+//! are equally spaced in time, into one [`Passing`] per tooth period: three axes at each slot. The passings of one tooth, one per
+//! revolution, form a *class*. [`Average`] keeps the mean of each class and splits the signal:
 //!
 //! ```text
 //! passing = at rest + forced (same for all teeth) + runout (same for one tooth, sums to 0 over the teeth) + residual
 //! ```
 //!
-//! Group delay of the filters before is the caller's to take off: the angle that comes with a sample is that of the moment it shows.
+//! The caller compensates the group delay of preceding filters: each sample comes with the spindle angle at the time that it represents.
 
 use crate::math::sqrt;
 use crate::tachometer::Turns;
@@ -17,37 +17,37 @@ use crate::tachometer::Turns;
 pub const SLOTS: usize = 8;
 /// Values per tooth period: three axes at each slot.
 pub const CHANNELS: usize = 3 * SLOTS;
-/// The most classes: teeth of a tool.
+/// Largest number of classes, one per tooth.
 pub const MAX_CLASSES: usize = 12;
 
 /// One tooth period: acceleration in m/s², slot by slot, x, y, z within a slot.
 pub type Passing = [f32; CHANNELS];
 
-/// How a slot is filled.
+/// Method of resampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The mean from the angle of the slot to that of the next: sees up to about SLOTS/2 cycles per tooth period, with the least noise.
+    /// The mean from the angle of the slot to that of the next: its bandwidth is about SLOTS/2 cycles per tooth period, with the least noise.
     ///
-    /// The mean is that of the straight lines through the samples. A tone of n samples per cycle is low by a part of π²/(3n²): 0.3 % at
-    /// 33 samples.
+    /// The mean is that of the straight lines through the samples. The amplitude of a tone with n samples per cycle is too low by the relative
+    /// amount π²/(3n²): 0.3 % for 33 samples.
     Mean,
-    /// The value at the angle of the slot: sees the whole band.
+    /// The value at the angle of the slot, with the bandwidth of the samples.
     ///
-    /// A cubic goes through the four samples around. A tone of n samples per cycle is off by a part of at most 36.5/n⁴: 0.06 % at
-    /// 16, 1 % at 8 samples.
+    /// It is that of the cubic through the four nearest samples. The relative error of a tone with n samples per cycle is at most
+    /// 36.5/n⁴: 0.06 % for 16, 1 % for 8 samples.
     Value,
 }
 
-/// Takes samples of a band to passings.
+/// Converts samples of a band into passings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampler {
     /// Teeth of the tool.
     pub teeth: u8,
-    /// How slots are filled.
+    /// Method of resampling.
     pub method: Method,
 }
 
-/// Where a [`Sampler`] stands.
+/// State of a [`Sampler`].
 #[derive(Clone, Copy, Debug)]
 pub struct SamplerState {
     /// The last four samples, newest last.
@@ -60,10 +60,11 @@ pub struct SamplerState {
     filled: u8,
     /// The slot whose angle comes next, counted from angle 0; `None` before the first.
     next_slot: Option<u64>,
-    /// Slots filled without a break.
+    /// Number of consecutive slots filled without a gap.
     unbroken: u8,
-    /// Integral of the signal since the angle of the last slot, in m/s² · samples, and the samples since.
+    /// Integral of the signal since the angle of the last slot, in m/s² · sample periods.
     integral: [f32; 3],
+    /// Sample periods since the angle of the last slot.
     span: f32,
     passing: Passing,
 }
@@ -91,12 +92,12 @@ impl SamplerState {
     }
 }
 
-/// A tooth period that is complete.
+/// A complete tooth period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed {
     /// Tooth periods since angle 0 of the tachometer.
     pub tooth: u64,
-    /// Its values.
+    /// Acceleration at each slot.
     pub passing: Passing,
 }
 
@@ -108,17 +109,17 @@ impl Sampler {
         Turns(((slot / per_turn) << 32) | part)
     }
 
-    /// The first slot whose angle is not before `angle`.
+    /// The first slot at or after `angle`.
     fn slot_from(&self, angle: Turns) -> u64 {
         let per_turn = u64::from(self.teeth) * SLOTS as u64;
         let part = u64::from(angle.fraction()) * per_turn;
         (angle.0 >> 32) * per_turn + part.div_ceil(1 << 32)
     }
 
-    /// Takes the next sample (x, y, z in m/s²) and the angle of the moment it shows. Angles that step back a little, as where the
-    /// tachometer's estimate was corrected, are taken as they are.
+    /// Processes the next sample (x, y, z in m/s²) with the spindle angle at the time that it represents. Small steps back of the angle, from a
+    /// correction of the tachometer's estimate, are allowed.
     ///
-    /// Returns the tooth period that this sample completes. At least two samples must fall into one tooth period.
+    /// Returns the tooth period that this sample completes. A tooth period must contain at least two samples.
     pub fn step(&self, state: &mut SamplerState, sample: [f32; 3], angle: Turns) -> Option<Passed> {
         state.samples.rotate_left(1);
         if let Some(newest) = state.samples.last_mut() {
@@ -157,7 +158,8 @@ impl Sampler {
         passed
     }
 
-    /// The angle of `slot` lies `part` of the way between the two middle samples; up to `done` the integral is there already.
+    /// Fills a slot whose angle lies at the fraction `part` between the two middle samples. The integral is already computed up to the
+    /// fraction `done`.
     fn fill(&self, state: &mut SamplerState, slot: u64, done: f32, part: f32) -> Option<Passed> {
         let value = match self.method {
             Method::Mean => {
@@ -177,7 +179,7 @@ impl Sampler {
         if let Some(values) = state.passing.get_mut(3 * place..3 * place + 3) {
             values.copy_from_slice(&value);
         }
-        // The very first slot of a mean began somewhere within itself.
+        // The first mean does not cover its whole slot.
         let partial = self.method == Method::Mean && state.unbroken == 0;
         state.unbroken = state.unbroken.saturating_add(1).min(SLOTS as u8 + 1);
         let whole = usize::from(state.unbroken) >= SLOTS + usize::from(self.method == Method::Mean);
@@ -189,7 +191,7 @@ impl Sampler {
 }
 
 impl SamplerState {
-    /// Adds the integral of the straight line between the two middle samples from `from` to `to`, parts of its length.
+    /// Adds the integral of the straight line between the two middle samples, from the fraction `from` to the fraction `to`.
     fn integrate(&mut self, from: f32, to: f32) {
         let [_, a, b, _] = &self.samples;
         let (length, middle) = (to - from, 0.5 * (to + from));
@@ -200,7 +202,7 @@ impl SamplerState {
     }
 }
 
-/// The cubic through four equally spaced values, `part` of the way from the second to the third.
+/// The cubic through four equally spaced values, at the fraction `part` between the second and the third.
 fn cubic(samples: &[[f32; 3]; 4], part: f32) -> [f32; 3] {
     let (before, after) = (part + 1.0, part - 1.0);
     let beyond = part - 2.0;
@@ -219,40 +221,40 @@ fn cubic(samples: &[[f32; 3]; 4], part: f32) -> [f32; 3] {
     value
 }
 
-/// Mean of each class, and the power of what is left over.
+/// Mean of each class, and the mean square of the residual.
 ///
-/// The mean is the plain one over the first [`MEMORY`](Self::MEMORY) revolutions and fades from then on. Where the conditions change,
-/// [`reset`](Self::reset) begins anew: the first revolution after it counts fully.
+/// Over the first [`MEMORY`](Self::MEMORY) revolutions it is the arithmetic mean, later an exponentially weighted one. After a change of
+/// the cutting conditions, [`reset`](Self::reset) discards the past.
 #[derive(Clone, Copy, Debug)]
 pub struct Average {
     means: [Passing; MAX_CLASSES],
-    /// Passings of each class since the reset, up to the memory.
+    /// Number of passings of each class since the reset, up to the memory.
     counts: [u8; MAX_CLASSES],
     classes: u8,
     /// Mean square of the residual, over all channels.
     residual: f32,
-    /// Passings that the residual rests on, up to the memory.
+    /// Number of passings in the residual, up to the memory.
     residual_count: u16,
 }
 
-/// Root mean squares, in m/s², over slots and axes.
+/// Levels: root mean squares over slots and axes, in m/s².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Levels {
-    /// What all teeth have in common, without the part that is constant over the tooth period.
+    /// Forced vibration: common to all teeth, without its mean over the tooth period.
     pub forced: f32,
-    /// What differs from tooth to tooth and comes back with each revolution.
+    /// Runout: differs from tooth to tooth and repeats with each revolution.
     pub runout: f32,
-    /// The part of it that changes sign from tooth to tooth; 0 for odd numbers of teeth.
+    /// Part of the runout that changes sign from tooth to tooth; 0 for odd numbers of teeth.
     pub alternating: f32,
-    /// What does not come back with the revolution.
+    /// Residual: not periodic with the revolution.
     pub residual: f32,
 }
 
 impl Average {
-    /// Revolutions that the means look back.
+    /// Memory of the means, in revolutions.
     pub const MEMORY: u8 = 8;
 
-    /// Knows nothing yet. `classes` from 1 to [`MAX_CLASSES`].
+    /// The initial state; `classes` from 1 to [`MAX_CLASSES`].
     pub const fn new(classes: u8) -> Self {
         Self {
             means: [[0.0; CHANNELS]; MAX_CLASSES],
@@ -263,17 +265,17 @@ impl Average {
         }
     }
 
-    /// Whether it was made for so many classes.
+    /// True if it was created for this number of classes.
     pub fn is_for(&self, classes: u8) -> bool {
         self.classes == clamp_classes(classes)
     }
 
-    /// Forgets the past.
+    /// Resets to the initial state.
     pub fn reset(&mut self) {
         *self = Self::new(self.classes);
     }
 
-    /// Takes a passing of tooth period `tooth`.
+    /// Updates the mean of a class with the passing of tooth period `tooth`.
     pub fn update(&mut self, tooth: u64, passing: &Passing) {
         let class = (tooth % u64::from(self.classes)) as usize;
         let (Some(mean), Some(count)) = (self.means.get_mut(class), self.counts.get_mut(class)) else {
@@ -287,7 +289,7 @@ impl Average {
             square += difference * difference;
         }
         if *count > 0 {
-            // Against a mean of c passings white noise of power s leaves s·(1 + 1/c): (1 − gain) takes that off.
+            // White noise of variance s deviates from a mean of c passings by s·(1 + 1/c). The factor (1 − gain) removes that excess.
             let power = square * (1.0 - gain) / CHANNELS as f32;
             let memory = u16::from(Self::MEMORY) * u16::from(self.classes);
             self.residual_count = (self.residual_count + 1).min(memory);
@@ -304,7 +306,7 @@ impl Average {
             .all(|&count| count >= 2)
     }
 
-    /// The levels now.
+    /// The present levels.
     pub fn levels(&self) -> Levels {
         let classes = usize::from(self.classes);
         let share = 1.0 / classes as f32;
@@ -340,7 +342,7 @@ impl Average {
     }
 }
 
-/// The nearest possible number of classes.
+/// Clamps a number of classes to the range 1 to `MAX_CLASSES`.
 pub(crate) const fn clamp_classes(classes: u8) -> u8 {
     if classes == 0 {
         1

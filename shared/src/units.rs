@@ -1,6 +1,6 @@
-//! Units as types, for every boundary: a number that crosses a module or a wire says what it is.
+//! Physical units as types, for interfaces between modules and in messages.
 //!
-//! Inside a computation plain `f32` with the unit last in the name is used; `.0` is the way in and out.
+//! Inside a computation, plain `f32` is used with the unit at the end of the name; `.0` converts in both directions.
 
 use serde::{Deserialize, Serialize};
 
@@ -62,17 +62,17 @@ impl Hertz {
 
 /// A point in time on the clock of the device that took the samples, in nanoseconds since its start.
 ///
-/// Samples and tachometer edges are stamped by the same clock: the sample clock of the sensor is
-/// off by up to a few percent and is fitted against it.
+/// Samples and tachometer edges are stamped by the same clock. The sensor's own clock deviates by up to a few percent, so its rate
+/// is fitted to this one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(transparent)]
 pub struct Nanoseconds(pub u64);
 
 impl Nanoseconds {
-    /// Seconds from `earlier` to `self`; negative where `self` comes first.
+    /// Seconds from `earlier` to `self`; negative if `self` is earlier.
     ///
-    /// The difference is taken in integers, so that it keeps its resolution after days of running.
+    /// The subtraction is done in integers, so that the result keeps its resolution after days of running.
     pub fn seconds_since(self, earlier: Self) -> f32 {
         if self.0 >= earlier.0 {
             (self.0 - earlier.0) as f32 * 1e-9

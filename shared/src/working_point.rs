@@ -1,26 +1,26 @@
-//! What the host knows of the cut and the machine, and tells the device.
+//! Cut, machine limits and tool, as set by the host.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Degrees, Millimeters, Rpm};
 
-/// The cut as it is set up. Spindle speed is not part of it: the device measures that.
+/// The conditions of the cut. The spindle speed is not one of them, because the device measures it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct WorkingPoint {
     /// Axial depth of cut.
     pub axial_depth: Millimeters,
-    /// Immersion angle where a tooth enters.
+    /// Entry angle of a tooth.
     pub start: Degrees,
-    /// Immersion angle where a tooth leaves.
+    /// Exit angle of a tooth.
     pub exit: Degrees,
     /// Feed per tooth.
     pub feed_per_tooth: Millimeters,
-    /// Posture of the robot: an index that means the same on host and device; 0 on a machine tool.
+    /// Index of the robot's posture, the same on host and device; 0 on a machine tool.
     pub posture: u8,
 }
 
-/// What the spindle can do: advice stays within.
+/// Speed limits of the spindle. Advice stays within them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
@@ -30,7 +30,7 @@ pub struct Limits {
     pub rpm_max: Rpm,
 }
 
-/// The tool as the signal chain sees it.
+/// The properties of the tool that the signal chain uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Tool {

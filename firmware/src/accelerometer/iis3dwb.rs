@@ -20,58 +20,59 @@ pub use configuration::{Configuration, Divisor, Filter, Range};
 
 use super::{Accelerometer, Gap, Queue};
 
-/// What the identity register of an IIS3DWB holds.
+/// Content of the identity register of an IIS3DWB.
 pub const IDENTITY: u8 = 0x7b;
 
-/// The most words in the sensor's queue.
+/// Capacity of the sensor's queue in words.
 pub const QUEUE_WORDS: u16 = 512;
 
 /// Bytes of one word of the queue: a tag and three axes of 16 bits.
 const WORD_BYTES: usize = 7;
 
-/// The sensor answers this long after power came.
+/// Boot time after power-on.
 const BOOT_MILLISECONDS: u32 = 10;
 
-/// Samples are settled this long after the sensor was turned on.
+/// Settling time of the samples after the sensor is switched on.
 const SETTLING_MILLISECONDS: u32 = 10;
 
-/// A reset takes some 50 µs.
+/// Number of polls of the reset bit. A reset takes about 50 µs.
 const RESET_POLLS: u32 = 20;
+/// Interval of the polls.
 const RESET_POLL_MICROSECONDS: u32 = 100;
 
-/// What can go wrong between driver and sensor.
+/// Error of the sensor driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error<B> {
     /// The bus failed.
     Bus(B),
-    /// The sensor at this address says it is another; 0x00 and 0xFF mean that nothing answers.
+    /// The identity register has another value; 0x00 and 0xFF mean that no sensor answers.
     WrongIdentity {
-        /// What the identity register held in place of 0x7B.
+        /// Value of the identity register; 0x7B is expected.
         found: u8,
     },
-    /// The reset did not end.
+    /// The reset did not end in time.
     ResetTimeout,
-    /// A watermark that the sensor cannot have.
+    /// The watermark is out of range.
     WatermarkOutOfRange {
-        /// What was asked for; 1 to 511 would be right.
+        /// The requested watermark; 1 to 511 are possible.
         asked: u16,
     },
-    /// A register does not hold what was written to it.
+    /// A register does not have the value written to it.
     NotWritten {
         /// Address of the register.
         register: u8,
-        /// What was written.
+        /// The written value.
         written: u8,
-        /// What was read back.
+        /// The value read back.
         found: u8,
     },
-    /// A level above what the queue can hold.
+    /// The level exceeds the capacity of the queue.
     LevelOutOfRange {
-        /// What the sensor said; at most 512 would be right.
+        /// The level read from the sensor; at most 512 is possible.
         found: u16,
     },
-    /// A word of the queue whose tag is of no acceleration, or whose parity is wrong.
+    /// A word of the queue has a tag other than acceleration, or wrong parity.
     BadTag {
         /// The tag byte.
         found: u8,
@@ -120,7 +121,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         }
     }
 
-    /// Puts every register to its default, whatever ran before.
+    /// Resets all registers to their defaults.
     fn reset(&mut self) -> Result<(), Error<S::Error>> {
         self.write_register(register::CTRL3_C, bits::IF_INC | bits::SW_RESET)?;
         for _ in 0..RESET_POLLS {
@@ -182,7 +183,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         Ok(())
     }
 
-    /// Level of the queue, and whether it overran since the last look.
+    /// Level of the queue, and whether it has overflowed since the preceding call.
     fn queue(&mut self) -> Result<(u16, bool), Error<S::Error>> {
         let mut status = [0; 2];
         self.read_registers(register::FIFO_STATUS1, &mut status)?;
@@ -239,7 +240,7 @@ impl<S: SpiDevice, D: DelayNs> Accelerometer for Iis3dwb<S, D> {
             return Err(Error::LevelOutOfRange { found: level });
         };
         if count > 0 {
-            // The address runs from 0x78 to 0x7E and round again, one word after the other.
+            // The address counts from 0x78 to 0x7E and wraps, one word after the other.
             self.read_registers(register::FIFO_DATA_OUT_TAG, words)?;
         }
         let mut gap = None;

@@ -23,7 +23,7 @@ const BOOT_NS: u64 = 10_000_000;
 const SETTLING_NS: u64 = 10_000_000;
 const QUEUE_WORDS: usize = 512;
 
-/// What the sensor gives before its filter has settled.
+/// Output of the sensor before its filter has settled.
 pub(crate) const UNSETTLED: Counts = [i16::MAX; 3];
 
 /// A sensor and the time around it.
@@ -49,7 +49,7 @@ pub(crate) struct Model {
     fault: Fault,
 }
 
-/// What is wrong with the sensor.
+/// Simulated fault of the sensor.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,
@@ -258,7 +258,7 @@ impl Model {
         self.update_line();
     }
 
-    /// The address of the next byte of a transfer: the queue's output comes round to its tag.
+    /// The address of the next byte of a transfer. After the last output byte of the queue it wraps to the tag.
     fn next(&self, address: u8) -> u8 {
         let counts_up = self.registers[0x12] & 0b100 != 0;
         match address {

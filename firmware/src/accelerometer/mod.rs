@@ -1,4 +1,4 @@
-//! Accelerometers with a sample queue: what the acquisition needs of one, and the drivers.
+//! Accelerometers with a sample queue: the interface for the acquisition, and the drivers.
 
 use heapless::Vec;
 use quietcut_core::acceleration::{Counts, MAX_BLOCK_SAMPLES, Sensor};
@@ -7,37 +7,36 @@ pub mod iis3dwb;
 #[cfg(test)]
 pub(crate) mod iis3dwb_model;
 
-/// An accelerometer that samples by its own clock into a queue and raises a line at a watermark.
+/// An accelerometer that samples with its own clock into a queue, and has a watermark line.
 ///
-/// The line rises when the queue comes to hold [`watermark`](Self::watermark) samples, from below.
+/// The line rises when the level of the queue reaches [`watermark`](Self::watermark) samples from below.
 pub trait Accelerometer {
-    /// What can go wrong.
+    /// Error of the driver.
     type Error;
 
-    /// What the signal chain must know of it.
+    /// The properties of the sensor that the signal chain uses.
     fn sensor(&self) -> Sensor;
 
-    /// How many samples in the queue raise the line.
+    /// Level of the queue, in samples, at which the line rises.
     fn watermark(&self) -> u16;
 
-    /// Resets and configures the sensor and empties its queue; returns when settled samples come in.
+    /// Resets and configures the sensor and empties its queue. Returns once the samples have settled.
     fn start(&mut self) -> Result<(), Self::Error>;
 
-    /// Takes samples from the queue, oldest first, until it is empty or `samples` is full.
+    /// Moves samples from the queue to `samples`, oldest first, until the queue is empty or `samples` is full.
     ///
-    /// `samples` is emptied first. After an error the queue is in an unknown state: start again.
+    /// `samples` is cleared first. After an error the state of the queue is unknown, and [`start`](Self::start) is required.
     fn read(&mut self, samples: &mut Vec<Counts, MAX_BLOCK_SAMPLES>) -> Result<Queue, Self::Error>;
 }
 
 /// The state of the queue at one read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Queue {
-    /// Samples that were in the queue when the read began.
+    /// Level of the queue at the beginning of the read, in samples.
     pub level: u16,
-    /// True where the queue was full since the read before and the oldest samples were overwritten.
+    /// True if the queue has overflowed since the preceding read, so that samples were overwritten.
     pub overrun: bool,
-    /// Samples missing between the last of the read before and the first of this one, where the
-    /// sensor counts its samples.
+    /// Samples missing between the preceding read and this one; `None` if the sensor does not number its samples.
     pub gap: Option<Gap>,
 }
 
@@ -46,6 +45,6 @@ pub struct Queue {
 pub struct Gap {
     /// Missing samples modulo `modulus`.
     pub remainder: u8,
-    /// After how many samples the sensor's count comes round.
+    /// Number of samples after which the sensor's count wraps.
     pub modulus: u8,
 }

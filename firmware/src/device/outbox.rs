@@ -1,4 +1,4 @@
-//! What the pipeline has said and the line has not taken yet.
+//! Messages that wait for room on the line.
 
 use heapless::Vec;
 use quietcut_core::monitor::{Band, Report, State};
@@ -8,21 +8,22 @@ use crate::link::Link;
 
 const BANDS: [Band; 2] = [Band::Structure, Band::Tool];
 
-/// Reports, points of the stroboscopic map and spectra on their way out, in this order.
+/// Reports, points of the stroboscopic map and spectra that wait to be sent, in this order.
 ///
-/// Points and spectra stay in the pipeline's state; what waits here is how much of them was sent.
+/// Points and spectra stay in the state of the signal chain. Only the progress of their transmission is stored here.
 #[derive(Default)]
 pub(super) struct Outbox {
     report: Option<Report>,
     strobes: Option<Strobes>,
     spectra: [Option<Spectrum>; BANDS.len()],
-    /// The reply to the request that is being done, with its sequence number.
+    /// The reply to the current request, with its sequence number.
     reply: Option<(u16, Reply)>,
-    /// True where the reply comes behind all that the request has made, false where it goes first.
+    /// True if the reply follows all messages that the request caused, false if it precedes them.
     is_reply_last: bool,
     dropped: u32,
 }
 
+/// Points of the stroboscopic map that are being sent.
 struct Strobes {
     sequence: u32,
     next: usize,
@@ -32,22 +33,22 @@ struct Strobes {
 struct Spectrum {
     /// Sequence number of the block that completed it.
     sequence: u32,
-    /// The first bin that was not sent.
+    /// Index of the first bin that was not sent.
     next: usize,
 }
 
 impl Outbox {
-    /// Messages that were given up because the line is too slow.
+    /// Number of messages dropped because the line is too slow.
     pub(super) fn dropped(&self) -> u32 {
         self.dropped
     }
 
-    /// True while a reply waits: the next request must too.
+    /// True while a reply waits. The next request then waits too.
     pub(super) fn has_reply(&self) -> bool {
         self.reply.is_some()
     }
 
-    /// Gives up what waits, and takes spectra from now on for new: the state was reset.
+    /// Discards all waiting messages, after the state was reset.
     pub(super) fn clear(&mut self) {
         *self = Self {
             dropped: self.dropped,
@@ -55,8 +56,8 @@ impl Outbox {
         };
     }
 
-    /// Gives up what the step before has left, since the state is about to change: spectra that go on are kept, for the
-    /// state may not touch them.
+    /// Drops waiting reports and points before the next step overwrites them. Spectra stay, because the next step may leave them
+    /// unchanged.
     pub(super) fn make_way(&mut self) {
         self.dropped = self
             .dropped
@@ -64,7 +65,7 @@ impl Outbox {
             .saturating_add(u32::from(self.strobes.take().is_some()));
     }
 
-    /// Takes what a step has made, as far as it is subscribed to.
+    /// Queues the results of a step that are subscribed to.
     pub(super) fn fill(
         &mut self,
         report: Option<Report>,
@@ -78,26 +79,26 @@ impl Outbox {
         }
         for (band, sending) in BANDS.into_iter().zip(&mut self.spectra) {
             if state.has_fresh_spectrum(band) {
-                // One that was not finished is gone: its memory now holds this one.
+                // The new spectrum has overwritten one that was not completely sent.
                 self.dropped = self.dropped.saturating_add(u32::from(sending.is_some()));
                 *sending = subscription.spectra.then_some(Spectrum { sequence, next: 0 });
             }
         }
     }
 
-    /// Takes the reply to a request: it goes first.
+    /// Queues the reply to a request before all other messages.
     pub(super) fn reply(&mut self, request: u16, reply: Reply) {
         self.reply = Some((request, reply));
         self.is_reply_last = false;
     }
 
-    /// Takes the reply to a request that has made all that waits: it goes last.
+    /// Queues the reply to a request after all messages that the request caused.
     pub(super) fn reply_last(&mut self, request: u16, reply: Reply) {
         self.reply = Some((request, reply));
         self.is_reply_last = true;
     }
 
-    /// Sends as much as the link has room for; the reply, if that was sent.
+    /// Sends as much as the link has room for. Returns the reply if it was sent.
     pub(super) fn pump(&mut self, link: &mut Link, state: &State) -> Option<(u16, Reply)> {
         let mut sent = None;
         while link.room() > 0 {
@@ -127,7 +128,7 @@ impl Outbox {
         Some((request, reply))
     }
 
-    /// The band whose spectrum is being sent, where to put what is left of it, and the spectrum.
+    /// The next spectrum to send: its band, the slot for the unsent rest, and its progress.
     fn next_spectrum(&mut self) -> Option<(Band, &mut Option<Spectrum>, Spectrum)> {
         BANDS.into_iter().zip(&mut self.spectra).find_map(|(band, slot)| {
             let spectrum = slot.take()?;
@@ -136,7 +137,7 @@ impl Outbox {
     }
 }
 
-/// Sends the next points of the map; what is left of them.
+/// Sends the next points of the map. Returns the progress if some are left.
 fn send_strobes(link: &mut Link, state: &State, strobes: Strobes) -> Option<Strobes> {
     let rest = state.strobes().get(strobes.next..).unwrap_or_default();
     let mut chunk = StrobeChunk {
@@ -153,7 +154,7 @@ fn send_strobes(link: &mut Link, state: &State, strobes: Strobes) -> Option<Stro
     (next < state.strobes().len()).then_some(Strobes { next, ..strobes })
 }
 
-/// Sends the next piece of a spectrum; what is left of it.
+/// Sends the next chunk of a spectrum. Returns the progress if some bins are left.
 fn send_spectrum(link: &mut Link, state: &State, band: Band, sending: Spectrum) -> Option<Spectrum> {
     let spectrum = state.spectrum(band)?;
     let mut power = Vec::new();

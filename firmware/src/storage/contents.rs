@@ -1,8 +1,8 @@
-//! What is in the table part of a slot.
+//! The content of a slot's table area.
 
 use quietcut_core::lobes::{Header, TableError};
 
-/// What is in the table part of a slot.
+/// The content of a slot's table area.
 #[derive(Clone, Copy)]
 pub(super) enum Contents {
     Empty,

@@ -1,4 +1,4 @@
-//! What is in the slots, and which of them comes next.
+//! Examination of the slots: their content, the newest table, and the slot of the next upload.
 
 use quietcut_core::lobes::format::HEADER_LENGTH;
 use quietcut_core::lobes::{Header, LobeTable, TableError};
@@ -14,17 +14,17 @@ impl<M: TableMemory> Storage<M> {
         self.contents.get(slot).copied().unwrap_or(Contents::Empty)
     }
 
-    /// Looks what is in a slot.
+    /// Examines a slot with a full check of its table.
     pub(super) fn examine(&mut self, slot: usize) {
         self.note(slot, |table| LobeTable::parse(table).map(|_| ()));
     }
 
-    /// A check for tables whose CRC is known to be right.
+    /// Checks the entries of a table whose CRC-32 was verified before.
     pub(super) fn entries_checked(table: &[u8]) -> Result<(), TableError> {
         LobeTable::reopen(table)?.check_entries()
     }
 
-    /// Notes what is in a slot; `check` refuses bytes that are no table.
+    /// Records the content of a slot. `check` refuses bytes that are not a valid table.
     pub(super) fn note(&mut self, slot: usize, check: impl FnOnce(&[u8]) -> Result<(), TableError>) {
         let bytes = self.slot_bytes(slot);
         let is_empty = bytes.iter().take(HEADER_LENGTH).all(|&byte| byte == ERASED);
@@ -46,19 +46,21 @@ impl<M: TableMemory> Storage<M> {
         }
     }
 
+    /// The slot with the newest valid table.
     pub(super) fn newest(&self) -> Option<usize> {
         let generation = |slot: &usize| match self.contents_of(*slot) {
             Contents::Valid(header) => Some(header.generation),
             _ => None,
         };
         let slots = || (0..SLOTS).filter(|slot| generation(slot).is_some());
-        // Generations may come round: the newer of two is the one less than half a round ahead.
+        // Generation numbers wrap at 2³². The newer of two is less than 2³¹ ahead.
         slots().reduce(|a, b| match (generation(&a), generation(&b)) {
             (Some(of_a), Some(of_b)) if of_b.wrapping_sub(of_a) < u32::MAX / 2 => b,
             _ => a,
         })
     }
 
+    /// The generation number of the next table.
     pub(super) fn next_generation(&self) -> u32 {
         match self.in_use.map(|slot| self.contents_of(slot)) {
             Some(Contents::Valid(header)) => header.generation.wrapping_add(1),
@@ -66,7 +68,7 @@ impl<M: TableMemory> Storage<M> {
         }
     }
 
-    /// The slot for the next upload: one that is not in use.
+    /// The slot of the next upload: one that is not in use.
     pub(super) fn free_slot(&self) -> usize {
         (0..SLOTS)
             .find(|&slot| self.in_use != Some(slot))

@@ -1,4 +1,4 @@
-//! The journal of a slot: which table is on its way, and how far it is.
+//! The journal of a slot: the header of the table being uploaded, and the progress of the upload.
 //!
 //! One page of flash:
 //!
@@ -7,11 +7,11 @@
 //! | 0 | 4 | magic `QCUP` |
 //! | 4 | 32 | header of the file |
 //! | 36 | 4 | CRC-32 of the 36 bytes before |
-//! | 40 | 24 | as erased |
-//! | 64 | U each | marks: number k is written when the k-th stretch of the slot is |
+//! | 40 | 24 | erased |
+//! | 64 | U each | marks: mark k is written after section k of the slot |
 //!
-//! A stretch is a page, or as many as make the marks fit. A mark is the CRC-32 of record and number in a word of
-//! the flash, so that none is right by chance; the highest right one counts, whatever those below it are.
+//! A section is one page, or several pages if the marks would not fit otherwise. A mark of U bytes, one or more flash words, holds the CRC-32 of
+//! the file's header and the number k, so that no mark is valid by chance. The highest valid mark counts, whatever the lower ones are.
 
 use core::marker::PhantomData;
 
@@ -28,36 +28,36 @@ const RECORD_LENGTH: usize = MAGIC.len() + HEADER_LENGTH + 4;
 const MARKS_OFFSET: usize = 64;
 const MARK_LENGTH: usize = 4;
 
-/// Where the journal of a slot is.
+/// Position and layout of the journal of a slot.
 pub(super) struct Journal<M> {
     start: u32,
-    /// Bytes of a stretch.
-    stretch: u32,
+    /// Length of a section in bytes.
+    section: u32,
     marks: u32,
     memory: PhantomData<M>,
 }
 
 impl<M: NorFlash> Journal<M> {
-    /// Bytes between two marks: whole words.
+    /// Distance of two marks in bytes: whole flash words.
     const MARK_STEP: usize = if M::WRITE_SIZE < MARK_LENGTH {
         MARK_LENGTH
     } else {
         M::WRITE_SIZE
     };
 
-    /// The fewest bytes of a page: the record and one mark.
+    /// Smallest page in bytes: the record and one mark.
     pub(super) const LEAST_PAGE: usize = MARKS_OFFSET + Self::MARK_STEP;
 
-    /// The journal at `start` for a slot that holds `capacity` bytes.
+    /// The journal at offset `start` of the memory, for a slot of `capacity` bytes.
     pub(super) fn new(start: u32, capacity: u32) -> Self {
         let page = M::ERASE_SIZE as u32;
         let room = ((M::ERASE_SIZE - MARKS_OFFSET) / Self::MARK_STEP) as u32;
         let pages_per_mark = (capacity / page).div_ceil(room).max(1);
-        let stretch = pages_per_mark * page;
+        let section = pages_per_mark * page;
         Self {
             start,
-            stretch,
-            marks: capacity.div_ceil(stretch),
+            section,
+            marks: capacity.div_ceil(section),
             memory: PhantomData,
         }
     }
@@ -66,7 +66,7 @@ impl<M: NorFlash> Journal<M> {
         self.start
     }
 
-    /// The record of an upload: whole words.
+    /// The record of an upload, padded to whole flash words.
     pub(super) fn record(header: &Header) -> [u8; MARKS_OFFSET] {
         let mut record = [ERASED; MARKS_OFFSET];
         let header = header.to_bytes();
@@ -78,25 +78,25 @@ impl<M: NorFlash> Journal<M> {
         record
     }
 
-    /// The next offset of the slot behind `written` where a mark is due.
+    /// The next offset of the slot after `written` at which a mark is due: the end of a section.
     pub(super) fn next_mark(&self, written: u32) -> u32 {
-        (written / self.stretch + 1) * self.stretch
+        (written / self.section + 1) * self.section
     }
 
-    /// True where the mark of a stretch is due that ends here.
+    /// True if a section ends at this offset, so that its mark is due.
     pub(super) fn is_at_mark(&self, written: u32) -> bool {
-        written > 0 && written.is_multiple_of(self.stretch)
+        written > 0 && written.is_multiple_of(self.section)
     }
 
-    /// Offset in the memory and bytes of the mark that says that so many bytes are written.
+    /// Offset in the memory and bytes of the mark for `written` bytes.
     pub(super) fn mark(&self, header: &Header, written: u32) -> (u32, Vec<u8, MAX_WRITE_SIZE>) {
-        let number = written.div_ceil(self.stretch).saturating_sub(1);
+        let number = written.div_ceil(self.section).saturating_sub(1);
         let value = mark_value(header, number);
         let bytes = value.into_iter().cycle().take(Self::MARK_STEP).collect();
         (self.start + self.offset_of(number), bytes)
     }
 
-    /// Header of the file and bytes received, where the journal knows an upload.
+    /// Header of the file and number of received bytes; `None` if the journal has no valid record.
     pub(super) fn read(&self, memory: &[u8]) -> Option<(Header, u32)> {
         let page = memory.get(self.start as usize..)?.get(..M::ERASE_SIZE)?;
         let record = page.get(..RECORD_LENGTH)?;
@@ -112,7 +112,7 @@ impl<M: NorFlash> Journal<M> {
         let finished = (0..self.marks)
             .rev()
             .find(is_set)
-            .map_or(0, |number| (number + 1) * self.stretch);
+            .map_or(0, |number| (number + 1) * self.section);
         Some((
             header,
             finished.clamp(HEADER_LENGTH as u32, header.length.max(HEADER_LENGTH as u32)),

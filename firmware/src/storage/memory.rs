@@ -1,19 +1,19 @@
-//! The flash that tables are kept in.
+//! The flash memory of the tables.
 
 use embedded_storage::nor_flash::NorFlash;
 use quietcut_core::lobes::format::HEADER_LENGTH;
 
-/// The largest [`NorFlash::WRITE_SIZE`] that is possible.
+/// Largest supported [`NorFlash::WRITE_SIZE`]: one word must not exceed the header.
 pub(super) const MAX_WRITE_SIZE: usize = HEADER_LENGTH;
 
-/// What erased flash reads as.
+/// Value of an erased byte.
 pub(super) const ERASED: u8 = 0xFF;
 
-/// Flash that can be read where it lies in the address space.
+/// Memory-mapped flash.
 ///
-/// A word whose writing, or a page whose erasing, was cut short by a loss of power may read as anything, but reading it
-/// must not fault: a memory with error correction that raises an interrupt there must return from it.
+/// After a loss of power during a write or an erase, the affected word or page may read as anything. Reading it must not
+/// fault: if the error correction of the memory raises an interrupt, its handler must return.
 pub trait TableMemory: NorFlash {
-    /// All bytes of the memory.
+    /// All bytes of the memory, as mapped into the address space.
     fn mapped(&self) -> &[u8];
 }

@@ -1,4 +1,4 @@
-//! An upload under way: how much has come, and its CRC.
+//! The progress of an upload: received bytes and their CRC-32.
 
 use heapless::Vec;
 use quietcut_core::checksum::Crc32;
@@ -8,26 +8,27 @@ use quietcut_core::protocol::Upload;
 
 use super::memory::MAX_WRITE_SIZE;
 
-/// An upload under way.
+/// The progress of an upload.
 pub(super) struct Progress {
     pub(super) slot: usize,
-    /// Header of the file.
+    /// Header of the uploaded file.
     pub(super) header: Header,
-    /// Bytes of the table that have come, its header included.
+    /// Received bytes of the table, with its header.
     pub(super) received: u32,
-    /// The slot is erased up to here, but for what is written already.
+    /// The slot is erased or written up to this offset.
     pub(super) erased_to: u32,
-    /// Received bytes that do not fill a word of the flash yet.
+    /// Received bytes that do not yet fill a flash word.
     pub(super) tail: Vec<u8, MAX_WRITE_SIZE>,
-    /// The header under which the table will stand in the slot, but for its CRC.
+    /// The header to be written into the slot, with the device's generation number; its CRC is set at the end.
     renewed: Header,
-    /// CRC-32 of what has come under both headers: to compute them at the end would hold the device up.
+    /// Running CRC-32 with the file's header. Computing it at the end of an upload would delay the device.
     crc: Crc32,
+    /// Running CRC-32 with the header for the slot.
     renewed_crc: Crc32,
 }
 
 impl Progress {
-    /// Goes on behind the bytes of the table that are in the slot: `payload`, behind the header, which ends with a page.
+    /// Resumes after `payload`: the bytes after the header that are already in the slot, up to the end of a page.
     pub(super) fn resumed(slot: usize, header: Header, generation: u32, payload: &[u8]) -> Self {
         let received = (HEADER_LENGTH + payload.len()) as u32;
         let renewed = Header { generation, ..header };
@@ -35,7 +36,7 @@ impl Progress {
             slot,
             header,
             received,
-            // The page that follows may be half written, the first one if no page was finished.
+            // The page after the last complete one may be partly written, so it is erased again.
             erased_to: if payload.is_empty() { 0 } else { received },
             tail: Vec::new(),
             renewed,
@@ -51,7 +52,7 @@ impl Progress {
         self.renewed_crc.update(payload);
     }
 
-    /// The header for the slot, where all that has come is what the file's header says.
+    /// The header for the slot, if the received bytes match the CRC of the file's header.
     pub(super) fn checked(&self) -> Result<Header, TableError> {
         let (header, computed) = (self.header.crc, self.crc.value());
         if header == computed {

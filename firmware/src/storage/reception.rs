@@ -1,4 +1,4 @@
-//! The reception of a table: pages erased, words written, marks in the journal.
+//! Reception of a table: erases pages, writes words and marks the progress in the journal.
 
 use quietcut_core::lobes::Header;
 use quietcut_core::lobes::format::HEADER_LENGTH;
@@ -13,7 +13,7 @@ use super::progress::Progress;
 use super::slots::Storage;
 
 impl<M: TableMemory> Storage<M> {
-    /// The upload that the journals know of.
+    /// The unfinished upload, according to the journals.
     pub(super) fn unfinished(&self) -> Option<Progress> {
         let empty = |&slot: &usize| matches!(self.contents_of(slot), Contents::Empty);
         (0..SLOTS).filter(empty).find_map(|slot| {
@@ -24,15 +24,15 @@ impl<M: TableMemory> Storage<M> {
         })
     }
 
-    /// Forgets the upload into a slot: without its journal, what has come is no part of a table.
+    /// Discards the upload into a slot by erasing its journal.
     ///
-    /// Where the flash does not let itself be erased, what is left is no valid table either.
+    /// A failure to erase is ignored: the slot has no header, so it holds no valid table.
     pub(super) fn forget(&mut self, slot: usize) {
         let journal = self.journal(slot).start();
         let _ = self.erase(journal, Self::PAGE);
     }
 
-    /// Writes data behind what has come: whole words at once, the rest waits in the tail.
+    /// Appends received data: writes whole words at once and keeps the rest in the tail.
     pub(super) fn receive(&mut self, mut upload: Progress, mut data: &[u8]) -> Result<Progress, Refusal> {
         let journal = self.journal(upload.slot);
         while !data.is_empty() {
@@ -69,14 +69,14 @@ impl<M: TableMemory> Storage<M> {
         Ok(upload)
     }
 
-    /// Writes whole words at an offset of the slot, erasing the pages they begin.
+    /// Writes whole words at an offset of the slot. Erases each page before its first word.
     fn program(&mut self, upload: &mut Progress, offset: u32, words: &[u8]) -> Result<(), Refusal> {
         let start = self.start_of(upload.slot);
         let end = offset + words.len() as u32;
         while upload.erased_to < end {
             let erased = self.erase(start + upload.erased_to, Self::PAGE);
             if upload.erased_to == 0 {
-                // The header of the table that was here is gone.
+                // The first page held the header of the old table, which is now erased.
                 self.examine(upload.slot);
             }
             erased?;
@@ -85,9 +85,9 @@ impl<M: TableMemory> Storage<M> {
         self.write(start + offset, words)
     }
 
-    /// Notes in the journal how much is written.
+    /// Marks the number of written bytes in the journal.
     ///
-    /// A power cut may have left this very mark half written: then it stays as it is, and the next one says it too.
+    /// A loss of power may have left this mark partly written. It is then skipped, since the next mark implies it.
     fn mark(&mut self, journal: &Journal<M>, upload: &Progress) -> Result<(), Refusal> {
         let (offset, mark) = journal.mark(&upload.header, upload.written());
         let range = offset as usize..offset as usize + mark.len();

@@ -1,4 +1,4 @@
-//! The requests of the host: which tables there are, and the upload of one from its beginning to its end.
+//! The requests of the host: list the slots, and upload a table.
 
 use quietcut_core::lobes::format::{HEADER_LENGTH, SCHEMA};
 use quietcut_core::lobes::{Header, LobeTable, TableError};
@@ -13,9 +13,9 @@ use super::progress::Progress;
 use super::slots::Storage;
 
 impl<M: TableMemory> Storage<M> {
-    /// Takes the memory and looks what is in it: the newest valid table is in use, an unfinished upload goes on.
+    /// Examines the memory. The newest valid table is in use, and an unfinished upload is resumed.
     ///
-    /// A memory of less than four pages holds no tables.
+    /// A memory of fewer than four pages cannot hold tables.
     pub fn new(memory: M) -> Self {
         const {
             assert!(
@@ -50,7 +50,7 @@ impl<M: TableMemory> Storage<M> {
         LobeTable::reopen(self.table_bytes(self.in_use?)?).ok()
     }
 
-    /// What is in the slots.
+    /// The content of each slot.
     pub fn slots(&self) -> [Slot; SLOTS] {
         core::array::from_fn(|slot| match (&self.upload, self.contents_of(slot)) {
             (Some(upload), _) if upload.slot == slot => Slot::Unfinished(upload.state()),
@@ -61,7 +61,7 @@ impl<M: TableMemory> Storage<M> {
         })
     }
 
-    /// How far the upload is.
+    /// The progress of the upload.
     ///
     /// # Errors
     /// [`Refusal::NoUpload`].
@@ -69,8 +69,8 @@ impl<M: TableMemory> Storage<M> {
         self.upload.as_ref().map(Progress::state).ok_or(Refusal::NoUpload)
     }
 
-    /// Begins to receive the table with this header, into the slot that is not in use; goes on where a part of the same
-    /// table is there already.
+    /// Begins the upload of the table with this header into the slot that is not in use. Resumes it if a part of the same table is
+    /// already there.
     ///
     /// # Errors
     /// [`Refusal::Table`], [`Refusal::TableTooLong`], [`Refusal::Flash`].
@@ -101,7 +101,7 @@ impl<M: TableMemory> Storage<M> {
         let slot = self.free_slot();
         self.upload = None;
         let journal = self.journal(slot);
-        // The journal first: without it nothing in the slot counts as a part of a table. The pages are erased as they are reached.
+        // The journal is written first: it identifies the table of which the slot holds a part. Pages are erased when they are reached.
         self.erase(journal.start(), Self::PAGE)?;
         let record = Journal::<M>::record(&header);
         self.write(journal.start(), &record)?;
@@ -111,11 +111,11 @@ impl<M: TableMemory> Storage<M> {
         Ok(state)
     }
 
-    /// Receives a piece of the table.
+    /// Receives a chunk of the table.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`], [`Refusal::ChunkOffset`]; after [`Refusal::Flash`] the upload must begin again, and goes on at
-    /// the last page that is whole.
+    /// [`Refusal::NoUpload`], [`Refusal::ChunkOffset`]; after [`Refusal::Flash`] the upload must begin again. It then resumes
+    /// at the last complete page.
     pub fn chunk(&mut self, offset: u32, data: &[u8]) -> Result<Upload, Refusal> {
         let upload = self.upload.take().ok_or(Refusal::NoUpload)?;
         let (expected, length) = (upload.received, upload.header.length);
@@ -134,11 +134,11 @@ impl<M: TableMemory> Storage<M> {
         Ok(state)
     }
 
-    /// Checks the table that was received and takes it into use.
+    /// Checks the received table and uses it from now on.
     ///
     /// # Errors
-    /// [`Refusal::NoUpload`], [`Refusal::Incomplete`]; after [`Refusal::Table`] or [`Refusal::Flash`] the upload is gone and the table
-    /// that was in use still is.
+    /// [`Refusal::NoUpload`], [`Refusal::Incomplete`]; after [`Refusal::Table`] or [`Refusal::Flash`] the upload is
+    /// discarded and the previous table stays in use.
     pub fn commit(&mut self) -> Result<(), Refusal> {
         let upload = self.upload.take().ok_or(Refusal::NoUpload)?;
         let Upload { header, received } = upload.state();
@@ -154,7 +154,7 @@ impl<M: TableMemory> Storage<M> {
             Ok(renewed) => self
                 .write(self.start_of(slot), &renewed.to_bytes())
                 .and_then(|()| {
-                    // The CRC is that of what was written and read back.
+                    // The CRC was computed from the bytes that were written and read back, so only the entries need a check.
                     self.note(slot, Self::entries_checked);
                     match self.contents_of(slot) {
                         Contents::Valid(_) => Ok(()),
@@ -171,7 +171,7 @@ impl<M: TableMemory> Storage<M> {
         committed
     }
 
-    /// Gives the upload up.
+    /// Aborts the upload.
     ///
     /// # Errors
     /// [`Refusal::NoUpload`].
@@ -181,7 +181,7 @@ impl<M: TableMemory> Storage<M> {
         Ok(())
     }
 
-    /// The memory, when the storage is no longer needed.
+    /// Returns the memory and drops the storage.
     pub fn into_memory(self) -> M {
         self.memory
     }

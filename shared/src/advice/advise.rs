@@ -1,4 +1,4 @@
-//! From the verdict to the next speed or depth: the table first, the tooth-passing rule where it does not help.
+//! The decision: advice from the lobe table first, from the tooth-passing rule otherwise.
 
 use super::proposal::{Action, Advice, Obstacle, Source};
 use super::quiet_speed_search::QuietSpeedSearch;
@@ -8,13 +8,13 @@ use crate::lobes::{IntervalKind, LobeTable, NotKnown, TabulatedStability};
 use crate::units::Rpm;
 use crate::working_point::{Limits, Tool, WorkingPoint};
 
-/// What to do next.
+/// Returns the advice for the present verdict and spindle speed.
 ///
-/// `speed` is the present spindle speed; `limits` are joined with those of the table, if it has any. Where no chatter is
-/// heard the answer is [`Action::Keep`]. The advised point is never one that the table calls unstable.
+/// `limits` are intersected with the limits of the table, if it has any. Without chatter the result is [`Action::Keep`].
+/// A point that is unstable in the table is never advised.
 ///
-/// Cost: one pass over the entries of the table for this cut, and the interpolation of some columns where stability
-/// changes; nearest speeds come first, so that most calls are far cheaper. Call it when something has changed, not for
+/// Cost: at most one pass over the entries of the table for this cut, plus the interpolation of the columns at which stability
+/// changes. The search begins at the present speed, so most calls are far cheaper. Call it when an input changes, not for
 /// every block.
 pub fn advise(
     judgement: &Judgement,
@@ -24,11 +24,11 @@ pub fn advise(
     limits: Option<&Limits>,
     tool: &Tool,
 ) -> Advice {
-    let told = working_point.map(|point| point.axial_depth);
+    let set_depth = working_point.map(|point| point.axial_depth);
     let keep = Advice {
         action: Action::Keep,
         speed,
-        depth: told,
+        depth: set_depth,
         source: if table.is_some() {
             Source::Table
         } else {
@@ -83,13 +83,13 @@ pub fn advise(
     }
 }
 
-/// A cut that a table knows something of.
+/// A table, and a working point for which it has a layer.
 struct Cut<'t> {
     table: &'t LobeTable<'t>,
     at: WorkingPoint,
 }
 
-/// The cut as told or assumed, if the table knows it at any speed.
+/// The working point as set or assumed, if the table has a layer for it at any speed.
 fn cut_in_table<'t>(
     judgement: &Judgement,
     speed: Rpm,
@@ -109,7 +109,7 @@ fn cut_in_table<'t>(
         Some(point) => *point,
         None => assumed_point(judgement, speed, table)?,
     };
-    // Another speed may be known where the present one lies outside; all else is the same at every speed.
+    // The present speed may lie outside the table while other speeds lie inside. All other conditions hold for every speed.
     let first = table.speed(0).ok_or(Obstacle::Table(NotKnown::Damaged))?;
     match table.lookup(first, &at) {
         TabulatedStability::NotKnown(why) if why != NotKnown::Undecided => Err(Obstacle::Table(why)),
@@ -117,7 +117,8 @@ fn cut_in_table<'t>(
     }
 }
 
-/// The first layer of the table at the least depth where it has the chatter that is heard, or any chatter.
+/// The working point to assume if none is set: the first layer, at the smallest depth with chatter of the detected kind, else
+/// with chatter of any kind.
 fn assumed_point(judgement: &Judgement, speed: Rpm, table: &LobeTable<'_>) -> Result<WorkingPoint, Obstacle> {
     let layer = table.layers().next().ok_or(Obstacle::Table(NotKnown::Damaged))?;
     let mut at = WorkingPoint {
@@ -128,7 +129,7 @@ fn assumed_point(judgement: &Judgement, speed: Rpm, table: &LobeTable<'_>) -> Re
         posture: layer.posture,
     };
     let column = table.column(speed, &at).map_err(Obstacle::Table)?;
-    let heard = match judgement.verdict {
+    let detected = match judgement.verdict {
         Verdict::PeriodDoubling => IntervalKind::Flip,
         _ => IntervalKind::Hopf,
     };
@@ -136,12 +137,12 @@ fn assumed_point(judgement: &Judgement, speed: Rpm, table: &LobeTable<'_>) -> Re
         .intervals()
         .iter()
         .filter(|i| i.kind != IntervalKind::Undecided);
-    let same_kind = unstable.clone().find(|i| i.kind == heard);
+    let same_kind = unstable.clone().find(|i| i.kind == detected);
     at.axial_depth = same_kind.or(unstable.next()).ok_or(Obstacle::Contradicted)?.from;
     Ok(at)
 }
 
-/// The speeds that both the machine and the table's machine allow.
+/// The speed range in rev/min that both the machine's limits and the limits in the table allow.
 fn speed_range(limits: Option<&Limits>, table: Option<&LobeTable<'_>>) -> (f32, f32) {
     let of_table = table.and_then(LobeTable::limits);
     limits
@@ -152,6 +153,7 @@ fn speed_range(limits: Option<&Limits>, table: Option<&LobeTable<'_>>) -> (f32, 
         })
 }
 
+/// Advice from the table: a quiet speed at the present depth, else a smaller depth.
 fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Result<Advice, Obstacle> {
     let quiet = QuietSpeedSearch::new(cut.table, &cut.at, range).map_err(Obstacle::Table)?;
     if let Some(quiet_speed) = quiet.nearest_speed(speed) {
@@ -173,6 +175,7 @@ fn by_table(cut: &Cut<'_>, speed: Rpm, range: (f32, f32), keep: Advice) -> Resul
     })
 }
 
+/// Advice from the tooth-passing rule, without the speeds that the table calls unstable.
 fn by_rule(
     judgement: &Judgement,
     tool: &Tool,

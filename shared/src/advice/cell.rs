@@ -1,33 +1,34 @@
-//! What is certain of a cell of the table, the speeds between two of its grid, without interpolation.
+//! Stability of a whole cell of the table, the speeds between two neighbouring grid speeds, without interpolation.
 
 use heapless::Vec;
 
 use super::margins::DEPTH_MARGIN;
 use crate::lobes::{CutLobes, FEW, Interval};
 
-/// What a cell is for the depth of a cut with its margin.
+/// Stability of a cell at one depth, with the depth margin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cell {
-    /// All of it is stable.
+    /// Stable at every speed of the cell.
     Stable,
-    /// None of it is.
+    /// Unstable at every speed of the cell.
     Unstable,
-    /// It changes within, or cannot be told from the entries alone.
+    /// Stability changes within the cell, or the entries alone do not decide it.
     Mixed,
 }
 
-/// What the entries at one speed of the grid say of a depth with its margin, in all layers that matter.
+/// Stability at one grid speed and one depth, with the depth margin, over the layers that the cut interpolates between.
 #[derive(Clone, Copy)]
 pub(super) struct Node {
     /// All depths within the margin are stable in all layers.
     is_stable: bool,
-    /// The depth less its margin, the depth, the depth and its margin: stable in no layer.
+    /// For the depths `(1 − DEPTH_MARGIN)·d`, `d` and `(1 + DEPTH_MARGIN)·d`: true if the depth is unstable in every layer.
     is_unstable: [bool; 3],
 }
 
 impl Node {
-    /// The node at a speed of the grid, of a table that ends at `depth_to_mm`; `None` where its entries alone are not
-    /// enough to tell what lies between it and the next.
+    /// The node at a grid speed of a table whose largest depth is `depth_to_mm`.
+    ///
+    /// `None` if the entries alone do not decide the stability between this grid speed and the next.
     pub(super) fn at(
         cut: &CutLobes<'_>,
         speed_index: usize,
@@ -73,11 +74,10 @@ impl Cell {
     }
 }
 
-/// No quiet depth of up to `depth_mm` is larger than this at a speed of the grid, or between two that are next to each
-/// other.
+/// Upper bound in mm of the quiet depths up to `depth_mm`, at one grid speed or between two neighbouring grid speeds.
 ///
-/// A depth that is stable between entries is stable in one of them. So all depths within the margin of a quiet one
-/// lie in the stable ranges of the entries taken together.
+/// A depth that is stable between two entries is stable in at least one of them. Therefore the margin range
+/// `(1 ± DEPTH_MARGIN)·d` of a quiet depth `d` lies within the union of the entries' stable ranges.
 pub(super) fn largest_possible_mm(
     cut: &CutLobes<'_>,
     speed_indices: impl IntoIterator<Item = usize>,
@@ -107,7 +107,7 @@ pub(super) fn largest_possible_mm(
     largest_mm
 }
 
-/// Stable ranges of up to four columns, ascending in their beginnings.
+/// Stable depth ranges (from, to) in mm of up to four columns, sorted by their lower ends.
 type Ranges = Vec<(f32, f32), { 4 * (FEW + 1) }>;
 
 fn add_stable_ranges(

@@ -1,4 +1,4 @@
-//! The largest quiet depth, where no speed is quiet at the present one.
+//! The largest quiet depth, used if no speed is quiet at the present depth.
 
 use heapless::{Deque, Vec};
 
@@ -8,16 +8,17 @@ use super::quiet_speed_search::{Direction, QuietSpeedSearch};
 use super::rule::ratio;
 use crate::units::{Millimeters, Rpm};
 
-/// Of smaller depths at other speeds that differ by less than this factor the one at the nearer speed is taken.
+/// Two depths within this factor count as equal; the one at the nearer speed is then preferred. Unfounded.
 const WORTH: f32 = 1.02;
 
-/// The most speeds that are looked at exactly for a smaller depth, each the most promising of its neighbourhood.
+/// Number of speeds whose quiet depth is computed exactly. Each has the largest bound within its speed band. It limits the
+/// computing time.
 const PROMISES: usize = 8;
 
-/// Ranges of quiet depths at one speed; what does not fit is left out, which is on the safe side.
+/// Quiet depth ranges (from, to) in mm at one speed. Ranges beyond the capacity are dropped, which is conservative.
 type Ranges = Vec<(f32, f32), 24>;
 
-/// A speed, and a bound for the depths that may be quiet there.
+/// A speed, and an upper bound of the quiet depth there.
 #[derive(Clone, Copy)]
 struct Promise {
     rpm: f32,
@@ -25,11 +26,11 @@ struct Promise {
 }
 
 impl QuietSpeedSearch<'_> {
-    /// The largest quiet depth up to that of the cut that was found, and the speed for it: the present one unless another
-    /// is better.
+    /// The largest quiet depth up to the depth of the cut, and its speed: the present speed, unless another speed is better by
+    /// the factor `BETTER`.
     ///
-    /// What is stored at the speeds of the grid bounds the quiet depth of every speed from above; the most promising
-    /// speeds are looked at exactly, until none promises more than what was found.
+    /// The entries at the grid speeds give an upper bound of the quiet depth at every speed. The speeds with the
+    /// largest bounds are computed exactly, until no bound exceeds the best depth found.
     pub(super) fn largest_depth(&self, speed: Rpm) -> Option<(Rpm, Millimeters)> {
         let present_mm = self.largest_depth_mm(speed.0, 0.0);
         let mut best = present_mm.map(|depth_mm| (speed.0, depth_mm));
@@ -46,7 +47,7 @@ impl QuietSpeedSearch<'_> {
         best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
     }
 
-    /// The speeds that promise the largest quiet depths above `to_beat_mm`, the most promising first.
+    /// The speeds with the largest upper bounds above `to_beat_mm`, largest first.
     fn promises(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Promise, PROMISES> {
         let mut promises: Vec<Promise, PROMISES> = Vec::new();
         let (low_rpm, high_rpm) = self.known_rpm;
@@ -54,7 +55,7 @@ impl QuietSpeedSearch<'_> {
             return promises;
         }
         let mut behind = Window::default();
-        // Two walks over the same speeds: `ahead` is a band further than the speed whose band is looked at.
+        // Two indices walk over the same speeds. `ahead_rpm` leads `rpm` by the upper half of the speed band.
         let mut rpm = low_rpm;
         let mut ahead_rpm = low_rpm;
         loop {
@@ -78,13 +79,13 @@ impl QuietSpeedSearch<'_> {
         }
     }
 
-    /// The next speed at which a depth is looked for: the next of the grid, or half the speed band on.
+    /// The next candidate speed: the next grid speed, or half a speed band further, whichever is nearer.
     fn next_point(&self, rpm: f32, end_rpm: f32) -> f32 {
         let (_, cell_end_rpm) = self.cell_at(Direction::Faster, rpm, end_rpm);
         f32::min(rpm * (1.0 + 0.5 * SPEED_BAND), cell_end_rpm)
     }
 
-    /// No depth that is quiet at this speed is larger, by what is stored at it, or around it.
+    /// Upper bound of the quiet depth at this speed, from the entries at this grid speed or at its two neighbours.
     fn possible_mm(&self, rpm: f32) -> f32 {
         let index = self.table.speeds_up_to(Rpm(rpm)).saturating_sub(1);
         let is_on_grid = self.table.speed(index) == Some(Rpm(rpm));
@@ -92,7 +93,7 @@ impl QuietSpeedSearch<'_> {
         largest_possible_mm(&self.cut, indices, self.depth_mm, self.depth_to_mm)
     }
 
-    /// The largest quiet depth at a speed, if it is more than `at_least_mm`.
+    /// The largest quiet depth in mm at a speed, if it exceeds `at_least_mm`. All speeds of the speed band are checked.
     fn largest_depth_mm(&self, rpm: f32, at_least_mm: f32) -> Option<f32> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let from_rpm = f32::max(rpm * (1.0 - SPEED_BAND), self.machine_rpm.0);
@@ -116,7 +117,7 @@ impl QuietSpeedSearch<'_> {
         }
     }
 
-    /// The depths up to that of the cut that are stable with margin at exactly this speed.
+    /// The depth ranges, up to the depth of the cut, that are stable with the depth margin at exactly this speed.
     fn quiet_depths(&self, rpm: f32) -> Option<Ranges> {
         let column = self.cut.column(Rpm(rpm)).ok()?;
         let mut ranges = Ranges::new();
@@ -131,7 +132,7 @@ impl QuietSpeedSearch<'_> {
     }
 }
 
-/// Keeps the best promises in order, and of those within a speed band of each other the best.
+/// Inserts a promise in order of preference. Of promises within one speed band of each other only the best is kept.
 fn insert(promises: &mut Vec<Promise, PROMISES>, new: Promise, speed: Rpm) {
     let is_better = |a: &Promise, b: &Promise| {
         let is_nearer = ratio(Rpm(a.rpm), speed) < ratio(Rpm(b.rpm), speed);
@@ -153,15 +154,15 @@ fn insert(promises: &mut Vec<Promise, PROMISES>, new: Promise, speed: Rpm) {
     if promises.is_full() && place < promises.len() {
         promises.pop();
     }
-    // Where it is the least of too many it is left out.
+    // A full list drops the least preferred promise.
     let _ = promises.insert(place, new);
 }
 
-/// The least of the bounds within a moving band of speeds.
+/// Minimum of the bounds within a moving band of speeds.
 #[derive(Default)]
 struct Window {
-    /// Ascending in speed and in bound: a bound that a later one undercuts is forgotten. Where there are too many the newest is
-    /// left out, which makes the bound larger and harms nothing.
+    /// Pairs (rev/min, mm), ascending in both. A bound is removed once a later bound is smaller. If the list is full, the newest bound
+    /// is dropped: the minimum then is too large, which is still an upper bound.
     bounds: Deque<(f32, f32), 32>,
 }
 
@@ -190,7 +191,7 @@ impl Window {
     }
 }
 
-/// What two ascending lists of ranges have in common.
+/// Intersection of two ascending lists of ranges.
 fn intersection(a: &Ranges, b: &Ranges) -> Ranges {
     let mut common = Ranges::new();
     for &(a_from, a_to) in a {

@@ -1,4 +1,4 @@
-//! What advice says: what to change, where that comes from, and why not from something better.
+//! The result of advice: the proposed change, its source, and the obstacle to a better source.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,11 +6,11 @@ use crate::lobes::NotKnown;
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// What to do.
+/// The change that advice proposes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Action {
-    /// Nothing: no chatter is heard.
+    /// No change: no chatter is detected.
     Keep,
     /// Change the spindle speed.
     Speed,
@@ -20,7 +20,7 @@ pub enum Action {
     NotKnown,
 }
 
-/// Where advice comes from.
+/// The source of advice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Source {
@@ -30,41 +30,41 @@ pub enum Source {
     ToothPassingRule,
 }
 
-/// What kept a better source from being used.
+/// The reason why no better source of advice was used.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Obstacle {
-    /// There is no lobe table.
+    /// No lobe table is loaded.
     NoTable,
-    /// The table does not know the present point.
+    /// The table has no entry for the present cut.
     Table(NotKnown),
-    /// The table calls the present point stable with margin, and yet it chatters: it is not true here.
+    /// The table says that the present point is stable with margin, but the cut chatters: the table is wrong here.
     Contradicted,
     /// The spindle speed is not a positive number.
     Speed,
-    /// The table knows no depth that is stable with margin at any speed within the limits.
+    /// The table has no depth that is stable with margin at any speed within the limits.
     NothingStable,
-    /// The chatter frequency is not known, so that the rule has nothing to go by.
+    /// The chatter frequency is unknown; the tooth-passing rule requires it.
     ChatterFrequency,
-    /// The rule has no speed within the limits of the machine that the table does not call unstable.
+    /// Every speed of the tooth-passing rule is outside the limits of the machine or unstable in the table.
     NoSpeedWithinLimits,
 }
 
-/// The next speed and depth.
+/// The advised spindle speed and axial depth, with their source.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Advice {
-    /// What to change.
+    /// The proposed change.
     pub action: Action,
-    /// The spindle speed to cut with.
+    /// Advised spindle speed.
     pub speed: Rpm,
-    /// The axial depth to cut with; `None` where it is not known: the host never told the working point, or the rule, which
-    /// knows no depths, says to reduce it.
+    /// Advised axial depth. `None` if no working point is set, or if the tooth-passing rule, which has no depths, says to
+    /// reduce the depth.
     pub depth: Option<Millimeters>,
-    /// What it rests on.
+    /// Source of the advice.
     pub source: Source,
-    /// The working point that was assumed, where the host told none.
+    /// The assumed working point, if none is set.
     pub assumed: Option<WorkingPoint>,
-    /// Why it rests on nothing better.
+    /// The reason why no better source was used; `None` if there is no better source.
     pub obstacle: Option<Obstacle>,
 }

@@ -1,4 +1,4 @@
-//! Where the table is quiet: stable with margin in depth over a band of speed.
+//! The search for quiet speeds: stable with the depth margin over the whole speed band.
 
 use super::cell::{Cell, Node};
 use super::margins::{DEPTH_MARGIN, SPEED_BAND};
@@ -7,10 +7,10 @@ use crate::lobes::{CutLobes, LobeTable, NotKnown};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Where columns must be interpolated they are looked at in steps of this, relative: four to each half of the speed band.
+/// Relative speed step at which interpolated columns are checked: four steps per half of the speed band.
 const STEP: f32 = SPEED_BAND / 4.0;
 
-/// Up or down in speed.
+/// Direction of the search in spindle speed.
 #[derive(Clone, Copy)]
 pub(super) enum Direction {
     Faster,
@@ -25,33 +25,34 @@ impl Direction {
         }
     }
 
-    /// True where `a` is `b` or lies behind it on the way.
+    /// True if `a` equals `b` or lies beyond it in this direction.
     fn is_beyond(self, a: f32, b: f32) -> bool {
         self.sign() * a >= self.sign() * b
     }
 
+    /// Whichever of `a` and `b` lies further in this direction.
     fn further(self, a: f32, b: f32) -> f32 {
         if self.is_beyond(a, b) { a } else { b }
     }
 }
 
-/// A search for quiet points of one cut.
+/// The search for quiet speeds and depths of one cut.
 pub(super) struct QuietSpeedSearch<'t> {
     pub(super) table: &'t LobeTable<'t>,
     pub(super) cut: CutLobes<'t>,
     pub(super) depth_mm: f32,
     pub(super) depth_to_mm: f32,
-    /// What the spindle can do: the band around a speed is cut off here, since the spindle cannot go there.
+    /// Speed range of the spindle. The speed band around a speed is clipped to this range.
     pub(super) machine_rpm: (f32, f32),
-    /// What the spindle can do and the table knows.
+    /// Intersection of the spindle's speed range with the speeds of the table.
     pub(super) known_rpm: (f32, f32),
 }
 
 impl<'t> QuietSpeedSearch<'t> {
-    /// A search within the range of speeds of the machine.
+    /// Prepares a search within the speed range `machine_rpm` of the machine.
     ///
     /// # Errors
-    /// The table knows nothing of this cut.
+    /// The table has no layer for this cut, or is damaged.
     pub(super) fn new(
         table: &'t LobeTable<'t>,
         at: &WorkingPoint,
@@ -77,16 +78,16 @@ impl<'t> QuietSpeedSearch<'t> {
         })
     }
 
-    /// The quiet speed that is nearest to `speed` in relative change; it may be `speed` itself.
+    /// The quiet speed with the smallest relative change from `speed`; it may be `speed` itself.
     pub(super) fn nearest_speed(&self, speed: Rpm) -> Option<Rpm> {
         let faster = self.walk(Direction::Faster, speed, f32::INFINITY);
         let limit = faster.map_or(f32::INFINITY, |faster| ratio(faster, speed));
         self.walk(Direction::Slower, speed, limit).or(faster)
     }
 
-    /// The first quiet speed from `speed` on, if its relative change is below `limit`.
+    /// The first quiet speed from `speed` on, if its speed ratio is below `limit`.
     ///
-    /// Walks from cell to cell. Only cells that are neither all stable nor all unstable are looked into, in steps.
+    /// The search steps from cell to cell. Only a cell of mixed stability is interpolated.
     fn walk(&self, direction: Direction, speed: Rpm, limit: f32) -> Option<Rpm> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let end_rpm = match direction {
@@ -108,7 +109,7 @@ impl<'t> QuietSpeedSearch<'t> {
         loop {
             let (index, cell_end_rpm) = self.cell_at(direction, rpm, end_rpm);
             let node = |index| match known {
-                // The end of one cell is the beginning of the next.
+                // A cell shares a node with the cell before it.
                 Some((known_index, node)) if known_index == index => node,
                 _ => Node::at(&self.cut, index, self.depth_mm, self.depth_to_mm),
             };
@@ -134,20 +135,20 @@ impl<'t> QuietSpeedSearch<'t> {
         }
     }
 
-    /// Index of the speed of the grid below the cell that lies ahead of a speed, and where that cell ends, or the way.
+    /// The next cell in a direction: index of the grid speed at its lower end, and the speed at which the cell or the search ends.
     pub(super) fn cell_at(&self, direction: Direction, rpm: f32, end_rpm: f32) -> (usize, f32) {
         let up_to = self.table.speeds_up_to(Rpm(rpm));
         let speed = |index: usize| self.table.speed(index).map_or(end_rpm, |speed| speed.0);
         let below = up_to.saturating_sub(1);
         let (index, ahead_rpm) = match direction {
             Direction::Faster => (below, speed(up_to)),
-            // Standing on a speed of the grid, the cell below it is ahead.
+            // Exactly at a grid speed, the next cell downwards is the one below it.
             Direction::Slower if speed(below) == rpm => {
                 (below.saturating_sub(1), speed(below.saturating_sub(1)))
             }
             Direction::Slower => (below, speed(below)),
         };
-        // A speed that is no number, of a damaged table, must not hold the walk up.
+        // In a damaged table a speed may be NaN. The search must end nevertheless.
         let is_ahead = ahead_rpm != rpm && direction.is_beyond(ahead_rpm, rpm);
         let is_before_end = direction.is_beyond(end_rpm, ahead_rpm);
         (
@@ -160,7 +161,7 @@ impl<'t> QuietSpeedSearch<'t> {
         )
     }
 
-    /// The next speed to look at within a cell: its middle or its end, or a step on if that is nearer.
+    /// The next speed to check within a cell: its middle, its end, or one `STEP` further, whichever comes first.
     pub(super) fn next_rpm(&self, direction: Direction, rpm: f32, index: usize, cell_end_rpm: f32) -> f32 {
         let step = rpm * (1.0 + direction.sign() * STEP);
         let ends = self.table.speed(index).zip(self.table.speed(index + 1));
@@ -175,7 +176,7 @@ impl<'t> QuietSpeedSearch<'t> {
             .fold(cell_end_rpm, nearer)
     }
 
-    /// True where the depth of the cut is stable with margin at exactly this speed.
+    /// True if the depth of the cut is stable with the depth margin at exactly this speed.
     fn is_stable(&self, rpm: f32) -> bool {
         let [from, to] =
             [1.0 - DEPTH_MARGIN, 1.0 + DEPTH_MARGIN].map(|factor| Millimeters(factor * self.depth_mm));
@@ -184,23 +185,24 @@ impl<'t> QuietSpeedSearch<'t> {
     }
 }
 
-/// A run of stable speeds on a walk: as soon as it is as wide as the band around a speed, that speed is quiet.
+/// A run of consecutive stable speeds. A speed is quiet once the run covers its whole speed band.
 struct Run<'q, 't> {
     quiet: &'q QuietSpeedSearch<'t>,
     direction: Direction,
-    /// Where the walk is for: no speed before it is looked for.
+    /// The present speed; no speed before it is a candidate.
     speed: Rpm,
-    /// Where the run began, if there is one.
+    /// First speed of the run; `None` outside a run.
     start_rpm: Option<f32>,
 }
 
 impl Run<'_, '_> {
+    /// Ends the run at an unstable speed.
     fn end(&mut self) -> Option<Rpm> {
         self.start_rpm = None;
         None
     }
 
-    /// All is stable from one speed to another: the quiet speed, if that makes one.
+    /// Extends the run over the stable speeds `from_rpm` to `to_rpm`. Returns the quiet speed, once the run covers its band.
     fn go_on(&mut self, from_rpm: f32, to_rpm: f32) -> Option<Rpm> {
         let start_rpm = *self.start_rpm.get_or_insert(from_rpm);
         let centre_rpm = self.centre_rpm(start_rpm);
@@ -217,7 +219,7 @@ impl Run<'_, '_> {
         (is_wide && is_known && self.quiet.is_stable(centre_rpm)).then_some(Rpm(centre_rpm))
     }
 
-    /// Steps through a cell in which stability changes.
+    /// Steps through a cell of mixed stability.
     fn look_into(&mut self, from_rpm: f32, index: usize, cell_end_rpm: f32) -> Option<Rpm> {
         let mut rpm = from_rpm;
         let mut unstable_rpm: Option<f32> = None;
@@ -240,7 +242,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Where stability begins between a speed that is not stable and one that is: within 1/32 of the way.
+    /// Bisects for the stability boundary between an unstable and a stable speed, to 1/32 of their distance. Returns the stable side.
     fn onset_rpm(&self, mut unstable_rpm: f32, mut stable_rpm: f32) -> f32 {
         for _ in 0..5 {
             let middle_rpm = 0.5 * (unstable_rpm + stable_rpm);
@@ -253,7 +255,7 @@ impl Run<'_, '_> {
         stable_rpm
     }
 
-    /// The speed whose band begins where the run does, but none before the one the walk is for.
+    /// The speed whose speed band begins at the start of the run, but not before the present speed.
     fn centre_rpm(&self, start_rpm: f32) -> f32 {
         let machine_rpm = match self.direction {
             Direction::Faster => self.quiet.machine_rpm.0,

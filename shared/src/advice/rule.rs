@@ -1,33 +1,33 @@
-//! The tooth-passing rule: a quiet speed from nothing but the chatter frequency.
+//! The tooth-passing rule: a spindle speed from the chatter frequency alone.
 
 use super::margins::SPEED_BAND;
 use crate::units::{Hertz, Rpm};
 use crate::working_point::Tool;
 
-/// The largest number of vibrations per tooth that the rule looks at. Pockets k and k + 1 are 1/k apart: beyond 20 that
-/// is under 5 %, most of it lobe, and no pocket holds the ±1 % of the speed band any more.
+/// The largest lobe number k (whole vibrations per tooth period) of the rule.
+///
+/// Pockets k and k + 1 differ in speed by the relative amount 1/k. Beyond k = 20 that is below 5 %, most of it unstable, so that no
+/// pocket is as wide as the ±1 % of the speed band.
 pub const MAX_LOBE: u16 = 20;
 
-/// The admissible speed nearest in relative change at which the chatter frequency is a multiple of the tooth
-/// passing: n = 60·f_c/(N·k), k = 1, 2, … [`MAX_LOBE`].
+/// The admissible speed, with the smallest relative change, at which the chatter frequency is a multiple of the tooth-passing
+/// frequency: n = 60·f_c/(N·k) rev/min, k = 1, 2, … [`MAX_LOBE`], with N teeth and f_c in Hz.
 ///
-/// *Why.* With whole vibrations from tooth to tooth successive waves are in phase and the chip thickness does not vary.
-/// Of a mode with natural frequency f_n, lobe k reaches from f_n/(k + 1), where it is steep and f_c = f_n, over
-/// its lowest point near f_n/(k + 3/4), to where lobe k − 1 begins, at f_n/k; the pocket is the notch just right of that.
-/// The heard f_c lies a little above f_n, so the rule lands a little right of f_n/k: in the notch. High on the right
-/// flank of a lobe f_c is well above f_n and the rule lands too far right; heard again from there, f_c is
-/// closer to f_n, and a second step of the rule corrects it.
+/// *Principle.* With a whole number of vibrations per tooth period, successive surface waves are in phase and the chip thickness does
+/// not vary. For a mode with natural frequency f_n, lobe k covers the tooth-passing frequencies from f_n/(k + 1), where it is
+/// steep and f_c = f_n, to f_n/k, where lobe k − 1 begins; its minimum is near f_n/(k + 3/4). The stable pocket lies just above f_n/k.
+/// The measured f_c is slightly above f_n, so f_c/k lies in the pocket. High on the right flank of a lobe f_c is far above f_n,
+/// and f_c/k is too fast. At that speed f_c is closer to f_n, and a second step of the rule corrects the speed.
 ///
-/// *Hopf.* Where the present speed is already one of the rule's (within the speed band) and it still chatters, the
-/// pocket is not deep enough; lower ones are shallower still, so that only faster speeds count then.
+/// *Hopf.* If the present speed is a speed of the rule (within the speed band) and the cut still chatters, the depth exceeds this
+/// pocket. Pockets at lower speeds are shallower, so only faster speeds are candidates.
 ///
-/// *Flip.* Then f_c is an odd multiple of half the tooth passing, f_c = (m + 1/2)·f_t, and every speed of the rule
-/// changes the present one by a factor (m + 1/2)/k, at least 1/(2m + 2) away from 1: the flip lobes sit at
-/// half-odd multiples, the speeds of the rule as far as can be from them. For m = 0 there is only the slower
-/// speed at which the tooth passing is f_c (half the present one or less); what may lie above the flip lobe the rule cannot
-/// know.
+/// *Flip.* f_c is an odd multiple of half the tooth-passing frequency, f_c = (m + 1/2)·f_t. Each candidate changes the
+/// speed by the factor (m + 1/2)/k, which differs from 1 by at least 1/(2m + 2): the candidates are as far as possible from the flip
+/// lobes. For m = 0 all candidates are slower, at half the present speed or less. The rule cannot find the stable speeds above
+/// a flip lobe.
 ///
-/// `None` where no such speed is admissible. The frequency must be positive and finite.
+/// `None` if no candidate is admissible. The frequency must be positive and finite.
 ///
 /// Source: Y. Altintas, *Manufacturing Automation*, on selecting spindle speed from the chatter frequency; S. Smith and
 /// J. Tlusty on regulating the speed to the chatter frequency.
@@ -50,7 +50,7 @@ pub fn tooth_passing_speed(
         .min_by(|&a, &b| f32::total_cmp(&ratio(a, speed), &ratio(b, speed)))
 }
 
-/// The relative change between two speeds, as the larger over the smaller.
+/// Ratio of two speeds, the larger over the smaller: at least 1.
 pub(super) fn ratio(a: Rpm, b: Rpm) -> f32 {
     f32::max(a.0 / b.0, b.0 / a.0)
 }

@@ -1,4 +1,4 @@
-//! What schema 2 adds behind the intervals, and in bytes of the layers that were zero: see [`format`](super::format).
+//! The additions of schema 2; [`format`](super::format) specifies their bytes.
 
 use super::TableError;
 use super::bytes::saturate;
@@ -6,28 +6,31 @@ use super::format::TURN;
 use super::slopes::{IntervalSlopes, LayerMode, MODES_MAX};
 use crate::units::{Degrees, Millimeters};
 
-/// How far what the table says between its entries may be from what the method says there.
+/// Bound of the difference between the interpolated table and the stability method that computed it.
 ///
-/// On the unsafe side `depth` bounds it alone: a depth that the table calls stable is stable for the method, or lies within `depth`
-/// of one that is. On the safe side, what a layer calls unstable may be stable within `depth` of a limit of the method, or within
-/// the share `speed` of the speed of one at the same depth: on steep flanks, and where islands begin and kinds change, entries are
-/// not interpolated but what is unstable in either holds. Between layers that may give up more.
+/// *Unsafe side*: a depth that is stable in the table is stable for the method, or within `depth` of a depth that is.
+///
+/// *Safe side*: a depth that is unstable in the table but stable for the method lies within `depth` of a limit of the method, or
+/// within the relative speed `speed` of a limit at the same depth. The second case occurs on steep flanks and where intervals
+/// are not interpolated but combined. Between layers the difference may be larger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InterpolationError {
-    /// In depth.
+    /// Bound in depth.
     pub depth: Millimeters,
-    /// In speed, relative to it, on the safe side.
+    /// Bound in speed, relative to the speed; on the safe side only.
     pub speed: f32,
 }
 
-/// What a table may hold beyond schema 1.
+/// The additions of schema 2 to a table.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Additions<'a> {
-    /// The error of lookups between entries, where known.
+    /// Bound of the interpolation error, if known.
     pub interpolation_error: Option<InterpolationError>,
-    /// For each layer the feed direction it holds for, from the machine's x towards its y; `None` for any. Empty: any for all.
+    /// For each layer the feed direction for which it is valid, from the machine's x axis towards its y axis; `None` for any. An empty
+    /// slice means any direction for all layers.
     pub feed_directions: &'a [Option<Degrees>],
-    /// For each layer the modes whose derivatives are given: as many for all, at most [`MODES_MAX`]. Empty: no derivatives.
+    /// For each layer the modes by whose parameters the limits are differentiated; the same number for all layers, at most
+    /// [`MODES_MAX`]. An empty slice means no derivatives.
     pub modes: &'a [&'a [LayerMode]],
     /// The derivatives of every interval, in the order of layers, speeds and intervals.
     pub slopes: &'a [IntervalSlopes],
@@ -39,14 +42,14 @@ impl Additions<'_> {
         self.modes.first().map_or(0, |modes| modes.len())
     }
 
-    /// True where schema 1 can say all of it.
+    /// True if schema 1 suffices.
     pub(super) fn is_empty(&self) -> bool {
         self.interpolation_error.is_none()
             && self.modes.is_empty()
             && self.feed_directions.iter().all(Option::is_none)
     }
 
-    /// Refuses what does not fit the layers and intervals of a table, and numbers that cannot be.
+    /// Checks the additions against the numbers of layers and intervals of the table.
     pub(super) fn check(&self, layers: usize, intervals: usize) -> Result<(), TableError> {
         let count = self.mode_count();
         let wrong = TableError::Slopes {
@@ -83,13 +86,13 @@ impl Additions<'_> {
     }
 }
 
-/// Hundredths of a degree from 0 to below a full turn; `None` for what is no angle.
+/// The feed direction in 1/100 degree, from 0 to below 360°; `None` for an angle that is not finite or beyond ±1000 revolutions.
 pub(super) fn direction_code(direction: Degrees) -> Option<u16> {
     let turns = direction.0 / 360.0;
     if !(-1.0e3..=1.0e3).contains(&turns) {
         return None;
     }
-    // The cast truncates towards zero; one more turn for negative angles.
+    // The cast truncates towards zero, so a negative angle needs one more revolution.
     let whole = turns as i32 - i32::from(turns < 0.0);
     let hundredths = (turns - whole as f32) * f32::from(TURN) + 0.5;
     Some(hundredths as u16 % TURN)

@@ -1,6 +1,6 @@
-//! Numbers read from the bytes of a table, and counts for messages.
+//! Little-endian numbers at an offset of a byte slice, and counts for messages.
 
-/// A count for a message: what does not fit is shown as the largest.
+/// A count for a message; a larger one is shown as `u32::MAX`.
 pub(super) fn saturate(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
 }

@@ -1,4 +1,4 @@
-//! What must be true of the entries of a table, whoever made it.
+//! Checks of the entries of a table: order, range and consistency.
 
 use super::bytes::saturate;
 use super::format::{HEADER_LENGTH, Header, MAX_INTERVALS};
@@ -7,7 +7,7 @@ use super::{IMMERSION_TOLERANCE, LobeTable, TableError, Validity};
 use crate::units::{Degrees, Rpm};
 
 impl<'a> LobeTable<'a> {
-    /// The table in `bytes`, which must be exactly one table, after checking all of it: header, CRC-32 and every entry.
+    /// Parses `bytes`, which must be exactly one table, and checks header, CRC-32 and every entry.
     ///
     /// Cost: one pass over the bytes for the CRC and one over the entries.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, TableError> {
@@ -23,7 +23,7 @@ impl<'a> LobeTable<'a> {
         Ok(table)
     }
 
-    /// Refuses entries that no table may have, as [`parse`](Self::parse) does: for a table whose CRC is known to be right.
+    /// Checks the entries as [`parse`](Self::parse) does, for a table whose CRC-32 was verified elsewhere.
     pub fn check_entries(&self) -> Result<(), TableError> {
         check_entries(self)
     }
@@ -54,7 +54,7 @@ fn check_entries(table: &LobeTable<'_>) -> Result<(), TableError> {
     check_additions(table)
 }
 
-/// Checks a column whose intervals must begin at index `expected`; the index behind them.
+/// Checks a column whose first interval must have the index `expected`. Returns the index after its last interval.
 fn check_column(
     LobeTable { bytes, shape, .. }: &LobeTable<'_>,
     layer: usize,
@@ -102,7 +102,8 @@ pub(super) fn check_speeds(speeds: impl Iterator<Item = Rpm>) -> Result<(), Tabl
     Ok(())
 }
 
-/// Layers must hold for something, and no two for the same; each with its feed direction, `None` for any.
+/// Checks that every layer has a non-empty range and that no two layers are valid for the same cut. Each layer comes with its
+/// feed direction, `None` for any.
 pub(super) fn check_layers(
     layers: impl Iterator<Item = (Validity, Option<Degrees>)> + Clone,
 ) -> Result<(), TableError> {
@@ -118,10 +119,10 @@ pub(super) fn check_layers(
             && layer.exit.0.is_finite();
         let clashes = |(other, other_direction): (Validity, Option<Degrees>)| match other.is_family_of(&layer)
         {
-            // A layer for any direction and one for some hold both for the latter.
+            // Layers with different feed directions do not overlap. A layer for any direction overlaps every other.
             true if direction.zip(other_direction).is_some_and(|(a, b)| a != b) => false,
             true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
-            // One cut must not belong to two families.
+            // The immersion ranges, tolerance included, of two families must not overlap.
             false => other.posture == layer.posture && is_near(&other, &layer),
         };
         if !is_range || layers.clone().take(index).any(clashes) {
@@ -139,13 +140,13 @@ pub(super) fn interval_order(layer: usize, speed: usize, interval: usize) -> Tab
     }
 }
 
-/// True where a cut could lie within the tolerance of both.
+/// True if a cut could lie within the immersion tolerance of both.
 fn is_near(a: &Validity, b: &Validity) -> bool {
     let tolerance = 2.0 * IMMERSION_TOLERANCE.0;
     (a.start.0 - b.start.0).abs() <= tolerance && (a.exit.0 - b.exit.0).abs() <= tolerance
 }
 
-/// Checks all that schema 2 adds: every number finite, errors and modes in their range.
+/// Checks the additions of schema 2: all numbers finite, interpolation error and modes within their range.
 fn check_additions(table: &LobeTable<'_>) -> Result<(), TableError> {
     let LobeTable { bytes, shape, .. } = table;
     for layer in 0..shape.layers {

@@ -1,14 +1,15 @@
-//! One column of the table: the depths that are not stable at one speed and working point.
+//! A column: the unstable depth intervals at one speed and working point.
 
 use heapless::Vec;
 
 use super::{Interval, IntervalKind, NotKnown, TabulatedStability};
 use crate::units::{Hertz, Millimeters};
 
-/// Intervals of a column after joining up to four columns; more are merged to the unstable side.
+/// Largest number of intervals in a column, also after combining up to four columns. Further intervals are merged, which may
+/// call stable depths unstable.
 const CAPACITY: usize = 32;
 
-/// The depths that are not stable at one speed, sorted and without overlaps; intervals may touch.
+/// The unstable depth intervals at one speed, ascending and without overlaps; intervals may touch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     depth_from_mm: f32,
@@ -17,7 +18,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// A column of a table for these depths in which all is stable.
+    /// A column for this depth range without unstable intervals.
     pub(super) fn new(depth_from_mm: f32, depth_to_mm: f32) -> Self {
         Self {
             depth_from_mm,
@@ -26,9 +27,9 @@ impl Column {
         }
     }
 
-    /// Puts an interval behind the others.
+    /// Appends an interval.
     ///
-    /// Where the column is full the last interval grows over it: depths may be called unstable that are not, never the reverse.
+    /// If the column is full, the last interval is extended instead. Stable depths may then be called unstable, never the reverse.
     pub(super) fn push(&mut self, interval: Interval) {
         if let Some(last) = self.intervals.last_mut()
             && last.to == interval.from
@@ -45,17 +46,17 @@ impl Column {
         }
     }
 
-    /// The intervals that are not stable, ascending.
+    /// The unstable intervals, ascending.
     pub fn intervals(&self) -> &[Interval] {
         &self.intervals
     }
 
-    /// The first interval that is not stable: where stability is lost when the depth grows from the smallest of the table.
+    /// The lowest unstable interval: its lower end is the stability limit for growing depth.
     pub fn first_limit(&self) -> Option<&Interval> {
         self.intervals.first()
     }
 
-    /// The stable depths as pairs [from, to), ascending; the last depth of the table counts where it is the end.
+    /// The stable depth ranges [from, to), ascending. The last range includes the largest depth of the table if it ends there.
     pub fn stable(&self) -> impl Iterator<Item = (Millimeters, Millimeters)> + '_ {
         let starts = core::iter::once(self.depth_from_mm).chain(self.intervals.iter().map(|i| i.to.0));
         let ends = self
@@ -69,7 +70,7 @@ impl Column {
             .map(|(from, to)| (Millimeters(from), Millimeters(to)))
     }
 
-    /// True where all depths of [from, to] are stable and inside the table.
+    /// True if all depths of [from, to] are stable and inside the table.
     pub fn is_stable_within(&self, from: Millimeters, to: Millimeters) -> bool {
         from.0 >= self.depth_from_mm
             && to.0 <= self.depth_to_mm
@@ -79,9 +80,9 @@ impl Column {
                 .all(|i| (i.to <= from && i.to.0 < self.depth_to_mm) || i.from > to)
     }
 
-    /// What this column says of a depth.
+    /// Stability at a depth.
     pub fn at(&self, depth: Millimeters) -> TabulatedStability {
-        // Written so that NaN lands here too.
+        // The negated comparison also catches NaN.
         if !(depth.0 >= self.depth_from_mm && depth.0 <= self.depth_to_mm) {
             return TabulatedStability::NotKnown(NotKnown::Depth {
                 asked: depth,
@@ -106,7 +107,7 @@ impl Column {
         }
     }
 
-    /// True where the interval holds at this depth: the end does not belong to it, but for the end of the table.
+    /// True if the interval contains this depth. Its upper end is excluded, unless it is the end of the table.
     fn covers(&self, interval: &Interval, depth_mm: f32) -> bool {
         interval.from.0 <= depth_mm
             && (depth_mm < interval.to.0
@@ -118,7 +119,7 @@ impl Column {
         let above = self.intervals.iter().find(|i| i.from.0 > depth_mm);
         let from_mm = match below {
             Some(interval) => interval.to.0,
-            // Depth 0 is no cut: below it there is nothing to lose.
+            // There is no depth below 0, so the lower end does not limit the margin.
             None if self.depth_from_mm > 0.0 => self.depth_from_mm,
             None => f32::NEG_INFINITY,
         };
@@ -126,7 +127,7 @@ impl Column {
         f32::min(depth_mm - from_mm, to_mm - depth_mm)
     }
 
-    /// The interval with those that touch it: kinds may change within.
+    /// The depth range in mm of an interval and of all intervals that touch it, of any kind.
     fn unstable_range_mm(&self, index: usize, interval: &Interval) -> (f32, f32) {
         let (mut from_mm, mut to_mm) = (interval.from.0, interval.to.0);
         for before in self.intervals.iter().take(index).rev() {
@@ -144,10 +145,10 @@ impl Column {
         (from_mm, to_mm)
     }
 
-    /// Fills an empty column with the one between two neighbouring ones; `weight` of `b` from 0 to 1.
+    /// Fills an empty column with the interpolation between two neighbouring columns. `weight` is the weight of `b`, 0 to 1.
     ///
-    /// Intervals that overlap or touch, in one column or across, form a group. A group with the same sequence of kinds in both
-    /// columns, overlapping pair by pair, is interpolated; any other is unstable where either column is.
+    /// Intervals that overlap or touch, within one column or across both, form a group. A group is interpolated if both columns have
+    /// the same sequence of kinds in it and the intervals overlap pairwise. Otherwise the union of both columns is unstable.
     pub(super) fn blend(&mut self, a: &Self, b: &Self, weight: f32) {
         let (mut rest_a, mut rest_b) = (a.intervals.as_slice(), b.intervals.as_slice());
         while !(rest_a.is_empty() && rest_b.is_empty()) {
@@ -167,9 +168,9 @@ impl Column {
         }
     }
 
-    /// The interval between two that belong together.
+    /// Linear interpolation between two corresponding intervals.
     ///
-    /// An end that lies at the end of the table is not known further than that: the result then keeps it.
+    /// An interval end at the end of the table may lie beyond it in truth. The result then also ends at the end of the table.
     fn interpolate(&self, a: &Interval, b: &Interval, weight: f32) -> Interval {
         let between = |x: f32, y: f32| x + (y - x) * weight;
         let from_mm = if f32::min(a.from.0, b.from.0) <= self.depth_from_mm {
@@ -195,7 +196,7 @@ impl Column {
         }
     }
 
-    /// Unstable where either group is; kind and frequency of `near` where both are.
+    /// Appends the union of two groups. Kind and frequency of `near` apply if both are unstable.
     fn push_union(&mut self, near: &[Interval], far: &[Interval]) {
         let mut depth_mm = f32::NEG_INFINITY;
         loop {
@@ -222,7 +223,7 @@ impl Column {
     }
 }
 
-/// How many of the first intervals of two columns form one group: each overlaps or touches another of it.
+/// Numbers of leading intervals of two columns that form one group of overlapping or touching intervals.
 fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
     let (mut count_a, mut count_b) = (0, 0);
     let mut end_mm = f32::min(
@@ -237,7 +238,7 @@ fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
             end_mm = f32::max(end_mm, i.to.0);
             count_b += 1;
         } else if count_a + count_b == 0 {
-            // Only entries that are not numbers come here: take one, so that the caller comes to an end.
+            // Reached only with NaN entries. Consuming one interval keeps the caller from looping forever.
             return (1, 1);
         } else {
             return (count_a, count_b);
@@ -245,6 +246,7 @@ fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
     }
 }
 
+/// True if two groups have the same sequence of kinds, with pairwise overlapping intervals.
 fn is_same_topology(a: &[Interval], b: &[Interval]) -> bool {
     a.len() == b.len()
         && a.iter()

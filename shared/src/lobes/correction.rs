@@ -1,11 +1,11 @@
-//! The entries of a table, corrected by what was learned.
+//! The entries of a table, corrected for parameter changes.
 
 use super::slopes::{IntervalSlopes, LayerMode, Learned, Slopes, corrected_limit};
 use super::{Column, Interval, LobeTable};
 use crate::units::{Hertz, Millimeters};
 
 impl LobeTable<'_> {
-    /// The modes of a layer whose derivatives the table has, in the order of the derivatives; none where it has none.
+    /// The modes of a layer in the order of the derivatives; empty if the table has no derivatives.
     pub fn modes(&self, layer: usize) -> impl ExactSizeIterator<Item = LayerMode> + '_ {
         (0..self.shape.modes).map(move |mode| {
             self.shape
@@ -17,8 +17,8 @@ impl LobeTable<'_> {
         })
     }
 
-    /// Derivatives of an interval of a layer at one speed of the grid, counted as they are stored; `None` where the table
-    /// has none or no such interval.
+    /// Derivatives of the interval with this index, of a layer at one grid speed. `None` if the table has no derivatives or no
+    /// such interval.
     pub fn slopes(&self, layer: usize, speed_index: usize, interval: usize) -> Option<IntervalSlopes> {
         let range = self.shape.column_range(self.bytes, layer, speed_index)?;
         let index = range
@@ -28,11 +28,11 @@ impl LobeTable<'_> {
         self.shape.interval_slopes(self.bytes, index)
     }
 
-    /// The entries of one layer at one speed of the grid, corrected by what was learned; as [`entry`](Self::entry) where the
-    /// table has no derivatives.
+    /// The entries of one layer at one grid speed, corrected for the parameter changes. Without derivatives they equal those of
+    /// [`entry`](Self::entry).
     ///
-    /// Ends at the first and last depth of the table stay. An interval whose ends meet is gone; one that reaches the one before
-    /// begins where that ends.
+    /// Interval ends at the smallest or largest depth of the table are not shifted. An interval whose ends meet vanishes. An interval
+    /// that would overlap the preceding one begins at its end.
     pub fn corrected_entry(&self, layer: usize, speed_index: usize, learned: &Learned) -> Option<Column> {
         let mut column = self.empty_column();
         let depths = self.depths();

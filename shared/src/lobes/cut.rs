@@ -1,4 +1,4 @@
-//! The lobes of one cut: the layers of a table between which its feed lies.
+//! The lobes of one cut: the two layers of a table between which the cut is interpolated.
 
 use super::{
     Column, FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE, Interval,
@@ -7,25 +7,27 @@ use super::{
 use crate::units::{Degrees, Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Two columns of n and m intervals join to at most 2n + m: four of this many to 27, which a [`Column`] holds.
+/// Largest number of intervals per stored column for which no combined column overflows.
+///
+/// Two columns of n and m intervals combine to at most 2n + m. Four columns of 3 combine to at most 27, which a [`Column`] holds.
 pub(crate) const FEW: usize = 3;
 
-/// A place between two speeds of the grid.
+/// Position of a speed between two grid speeds.
 #[derive(Clone, Copy)]
 struct Between {
-    /// Index of the speed below.
+    /// Index of the grid speed below.
     below: usize,
-    /// Weight of the speed above, 0 to 1.
+    /// Interpolation weight of the grid speed above, 0 to 1.
     weight: f32,
 }
 
-/// The columns of a table for one feed, immersion and posture.
+/// The columns of a table for one feed, feed direction, immersion and posture.
 #[derive(Clone, Copy, Debug)]
 pub struct CutLobes<'a> {
     table: LobeTable<'a>,
     near: usize,
     far: usize,
-    /// Weight of the far layer, 0 to 1.
+    /// Interpolation weight of layer `far`, 0 to 1.
     weight: f32,
 }
 
@@ -40,7 +42,7 @@ impl<'a> CutLobes<'a> {
         })
     }
 
-    /// The column at any speed.
+    /// The column at a spindle speed, interpolated between grid speeds and layers.
     pub fn column(&self, speed: Rpm) -> Result<Column, NotKnown> {
         let between = self.between(speed)?;
         let mut column = self.table.empty_column();
@@ -55,18 +57,20 @@ impl<'a> CutLobes<'a> {
         Ok(blended)
     }
 
-    /// The layers on both sides of the feed, or the one that holds for it.
+    /// The one or two layers that the cut is interpolated from.
     pub(crate) fn layers(&self) -> impl Iterator<Item = usize> + use<> {
         [Some(self.near), (self.far != self.near).then_some(self.far)]
             .into_iter()
             .flatten()
     }
 
-    /// What is stored in a layer at one speed of the grid; `None` for an interval that cannot be read.
+    /// The stored intervals of a layer at one grid speed.
     ///
-    /// Between two speeds of the grid a depth that is stable in the lists of both, in all [`layers`](Self::layers), is
-    /// stable, and one that is stable in none of them is not: most questions need no interpolation. `None` where a list has
-    /// more than [`FEW`] intervals, so that this is not certain, or cannot be read.
+    /// A depth that is stable at both neighbouring grid speeds, in all [`layers`](Self::layers), is stable between them. A depth
+    /// that is stable at neither, in no layer, is unstable between them. Most lookups therefore need no interpolation.
+    ///
+    /// Returns `None` if the list cannot be read, or has more than [`FEW`] intervals, for which these two rules are not
+    /// guaranteed. An item is `None` if that interval cannot be read.
     pub(crate) fn stored(
         &self,
         layer: usize,
@@ -78,7 +82,7 @@ impl<'a> CutLobes<'a> {
             .filter(|column| column.len() <= FEW)
     }
 
-    /// Reads the column of one layer into an empty one.
+    /// Reads the column of one layer, interpolated in speed, into an empty column.
     fn read(&self, layer: usize, between: Between, column: &mut Column) -> Result<(), NotKnown> {
         if between.weight == 0.0 {
             return self.table.read_column(layer, between.below, column);
@@ -90,7 +94,7 @@ impl<'a> CutLobes<'a> {
         Ok(())
     }
 
-    /// The speeds of the grid around a speed.
+    /// The position of a speed in the speed grid.
     fn between(&self, speed: Rpm) -> Result<Between, NotKnown> {
         let count = self.table.shape.speeds;
         let outside = || NotKnown::Speed {
@@ -117,17 +121,17 @@ impl<'a> CutLobes<'a> {
 }
 
 impl<'a> LobeTable<'a> {
-    /// The columns of one cut; its axial depth is not used.
+    /// The columns of one cut; the axial depth of the working point is not used.
     pub fn cut(&self, working_point: &WorkingPoint) -> Result<CutLobes<'a>, NotKnown> {
         CutLobes::new(*self, working_point)
     }
 
-    /// The column at any speed and working point; its axial depth is not used.
+    /// The column at a speed and working point; the axial depth of the working point is not used.
     pub fn column(&self, speed: Rpm, working_point: &WorkingPoint) -> Result<Column, NotKnown> {
         self.cut(working_point)?.column(speed)
     }
 
-    /// What the table says of the cut at `speed`.
+    /// Stability of the cut at `speed`, according to the table.
     pub fn lookup(&self, speed: Rpm, working_point: &WorkingPoint) -> TabulatedStability {
         match self.column(speed, working_point) {
             Ok(column) => column.at(working_point.axial_depth),
@@ -136,11 +140,11 @@ impl<'a> LobeTable<'a> {
     }
 }
 
-/// The two layers around the working point in feed or in feed direction, and the weight of the second.
-// Here and below one copy each: flash is scarcer than the time of a call.
+/// The two layers that enclose the working point in feed or in feed direction, and the weight of the second.
+// `inline(never)` here and below: one copy of the code saves flash, and the time of a call is negligible.
 #[inline(never)]
 fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize, usize, f32), NotKnown> {
-    // Most tables know of no directions: they are not asked for them at every lookup.
+    // Schema 1 has no feed directions.
     if !table.shape.is_extended {
         return bracket_feed(table, working_point, &|_| true);
     }
@@ -169,7 +173,7 @@ fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize
         return at(above);
     }
     match (at(below)?, at(above)?) {
-        // Either interpolates in feed, or in direction: four layers at once are too many.
+        // A lookup interpolates in feed or in direction, not in both: it would need four layers.
         ((low, same_low, _), (high, same_high, _)) if low == same_low && high == same_high => {
             Ok((low, high, to_below / (to_below + to_above)))
         }
@@ -190,8 +194,8 @@ fn family<'t>(table: &'t LobeTable<'_>, working_point: &'t WorkingPoint) -> impl
         .map(|(index, _)| index)
 }
 
-/// The directions of layers next to one on both sides, if they are near enough; a layer for any direction counts as
-/// being there itself.
+/// The nearest layer directions below and above a direction, if they are at most [`FEED_DIRECTION_SPAN`] apart. A layer for any
+/// direction counts as having exactly the requested one.
 #[inline(never)]
 fn neighbours(
     table: &LobeTable<'_>,
@@ -209,13 +213,13 @@ fn neighbours(
         }
     }
     let (below, above) = (below?, above?);
-    // A lone direction is its own neighbour on both sides: near only where it is the one asked for.
+    // A single direction is its own neighbour on both sides. It is valid only within the tolerance.
     let (to_below, to_above) = (turn(below, asked), turn(asked, above));
     let is_there = f32::min(to_below, to_above) <= FEED_DIRECTION_TOLERANCE.0;
     (is_there || to_below + to_above <= FEED_DIRECTION_SPAN.0).then_some((below, above))
 }
 
-/// The angle from one direction to another, anticlockwise, from 0 to below 360; NaN where one is no angle.
+/// The angle in degrees from one direction to another, counter-clockwise, from 0 to below 360; NaN if one of them is no angle.
 #[inline(never)]
 fn turn(from: Degrees, to: Degrees) -> f32 {
     let mut turn = to.0 - from.0;
@@ -231,8 +235,8 @@ fn turn(from: Degrees, to: Degrees) -> f32 {
     turn
 }
 
-/// The two layers whose feeds are around that of the working point, and the weight of the second; the same
-/// layer twice where one holds for it.
+/// The two layers whose feeds enclose the feed of the working point, and the weight of the second. If one layer contains the
+/// feed, it is returned twice. `belongs` selects the layers.
 #[inline(never)]
 fn bracket_feed(
     table: &LobeTable<'_>,

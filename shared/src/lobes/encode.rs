@@ -1,4 +1,4 @@
-//! Content to the bytes of a table, into the caller's buffer.
+//! Encoding of a table into the caller's buffer.
 
 use super::additions::{Additions, direction_code};
 use super::bytes::saturate;
@@ -12,20 +12,20 @@ use super::{Interval, LobeTable, TableError, Validity, half};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::Limits;
 
-/// What a table is made of.
+/// The content of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Content<'a> {
     /// Name of the case; at most [`NAME_CAPACITY`] bytes.
     pub name: &'a str,
     /// Number of teeth of the tool.
     pub teeth: u8,
-    /// Limits of the machine, where known.
+    /// Speed limits of the machine, if known.
     pub limits: Option<Limits>,
-    /// The smallest depth that was computed.
+    /// The smallest computed depth.
     pub depth_from: Millimeters,
-    /// The largest depth that was computed.
+    /// The largest computed depth.
     pub depth_to: Millimeters,
-    /// Spindle speeds, strictly ascending; the steps may be of any size, finer in pockets and at flips.
+    /// Spindle speeds, strictly ascending, with steps of any size.
     pub speeds: &'a [Rpm],
     /// The layers, in any order.
     pub layers: &'a [Layer<'a>],
@@ -34,29 +34,29 @@ pub struct Content<'a> {
 /// One layer of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'a> {
-    /// What it holds for.
+    /// The cuts for which the layer is valid.
     pub validity: Validity,
-    /// Per speed the depths that are not stable, ascending and without overlaps; a speed that could not be
-    /// computed has one interval over all depths of kind [`Undecided`](super::IntervalKind::Undecided).
+    /// For each speed the unstable depth intervals, ascending and without overlaps. A speed whose computation failed has one
+    /// interval of kind [`Undecided`](super::IntervalKind::Undecided) over all depths.
     pub columns: &'a [&'a [Interval]],
 }
 
-/// Bytes that [`encode`] needs.
+/// Length in bytes of the table that [`encode`] writes.
 pub fn encoded_length(content: &Content<'_>) -> u64 {
     encoded_length_with(content, &Additions::default())
 }
 
-/// Bytes that [`encode_with`] needs.
+/// Length in bytes of the table that [`encode_with`] writes.
 pub fn encoded_length_with(content: &Content<'_>, additions: &Additions<'_>) -> u64 {
     shape_of(content, additions).length()
 }
 
-/// Writes the table into `buffer` and returns its bytes: header with generation 0, CRC-32, content.
+/// Writes a table of schema 1 into `buffer` and returns its bytes. The generation in the header is 0.
 pub fn encode<'b>(content: &Content<'_>, buffer: &'b mut [u8]) -> Result<&'b [u8], TableError> {
     encode_with(content, &Additions::default(), buffer)
 }
 
-/// [`encode`] with what schema 2 adds; without any addition the bytes are those of schema 1.
+/// Writes a table with the additions of schema 2. Without any addition the bytes are those of schema 1.
 pub fn encode_with<'b>(
     content: &Content<'_>,
     additions: &Additions<'_>,
@@ -93,7 +93,7 @@ pub fn encode_with<'b>(
         crc: 0,
     };
     head.copy_from_slice(&header.with_generation(0, payload).to_bytes());
-    // What this code writes this code must read: the last word belongs to the reader.
+    // The written table must pass the checks of the reader.
     LobeTable::parse(bytes).map(|table| table.bytes())
 }
 
@@ -110,7 +110,7 @@ fn shape_of(content: &Content<'_>, additions: &Additions<'_>) -> Shape {
         limits: content.limits,
         depth_from_mm: content.depth_from.0,
         depth_to_mm: content.depth_to.0,
-        // `max` passes over NaN; `write_column` refuses it.
+        // `f32::max` ignores NaN; `write_column` refuses it.
         chatter_max_hz: intervals().map(|i| i.chatter.0).fold(0.0, f32::max),
         layers: content.layers.len(),
         speeds: content.speeds.len(),
@@ -254,7 +254,7 @@ fn write_column(
     let (mut end_mm, mut end_code) = (shape.depth_from_mm, 0);
     for (index, interval) in column.iter().enumerate() {
         let (from_mm, to_mm) = (interval.from.0, interval.to.0);
-        // Written so that NaN is refused too.
+        // The negated comparison also refuses NaN.
         if !(from_mm >= end_mm && from_mm < to_mm && to_mm <= shape.depth_to_mm) {
             return Err(interval_order(layer, speed, index));
         }
@@ -263,7 +263,7 @@ fn write_column(
                 found: interval.chatter,
             });
         }
-        // Each interval keeps one step at least, also those that follow: none is lost however thin it is.
+        // Each interval, and each that follows, keeps at least one step of depth. So no thin interval is lost.
         let following = (column.len() - 1 - index) as u16;
         let top = u16::MAX.saturating_sub(following);
         let from = depth_code_down(shape, from_mm)
@@ -279,11 +279,13 @@ fn write_column(
     Ok(())
 }
 
-/// Steps are snapped when they are this close: a decoded depth must come back to the step it came
-/// from. Decoding in f32 errs by up to 65 535·2⁻²⁴ = 0.004 steps for the size of a step and as much for each of two roundings.
+/// A depth within this distance of a step, in steps, is taken as exactly that step, so that a decoded table encodes to the same
+/// bytes.
+///
+/// Decoding in f32 errs by up to 65 535·2⁻²⁴ = 0.004 steps from the step size, and by as much from each of two roundings: 0.012.
 const SNAP_STEPS: f64 = 0.02;
 
-// f64 and the truncating, saturating cast: exact to far below `SNAP_STEPS`, on the host that makes tables.
+// f64 keeps the error far below `SNAP_STEPS`. Only the host encodes tables.
 fn depth_steps(shape: &Shape, depth_mm: f32) -> f64 {
     let range_mm = f64::from(shape.depth_to_mm) - f64::from(shape.depth_from_mm);
     (f64::from(depth_mm) - f64::from(shape.depth_from_mm)) / range_mm * f64::from(STEPS)
@@ -311,7 +313,7 @@ fn chatter_code(shape: &Shape, chatter_hz: f32) -> u16 {
     ((steps + 0.5) as u16).max(1)
 }
 
-/// Writes piece by piece; the length was taken from the same content, so that nothing is left out.
+/// Writes bytes to consecutive positions. The buffer length was computed from the same content, so nothing is cut off.
 struct Writer<'b> {
     rest: &'b mut [u8],
 }

@@ -1,11 +1,11 @@
-//! Why bytes are no table, or content cannot become one.
+//! Errors of reading and encoding a table.
 
 use serde::{Deserialize, Serialize};
 
 use super::format::{MAGIC, MAX_INTERVALS, NAME_CAPACITY};
 use crate::units::{Hertz, Millimeters, Rpm};
 
-/// Why bytes are no table, or content cannot become one.
+/// The reason why bytes are not a valid table, or why content cannot be encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
@@ -16,9 +16,9 @@ pub enum TableError {
         /// Bytes found.
         found: u32,
     },
-    /// The bytes do not begin as a table does.
+    /// The bytes do not begin with the magic number of a table.
     Magic {
-        /// What they begin with; a table begins with [`MAGIC`](super::format::MAGIC).
+        /// The first four bytes found; a table begins with [`MAGIC`](super::format::MAGIC).
         found: [u8; 4],
     },
     /// The table has a schema that this code does not know.
@@ -28,7 +28,7 @@ pub enum TableError {
         /// The latest schema that this code knows.
         known: u16,
     },
-    /// The header says another length than there are bytes.
+    /// The length in the header differs from the number of bytes.
     Length {
         /// What the header says.
         header: u32,
@@ -42,11 +42,11 @@ pub enum TableError {
         /// The CRC of the bytes found.
         computed: u32,
     },
-    /// The arrays that the description announces do not fill the length.
+    /// The counts in the description do not match the length of the table.
     Arrays {
-        /// The length that the description needs.
+        /// The length in bytes that the description implies.
         needed: u64,
-        /// The length of the table.
+        /// The length in bytes of the table.
         found: u32,
     },
     /// The name is too long or not UTF-8.
@@ -56,14 +56,14 @@ pub enum TableError {
     },
     /// A tool without teeth.
     Teeth,
-    /// Limits of the machine that are no range of positive speeds.
+    /// Machine limits that are not an ascending range of speeds.
     Limits {
         /// Slowest.
         from: Rpm,
         /// Fastest.
         to: Rpm,
     },
-    /// Depths that are no range beginning at 0 or above.
+    /// Depths that are not an ascending range from 0 or above.
     Depths {
         /// Smallest.
         from: Millimeters,
@@ -82,20 +82,20 @@ pub enum TableError {
         /// Layers; 1 to 65 535.
         layers: u32,
     },
-    /// Speeds must be positive and strictly ascending.
+    /// Speeds that are not positive and strictly ascending.
     SpeedOrder {
-        /// Index of the speed that is wrong.
+        /// Index of the wrong speed.
         index: u32,
         /// Its value.
         found: Rpm,
     },
-    /// A layer that holds for nothing, for feeds that another layer of the same immersion and posture has too, or for
-    /// an immersion that is not another layer's but closer than twice the tolerance.
+    /// A layer with an empty range, with feeds that overlap those of another layer of the same immersion and posture, or with an
+    /// immersion that differs from that of another layer by less than twice the tolerance.
     Layer {
         /// Index of the layer.
         layer: u32,
     },
-    /// A layer has not one column per speed.
+    /// A layer whose number of columns differs from the number of speeds.
     Columns {
         /// Index of the layer.
         layer: u32,
@@ -113,14 +113,14 @@ pub enum TableError {
         /// Intervals found: in the column, or up to it in the layer.
         found: u32,
     },
-    /// The intervals of a column do not begin where those of the column before end.
+    /// A column whose intervals do not follow those of the preceding column.
     ColumnOrder {
         /// Index of the layer.
         layer: u32,
         /// Index of the speed.
         speed: u32,
     },
-    /// An interval that is empty, outside the depths of the table, not behind the one before it, or of unknown kind.
+    /// An interval that is empty, outside the depths of the table, not above the preceding one, or of unknown kind.
     IntervalOrder {
         /// Index of the layer.
         layer: u32,
@@ -133,24 +133,24 @@ pub enum TableError {
     Buffer {
         /// Bytes needed.
         needed: u64,
-        /// Bytes there are.
+        /// Bytes available.
         found: u64,
     },
-    /// Flags that this code does not know, or more modes than a table can have.
+    /// Unknown flags, or more modes than a table can have.
     Flags {
         /// The flags of the description.
         found: u16,
     },
-    /// A feed direction that is none, or not one for each layer.
+    /// A feed direction that is not an angle, or a number of directions that differs from the number of layers.
     FeedDirection {
-        /// Index of the layer, or how many directions there are.
+        /// Index of the layer, or the number of directions.
         layer: u32,
     },
-    /// A mode whose frequency is not positive or whose damping ratio is not from 0 to below 1.
+    /// A mode whose frequency is not positive, or whose damping ratio is not in [0, 1).
     Mode {
         /// Index of the layer.
         layer: u32,
-        /// Index of the mode in it.
+        /// Index of the mode in the layer.
         mode: u32,
     },
     /// An interpolation error that is negative or not finite.
@@ -160,9 +160,10 @@ pub enum TableError {
         /// In speed, relative; below 1.
         speed: f32,
     },
-    /// A derivative that is not finite, or not as many of them as there are intervals, or layers with different numbers of modes.
+    /// A derivative that is not finite, a number of derivatives that differs from the number of intervals, or layers with different
+    /// numbers of modes.
     Slopes {
-        /// Index of the interval in the table, or how many derivatives there are.
+        /// Index of the interval in the table, or the number of derivatives.
         index: u32,
     },
 }

@@ -1,4 +1,4 @@
-//! The bytes of a table, schemas 1 and 2. All numbers little-endian, no alignment needed.
+//! The bytes of a table, schemas 1 and 2. All numbers are little-endian and unaligned.
 //!
 //! | offset | bytes | header |
 //! |---|---|---|
@@ -6,7 +6,7 @@
 //! | 4 | 2 | schema: [`SCHEMA_PLAIN`] or [`SCHEMA`] |
 //! | 6 | 2 | zero |
 //! | 8 | 4 | length of the whole table in bytes, header included |
-//! | 12 | 4 | generation: 0 in a file; the device counts it up to know the newer of its two slots |
+//! | 12 | 4 | generation: 0 in a file; the device increments it to find the newer of its two slots |
 //! | 16 | 12 | zero |
 //! | 28 | 4 | CRC-32 of bytes 0..28 and 32..length |
 //!
@@ -32,16 +32,17 @@
 //!
 //! A depth is smallest + q·(largest − smallest)/65535, a chatter frequency q·largest/65535 with 0 for "not known".
 //! `from` is rounded down and `to` up, so that an entry errs by less than one step and to the unstable side only
-//! (steps are snapped at 1/50: a table that is read and encoded again keeps its bytes). The chatter frequency is rounded to
+//! (a depth within 1/50 of a step is taken as that step: a table that is read and encoded again keeps its bytes). The chatter frequency is rounded to
 //! the nearest, but never to 0. With 10 mm and 5 000 Hz a step is 0.15 µm and 0.08 Hz. 600 speeds, 6 layers and
 //! 2 intervals per column are 67 KB; 3 are 96 KB.
 //!
 //! # Schemas
 //!
-//! The header never changes. Schema 1 is a table without additions; its bytes stay readable, and what needs no addition is
-//! written in it, so that devices with older firmware take it. Schema 2 has the additions marked above. A reader refuses every
-//! other schema with [`TableError::Schema`](super::TableError::Schema), before it looks at anything behind the header, and within schema 2 every flag that it
-//! does not know. Whoever adds something raises [`SCHEMA`], puts it behind what is there, and freezes its bytes in the tests.
+//! The header never changes. Schema 1 is a table without additions. Tables without additions are always written in schema 1, so
+//! that devices with older firmware accept them. Schema 2 has the additions marked above. A reader refuses every other schema
+//! with [`TableError::Schema`](super::TableError::Schema) before it reads beyond the header, and refuses unknown flags of schema 2.
+//!
+//! A further addition needs a higher [`SCHEMA`], goes to the end of the table, and has its bytes frozen in the tests.
 
 pub use super::header::Header;
 
@@ -51,11 +52,11 @@ pub const MAGIC: [u8; 4] = *b"QCLT";
 pub const SCHEMA: u16 = 2;
 /// The schema of tables without additions.
 pub const SCHEMA_PLAIN: u16 = 1;
-/// Length of the header in bytes.
+/// Length of the header, in bytes.
 pub const HEADER_LENGTH: usize = 32;
-/// The most bytes in the name of a case.
+/// Largest length of the name of a case, in bytes.
 pub const NAME_CAPACITY: usize = 32;
-/// The most intervals of one column.
+/// Largest number of intervals in one stored column.
 pub const MAX_INTERVALS: usize = 12;
 
 pub(super) const CRC_OFFSET: usize = 28;
@@ -66,14 +67,14 @@ pub(super) const LAYER_LENGTH: usize = 24;
 pub(super) const INTERVAL_LENGTH: usize = 8;
 pub(super) const STEPS: f32 = 65_535.0;
 
-/// Bit of the flags: the interpolation error is given.
+/// Flag bit: the table contains its interpolation error.
 pub(super) const ERROR_GIVEN: u16 = 2;
-/// Where the number of modes stands in the flags.
+/// Position of the number of modes in the flags.
 pub(super) const MODES_SHIFT: u16 = 8;
-/// All bits of the flags that schema 2 knows, but for the number of modes.
+/// All flag bits of schema 2, without the number of modes.
 pub(super) const KNOWN_FLAGS: u16 = 1 | ERROR_GIVEN;
 
-/// Codes of a full turn of the feed direction.
+/// Number of feed-direction codes in 360°: 1/100 degree each.
 pub(super) const TURN: u16 = 36_000;
 
 pub(super) const ERROR_LENGTH: usize = 8;

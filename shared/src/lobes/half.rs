@@ -1,9 +1,9 @@
-//! Numbers of 16 bits: IEEE 754 binary16, by bits, so that host and device agree.
+//! IEEE 754 binary16 numbers, converted in integer arithmetic so that host and device agree to the bit.
 
-/// The largest number.
+/// The largest finite binary16 number.
 pub(super) const MAX: f32 = 65_504.0;
 
-/// The value of a code; infinities and NaN stay what they are. Exact.
+/// The value of a binary16 code, exactly; infinities and NaN are preserved.
 pub(super) fn decode(code: u16) -> f32 {
     let sign = u32::from(code & 0x8000) << 16;
     let exponent = u32::from(code >> 10) & 0x1F;
@@ -19,7 +19,7 @@ pub(super) fn decode(code: u16) -> f32 {
     }
 }
 
-/// The nearest code, ties to even; what is larger than [`MAX`] becomes that. NaN stays NaN.
+/// The nearest binary16 code, ties to even. Larger magnitudes saturate at [`MAX`]; NaN stays NaN.
 pub(super) fn encode(value: f32) -> u16 {
     let sign = ((value.to_bits() >> 16) & 0x8000) as u16;
     let size = f32::from_bits(value.to_bits() & 0x7FFF_FFFF);
@@ -29,9 +29,9 @@ pub(super) fn encode(value: f32) -> u16 {
     if size >= MAX {
         return sign | 0x7BFF;
     }
-    // Below 2⁻¹⁴ codes are multiples of 2⁻²⁴, else the upper bits of single precision with another exponent.
+    // Below 2⁻¹⁴ (subnormal) a code is a multiple of 2⁻²⁴. Above, it is the upper bits of the f32 with the exponent rebased.
     let (bits, step) = if size < 1.0 / 16_384.0 {
-        // Adding 1/2 makes the last bit of single precision worth 2⁻²⁴: the sum is rounded as is wanted here.
+        // In [1/2, 1) the last bit of an f32 is worth 2⁻²⁴, so adding 1/2 rounds to a multiple of 2⁻²⁴.
         return sign | ((size + 0.5).to_bits() - 0.5_f32.to_bits()) as u16;
     } else {
         (size.to_bits() - (112 << 23), 1_u32 << 13)

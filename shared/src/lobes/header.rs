@@ -15,21 +15,21 @@ pub struct Header {
     pub schema: u16,
     /// Length of the table in bytes, header included.
     pub length: u32,
-    /// Counted up by the device; 0 in a file.
+    /// Incremented by the device with each upload; 0 in a file.
     pub generation: u32,
-    /// CRC-32 of everything but itself.
+    /// CRC-32 of all bytes of the table except these four.
     pub crc: u32,
 }
 
 impl Header {
-    /// True for the schemas that this code reads.
+    /// True if this code can read the schema.
     pub const fn knows(schema: u16) -> bool {
         schema == SCHEMA_PLAIN || schema == SCHEMA
     }
 
-    /// The header at the beginning of `bytes`; refuses a wrong magic, an unknown schema and a length that cannot be.
+    /// Reads the header at the beginning of `bytes`. Refuses a wrong magic number, an unknown schema and an impossible length.
     ///
-    /// More may follow in `bytes` than the length says; whether the CRC is right is for [`check`](Self::check) to say.
+    /// `bytes` may be longer than the table. The CRC is not checked here, but by [`check`](Self::check).
     pub fn read(bytes: &[u8]) -> Result<Self, TableError> {
         let too_short = TableError::TooShort {
             needed: LAYERS_OFFSET as u32,
@@ -61,7 +61,7 @@ impl Header {
         })
     }
 
-    /// Refuses bytes that are not exactly the table of this header.
+    /// Checks that `bytes` are exactly the table of this header, including the CRC.
     pub fn check(&self, bytes: &[u8]) -> Result<(), TableError> {
         if bytes.len() as u64 != u64::from(self.length) {
             return Err(TableError::Length {
@@ -71,7 +71,7 @@ impl Header {
         }
         let payload = bytes.get(HEADER_LENGTH..).unwrap_or_default();
         self.check_payload(payload)?;
-        // The CRC was taken with zeros where the header has them: they must be there.
+        // The CRC assumes zeros in the reserved bytes of the header, so these bytes must be zero.
         if bytes.get(..HEADER_LENGTH) == Some(&self.to_bytes()) {
             return Ok(());
         }
@@ -82,7 +82,7 @@ impl Header {
         })
     }
 
-    /// Refuses a payload, the bytes behind the header, that does not have the CRC of this header.
+    /// Checks the CRC of the payload: the bytes after the header.
     pub fn check_payload(&self, payload: &[u8]) -> Result<(), TableError> {
         let computed = self.crc_with(payload);
         if computed == self.crc {
@@ -95,7 +95,7 @@ impl Header {
         }
     }
 
-    /// This header with another generation, and with the CRC that then is right for `payload`: the bytes behind the header.
+    /// This header with another generation and the matching CRC. `payload` are the bytes after the header.
     pub fn with_generation(self, generation: u32, payload: &[u8]) -> Self {
         let renewed = Self { generation, ..self };
         Self {
@@ -127,7 +127,7 @@ impl Header {
         bytes
     }
 
-    /// The CRC-32 of a table with this header, as far as the header: the payload is to follow.
+    /// The CRC-32 over the header only; the caller updates it with the payload.
     pub fn begin_crc(&self) -> Crc32 {
         let mut crc = Crc32::new();
         crc.update(self.without_crc().get(..CRC_OFFSET).unwrap_or_default());

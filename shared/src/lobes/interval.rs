@@ -1,37 +1,37 @@
-//! An interval of depths that is not stable, and how stability is lost there.
+//! A depth interval that is not stable, and the kind of its stability loss.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Hertz, Millimeters};
 
-/// What a depth interval is, if it is not stable.
+/// Kind of stability loss in a depth interval.
 ///
-/// Multipliers are those over a tooth period; of a tool with teeth at unequal pitch over a revolution.
+/// The Floquet multipliers are those of one tooth period; for a tool with unequal pitch, of one revolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum IntervalKind {
-    /// Chatter at a frequency of its own: a complex pair of multipliers outside the unit circle.
+    /// Hopf (Neimark–Sacker): a complex pair of Floquet multipliers outside the unit circle.
     Hopf,
-    /// Chatter with twice the tooth period: a multiplier below −1.
+    /// Flip (period doubling): a real multiplier below −1; the vibration has twice the tooth period.
     Flip,
-    /// The forced orbit itself is lost: a multiplier above +1.
+    /// Fold: a real multiplier above +1; the forced orbit does not persist.
     Fold,
-    /// The computation could not decide (its error bar crosses the unit circle, or it failed).
+    /// Undecided: the error bound of the multiplier crosses the unit circle, or the computation failed.
     Undecided,
 }
 
-/// A range of depths [from, to) that is not stable.
+/// A half-open depth interval [from, to) that is not stable.
 ///
-/// An interval that ends at the last depth of the table includes it.
+/// An interval that ends at the largest depth of the table includes that depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Interval {
-    /// The first depth that is not stable.
+    /// Smallest unstable depth.
     pub from: Millimeters,
-    /// The first depth that is stable again, or the last depth of the table.
+    /// Smallest depth above the interval that is stable, or the largest depth of the table.
     pub to: Millimeters,
-    /// What it is.
+    /// Kind of stability loss.
     pub kind: IntervalKind,
-    /// The chatter frequency; 0 where it is not known.
+    /// Chatter frequency; 0 if unknown.
     pub chatter: Hertz,
 }

@@ -1,4 +1,4 @@
-//! The description of a table: how many entries it has, where they are, and the scales of their numbers.
+//! The description of a table: numbers of entries, their offsets, and the scales of stored numbers.
 
 use core::ops::Range;
 
@@ -14,7 +14,7 @@ use super::{Interval, IntervalKind, TableError, Validity};
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::Limits;
 
-/// Where the arrays of a table are, and the scales of its numbers.
+/// Numbers of entries of a table, from which all offsets follow, and the scales of stored numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
     pub(super) teeth: u8,
@@ -28,14 +28,14 @@ pub(super) struct Shape {
     pub(super) name_length: usize,
     /// True for schema 2.
     pub(super) is_extended: bool,
-    /// True where the interpolation error is given.
+    /// True if the table contains its interpolation error.
     pub(super) error_given: bool,
-    /// Number of modes of each layer whose derivatives are given; 0 for none.
+    /// Number of modes per layer whose derivatives the table contains; 0 for none.
     pub(super) modes: usize,
 }
 
 impl Shape {
-    /// Reads the description and checks that all of it can be.
+    /// Reads the description and checks it.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, TableError> {
         let found = saturate(bytes.len());
         let shape = Self::read_fields(bytes).ok_or(TableError::TooShort {
@@ -84,7 +84,7 @@ impl Shape {
         })
     }
 
-    /// Refuses numbers that cannot be.
+    /// Checks that all numbers are possible.
     pub(super) fn check(&self) -> Result<(), TableError> {
         if self.teeth == 0 {
             return Err(TableError::Teeth);
@@ -140,8 +140,8 @@ impl Shape {
             .unwrap_or_default()
     }
 
-    // The counts are 16 bits wide, so these offsets fit 32 bits: 24·65535 + 4·65535 + 2·65535·65536 would not, but such a
-    // table cannot be held by a target with 32-bit addresses; saturating keeps the sum from wrapping there.
+    // With 16-bit counts the offsets of speeds and columns fit into 32 bits. The offset of the intervals may reach
+    // 24·65535 + 4·65535 + 2·65535·65536 and not fit. It saturates, and such a table does not fit into the memory either.
     fn speeds_offset(&self) -> usize {
         LAYERS_OFFSET + LAYER_LENGTH * self.layers
     }
@@ -174,7 +174,7 @@ impl Shape {
         f32_at(bytes, self.speeds_offset() + 4 * index)
     }
 
-    /// Indices of the intervals of a column.
+    /// Range of the indices of a column's intervals.
     pub(super) fn column_range(&self, bytes: &[u8], layer: usize, speed: usize) -> Option<Range<usize>> {
         if layer >= self.layers || speed >= self.speeds {
             return None;
@@ -186,7 +186,7 @@ impl Shape {
         Some(from..to)
     }
 
-    /// The intervals of a column; `None` for one of a kind that does not exist.
+    /// The intervals of a column; an item is `None` if its kind is unknown.
     pub(super) fn column<'a>(
         &self,
         bytes: &'a [u8],
@@ -201,7 +201,7 @@ impl Shape {
         let entries = bytes.get(offset(range.start)?..offset(range.end)?)?;
         let (depth_from_mm, depth_to_mm) = (self.depth_from_mm, self.depth_to_mm);
         let (depth_step_mm, chatter_step_hz) = (self.depth_step_mm(), self.chatter_step_hz());
-        // The ends must come out exactly: they say that an interval reaches the end of the table.
+        // The largest code must give exactly the largest depth, which marks an interval that reaches the end of the table.
         let depth = move |code: u16| match code {
             u16::MAX => Millimeters(depth_to_mm),
             _ => Millimeters(depth_from_mm + f32::from(code) * depth_step_mm),
@@ -219,14 +219,15 @@ impl Shape {
 }
 
 impl Shape {
-    /// Bytes behind the intervals.
+    /// Length in bytes of the additions after the intervals.
     pub(super) fn additions_length(&self) -> u64 {
         let error = if self.error_given { ERROR_LENGTH as u64 } else { 0 };
         let modes = (MODE_LENGTH * self.modes) as u64 * self.layers as u64;
         error + modes + self.slopes_length() as u64 * self.intervals as u64
     }
 
-    /// Bytes of the derivatives of one interval: two ends, 16 bits each by frequency and damping of every mode and by force.
+    /// Length in bytes of the derivatives of one interval: for both ends, 16 bits per derivative by the frequency and the damping
+    /// ratio of each mode and by the cutting force.
     fn slopes_length(&self) -> usize {
         if self.modes == 0 {
             0
@@ -269,7 +270,7 @@ impl Shape {
         })
     }
 
-    /// Derivatives of the interval with this index in the whole table.
+    /// Derivatives of the interval with this index, counted over the whole table.
     pub(super) fn interval_slopes(&self, bytes: &[u8], index: usize) -> Option<IntervalSlopes> {
         if self.modes == 0 || index >= self.intervals {
             return None;
@@ -286,7 +287,7 @@ impl Shape {
         })
     }
 
-    /// The feed direction a layer holds for; `None` for any. The error is a code that no direction has.
+    /// The feed direction for which a layer is valid; `None` for any. An impossible code is an error.
     pub(super) fn feed_direction(&self, bytes: &[u8], layer: usize) -> Result<Option<Degrees>, TableError> {
         let wrong = TableError::FeedDirection {
             layer: saturate(layer),
@@ -304,7 +305,7 @@ impl Shape {
     }
 }
 
-/// The flags of a table: refuses those that this code does not know. Schema 1 has but one, the others were not looked at.
+/// Refuses unknown flags of schema 2. In schema 1 all flags except the first are ignored.
 fn check_flags(flags: u16, is_extended: bool) -> Result<(), TableError> {
     let modes = usize::from(flags >> MODES_SHIFT);
     if is_extended && (flags & 0xFF & !KNOWN_FLAGS != 0 || modes > MODES_MAX) {

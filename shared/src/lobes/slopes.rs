@@ -1,16 +1,16 @@
-//! How a limit moves with what the device learns: derivatives beside the entries, and the corrected limit.
+//! Derivatives of the stability limits by modal parameters and cutting force, and the corrected limit.
 //!
-//! To first order limit(p + Δp) = limit(p) + Σ ∂limit/∂ln p · Δp/p, with p the natural frequencies and damping ratios of a
-//! layer's modes (shapes kept) and the cutting force coefficient K_tc (K_rc and K_ac in fixed ratio to it).
+//! To first order, limit(p + Δp) = limit(p) + Σ ∂limit/∂ln p · Δp/p. The parameters p are the natural frequencies and damping
+//! ratios of a layer's modes, with fixed mode shapes, and the cutting force coefficient K_tc, with K_rc/K_tc and K_ac/K_tc fixed.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Hertz, Millimeters};
 
-/// The most modes of a table whose derivatives are kept: those that matter most.
+/// Largest number of modes per layer with derivatives. It limits the size of a table.
 pub const MODES_MAX: usize = 4;
 
-/// A mode as the table was computed with it.
+/// A mode with the parameters from which the table was computed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LayerMode {
     /// Natural frequency |λ|/2π.
@@ -19,10 +19,10 @@ pub struct LayerMode {
     pub damping_ratio: f32,
 }
 
-/// Derivatives of one end of an interval, mm per relative change of a parameter.
+/// Derivatives of one end of an interval, in mm per relative change of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
-    /// By the natural frequency of each mode; 0 for those that the table has not.
+    /// By the natural frequency of each mode; 0 for modes that the table does not contain.
     pub by_frequency: [f32; MODES_MAX],
     /// By the damping ratio of each mode.
     pub by_damping_ratio: [f32; MODES_MAX],
@@ -30,34 +30,34 @@ pub struct Slopes {
     pub by_cutting_force: f32,
 }
 
-/// Derivatives of both ends of an interval; 0 for an end at the first or last depth of the table.
+/// Derivatives of both ends of an interval; 0 for an end at the smallest or largest depth of the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct IntervalSlopes {
-    /// Of the first depth that is not stable.
+    /// Derivatives of the lower end.
     pub from: Slopes,
-    /// Of the first depth that is stable again.
+    /// Derivatives of the upper end.
     pub to: Slopes,
 }
 
-/// What was learned since the table was computed: relative changes, such as 0.01 for 1 % more.
+/// Relative changes of parameters since the table was computed: 0.01 is an increase by 1 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Learned {
-    /// Of the natural frequency of each mode of the layer.
+    /// Relative change of the natural frequency of each mode of the layer.
     pub frequency: [f32; MODES_MAX],
-    /// Of the damping ratio of each mode.
+    /// Relative change of the damping ratio of each mode.
     pub damping_ratio: [f32; MODES_MAX],
-    /// Of the cutting force coefficient.
+    /// Relative change of the cutting force coefficient.
     pub cutting_force: f32,
 }
 
 impl Learned {
-    /// Nothing but new values of one mode of a layer; a number that is no mode of the table changes nothing.
+    /// The changes if only the mode with this index has new values. An index beyond the modes of the table gives no changes.
     pub fn of_mode(index: usize, table: &LayerMode, now: &LayerMode) -> Self {
         let mut learned = Self::default();
         if let Some(slot) = learned.frequency.get_mut(index) {
             *slot = (now.frequency.0 - table.frequency.0) / table.frequency.0;
         }
-        // A mode without damping has no relative change of it.
+        // For zero damping the relative change is undefined.
         if let Some(slot) = learned.damping_ratio.get_mut(index)
             && table.damping_ratio > 0.0
         {
@@ -68,7 +68,7 @@ impl Learned {
 }
 
 impl Slopes {
-    /// By how much the depth moves, to first order.
+    /// Shift of the depth, to first order: positive for a higher limit.
     pub fn shift(&self, learned: &Learned) -> Millimeters {
         let mut shift_mm = self.by_cutting_force * learned.cutting_force;
         for (slope, change) in self.by_frequency.iter().zip(&learned.frequency) {
@@ -80,7 +80,7 @@ impl Slopes {
         Millimeters(shift_mm)
     }
 
-    /// The numbers in the order of the table's bytes, for so many modes.
+    /// The derivatives in the order of the table's bytes, for this number of modes.
     pub(super) fn numbers(&self, modes: usize) -> impl Iterator<Item = f32> + '_ {
         self.by_frequency
             .iter()
@@ -104,10 +104,10 @@ impl Slopes {
     }
 }
 
-/// The limit with what was learned, to first order, kept within depths `from` to `to`.
+/// The limit corrected to first order, clamped to the depths `from` to `to`.
 ///
-/// Good while the correction is small against the distance to the next cusp; who learns must not correct by more than a
-/// few percent of a frequency. A correction that is no number leaves the limit as it is.
+/// The correction is valid while it is small against the distance to the next cusp of the lobes, which allows changes of a frequency by
+/// a few percent. A NaN correction leaves the limit unchanged.
 pub fn corrected_limit(
     limit: Millimeters,
     slopes: &Slopes,

@@ -1,4 +1,4 @@
-//! A table, read where its bytes lie.
+//! The lobe table, read in place from its bytes.
 
 use super::format::{self, Header};
 use super::shape::Shape;
@@ -7,19 +7,19 @@ use super::{Column, InterpolationError, Interval, NotKnown, TableError, Validity
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 use crate::working_point::Limits;
 
-/// A validated table, read where it lies.
+/// A validated lobe table, read in place from its bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct LobeTable<'a> {
     pub(super) bytes: &'a [u8],
     pub(super) shape: Shape,
-    /// Where the feed goes, if that is known.
+    /// Feed direction of the cut, if set.
     pub(super) feed_direction: Option<Degrees>,
 }
 
 impl<'a> LobeTable<'a> {
-    /// The table in bytes that [`parse`](Self::parse) accepted before: the CRC and the entries are not checked again.
+    /// Opens bytes that [`parse`](Self::parse) has accepted before, without checking CRC and entries again.
     ///
-    /// Bytes that changed since do no harm beyond wrong entries: every read is checked against their length.
+    /// If the bytes were changed since, entries may be wrong. Every read is bounds-checked.
     pub fn reopen(bytes: &'a [u8]) -> Result<Self, TableError> {
         Header::read(bytes)?;
         Ok(Self {
@@ -49,12 +49,12 @@ impl<'a> LobeTable<'a> {
         self.shape.teeth
     }
 
-    /// Limits of the machine, where the case has them.
+    /// Speed limits of the machine, if the case has any.
     pub fn limits(&self) -> Option<Limits> {
         self.shape.limits
     }
 
-    /// The smallest and the largest depth.
+    /// The smallest and the largest depth of the table.
     pub fn depths(&self) -> (Millimeters, Millimeters) {
         (
             Millimeters(self.shape.depth_from_mm),
@@ -62,30 +62,30 @@ impl<'a> LobeTable<'a> {
         )
     }
 
-    /// Largest difference between an entry and the depth it was made from, in mm: one step of the 16-bit grid.
+    /// Largest rounding error of a stored depth: one step of the 16-bit grid.
     ///
-    /// Entries are rounded to the unstable side: `from` down, `to` up (see [`format`]).
+    /// Depths are rounded to the unstable side: `from` down, `to` up (see [`format`]).
     pub fn depth_step(&self) -> Millimeters {
         Millimeters(self.shape.depth_step_mm())
     }
 
-    /// Largest difference between an entry and the chatter frequency it was made from: half a step of the 16-bit grid.
+    /// Largest rounding error of a stored chatter frequency: half a step of the 16-bit grid.
     pub fn chatter_error(&self) -> Hertz {
         Hertz(0.5 * self.shape.chatter_step_hz())
     }
 
-    /// The spindle speeds of the grid, ascending.
+    /// The grid speeds, ascending.
     pub fn speeds(&self) -> impl ExactSizeIterator<Item = Rpm> + DoubleEndedIterator + use<'a> {
         let table = *self;
         (0..self.shape.speeds).map(move |index| Rpm(table.speed_rpm(index)))
     }
 
-    /// The speed of the grid at `index`.
+    /// The grid speed with this index.
     pub fn speed(&self, index: usize) -> Option<Rpm> {
         (index < self.shape.speeds).then(|| Rpm(self.speed_rpm(index)))
     }
 
-    /// Number of speeds of the grid below or equal to `speed`; they are `0..` this.
+    /// Number of grid speeds that are at most `speed`: their indices are 0 up to this number, exclusive.
     pub fn speeds_up_to(&self, speed: Rpm) -> usize {
         let (mut low, mut high) = (0, self.shape.speeds);
         while low < high {
@@ -99,20 +99,20 @@ impl<'a> LobeTable<'a> {
         low
     }
 
-    /// What the layers are valid for, in the order of the table.
+    /// The validity of each layer, in the order of the table.
     pub fn layers(&self) -> impl ExactSizeIterator<Item = Validity> + Clone + use<'a> {
         let table = *self;
         (0..self.shape.layers).map(move |layer| table.shape.validity(table.bytes, layer).unwrap_or(NOWHERE))
     }
 
-    /// The entries of one layer at one speed of the grid.
+    /// The entries of one layer at one grid speed.
     pub fn entry(&self, layer: usize, speed_index: usize) -> Option<Column> {
         let mut column = self.empty_column();
         self.read_column(layer, speed_index, &mut column).ok()?;
         Some(column)
     }
 
-    /// The same table for cuts whose feed has this direction, from the machine's x towards its y.
+    /// The same table, with the feed direction of the cut set: the angle from the machine's x axis towards its y axis.
     pub fn towards(self, feed_direction: Degrees) -> Self {
         Self {
             feed_direction: Some(feed_direction),
@@ -120,17 +120,17 @@ impl<'a> LobeTable<'a> {
         }
     }
 
-    /// The feed direction that cuts are asked for with, as [`towards`](Self::towards) has told it.
+    /// The feed direction set by [`towards`](Self::towards).
     pub fn asked_direction(&self) -> Option<Degrees> {
         self.feed_direction
     }
 
     pub(super) fn speed_rpm(&self, index: usize) -> f32 {
-        // Where the bytes changed after the check, NaN fails every comparison and ends in `NotKnown`.
+        // If the bytes were changed after the check, NaN fails every comparison and the lookup returns `NotKnown`.
         self.shape.speed_rpm(self.bytes, index).unwrap_or(f32::NAN)
     }
 
-    /// The intervals of one layer at one speed of the grid, as they are stored.
+    /// The stored intervals of one layer at one grid speed.
     pub(super) fn intervals(
         &self,
         layer: usize,
@@ -141,9 +141,9 @@ impl<'a> LobeTable<'a> {
         Ok(intervals.map(|interval| interval.ok_or(NotKnown::Damaged)))
     }
 
-    /// Reads the intervals of one layer at one speed of the grid into an empty column.
+    /// Reads the intervals of one layer at one grid speed into an empty column.
     ///
-    /// Columns are large: they are filled where they lie, not moved.
+    /// A column is large, so it is filled in place rather than returned.
     pub(super) fn read_column(
         &self,
         layer: usize,
@@ -162,12 +162,12 @@ impl<'a> LobeTable<'a> {
 }
 
 impl LobeTable<'_> {
-    /// How far lookups between the entries may be off; `None` where the table does not say.
+    /// Bound of the interpolation error; `None` if the table has none.
     pub fn interpolation_error(&self) -> Option<InterpolationError> {
         self.shape.interpolation_error(self.bytes)
     }
 
-    /// The feed direction that a layer holds for, from the machine's x towards its y; `None` for any.
+    /// The feed direction for which a layer is valid, from the machine's x axis towards its y axis; `None` for any direction.
     pub fn feed_direction(&self, layer: usize) -> Option<Degrees> {
         self.shape.feed_direction(self.bytes, layer).ok().flatten()
     }

@@ -1,91 +1,91 @@
-//! What a table says of a point, and why it may not.
+//! The result of a lookup: stable, unstable, or not known with the reason.
 
 use serde::{Deserialize, Serialize};
 
 use super::IntervalKind;
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 
-/// Why a table has no answer.
+/// The reason why a lookup has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum NotKnown {
     /// The speed lies outside the table.
     Speed {
-        /// The speed asked for.
+        /// The requested speed.
         asked: Rpm,
-        /// The slowest of the table.
+        /// The slowest speed of the table.
         from: Rpm,
-        /// The fastest of the table.
+        /// The fastest speed of the table.
         to: Rpm,
     },
     /// The depth lies outside the table.
     Depth {
-        /// The depth asked for.
+        /// The requested depth.
         asked: Millimeters,
-        /// The smallest of the table.
+        /// The smallest depth of the table.
         from: Millimeters,
-        /// The largest of the table.
+        /// The largest depth of the table.
         to: Millimeters,
     },
     /// The feed per tooth lies outside the layers for this immersion and posture.
     Feed {
-        /// The feed asked for.
+        /// The requested feed per tooth.
         asked: Millimeters,
-        /// The smallest of the layers.
+        /// The smallest feed of these layers.
         from: Millimeters,
-        /// The largest of the layers.
+        /// The largest feed of these layers.
         to: Millimeters,
     },
     /// The table has no layer for this immersion.
     Immersion {
-        /// The entry angle asked for.
+        /// The requested entry angle.
         start: Degrees,
-        /// The exit angle asked for.
+        /// The requested exit angle.
         exit: Degrees,
     },
     /// The table has no layer for this posture.
     Posture {
-        /// The posture asked for.
+        /// The requested posture.
         asked: u8,
     },
-    /// The table is for a tool with another number of teeth.
+    /// The table was computed for another number of teeth.
     Teeth {
-        /// The teeth of the tool.
+        /// Number of teeth of the tool.
         asked: u8,
-        /// The teeth of the table.
+        /// Number of teeth in the table.
         table: u8,
     },
-    /// The point lies in the table, but its computation could not decide.
+    /// The point lies in the table, but its stability is [`Undecided`](super::IntervalKind::Undecided).
     Undecided,
-    /// The bytes of the table changed after they were checked.
+    /// The bytes of the table were changed after the check.
     Damaged,
-    /// The table has layers for several feed directions, and none is near enough to the one asked for.
+    /// The table has layers for several feed directions, and none is close enough to the requested one.
     FeedDirection {
-        /// The direction asked for.
+        /// The requested feed direction.
         asked: Degrees,
     },
-    /// The table has layers for several feed directions, and that of the cut was not told.
+    /// The table has layers for several feed directions, and no feed direction is set.
     FeedDirectionNotTold,
 }
 
-/// What the table says of a point.
+/// Stability of a point (speed, working point) according to the table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TabulatedStability {
-    /// Disturbances die out.
+    /// The cut is stable: a perturbation of the forced vibration decays.
     Stable {
-        /// Distance in depth to the nearest depth that is not stable, or to the end of the table.
+        /// Distance to the nearest depth that is not stable, or to the end of the table.
         margin: Millimeters,
     },
-    /// The cut chatters.
+    /// The cut is unstable.
     Unstable {
-        /// The kind of the loss of stability.
+        /// Kind of stability loss.
         kind: IntervalKind,
-        /// The chatter frequency; 0 where it is not known.
+        /// Chatter frequency; 0 if unknown.
         chatter: Hertz,
-        /// Distance in depth to the nearest stable depth, or to the end of the table.
+        /// Distance to the nearest stable depth, or to the end of the table.
         margin: Millimeters,
     },
-    /// The table does not know.
+    /// The table does not contain the point; the reason is given.
     NotKnown(NotKnown),
 }

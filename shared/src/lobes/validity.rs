@@ -1,33 +1,33 @@
-//! What a layer of a table is valid for.
+//! The conditions for which a layer of a table is valid.
 
 use serde::{Deserialize, Serialize};
 
 use crate::units::{Degrees, Millimeters};
 
-/// What a layer is valid for.
+/// The conditions for which a layer is valid: feed range, immersion and posture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Validity {
     /// Smallest feed per tooth.
     pub feed_from: Millimeters,
-    /// Largest feed per tooth; equal to the smallest where limits depend on the feed.
+    /// Largest feed per tooth; equal to the smallest if the limits depend on the feed.
     pub feed_to: Millimeters,
-    /// Immersion angle where a tooth enters.
+    /// Entry angle of a tooth.
     pub start: Degrees,
-    /// Immersion angle where a tooth leaves.
+    /// Exit angle of a tooth.
     pub exit: Degrees,
-    /// Posture of the robot; 0 on a machine tool.
+    /// Index of the robot's posture; 0 on a machine tool.
     pub posture: u8,
 }
 
 impl Validity {
-    /// True where both have the same immersion and posture: feeds may then be interpolated between them.
+    /// True if both have the same immersion and posture, so that the feed may be interpolated between them.
     pub(super) fn is_family_of(&self, other: &Self) -> bool {
         self.posture == other.posture && self.start == other.start && self.exit == other.exit
     }
 }
 
-/// Stands for a layer that could not be read: no working point lies in it.
+/// Placeholder for a layer that could not be read. Its NaN bounds contain no working point.
 pub(super) const NOWHERE: Validity = Validity {
     feed_from: Millimeters(f32::NAN),
     feed_to: Millimeters(f32::NAN),

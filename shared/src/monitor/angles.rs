@@ -4,20 +4,20 @@ use super::pipeline::Monitor;
 use super::state::State;
 use crate::tachometer::Turns;
 
-/// The angle at the first sample of a block, and how it goes on.
+/// Spindle angle at the first sample of a block, with its increment per sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angles {
     first: Turns,
-    /// 2⁻³² turns per sample of the sensor.
+    /// Increment per sensor sample, in 2⁻³² revolutions.
     per_sample: u64,
-    /// Standard deviation, in tooth periods.
+    /// Standard deviation of the angle, in tooth periods.
     pub(super) deviation: f32,
-    /// Samples of the sensor per tooth period.
+    /// Sensor samples per tooth period.
     pub(super) samples_per_tooth: f32,
 }
 
 impl Angles {
-    /// The angle at sample `n` of the block, less a group delay in samples.
+    /// The angle `delay` samples before sample `n` of the block: compensates the group delay of a filter.
     pub(super) fn at(&self, n: usize, delay: u32) -> Turns {
         let forward = self.per_sample.wrapping_mul(n as u64);
         let back = self.per_sample.wrapping_mul(u64::from(delay));
@@ -26,7 +26,7 @@ impl Angles {
 }
 
 impl Monitor {
-    /// The angles of the samples of the newest block.
+    /// The angles of the newest block; `None` while the tachometer has no lock.
     pub(super) fn angles(&self, state: &State) -> Option<Angles> {
         let tachometer = self.tachometer.as_ref()?;
         let phase = tachometer.phase(&state.tachometer, state.sample_clock.time_of(0)?)?;

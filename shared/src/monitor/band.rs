@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Band {
-    /// Modes of a robot or a machine's frame: 5 to 400 Hz.
+    /// 5 to 400 Hz: modes of a robot or of a machine's frame.
     Structure,
-    /// Modes of tool, holder and spindle: up to 5 kHz.
+    /// Up to 5 kHz: modes of tool, holder and spindle.
     Tool,
 }

@@ -1,4 +1,4 @@
-//! What the pipeline knows of one band.
+//! The state of one frequency band.
 
 use crate::decimation::Sample;
 use crate::detector::growth::Growth;
@@ -8,24 +8,24 @@ use crate::spectrum::{Overlap, PowerSpectrum};
 use crate::synchronous::SamplerState;
 use crate::units::Hertz;
 
-/// One band on its way from samples to findings.
+/// The state of one band: samples for the next spectrum, the newest spectrum, and the tooth periods.
 #[derive(Clone, Debug)]
 pub(super) struct BandState<const POINTS: usize, const BINS: usize> {
     pub(super) overlap: Overlap<POINTS>,
     pub(super) power: [f32; BINS],
     /// Width of a bin of the newest spectrum; 0 before the first.
     pub(super) bin: Hertz,
-    /// The newest block completed a spectrum.
+    /// True if the newest block completed a spectrum.
     pub(super) fresh: bool,
     pub(super) background: Background<BINS>,
     pub(super) tone: Option<Tone>,
     pub(super) sampler: SamplerState,
     pub(super) growth: Growth,
-    /// The newest block completed a passing.
+    /// True if the newest block completed a tooth period whose growth was evaluated.
     pub(super) passed: bool,
-    /// Root mean square of the sensor's noise in one channel of a passing, in m/s².
+    /// Root mean square of the sensor noise in one channel of a tooth period, in m/s².
     pub(super) floor: f32,
-    /// Samples of the band since the growth was last looked at.
+    /// Samples of the band since growth was last evaluated.
     pub(super) since_look: u32,
 }
 
@@ -46,7 +46,7 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
         }
     }
 
-    /// Knows nothing again. What is only read where it was written since stays as it is.
+    /// Resets to the initial state. Buffers that are written before they are read keep their content.
     pub(super) fn reset(&mut self) {
         let Self {
             overlap,
@@ -69,20 +69,20 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
         (*fresh, *tone, *passed, *floor, *since_look) = (false, None, false, 0.0, 0);
     }
 
-    /// Takes a sample towards the next spectrum, one of which is due every `hop` samples.
+    /// Takes a sample for the next spectrum; a spectrum is due every `hop` samples.
     pub(super) fn take(&mut self, sample: Sample, hop: usize) {
         self.fresh |= self.overlap.push(sample, hop);
         self.since_look = self.since_look.saturating_add(1);
     }
 
-    /// Forgets the signal, but not what is usual.
+    /// Discards samples and tone after a gap. The background spectrum is kept.
     pub(super) fn interrupt(&mut self) {
         self.overlap.reset();
         self.tone = None;
         self.interrupt_angles();
     }
 
-    /// Forgets what was sampled at angles.
+    /// Discards the tooth periods, after the tachometer lost its lock.
     pub(super) fn interrupt_angles(&mut self) {
         self.sampler = SamplerState::new();
         self.growth.reset();
@@ -96,7 +96,7 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
     }
 }
 
-/// Goes on with the tone of a fresh spectrum, and with the background where there is no chatter.
+/// Updates the tracked tone from a new spectrum. Updates the background spectrum unless there is chatter.
 pub(super) fn follow_tone<const POINTS: usize, const BINS: usize>(
     band: &mut BandState<POINTS, BINS>,
     rotation: Option<Rotation>,

@@ -1,4 +1,4 @@
-//! Samples of both bands, taken towards spectra and at fixed angles.
+//! Samples of both bands: collected for spectra, and resampled at fixed spindle angles into tooth periods.
 
 use super::Band;
 use super::angles::Angles;
@@ -12,19 +12,21 @@ use crate::math;
 use crate::spectrum::{STRUCTURE_POINTS, TOOL_POINTS};
 use crate::synchronous::{Method, Passed, SLOTS, Sampler};
 
-/// Samples of a band from one spectrum to the next.
+/// Samples between two spectra of the tool band: an overlap of 1/2.
 const TOOL_HOP: usize = TOOL_POINTS / 2;
+/// Samples between two spectra of the structure band: an overlap of 3/4.
 const STRUCTURE_HOP: usize = STRUCTURE_POINTS / 4;
-/// A tooth period must have so many samples of a band to be sampled at fixed angles.
+/// Fewest samples per tooth period for resampling the structure band at fixed angles. Unfounded.
 const STRUCTURE_SAMPLES_PER_TOOTH: f32 = 8.0;
+/// Fewest samples per tooth period for resampling the tool band at fixed angles. Unfounded.
 const TOOL_SAMPLES_PER_TOOTH: f32 = 2.5;
-/// The angle must be known to this part of a tooth period.
+/// Largest standard deviation of the spindle angle for resampling, in tooth periods. Unfounded.
 const LARGEST_ANGLE_DEVIATION: f32 = 0.03;
-/// In the tool band growth is looked at not more often than after so many of its samples, 4 ms: what it costs.
+/// Fewest tool-band samples between two evaluations of growth: 4 ms. It limits the computing time.
 const LOOK_SAMPLES: u32 = 53;
 
 impl Monitor {
-    /// Whether samples of a band can be taken at fixed angles.
+    /// True if a band, decimated by `divisor`, has `least` samples per tooth period and the angle is known well enough.
     fn can_sample(&self, angles: &Angles, divisor: u32, least: f32) -> bool {
         angles.samples_per_tooth >= least * divisor as f32 && angles.deviation < LARGEST_ANGLE_DEVIATION
     }
@@ -48,15 +50,15 @@ impl Monitor {
         };
         let rate = self.settings.sensor.nominal_rate.0 / self.decimation.tool_divisor() as f32;
         let noise = self.noise_density() * 0.5 * rate;
-        // Not closely: samples between the samples are as good as a cubic, and what that leaves of the forced vibration turns by the samples per
-        // tooth period, a tone that beats with its own harmonics.
+        // No evaluation of slow growth in this band. The error of cubic interpolation leaves a residual of the forced vibration, which
+        // beats with the ratio of tooth period to sample period and would look like slow growth.
         let look = if band.since_look >= LOOK_SAMPLES {
             Look::Quick
         } else {
             Look::None
         };
         self.take_passing(band, &passed, noise, look);
-        // Slower teeth than the structure band needs are shown from there.
+        // The stroboscopic map comes from the tool band only if the tooth period is too short for the structure band.
         if !self.can_sample(
             angles,
             self.decimation.structure_divisor(),
@@ -88,7 +90,7 @@ impl Monitor {
         let Some(passed) = sampler.step(&mut band.sampler, sample.map(|x| x as f32 * unit), angle) else {
             return;
         };
-        // A mean over w seconds lets 1/(2w) Hz of the noise through.
+        // A mean over w seconds has a noise bandwidth of 1/(2w) Hz.
         let rate = self.settings.sensor.nominal_rate.0;
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
@@ -96,6 +98,7 @@ impl Monitor {
         show(&mut state.strobes, Band::Structure, &passed);
     }
 
+    /// Passes a complete tooth period to the growth estimators. `noise` is the variance in (m/s²)² of one channel.
     fn take_passing<const POINTS: usize, const BINS: usize>(
         &self,
         band: &mut BandState<POINTS, BINS>,
@@ -112,7 +115,7 @@ impl Monitor {
             look,
         );
         if look >= Look::Quick {
-            // Without a look there is nothing new to judge.
+            // Without an evaluation the detector has no new finding.
             band.passed = true;
             band.since_look = 0;
         }

@@ -1,11 +1,11 @@
-//! The pipeline as it was set up.
+//! The configured signal chain.
 
 use super::settings::{self, Settings, SettingsError};
 use crate::acceleration::SampleClock;
 use crate::decimation::{Decimation, FRACTION_BITS};
 use crate::tachometer::Tachometer;
 
-/// The pipeline, set up. It never changes; what it learns is in [`State`].
+/// The configured signal chain. It is constant; everything learned is in [`State`](super::State).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor {
     pub(super) settings: Settings,
@@ -15,10 +15,10 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Sets the pipeline up.
+    /// Configures the signal chain.
     ///
     /// # Errors
-    /// [`SettingsError`] names the setting that cannot be, with its value.
+    /// [`SettingsError`] names the invalid setting and its value.
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
         settings::check(&settings)?;
         let tachometer = match settings.wheel {
@@ -35,12 +35,12 @@ impl Monitor {
         })
     }
 
-    /// The settings it was made from.
+    /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// White noise of the sensor and of its rounding, in (m/s²)² per Hz.
+    /// One-sided white-noise density of the sensor and of its rounding, in (m/s²)² per Hz.
     pub(super) fn noise_density(&self) -> f32 {
         let sensor = &self.settings.sensor;
         let density = sensor.noise_meters_per_second2_per_root_hertz;
@@ -48,6 +48,7 @@ impl Monitor {
         density * density + step * step / 6.0 / sensor.nominal_rate.0
     }
 
+    /// Acceleration in m/s² of one unit of a decimated sample.
     pub(super) fn unit(&self) -> f32 {
         self.settings.sensor.meters_per_second2_per_count / (1 << FRACTION_BITS) as f32
     }

@@ -1,4 +1,4 @@
-//! What the pipeline says after each block.
+//! The result of the signal chain for one block.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,21 +6,21 @@ use crate::advice::Advice;
 use crate::detector::Judgement;
 use crate::units::{Nanoseconds, Rpm};
 
-/// What the pipeline says after each block.
+/// The result of the signal chain for one block.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Sequence number of the block.
     pub sequence: u32,
     /// Time of the last sample of the block.
     pub time: Nanoseconds,
-    /// Spindle speed, where it is known.
+    /// Spindle speed: measured, else estimated from the spectrum, else assumed.
     pub speed: Option<Rpm>,
-    /// The verdict and what it rests on.
+    /// The verdict with its reason and estimates.
     pub judgement: Judgement,
-    /// What to do about it.
+    /// The advice; `None` if the spindle speed is unknown.
     pub advice: Option<Advice>,
-    /// Samples clipped since the start.
+    /// Number of clipped samples since the start.
     pub clipped: u32,
-    /// Samples lost since the start.
+    /// Number of lost samples since the start.
     pub lost: u32,
 }

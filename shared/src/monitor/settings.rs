@@ -1,4 +1,4 @@
-//! What the pipeline must be told before it starts.
+//! The settings of the signal chain and their check.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,34 +8,34 @@ use crate::tachometer::Wheel;
 use crate::units::{Hertz, Rpm};
 use crate::working_point::{Limits, Tool};
 
-/// What the pipeline must be told before it starts; the host may change it over the link.
+/// The settings of the signal chain. The host may change them over the link.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The accelerometer.
     pub sensor: Sensor,
     /// The tool.
     pub tool: Tool,
-    /// The tachometer wheel; `None` where there is no tachometer.
+    /// The tachometer wheel; `None` without a tachometer.
     pub wheel: Option<Wheel>,
-    /// Spindle speed to assume where there is no tachometer.
+    /// Spindle speed assumed without a tachometer.
     pub assumed_speed: Option<Rpm>,
-    /// What the spindle can do.
+    /// Speed limits of the spindle.
     pub limits: Option<Limits>,
 }
 
-/// The most teeth of a tool.
+/// Largest number of teeth of a tool.
 pub const MAX_TEETH: u8 = 12;
 
-/// What is wrong with [`Settings`].
+/// The reason why [`Settings`] are invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SettingsError {
     /// The tool has no teeth, or more than [`MAX_TEETH`].
     Teeth(u8),
-    /// The wheel has no positions, or less than four teeth beside its gap.
+    /// The wheel has no positions, or fewer than four teeth beside its gap.
     Wheel(Wheel),
-    /// The sample rate is not one that the filters are made for.
+    /// The sample rate is outside the range of the decimation filters.
     SampleRate(Hertz),
-    /// The value of one count is not a positive number.
+    /// The acceleration of one count is not a positive number.
     CountScale(f32),
     /// The noise of the sensor is not a number of at least 0.
     Noise(f32),
@@ -77,7 +77,7 @@ impl core::fmt::Display for SettingsError {
 
 impl core::error::Error for SettingsError {}
 
-/// Refuses settings that cannot be. Not-a-number fails every comparison, so each test is for what must hold.
+/// Checks the settings. NaN fails every comparison, so each condition is written as what must hold.
 pub(super) fn check(settings: &Settings) -> Result<(), SettingsError> {
     let Settings {
         sensor,

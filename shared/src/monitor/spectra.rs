@@ -1,4 +1,4 @@
-//! The spectra of both bands, and the spindle speed that is read from them.
+//! The spectra of both bands, their tones, and the spindle speed estimated from them.
 
 use super::band_state::follow_tone;
 use super::pipeline::Monitor;
@@ -8,22 +8,22 @@ use crate::peaks::Rotation;
 use crate::spectrum::{PowerSpectrum, structure_spectrum, tool_spectrum};
 use crate::units::Hertz;
 
-/// An assumed speed is believed to this part,
+/// Relative uncertainty of an assumed spindle speed. Unfounded.
 const ASSUMED_UNCERTAINTY: f32 = 0.005;
-/// one that was measured to this,
+/// Relative uncertainty of a spindle speed measured by the tachometer. Unfounded.
 const MEASURED_UNCERTAINTY: f32 = 5e-4;
-/// and one that was heard at the tooth passing to this part of a bin.
+/// Uncertainty of a tooth-passing frequency read from a spectrum, in bins. Unfounded.
 const HEARD_BINS: f32 = 0.2;
-/// A tooth-passing tone stands out of the noise by this factor of power at least to be believed.
+/// Smallest ratio of power to noise floor of a tone that is accepted as the tooth-passing tone: 20 dB. Unfounded.
 const HEARD_SNR: f32 = 100.0;
 /// Spectra are summed over all axes.
 const AXES: [usize; 3] = [0, 1, 2];
-/// Where tones are looked for.
+/// Frequency range of the tone search in each band.
 const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
 const TOOL_TONES: (Hertz, Hertz) = (Hertz(150.0), TOOL_BAND);
 
 impl Monitor {
-    /// Spectra that are due, the background, and the tones in them.
+    /// Computes the spectra that are due, and updates the background spectrum and the tracked tone of each band.
     pub(super) fn take_spectra(&self, state: &mut State, measured: Option<Hertz>) {
         let rate = state
             .sample_clock
@@ -78,7 +78,7 @@ impl Monitor {
         }
     }
 
-    /// Revolutions per second read from a tone at the tooth passing near the assumed one.
+    /// Revolutions per second, from a tone near the assumed tooth-passing frequency; `None` if there is no distinct tone.
     fn hear_speed(&self, spectrum: &PowerSpectrum<'_>) -> Option<Hertz> {
         let assumed = self.settings.assumed_speed?.to_hertz().0 * f32::from(self.settings.tool.teeth);
         let reach = ASSUMED_UNCERTAINTY * assumed + spectrum.bin.0;
@@ -88,7 +88,7 @@ impl Monitor {
             .then_some(Hertz(peak.frequency.0 / f32::from(self.settings.tool.teeth)))
     }
 
-    /// What the spindle does, with its uncertainty.
+    /// Rotation of the spindle with its uncertainty: measured, else from the spectrum, else assumed.
     fn rotation(&self, state: &State, measured: Option<Hertz>) -> Option<Rotation> {
         let with = |frequency: Hertz, uncertainty: f32| Rotation {
             frequency,

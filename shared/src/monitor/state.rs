@@ -1,4 +1,4 @@
-//! What the pipeline knows from the blocks so far.
+//! The state of the signal chain.
 
 use heapless::Vec;
 
@@ -15,28 +15,28 @@ use crate::tachometer::TachometerState;
 use crate::units::{Degrees, Hertz, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// What the pipeline knows from the blocks so far. [`State::new`] knows nothing.
+/// The state of the signal chain: everything learned from the blocks so far.
 #[derive(Clone, Debug)]
 pub struct State {
     pub(super) sample_clock: SampleClockState,
     pub(super) tachometer: TachometerState,
-    /// Times the tachometer had lost its lock when the angles were last taken from it.
+    /// The tachometer's count of lost locks at the previous block.
     pub(super) losses: u32,
     pub(super) decimation: decimation::State,
     pub(super) structure: BandState<STRUCTURE_POINTS, STRUCTURE_BINS>,
     pub(super) tool: BandState<TOOL_POINTS, TOOL_BINS>,
     pub(super) tool_work: [i32; TOOL_POINTS],
     pub(super) work: [f32; STRUCTURE_POINTS],
-    /// Part of the samples that were clipped or lost lately.
+    /// Running mean of the share of clipped or lost samples.
     pub(super) damage: f32,
-    /// Speed read from the spectrum, where there is no tachometer.
+    /// Spindle speed from the spectrum, in revolutions per second; used without a tachometer.
     pub(super) heard_speed: Option<Hertz>,
     pub(super) detector: Detector,
     pub(super) advice: Option<Advised>,
     pub(super) strobes: Vec<Strobe, MAX_BLOCK_STROBES>,
 }
 
-/// Advice, with what it was given for.
+/// Advice with the inputs from which it was computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Advised {
     pub(super) advice: Advice,
@@ -44,9 +44,9 @@ pub(super) struct Advised {
     pub(super) chatter: Option<Hertz>,
     pub(super) speed: Rpm,
     pub(super) working_point: Option<WorkingPoint>,
-    /// CRC-32 of the table.
+    /// CRC-32 of the lobe table.
     pub(super) table: Option<u32>,
-    /// The feed direction that the table was asked with.
+    /// Feed direction of the cut, if set.
     pub(super) feed_direction: Option<Degrees>,
 }
 
@@ -57,7 +57,7 @@ impl Default for State {
 }
 
 impl State {
-    /// Knows nothing.
+    /// The initial state.
     pub const fn new() -> Self {
         Self {
             sample_clock: SampleClockState::new(),
@@ -76,7 +76,7 @@ impl State {
         }
     }
 
-    /// Knows nothing again, as after [`State::new`], in place: a state is too large for the stack of a microcontroller.
+    /// Resets to the initial state in place. A state is too large for the stack of a microcontroller.
     pub fn reset(&mut self) {
         let Self {
             sample_clock,
@@ -103,8 +103,8 @@ impl State {
         (*losses, *damage, *heard_speed, *advice) = (0, 0.0, None, None);
     }
 
-    /// The points of the stroboscopic map that the newest block made, oldest first: of the structure band where it holds tooth
-    /// periods long enough, else of the tool band.
+    /// The points of the stroboscopic map from the newest block, oldest first. They come from the structure band if the tooth period is
+    /// long enough for it, else from the tool band.
     pub fn strobes(&self) -> &[Strobe] {
         &self.strobes
     }
@@ -117,7 +117,7 @@ impl State {
         }
     }
 
-    /// True where the newest block completed a spectrum of the band.
+    /// True if the newest block completed a spectrum of the band.
     pub fn has_fresh_spectrum(&self, band: Band) -> bool {
         match band {
             Band::Structure => self.structure.fresh,
@@ -125,7 +125,7 @@ impl State {
         }
     }
 
-    /// What the samples at fixed angles of a band say.
+    /// The newest finding from the tooth periods of a band.
     pub fn finding(&self, band: Band) -> &Finding {
         match band {
             Band::Structure => self.structure.growth.finding(),
@@ -133,12 +133,12 @@ impl State {
         }
     }
 
-    /// The sample clock: rate, clips, losses.
+    /// The sample clock: fitted rate, clipped and lost samples.
     pub fn sample_clock(&self) -> &SampleClockState {
         &self.sample_clock
     }
 
-    /// The tachometer: speed per turn, rejected and missing edges.
+    /// The tachometer: speed per revolution, rejected and missing edges.
     pub fn tachometer(&self) -> &TachometerState {
         &self.tachometer
     }

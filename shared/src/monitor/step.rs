@@ -1,4 +1,4 @@
-//! One step of the pipeline: a block in, a report out.
+//! One step of the pipeline: takes a block of samples, returns a report.
 
 use super::pipeline::Monitor;
 use super::report::Report;
@@ -9,13 +9,13 @@ use crate::tachometer::Edge;
 use crate::units::{Hertz, Nanoseconds, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Blocks over which that is counted.
+/// Time constant, in blocks, of the running mean of the damaged share of samples. Unfounded.
 const DAMAGE_MEMORY: f32 = 64.0;
 
 impl Monitor {
-    /// Takes the next block, and the tachometer edges that no step has seen yet, up to the end of the block.
+    /// Processes the next block and the new tachometer edges up to the end of the block.
     ///
-    /// Edges may come with a later block than the one they belong to, by a turn at most; they must be in the order of their time.
+    /// Edges must be in order of time. An edge may come with a later block than its own, at most one revolution late.
     pub fn step(
         &self,
         state: &mut State,
@@ -58,7 +58,7 @@ impl Monitor {
         }
     }
 
-    /// Numbers the samples of the block and deals with what is missing before them.
+    /// Numbers the samples of the block. Resets filters, spectra and the detector's history after lost samples.
     fn take_block(&self, state: &mut State, block: &Block) {
         let lost = match self.sample_clock.observe(&mut state.sample_clock, block) {
             Continuity::Contiguous => 0,
@@ -78,7 +78,7 @@ impl Monitor {
         }
     }
 
-    /// Speed as measured, after all edges up to `now`.
+    /// Processes the tachometer edges up to `now` and returns the measured spindle speed.
     fn take_edges(&self, state: &mut State, edges: &[Edge], now: Nanoseconds) -> Option<Rpm> {
         let tachometer = self.tachometer.as_ref()?;
         for &edge in edges {

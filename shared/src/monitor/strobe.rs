@@ -1,4 +1,4 @@
-//! The points of the stroboscopic map that are shown.
+//! Points of the stroboscopic map for display.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -6,21 +6,21 @@ use serde::{Deserialize, Serialize};
 use super::Band;
 use crate::synchronous::Passed;
 
-/// A point of the stroboscopic map: what the sensor felt when a tooth stood at a fixed angle.
+/// A point of the stroboscopic map: the acceleration at a fixed angle of a tooth, once per tooth period.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Strobe {
-    /// The band it was taken from.
+    /// The band of the acceleration.
     pub band: Band,
-    /// Tooth passings since the tachometer locked. Its remainder by the number of teeth names the tooth.
+    /// Tooth periods since the tachometer locked. Modulo the number of teeth it is the index of the tooth.
     pub tooth: u32,
-    /// Acceleration in the three axes, in m/s².
+    /// Acceleration along x, y and z, in m/s².
     pub meters_per_second2: [f32; 3],
 }
 
-/// The most [`Strobe`]s that one block makes.
+/// Largest number of [`Strobe`]s from one block.
 pub const MAX_BLOCK_STROBES: usize = 32;
 
-/// Adds a point of the stroboscopic map: what was felt at the first slot.
+/// Adds the first slot of a tooth period to the stroboscopic map.
 pub(super) fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, passed: &Passed) {
     let [x, y, z, ..] = passed.passing;
     let strobe = Strobe {
@@ -28,6 +28,6 @@ pub(super) fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, pas
         tooth: passed.tooth as u32,
         meters_per_second2: [x, y, z],
     };
-    // More than the capacity cannot come in one block; if they did, the last would be left out.
+    // One block never gives more points than the capacity.
     let _ = strobes.push(strobe);
 }

@@ -1,4 +1,4 @@
-//! The verdict on a block, and the advice that follows from it.
+//! Verdict and advice after each block.
 
 use super::pipeline::Monitor;
 use super::settings::Settings;
@@ -12,16 +12,17 @@ use crate::lobes::LobeTable;
 use crate::units::Rpm;
 use crate::working_point::WorkingPoint;
 
-/// A speed that changes by more than this part per turn makes passings that cannot be compared.
+/// Largest relative change of speed per revolution for which tooth periods are comparable. Unfounded.
 const LARGEST_CHANGE_PER_TURN: f32 = 0.02;
-/// So many clipped or lost samples, as a part of all, and nothing else can be said.
+/// Largest share of clipped or lost samples that still allows a verdict. Unfounded.
 const LARGEST_DAMAGE: f32 = 0.05;
-/// Advice is given anew where the speed has moved by this part.
+/// Relative change of spindle speed after which advice is computed again. Unfounded.
 const ADVICE_SPEED_STEP: f32 = 0.002;
-/// Or the chatter frequency by this part.
+/// Relative change of chatter frequency after which advice is computed again. Unfounded.
 const ADVICE_FREQUENCY_STEP: f32 = 0.005;
 
 impl Monitor {
+    /// Passes all findings, spectra and tones to the detector and returns its verdict.
     pub(super) fn judge(&self, state: &mut State, speed: Option<Rpm>) -> Judgement {
         let change = state.tachometer.change_per_turn().unwrap_or(0.0);
         let sampled = self.tachometer.is_some();
@@ -45,7 +46,7 @@ impl Monitor {
         state.detector.step(&evidence)
     }
 
-    /// Advice, given anew where something has changed.
+    /// Returns the previous advice, or computes it again if one of its inputs has changed.
     pub(super) fn advise(
         &self,
         state: &mut State,

@@ -1,14 +1,14 @@
-//! Frames: bytes around a message that tell where it begins, that it is whole, and which one it is.
+//! Frames: delimiter, version, sequence number and CRC-32 around a message.
 //!
 //! | bytes | before COBS |
 //! |---|---|
 //! | 1 | version of the protocol, [`VERSION`] |
 //! | 2 | sequence number, little-endian |
 //! | 1 … [`MAX_BODY`] | body: the message in postcard |
-//! | 4 | CRC-32 of all before it, little-endian |
+//! | 4 | CRC-32 of all preceding bytes, little-endian |
 //!
-//! COBS removes the zeros, one zero byte ends the frame. Zeros between frames mean nothing: who
-//! connects sends one to end what noise began.
+//! COBS removes zero bytes, and one zero byte ends the frame. Zeros between frames are ignored. After connecting, a host sends one
+//! zero to end a frame that noise may have begun.
 
 use cobs::{DecodeResult, DecoderState};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -16,71 +16,71 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use super::version::VERSION;
 use crate::checksum::crc32;
 
-/// The most bytes of a body.
+/// Largest length of a body, in bytes.
 pub const MAX_BODY: usize = 512;
 
 const HEADER: usize = 3;
 const CRC: usize = 4;
-/// The most bytes of a frame before COBS.
+/// Largest length of a frame before COBS, in bytes.
 const MAX_RAW: usize = HEADER + MAX_BODY + CRC;
 
-/// The most bytes of a frame on the wire, the closing zero included: COBS adds one byte in 254.
+/// Largest length of a frame on the wire, in bytes, with the closing zero: COBS adds one byte per 254.
 pub const MAX_FRAME: usize = MAX_RAW + MAX_RAW / 254 + 1 + 1;
 
-/// What may be sent as a body.
+/// A message: a type that is sent as the body of a frame.
 pub trait Message: Serialize + DeserializeOwned {
-    /// Number of variants; the body begins with the number of one.
+    /// Number of variants. The first byte of the body is the index of the variant.
     const VARIANTS: u8;
 }
 
-/// Why a frame cannot be used.
+/// The reason why a frame is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FrameError {
-    /// More bytes than a frame may have, without an end.
+    /// More bytes than a frame may have, without a closing zero.
     TooLong {
-        /// The most bytes a frame may have before COBS.
+        /// Largest length of a frame before COBS, in bytes.
         limit: u16,
     },
-    /// The bytes are no COBS: a zero came inside.
+    /// The bytes are not valid COBS.
     Cobs,
-    /// Fewer bytes than version, sequence, one byte of body and CRC need.
+    /// Fewer bytes than version, sequence number, one byte of body and CRC need.
     TooShort {
         /// Bytes found.
         found: u8,
     },
-    /// Bytes have changed on the way.
+    /// The CRC does not match: bytes were changed on the line.
     Crc {
-        /// What the frame says.
+        /// The CRC in the frame.
         frame: u32,
         /// The CRC of the bytes found.
         computed: u32,
     },
-    /// The other side speaks another version.
+    /// The frame has another protocol version.
     Version {
-        /// The version of this side.
+        /// The version of this code.
         ours: u8,
         /// The version of the frame.
         theirs: u8,
     },
-    /// A message that this side does not know.
+    /// An unknown message variant.
     UnknownMessage {
         /// The number of the variant.
         variant: u8,
     },
-    /// The body is not what a message of this variant is.
+    /// The body is not a valid message of this variant.
     Body {
         /// The number of the variant.
         variant: u8,
     },
-    /// Bytes behind the message.
+    /// Surplus bytes after the message.
     TrailingBytes {
-        /// How many.
+        /// Number of surplus bytes.
         count: u16,
     },
-    /// Frames are missing, or came twice, or in another order.
+    /// The sequence number is not the expected one: frames were lost, repeated or reordered.
     OutOfOrder {
-        /// The sequence number that was due.
+        /// The expected sequence number.
         expected: u16,
         /// The sequence number of the frame.
         found: u16,
@@ -119,7 +119,7 @@ impl core::fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// How often each [`FrameError`] came.
+/// Number of frames refused with each [`FrameError`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameErrors {
@@ -144,7 +144,7 @@ pub struct FrameErrors {
 }
 
 impl FrameErrors {
-    /// Counts one.
+    /// Counts an error.
     pub fn count(&mut self, error: &FrameError) {
         let counter = match error {
             FrameError::TooLong { .. } => &mut self.too_long,
@@ -160,7 +160,7 @@ impl FrameErrors {
         *counter = counter.saturating_add(1);
     }
 
-    /// All of them.
+    /// Total number of errors.
     pub fn total(&self) -> u32 {
         [
             self.too_long,
@@ -178,14 +178,14 @@ impl FrameErrors {
     }
 }
 
-/// A message that does not fit a frame. The messages of this crate always fit; a test holds the largest of each.
+/// A message is too large for a frame. The messages of this crate always fit, which a test checks for the largest of each kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge;
 
-/// Writes the frame of a message into `buffer` and returns its bytes, the closing zero included.
+/// Writes the frame of a message into `buffer` and returns its bytes, with the closing zero.
 ///
 /// # Errors
-/// [`TooLarge`] where the body has more than [`MAX_BODY`] bytes.
+/// [`TooLarge`] if the body has more than [`MAX_BODY`] bytes.
 pub fn encode<'b, M: Message>(
     message: &M,
     sequence: u16,
@@ -206,16 +206,16 @@ pub fn encode<'b, M: Message>(
     buffer.get(..length + 1).ok_or(TooLarge)
 }
 
-/// A frame whose CRC and version are right.
+/// A received frame with valid CRC and version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Its number.
+    /// Sequence number of the frame.
     pub sequence: u16,
     body: &'a [u8],
 }
 
 impl Frame<'_> {
-    /// The message in it.
+    /// Decodes the message in the frame.
     ///
     /// # Errors
     /// [`FrameError::UnknownMessage`], [`FrameError::Body`] and [`FrameError::TrailingBytes`].
@@ -234,15 +234,15 @@ impl Frame<'_> {
     }
 }
 
-/// Finds frames in a stream of bytes, byte by byte.
+/// Decoder of frames from a stream of bytes.
 ///
-/// After bytes that are no frame it begins anew behind the next zero. Every run of such bytes makes one error.
+/// After invalid bytes it starts again after the next zero. Each run of invalid bytes gives one error.
 #[derive(Debug)]
 pub struct Decoder {
     state: DecoderState,
     raw: [u8; MAX_RAW],
     length: usize,
-    /// True while the rest of a frame that is too long is passed over.
+    /// True while the rest of an overlong frame is skipped.
     is_skipping: bool,
 }
 
@@ -253,7 +253,7 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// A decoder that waits for the beginning of a frame.
+    /// A decoder before its first byte.
     pub const fn new() -> Self {
         Self {
             state: DecoderState::Idle,
@@ -263,7 +263,7 @@ impl Decoder {
         }
     }
 
-    /// Takes a byte; at the end of a frame the frame, or why it is none.
+    /// Takes a byte. At the end of a frame it returns the frame or the reason of its refusal.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -298,7 +298,7 @@ impl Decoder {
     }
 }
 
-/// Checks length, CRC and version, in this order: what is damaged says nothing about versions.
+/// Checks length, CRC and version, in this order: the version of a damaged frame is meaningless.
 fn open(raw: &[u8]) -> Result<Frame<'_>, FrameError> {
     let too_short = FrameError::TooShort {
         found: raw.len() as u8,
@@ -324,14 +324,14 @@ fn open(raw: &[u8]) -> Result<Frame<'_>, FrameError> {
     })
 }
 
-/// The sequence numbers of one direction.
+/// The sequence numbers of one direction of the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sequence {
     due: Option<u16>,
 }
 
 impl Sequence {
-    /// A count whose next number is `next`.
+    /// A sequence whose next number is `next`.
     pub const fn from(next: u16) -> Self {
         Self { due: Some(next) }
     }
@@ -343,10 +343,10 @@ impl Sequence {
         number
     }
 
-    /// Checks the number of a frame that was received; the first may have any.
+    /// Checks the sequence number of a received frame. The first may have any.
     ///
     /// # Errors
-    /// [`FrameError::OutOfOrder`]; the number that is due stays the same.
+    /// [`FrameError::OutOfOrder`]; the expected number stays the same.
     pub fn check(&mut self, found: u16) -> Result<(), FrameError> {
         match self.due {
             Some(expected) if expected != found => Err(FrameError::OutOfOrder { expected, found }),
@@ -357,7 +357,7 @@ impl Sequence {
         }
     }
 
-    /// Takes `found` for right: the number behind it is due next.
+    /// Accepts `found`: the number after it is expected next.
     pub fn restart_after(&mut self, found: u16) {
         self.due = Some(found.wrapping_add(1));
     }

@@ -12,66 +12,67 @@ use crate::tachometer::Edge;
 use crate::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
 use crate::working_point::{Limits, WorkingPoint};
 
-/// The most bytes of a table in one [`Request::UploadChunk`].
+/// Largest number of table bytes in one [`Request::UploadChunk`].
 pub const MAX_CHUNK: usize = 256;
-/// The most edges in one [`Feed`]; more go before it in [`Request::FeedEdges`].
+/// Largest number of edges in one [`Feed`]; further edges precede it in [`Request::FeedEdges`].
 pub const MAX_FEED_EDGES: usize = 8;
-/// The most edges in one [`Request::FeedEdges`].
+/// Largest number of edges in one [`Request::FeedEdges`].
 pub const MAX_EDGES: usize = 32;
-/// The most edges that a device holds for one block.
+/// Largest number of edges that a device holds for one block.
 pub const MAX_BLOCK_EDGES: usize = 128;
-/// The most bins in one [`SpectrumChunk`].
+/// Largest number of bins in one [`SpectrumChunk`].
 pub const MAX_CHUNK_BINS: usize = 96;
-/// The most points in one [`StrobeChunk`].
+/// Largest number of points in one [`StrobeChunk`].
 pub const MAX_CHUNK_STROBES: usize = 16;
 /// Number of table slots of a device.
 pub const SLOTS: usize = 2;
 
-/// What the host asks of the device. Each gets one [`Reply`].
+/// A request of the host. Each gets one [`Reply`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 // The largest is what the link's buffers are made for; a box would need an allocator.
 #[allow(clippy::large_enum_variant)]
 pub enum Request {
-    /// Begins to talk; restarts the count of requests. Reply: [`Reply::Info`].
+    /// Begins a session and restarts the sequence numbers. Reply: [`Reply::Info`].
     Hello,
-    /// Asks who the device is. Reply: [`Reply::Info`].
+    /// Requests the identity of the device. Reply: [`Reply::Info`].
     Info,
-    /// Asks how the device is. Reply: [`Reply::Status`].
+    /// Requests the operating status. Reply: [`Reply::Status`].
     Status,
-    /// Asks for the settings of the pipeline. Reply: [`Reply::Settings`].
+    /// Requests the settings of the signal chain. Reply: [`Reply::Settings`].
     Settings,
-    /// Sets the pipeline up anew; what it has learned is forgotten.
+    /// Configures the signal chain and resets its state.
     SetSettings(Settings),
-    /// Tells the working point, or that it is not known.
+    /// Sets the working point; `None` if it is unknown.
     SetWorkingPoint(Option<WorkingPoint>),
-    /// Says what the device shall send by itself; nothing after [`Hello`](Self::Hello).
+    /// Selects the messages that the device sends without a request. After [`Hello`](Self::Hello) there are none.
     Subscribe(Subscription),
-    /// Begins to send a table, or goes on with one: the header is that of the file. Reply: [`Reply::Upload`], which says where to
-    /// go on: a device that holds a part of the same table keeps it.
+    /// Begins or resumes the upload of the table with this file header. Reply: [`Reply::Upload`] with the offset of the next chunk. A
+    /// device keeps the part of the same table that it already holds.
     UploadBegin(Header),
-    /// A piece of the table. Reply: [`Reply::Upload`].
+    /// A chunk of the table. Reply: [`Reply::Upload`].
     UploadChunk {
-        /// Where it belongs, in bytes from the start of the file; must be the next one due.
+        /// Offset in bytes from the start of the file; it must be the next one expected.
         offset: u32,
-        /// The bytes; at least 1.
+        /// The bytes of the chunk, at least 1.
         data: Vec<u8, MAX_CHUNK>,
     },
-    /// Asks how far the upload is, also after a restart of the device. Reply: [`Reply::Upload`].
+    /// Requests the progress of the upload, also after a restart of the device. Reply: [`Reply::Upload`].
     UploadQuery,
-    /// All is sent: checks the table and takes it into use.
+    /// Ends the upload: the device checks the table and uses it from now on.
     UploadCommit,
-    /// Gives the upload up.
+    /// Aborts the upload.
     UploadAbort,
-    /// A block of samples for the pipeline in place of the sensor's. Its reply comes when the block has gone
-    /// through: reports, spectra and strobes that it makes are sent before.
+    /// A block of samples that replaces those of the sensor. The reply comes after the block is processed: reports, spectra and strobes
+    /// of the block are sent before it.
     Feed(Feed),
-    /// Edges that come before those of the next [`Feed`]; in the order of their time.
+    /// Tachometer edges that precede those of the next [`Feed`], in order of time.
     FeedEdges(Vec<Edge, MAX_EDGES>),
-    /// Forgets what the pipeline has learned and takes blocks from the sensor again.
+    /// Resets the signal chain and processes blocks of the sensor again.
     Reset,
-    /// Tells the feed direction, from the machine's x towards its y, or that it is not known: for tables with layers for some.
+    /// Sets the feed direction, from the machine's x axis towards its y axis; `None` if it is unknown. Tables with layers per feed
+    /// direction require it.
     SetFeedDirection(Option<Degrees>),
-    /// Asks for the feed direction, as told. Reply: [`Reply::FeedDirection`].
+    /// Requests the feed direction that is set. Reply: [`Reply::FeedDirection`].
     FeedDirection,
 }
 
@@ -79,22 +80,22 @@ impl Message for Request {
     const VARIANTS: u8 = 17;
 }
 
-/// What the device sends.
+/// A message of the device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)] // As for `Request`.
 pub enum Response {
-    /// The answer to a request.
+    /// The reply to a request.
     Reply {
         /// Sequence number of the request.
         request: u16,
-        /// The answer.
+        /// The reply.
         reply: Reply,
     },
-    /// A frame could not be read, or was not the one that was due.
+    /// A frame was unreadable, or did not have the expected sequence number.
     FrameRefused(FrameError),
-    /// What the pipeline says of a block.
+    /// The report of the signal chain on a block.
     Report(Report),
-    /// A piece of a spectrum.
+    /// A chunk of a spectrum.
     Spectrum(SpectrumChunk),
     /// Points of the stroboscopic map.
     Strobes(StrobeChunk),
@@ -104,70 +105,70 @@ impl Message for Response {
     const VARIANTS: u8 = 5;
 }
 
-/// The answer to a [`Request`].
+/// The reply to a [`Request`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant)] // As for `Request`.
 pub enum Reply {
-    /// It is done.
+    /// The request is done.
     Done,
-    /// It is not done.
+    /// The request is refused.
     Refused(Refusal),
-    /// Who the device is.
+    /// Identity of the device.
     Info(Info),
-    /// How the device is.
+    /// Operating status of the device.
     Status(Status),
-    /// The settings of the pipeline.
+    /// The settings of the signal chain.
     Settings(Settings),
-    /// How far the upload is.
+    /// Progress of the upload.
     Upload(Upload),
-    /// The feed direction, as told.
+    /// The feed direction that is set.
     FeedDirection(Option<Degrees>),
 }
 
-/// Why a request is not done.
+/// The reason why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Refusal {
     /// [`Request::Hello`] must come first.
     HelloFirst,
-    /// The settings cannot be.
+    /// The settings are invalid.
     Settings(SettingsError),
-    /// The working point cannot be: depth and feed must be numbers of at least 0, immersion from a smaller to a larger angle.
+    /// The working point is invalid: depth and feed must be numbers of at least 0, the entry angle below the exit angle.
     WorkingPoint(WorkingPoint),
-    /// The table, or its header, is none that this device can use.
+    /// The table or its header is invalid.
     Table(TableError),
-    /// The table does not fit a slot.
+    /// The table does not fit into a slot.
     TableTooLong {
         /// Its length in bytes.
         length: u32,
-        /// The most bytes that fit.
+        /// Capacity of a slot in bytes.
         capacity: u32,
     },
-    /// There is no upload to go on with.
+    /// There is no upload to continue.
     NoUpload,
-    /// The chunk is not the next one due, or goes beyond the end of the table.
+    /// The chunk is not the expected one, or extends beyond the end of the table.
     ChunkOffset {
-        /// Offset that is due.
+        /// The expected offset.
         expected: u32,
         /// Offset of the chunk.
         found: u32,
         /// Length of the table.
         length: u32,
     },
-    /// Not all of the table has been sent.
+    /// The table is incomplete.
     Incomplete {
         /// Bytes received.
         received: u32,
         /// Length of the table.
         length: u32,
     },
-    /// The flash memory does not take or keep the bytes.
+    /// Erasing, writing or reading back the flash memory failed.
     Flash,
-    /// More edges than the device can hold for one block.
+    /// More tachometer edges than the device can hold for one block.
     TooManyEdges {
-        /// The most it can hold.
+        /// Largest number of edges.
         limit: u16,
     },
-    /// The feed direction is no angle from −360 to 360 degrees.
+    /// The feed direction is not an angle from −360° to 360°.
     FeedDirection(Degrees),
 }
 
@@ -219,7 +220,7 @@ impl core::fmt::Display for Refusal {
 
 impl core::error::Error for Refusal {}
 
-/// Who a device is.
+/// Identity of a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Info {
     /// Version of the protocol.
@@ -228,9 +229,9 @@ pub struct Info {
     pub board: String<24>,
     /// Version of the firmware.
     pub firmware: String<16>,
-    /// The accelerometer of the board; `None` where it has none and is fed.
+    /// The accelerometer of the board; `None` if the host feeds the samples.
     pub sensor: Option<Sensor>,
-    /// The most bytes of a table.
+    /// Largest length of a table in bytes.
     pub slot_capacity: u32,
     /// The slots for tables.
     pub slots: [Slot; SLOTS],
@@ -238,29 +239,29 @@ pub struct Info {
     pub table: Option<TableSummary>,
 }
 
-/// What is in a slot.
+/// Content of a table slot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Slot {
-    /// Nothing.
+    /// The slot is empty.
     Empty,
-    /// A part of a table.
+    /// An incomplete upload.
     Unfinished(Upload),
-    /// Bytes that are no table.
+    /// Bytes that are not a valid table.
     Damaged(TableError),
-    /// A table.
+    /// A valid table that is not in use.
     Valid(Header),
     /// The table in use.
     InUse(Header),
 }
 
-/// A table in a few words.
+/// Summary of a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TableSummary {
-    /// Name of its case.
+    /// Name of the case.
     pub name: String<NAME_CAPACITY>,
     /// Number of teeth of the tool.
     pub teeth: u8,
-    /// Limits of the machine, where the case has them.
+    /// Speed limits of the machine, if the case has any.
     pub limits: Option<Limits>,
     /// Number of speeds.
     pub speeds: u16,
@@ -294,57 +295,57 @@ impl TableSummary {
     }
 }
 
-/// How a device is.
+/// Operating status of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// Time since the start.
     pub uptime: Nanoseconds,
-    /// Blocks that went through the pipeline since the start.
+    /// Blocks processed since the start.
     pub blocks: u32,
-    /// Samples clipped since the pipeline was set up or reset.
+    /// Clipped samples since the signal chain was configured or reset.
     pub clipped: u32,
-    /// Samples lost since then.
+    /// Lost samples since the signal chain was configured or reset.
     pub lost: u32,
-    /// True where the host feeds the pipeline, false where the sensor does.
+    /// True if the samples come from the host, false if they come from the sensor.
     pub is_fed: bool,
-    /// The working point, as told.
+    /// The working point, if set.
     pub working_point: Option<WorkingPoint>,
-    /// What is sent without being asked.
+    /// The messages that are sent without a request.
     pub subscription: Subscription,
     /// Frames received.
     pub frames: u32,
-    /// Frames that could not be used.
+    /// Refused frames.
     pub frame_errors: FrameErrors,
-    /// Reports, spectra and strobes that were not sent because the line is too slow.
+    /// Reports, spectra and strobes dropped because the line is too slow.
     pub dropped: u32,
 }
 
-/// Which reports are sent.
+/// The reports that are sent without a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reports {
-    /// None.
+    /// No reports.
     #[default]
     None,
-    /// Where verdict, reason or advice differ from the report before.
+    /// Reports whose verdict, reason or advice differs from the preceding one.
     Changes,
-    /// All.
+    /// All reports.
     All,
 }
 
-/// What the device sends without being asked.
+/// The messages that the device sends without a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Subscription {
-    /// Reports.
+    /// The reports to send.
     pub reports: Reports,
-    /// Spectra, each when it is new.
+    /// True to send each new spectrum.
     pub spectra: bool,
-    /// Points of the stroboscopic map.
+    /// True to send the points of the stroboscopic map.
     pub strobes: bool,
 }
 
-/// How far an upload is.
+/// Progress of an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Upload {
@@ -361,14 +362,14 @@ pub struct Feed {
     time: Nanoseconds,
     lost: u32,
     clipped: u16,
-    /// Six bytes each, little-endian: a block of loud samples fits a frame just as one of quiet ones.
+    /// Six bytes per sample, little-endian. A fixed length keeps large values from exceeding the frame.
     counts: Vec<[u8; 6], MAX_BLOCK_SAMPLES>,
-    /// Edges up to the end of the block, behind those of [`Request::FeedEdges`].
+    /// Tachometer edges up to the end of the block, after those of [`Request::FeedEdges`].
     pub edges: Vec<Edge, MAX_FEED_EDGES>,
 }
 
 impl Feed {
-    /// The message that carries this block and these edges.
+    /// The message with this block and these edges.
     pub fn new(block: &Block, edges: Vec<Edge, MAX_FEED_EDGES>) -> Self {
         Self {
             sequence: block.sequence,
@@ -405,7 +406,7 @@ fn counts_of([a, b, c, d, e, f]: [u8; 6]) -> Counts {
     ]
 }
 
-/// A piece of a spectrum. The pieces of one spectrum come in order, without another one between.
+/// A chunk of a spectrum. The chunks of one spectrum are sent in order and are not interleaved with those of another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpectrumChunk {
     /// The band.
@@ -416,13 +417,13 @@ pub struct SpectrumChunk {
     pub bin: Hertz,
     /// Number of bins of the whole spectrum.
     pub bins: u16,
-    /// Number of the first bin in this piece.
+    /// Index of the first bin in this chunk.
     pub first: u16,
     /// Power per bin, in (m/s²)².
     pub power: Vec<f32, MAX_CHUNK_BINS>,
 }
 
-/// Points of the stroboscopic map that one block made, or a part of them.
+/// Points of the stroboscopic map from one block, all or some of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StrobeChunk {
     /// Sequence number of the block.

@@ -1,22 +1,22 @@
-//! The wire: postcard + CRC-32 + COBS, with sequence numbers and a version handshake.
+//! The protocol between host and device: postcard, CRC-32 and COBS, with sequence numbers and a version handshake.
 //!
 //! ```text
 //! Request ─ postcard ─► body ─► [version][sequence][body][CRC-32] ─ COBS ─► bytes 00   host to device
 //!                                                                                       device to host: Response
 //! ```
 //!
-//! How a host talks to a device:
-//! - It sends one [`Request`] at a time and waits for the [`Response::Reply`] with the request's sequence number. Where
-//!   none comes it sends the same frame again, *with the same sequence number*: a device that has done the
-//!   request already does not do it twice but repeats its reply.
-//! - It begins with [`Request::Hello`], under any sequence number; the next request has the following number, and so on, around
-//!   the end of 16 bits. A device refuses any other number with [`FrameError::OutOfOrder`] and waits for
-//!   the right one, or for another `Hello`.
-//! - What the device sends by itself (reports, spectra, strobes) it numbers with the replies in one count of its own. A
-//!   jump in it means that frames were lost on the line.
-//! - A frame that the device cannot read it answers with [`Response::FrameRefused`] and counts in [`Status`].
+//! Rules of the dialogue:
+//! - The host sends one [`Request`] at a time and waits for the [`Response::Reply`] with the request's sequence number. After a
+//!   timeout it sends the same frame again, *with the same sequence number*. A device that has already done the request
+//!   does not do it again, but repeats its reply.
+//! - A session begins with [`Request::Hello`], which may have any sequence number. Each further request has the next number,
+//!   modulo 2¹⁶. The device refuses any other number with [`FrameError::OutOfOrder`] and waits for the expected number or
+//!   another `Hello`.
+//! - The device numbers all its frames (replies, reports, spectra, strobes) in one sequence of its own. A jump means that frames
+//!   were lost on the line.
+//! - The device answers an unreadable frame with [`Response::FrameRefused`] and counts it in [`Status`].
 //!
-//! [`frame`] documents the bytes, [`version`] what may change and how.
+//! [`frame`] specifies the bytes, [`version`] the rules for changes.
 
 pub mod frame;
 pub mod message;

@@ -1,6 +1,6 @@
-//! Bits of the registers.
+//! Bits of the sensor's registers.
 
-/// An address to read from.
+/// Bit of the address byte that marks a read.
 pub(super) const READ: u8 = 0x80;
 /// CTRL1_XL: the accelerometer runs at 26.667 kHz; no other rate exists.
 pub(super) const XL_ON: u8 = 0b101 << 5;
@@ -10,7 +10,7 @@ pub(super) const LPF2_ON: u8 = 1 << 1;
 pub(super) const SW_RESET: u8 = 1;
 /// CTRL3_C: the address counts up within a transfer.
 pub(super) const IF_INC: u8 = 1 << 2;
-/// CTRL3_C: the two bytes of a sample are never of different samples.
+/// CTRL3_C: block data update: both bytes of a value belong to the same sample.
 pub(super) const BDU: u8 = 1 << 6;
 /// CTRL4_C: the pins are SPI only.
 pub(super) const I2C_OFF: u8 = 1 << 2;

@@ -1,8 +1,8 @@
-//! How the sensor is to be set up.
+//! Configuration of the sensor.
 
 use quietcut_core::acceleration::MAX_BLOCK_SAMPLES;
 
-/// The acceleration at which an axis clips.
+/// Measuring range: the acceleration at which an axis clips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Range {
@@ -37,14 +37,14 @@ impl Range {
     }
 }
 
-/// What is in the path of the samples.
+/// Filters in the signal path of the sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Filter {
     /// The first filter only: flat from DC to 6 kHz.
     #[default]
     Wide,
-    /// A second low-pass filter whose corner is the sampling rate over a divisor.
+    /// A second low-pass filter; its corner frequency is the sampling rate over a divisor.
     LowPass(Divisor),
 }
 
@@ -71,15 +71,15 @@ pub enum Divisor {
     By800 = 7,
 }
 
-/// How the sensor is to be set up.
+/// Configuration of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
-    /// Where the axes clip.
+    /// Measuring range.
     pub range: Range,
-    /// What is in the path of the samples.
+    /// Filters in the signal path.
     pub filter: Filter,
-    /// Samples in the queue that raise pin INT1, 1 to 511.
+    /// Level of the queue, in samples, at which pin INT1 rises: 1 to 511.
     pub watermark: u16,
 }
 

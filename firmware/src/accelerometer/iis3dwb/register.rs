@@ -1,4 +1,4 @@
-//! Addresses of the registers.
+//! Addresses of the sensor's registers.
 
 pub(crate) const FIFO_CTRL1: u8 = 0x07;
 pub(crate) const FIFO_CTRL2: u8 = 0x08;

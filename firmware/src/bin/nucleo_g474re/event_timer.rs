@@ -1,7 +1,7 @@
-//! The device's clock, TIM2, which catches tachometer edges and the sensor's watermark line in hardware.
+//! The device's clock: timer TIM2, which captures tachometer edges and the sensor's watermark line in hardware.
 //!
-//! Both inputs pass the same filter, so that both are late by the same time. The timer comes round
-//! every 53 s; events and calls of [`now`] in between carry its count on.
+//! Both inputs pass the same filter, so that both have the same delay. The timer wraps every 53 s. Events and calls of [`now`]
+//! extend its count beyond 32 bits.
 
 use core::cell::{Cell, RefCell};
 
@@ -24,28 +24,28 @@ const TICKS_PER_SECOND: u32 = 80_000_000;
 const TACHOMETER: Channel = Channel::Ch1;
 const WATERMARK: Channel = Channel::Ch2;
 
-/// Edges that wait to be taken: 0.1 s of a wheel of 60 at 1 500 rev/min, twice what comes while a page
-/// of flash is erased at 6 000.
+/// Capacity of the edge queue: 0.1 s of a wheel with 60 positions at 1 500 rev/min, or twice the edges at 6 000 rev/min during a page
+/// erase.
 const MAX_EDGES: usize = 256;
 
-/// Edges of the tachometer, in the order of their time; the newest are dropped where nobody takes them.
+/// Edges of the tachometer, in order of time. If the queue is full, the newest are dropped.
 pub(crate) static EDGES: Queue<CriticalSectionRawMutex, Edge, MAX_EDGES> = Queue::new();
 
-/// When the sensor's watermark line last rose.
+/// Time of the last rise of the sensor's watermark line.
 pub(crate) static RISE: Signal<CriticalSectionRawMutex, Nanoseconds> = Signal::new();
 
 static TIMER: Mutex<RefCell<Option<Timer<'static, TIM2>>>> = Mutex::new(RefCell::new(None));
-/// The count of the timer at its newest reading, carried on beyond 32 bits.
+/// The newest count of the timer, extended to 64 bits.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
-/// Starts the clock. The pins stay inputs of the timer for good.
+/// Starts the clock. The pins remain inputs of the timer.
 pub(crate) fn start(
     timer: Peri<'static, TIM2>,
     tachometer: Peri<'static, PA0>,
     watermark: Peri<'static, PA1>,
 ) {
     use embassy_stm32::gpio::Pull;
-    // The tachometer drives both ways; the pull only keeps an open input quiet.
+    // The tachometer output is push-pull. The pull-down only defines the level of an open input.
     core::mem::forget(CapturePin::<TIM2, Ch1>::new(tachometer, Pull::Down));
     core::mem::forget(CapturePin::<TIM2, Ch2>::new(watermark, Pull::Down));
 
@@ -54,7 +54,7 @@ pub(crate) fn start(
     timer.set_max_compare_value(u32::MAX);
     for channel in [TACHOMETER, WATERMARK] {
         timer.set_input_ti_selection(channel, InputTISelection::Normal);
-        // Eight samples alike at a quarter of 160 MHz: shorter than 0.2 µs is a disturbance.
+        // Input filter: eight equal samples at a quarter of 160 MHz. Pulses shorter than 0.2 µs are suppressed.
         timer.set_input_capture_filter(channel, FilterValue::FDTS_DIV4_N8);
         timer.set_input_capture_mode(channel, InputCaptureMode::Rising);
         timer.set_input_capture_prescaler(channel, 0);
@@ -79,14 +79,14 @@ pub(crate) fn now() -> Nanoseconds {
     })
 }
 
-/// The time of a count of the timer that is at most half a round away from the newest one.
+/// The time of a timer count that is at most half a period of the timer from the newest one.
 fn carry_on(token: CriticalSection<'_>, count: u32) -> Nanoseconds {
     let newest = TICKS.borrow(token).get();
-    // Two events of one interrupt may be out of order: the difference has a sign.
+    // Two events of one interrupt may be out of order, so the difference is signed.
     let difference = count.wrapping_sub(newest as u32).cast_signed();
     let ticks = newest.saturating_add_signed(i64::from(difference));
     TICKS.borrow(token).set(newest.max(ticks));
-    // 12.5 ns each.
+    // One tick is 12.5 ns.
     Nanoseconds(ticks * 25 / 2)
 }
 

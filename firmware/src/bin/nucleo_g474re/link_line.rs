@@ -1,4 +1,4 @@
-//! The link's port: LPUART1 by DMA, with a queue of bytes each way between its tasks and the device.
+//! The serial port of the link: LPUART1 with DMA, and a queue of bytes in each direction between its tasks and the device.
 
 use core::convert::Infallible;
 
@@ -10,12 +10,12 @@ use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 
 use crate::WORK;
 
-/// Bytes to the device: 22 ms of the line, while a page of flash is erased.
+/// Capacity of the queue to the device: 22 ms of the line, the time of a page erase.
 static RECEIVED: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
-/// Bytes to the host.
+/// Capacity of the queue to the host.
 static SENT: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
 
-/// Passes on what the host sends.
+/// Task: passes received bytes to the device.
 #[embassy_executor::task]
 pub(crate) async fn receive(mut port: RingBufferedUartRx<'static>) {
     let mut bytes = [0; 128];
@@ -25,13 +25,13 @@ pub(crate) async fn receive(mut port: RingBufferedUartRx<'static>) {
                 RECEIVED.write_all(bytes.get(..count).unwrap_or_default()).await;
                 WORK.signal(());
             }
-            // The frame in which bytes are missing is found out by its checksum.
+            // A frame with missing bytes fails its CRC.
             Err(error) => defmt::warn!("link: {}", error),
         }
     }
 }
 
-/// Sends what the device has for the host.
+/// Task: sends the bytes of the device to the host.
 #[embassy_executor::task]
 pub(crate) async fn send(mut port: UartTx<'static, Async>) {
     let mut bytes = [0; 256];
@@ -44,7 +44,7 @@ pub(crate) async fn send(mut port: UartTx<'static, Async>) {
     }
 }
 
-/// The link as the device sees it.
+/// The link's byte stream for the device.
 pub(crate) struct LinkLine;
 
 impl ErrorType for LinkLine {
@@ -58,7 +58,7 @@ impl ReadReady for LinkLine {
 }
 
 impl Read for LinkLine {
-    /// Takes what is there: 0 bytes where nothing is.
+    /// Reads the available bytes; 0 if there are none.
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
         Ok(RECEIVED.try_read(bytes).unwrap_or(0))
     }
@@ -71,7 +71,7 @@ impl WriteReady for LinkLine {
 }
 
 impl Write for LinkLine {
-    /// Takes as many bytes as there is room for.
+    /// Accepts as many bytes as the queue has room for.
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         Ok(SENT.try_write(bytes).unwrap_or(0))
     }

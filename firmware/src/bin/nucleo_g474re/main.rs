@@ -11,8 +11,8 @@
 //! | PA2, PA3 | ST-LINK | LPUART1 TX and RX: the link to the host, 921 600 baud, 8N1 |
 //! | SWD | ST-LINK | log of defmt over RTT |
 //!
-//! What runs at which priority, the highest first: the timer's captures; the link's port and DMA; the tasks that read the
-//! sensor and pass bytes, in an executor of their own; the device, in the main executor.
+//! Priorities, highest first: captures of the timer; port and DMA of the link; the tasks for sensor and link, in an interrupt executor; the
+//! device, in the main executor.
 #![no_std]
 #![no_main]
 #![deny(clippy::undocumented_unsafe_blocks)]
@@ -67,20 +67,20 @@ const IDENTITY: Identity = Identity {
 const LINK_BAUD: u32 = 921_600;
 const SENSOR_BUS: Hertz = Hertz(10_000_000);
 const WATCHDOG_MICROSECONDS: u32 = 2_000_000;
-/// The main loop turns at least this often, also where nothing comes.
+/// Longest wait of the main loop without events.
 const TURN: Duration = Duration::from_millis(500);
 
-/// There is something to do for the device: blocks, bytes, or room for bytes.
+/// Signals work for the device: blocks, bytes, or room for bytes.
 static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static IO_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-/// Memory for the pipeline's state, which the device resets. With all bits zero it takes no room in the program.
+/// Memory for the state of the signal chain, which the device resets. All-zero bits take no space in the image.
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(NO_BITS);
 
-// SAFETY: the compiler refuses a constant whose bits are no value of its type.
+// SAFETY: the compiler refuses a constant whose bits are not a valid value of its type.
 const NO_BITS: State = unsafe { core::mem::zeroed() };
 
-/// The interrupt of a port that is not used runs the tasks for sensor and link.
+/// The interrupt of an unused port runs the tasks for sensor and link.
 #[interrupt]
 unsafe fn UART4() {
     // SAFETY: this is the interrupt that the executor was started with.
@@ -138,8 +138,8 @@ async fn main(_spawner: Spawner) {
     defmt::info!("quietcut on NUCLEO-G474RE");
     let mut edges = BlockEdges::default();
     loop {
-        // All that wait, and those that come meanwhile, before a request that may erase a page; but requests are heard also
-        // where the pipeline cannot keep up.
+        // Process all waiting blocks before a request, which may erase a page. The number is limited, so that requests are done even if
+        // the signal chain cannot keep up.
         for _ in 0..2 * MAX_BLOCKS {
             let Ok(block) = BLOCKS.try_receive() else { break };
             device.take(&block, edges.until_the_end_of(&block));
@@ -148,16 +148,16 @@ async fn main(_spawner: Spawner) {
         }
         let Ok(is_busy) = device.poll(&mut LinkLine);
         watchdog.pet();
-        // Carries the timer's count on, where no event does.
+        // Extends the timer's count if there was no event.
         event_timer::now();
         if !is_busy {
-            // Without work for a turn there is just another turn.
+            // A timeout is no error: the loop continues.
             let _ = with_timeout(TURN, WORK.wait()).await;
         }
     }
 }
 
-/// The task that was made, the only one of its kind.
+/// The only instance of a task.
 fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
     match task {
         Ok(task) => task,
@@ -169,12 +169,12 @@ fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
 #[derive(Default)]
 struct BlockEdges {
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
-    /// An edge behind the end of the newest block.
+    /// An edge after the end of the newest block.
     ahead: Option<Edge>,
 }
 
 impl BlockEdges {
-    /// The edges up to the end of a block that belong to none before it.
+    /// The new edges up to the end of a block.
     fn until_the_end_of(&mut self, block: &Block) -> &[Edge] {
         let period_ns = (1e9 / Sensor::IIS3DWB_16G.nominal_rate.0) as u64;
         let end = Nanoseconds(block.time.0 + block.counts.len() as u64 * period_ns);
@@ -194,7 +194,7 @@ impl BlockEdges {
     }
 }
 
-/// The board's clock as the device sees it.
+/// The board's clock, for the device.
 struct BoardClock;
 
 impl Clock for BoardClock {
@@ -203,8 +203,7 @@ impl Clock for BoardClock {
     }
 }
 
-/// 160 MHz from the board's crystal of 24 MHz: the fastest at which a divider of 16 gives the
-/// sensor's bus exactly its 10 MHz.
+/// Core clock of 160 MHz from the board's 24 MHz crystal: a divider of 16 then gives exactly the sensor bus's maximum of 10 MHz.
 fn clocks() -> Config {
     let mut config = Config::default();
     config.rcc.hse = Some(Hse {
@@ -224,7 +223,7 @@ fn clocks() -> Config {
     config
 }
 
-/// Comes where a table is read that a loss of power has damaged, and goes on.
+/// Interrupt on reading a table that a loss of power has damaged: returns and lets the read continue.
 // SAFETY: the handler touches a flag of the flash only.
 #[exception]
 unsafe fn NonMaskableInt() {
@@ -233,7 +232,7 @@ unsafe fn NonMaskableInt() {
     }
 }
 
-/// Says why, and starts anew.
+/// Logs the panic and resets the board.
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
     defmt::error!("{}", defmt::Display2Format(info));

@@ -1,4 +1,4 @@
-//! Reads the accelerometer: blocks to the device whenever the watermark line rises.
+//! The task that reads the accelerometer at each rise of the watermark line and queues blocks for the device.
 
 use core::convert::Infallible;
 
@@ -22,26 +22,28 @@ use crate::event_timer::{self, RISE};
 pub(crate) type Sensor =
     Iis3dwb<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, Delay>, Delay>;
 
-/// Blocks that wait while a page of flash is erased or a table is checked: 38 ms. A test in the emulator asserts that no request takes longer.
+/// Capacity of the block queue: 38 ms, for a page erase or the check of a table. A test in the emulator asserts that no request takes
+/// longer.
 pub(crate) const MAX_BLOCKS: usize = 16;
 
-/// The line rises every 2.4 ms. Where it does not, it is not connected, and the queue is read at this interval; it is full after 19 ms.
+/// Longest wait for the watermark line, which rises every 2.4 ms. If it is not connected, the sensor's queue is read at this interval. The
+/// queue is full after 19 ms.
 const LINE_TIMEOUT: Duration = Duration::from_millis(10);
 const RETRY: Duration = Duration::from_secs(1);
 
-/// Blocks in their order; the newest are dropped where nobody takes them.
+/// Blocks in order. If the queue is full, the newest are dropped.
 pub(crate) static BLOCKS: Channel<CriticalSectionRawMutex, Block, MAX_BLOCKS> = Channel::new();
 
-/// Why the sensor is started again.
+/// The reason why the sensor is restarted.
 #[derive(defmt::Format)]
 enum Failure {
-    /// The driver found an error.
+    /// The driver returned an error.
     Driver(<Sensor as Accelerometer>::Error),
     /// No samples came.
     Silent,
 }
 
-/// Starts the sensor, reads it, and starts it again after an error.
+/// Task: starts the sensor, reads it, and restarts it after an error.
 #[embassy_executor::task]
 pub(crate) async fn read(sensor: Sensor) {
     let mut acquisition = Acquisition::new(sensor);
@@ -58,10 +60,10 @@ pub(crate) async fn read(sensor: Sensor) {
     }
 }
 
-/// Passes blocks on until the sensor fails.
+/// Queues blocks until the sensor fails.
 async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible, Failure> {
     loop {
-        // While the line is high it cannot rise: more samples are there already.
+        // While the line is high it cannot rise: the queue already holds the watermark.
         let rise = if watermark_is_reached() || acquisition.is_behind() {
             RISE.try_take()
         } else {
@@ -78,12 +80,12 @@ async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible
             );
         }
         WORK.signal(());
-        // A rise during the read belongs to no known sample.
+        // Discards a rise during the read, which belongs to no known sample.
         RISE.reset();
     }
 }
 
-/// True while the sensor's queue holds as many samples as the watermark or more.
+/// True while the sensor's queue holds at least the watermark.
 fn watermark_is_reached() -> bool {
     pac::GPIOA.idr().read().idr(1) == pac::gpio::vals::Idr::HIGH
 }

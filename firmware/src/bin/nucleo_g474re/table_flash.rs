@@ -1,11 +1,11 @@
-//! The two table slots: the second bank of the internal flash, as `memory.x` says.
+//! The flash of the two table slots: the second bank of the internal flash, as defined in `memory.x`.
 //!
-//! The program runs from the first bank, so the processor and its interrupts go on while a page of the second is erased or written
-//! (RM0440, chapter 3: read-while-write); only the caller waits. The driver turns the data cache off meanwhile and empties it,
-//! and refuses to start where the option bytes join the banks to one.
+//! The program runs from the first bank, so processor and interrupts continue while a page of the second is erased or written (RM0440,
+//! chapter 3: read-while-write). Only the caller waits. The driver disables the data cache meanwhile and clears it. It refuses to
+//! start if the option bytes select single-bank mode.
 //!
-//! What no emulator shows, and no board has confirmed yet: that samples go on being read while a page is erased, and that a
-//! double word which a loss of power left half written raises the interrupt of [`pass_over_damage`] and nothing else.
+//! Not yet confirmed on a board, and not testable in an emulator: sampling continues during a page erase, and a double word left
+//! half written by a loss of power raises the interrupt of [`pass_over_damage`] only.
 
 use embassy_stm32::flash::{Blocking, Error, FLASH_BASE, Flash};
 use embassy_stm32::pac;
@@ -13,9 +13,9 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use quietcut_firmware::storage::TableMemory;
 
 unsafe extern "C" {
-    /// Start of the first slot; only its address means anything.
+    /// Linker symbol: its address is the start of the first slot.
     static __table_slots_start: u8;
-    /// End of the second slot; only its address means anything.
+    /// Linker symbol: its address is the end of the second slot.
     static __table_slots_end: u8;
 }
 
@@ -38,7 +38,7 @@ impl TableFlash {
         }
     }
 
-    /// Offset in the flash of the range that begins at `offset` in the slots.
+    /// Offset in the flash for an offset in the slots.
     fn place(&self, offset: u32, length: usize) -> Result<u32, Error> {
         let end = u32::try_from(length)
             .ok()
@@ -50,14 +50,13 @@ impl TableFlash {
     }
 }
 
-/// Serves the interrupt that cannot be turned off: it comes where a double word with two wrong bits is read.
+/// Handles the non-maskable interrupt on reading a double word with a two-bit error, which a loss of power during a write leaves behind.
 ///
-/// That is what a loss of power leaves of a write. The bytes read count as they are: the checksum of the table finds them out.
-/// Returns false where the interrupt has another cause.
+/// The bytes are used as read, and the CRC of the table detects them. Returns false if the interrupt has another cause.
 pub(crate) fn pass_over_damage() -> bool {
     let is_damage = pac::FLASH.eccr().read().eccd();
     if is_damage {
-        // The flag goes away where a one is written to it.
+        // Writing a one clears the flag.
         pac::FLASH.eccr().modify(|register| register.set_eccd(true));
     }
     is_damage
@@ -65,7 +64,7 @@ pub(crate) fn pass_over_damage() -> bool {
 
 impl TableMemory for TableFlash {
     fn mapped(&self) -> &[u8] {
-        // SAFETY: `memory.x` gives these addresses to the slots; they hold bytes of any value, and are written through `self` only.
+        // SAFETY: `memory.x` reserves these addresses for the slots. Any byte value is valid, and they are written through `self` only.
         unsafe { core::slice::from_raw_parts(&raw const __table_slots_start, self.bytes as usize) }
     }
 }

@@ -1,4 +1,4 @@
-//! The board's timer 0, which counts 25 MHz down from 2³² − 1, and how often it came round.
+//! The board's clock: timer 0, which counts down from 2³² − 1 at 25 MHz, extended by its number of wraps.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,16 +14,16 @@ const TICKS_PER_MICROSECOND: u32 = 25;
 static WRAPS: AtomicU32 = AtomicU32::new(0);
 
 pub(crate) fn start() {
-    // SAFETY: registers of timer 0, which nothing else uses.
+    // SAFETY: registers of timer 0, which no other code uses.
     unsafe {
         (RELOAD as *mut u32).write_volatile(u32::MAX);
         (VALUE as *mut u32).write_volatile(u32::MAX);
-        // Count, and interrupt on zero.
+        // Enables the timer and its interrupt at zero.
         (CONTROL as *mut u32).write_volatile(0b1001);
     }
 }
 
-/// Serves the interrupt of the timer.
+/// Handles the interrupt of the timer.
 pub(crate) fn wrap() {
     // SAFETY: clears the interrupt flag of timer 0.
     unsafe { (INTERRUPT as *mut u32).write_volatile(1) };
@@ -47,7 +47,7 @@ pub(crate) fn microseconds() -> u64 {
     }
 }
 
-/// The board's clock as the device sees it.
+/// The board's clock, for the device.
 pub(crate) struct BoardClock;
 
 impl device::Clock for BoardClock {
@@ -56,7 +56,7 @@ impl device::Clock for BoardClock {
     }
 }
 
-/// Waits, doing nothing else.
+/// Busy-waits.
 pub(crate) fn wait_microseconds(microseconds: u32) {
     let start = ticks();
     while ticks().wrapping_sub(start) < microseconds * TICKS_PER_MICROSECOND {}

@@ -1,39 +1,39 @@
-//! What the device costs: the depth of the stack, and the time that each block and each look at the link takes.
+//! Cost of the device: stack depth, and processing time of blocks and of polls of the link.
 //!
-//! The memory below the stack is painted at the start and looked at later. Time is that of the board's timer: where the emulator
-//! counts instructions (`-icount shift=6`) one instruction is 64 ns of it.
+//! The memory below the stack is filled with a pattern at the start, and the overwritten part is measured later. Time is that of the
+//! board's timer. If the emulator counts instructions (`-icount shift=6`), one instruction takes 64 ns.
 
 use crate::{clock, flash};
 
-/// More than the real board has in all.
+/// Measured depth of the stack in bytes: more than the memory of the real board.
 const PAINTED_BYTES: usize = 128 * 1024;
-/// The frame of the painting function itself.
+/// Allowance for the stack frame of the filling function, in bytes.
 const SPARED_BYTES: usize = 256;
 const PAINT: u32 = 0xdead_beef;
 
-/// Costs so far.
+/// The costs so far.
 pub(crate) struct Cost {
-    /// The stack pointer when the memory below it was painted.
+    /// The stack pointer when the memory below it was filled.
     top: usize,
     blocks: u32,
     ticks: u64,
     most_ticks: u32,
-    /// The longest look at the link, which may end with a request: without the time of the flash, and that of the flash.
+    /// The longest poll of the link, with the request it performed: time without flash operations, and time of flash operations.
     request_ticks: u32,
     flash_ticks: u32,
 }
 
 impl Cost {
-    /// Begins to watch. The frame of the caller does not count: it is the main function's, which holds the device; the
-    /// real board has that in static memory.
+    /// Starts the measurement. It excludes the frame of the caller: the main function, which holds the device. The real board holds the device
+    /// in static memory.
     ///
     /// # Safety
-    /// No interrupt may be on, and the stack at most some kilobytes deep.
+    /// Interrupts must be disabled, and the stack at most some kilobytes deep.
     #[inline(never)]
     pub(crate) unsafe fn watch() -> Self {
         let top = cortex_m::register::msp::read() as usize;
         for word in (top - PAINTED_BYTES..top - SPARED_BYTES).step_by(4) {
-            // SAFETY: below the stack pointer, above all statics: nothing else is there.
+            // SAFETY: the memory between statics and stack pointer is unused.
             unsafe { (word as *mut u32).write_volatile(PAINT) };
         }
         Self {
@@ -46,7 +46,7 @@ impl Cost {
         }
     }
 
-    /// Does something with a block, and notes how long it takes.
+    /// Processes a block and records the time.
     pub(crate) fn of_block(&mut self, work: impl FnOnce()) {
         let start = clock::ticks();
         work();
@@ -56,7 +56,7 @@ impl Cost {
         self.most_ticks = self.most_ticks.max(ticks);
     }
 
-    /// Looks at the link, does what the host asks, and notes how long that takes.
+    /// Polls the link and records the time.
     pub(crate) fn of_request<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let (start, flash_start) = (clock::ticks(), flash::busy_ticks());
         let done = work();
@@ -67,7 +67,7 @@ impl Cost {
         done
     }
 
-    /// Writes all to the log.
+    /// Writes the costs to the log.
     pub(crate) fn log(&self) {
         defmt::info!(
             "cost: {=usize} bytes of stack; {=u32} blocks took {=u64} ticks, one at most {=u32}; a request at most {=u32}, and the flash {=u32}",

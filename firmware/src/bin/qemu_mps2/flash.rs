@@ -1,7 +1,7 @@
-//! Flash for the lobe tables in the board's lasting memory, as slow and as strict as the real board's.
+//! Emulated flash for the lobe tables in the board's non-volatile memory, with the timing and restrictions of the real board's flash.
 //!
-//! Pages of 2 KB are erased to ones, double words of 8 bytes are written once. The times are those of
-//! the STM32G474: a power cut falls where it would fall on the real board.
+//! A page has 2 KB, and an erase sets all its bits. A double word of 8 bytes is written once. The times are those of the STM32G474, so
+//! that a loss of power interrupts the same operations as on the real board.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -13,7 +13,7 @@ use quietcut_firmware::storage::TableMemory;
 
 use crate::clock;
 
-/// Where the emulator maps the file that lasts.
+/// Address at which the emulator maps the file of the non-volatile memory.
 pub(crate) const PSRAM_BASE: usize = 0x2100_0000;
 
 const PAGE_BYTES: usize = 2048;
@@ -23,7 +23,7 @@ const WRITE_DOUBLE_WORD_MICROSECONDS: u32 = 82;
 
 static BUSY_TICKS: AtomicU32 = AtomicU32::new(0);
 
-/// For how long the flash was busy, in ticks of the clock, modulo 2³².
+/// Busy time of the flash in ticks of the clock, modulo 2³².
 pub(crate) fn busy_ticks() -> u32 {
     BUSY_TICKS.load(Ordering::Relaxed)
 }
@@ -35,7 +35,7 @@ fn be_busy(microseconds: u32) {
     BUSY_TICKS.store(busy_ticks().wrapping_add(ticks), Ordering::Relaxed);
 }
 
-/// The only handle of the flash: [`Flash::take`] makes one.
+/// The only handle of the flash, created by [`Flash::take`].
 pub(crate) struct Flash(());
 
 impl Flash {
@@ -105,7 +105,7 @@ impl NorFlash for Flash {
             let word = word.try_into().map_or(0, u64::from_le_bytes);
             // SAFETY: as in `erase`.
             let erased = unsafe { Self::word(offset).read_volatile() } == u64::MAX;
-            // The real flash refuses to write over what is written, except to clear it.
+            // The real flash refuses to overwrite a written double word, except with zeros.
             if !erased && word != 0 {
                 return Err(NorFlashErrorKind::Other);
             }

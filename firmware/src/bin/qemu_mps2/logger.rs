@@ -1,4 +1,4 @@
-//! defmt frames on the log port.
+//! Logger: defmt frames on the log port.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -32,7 +32,7 @@ unsafe impl defmt::Logger for Logger {
     fn acquire() {
         // SAFETY: released by `release`, which defmt calls once after each `acquire`.
         let restore = unsafe { critical_section::acquire() };
-        // A log statement inside a log statement: the log cannot tell.
+        // A nested log statement is dropped.
         assert!(!TAKEN.swap(true, Ordering::Relaxed));
         // SAFETY: interrupts are off and nobody else holds the logger.
         unsafe {

@@ -7,7 +7,7 @@
 //! | UART2 | simulated sensor and tachometer, see [`quietcut_firmware::stimulus`] |
 //! | PSRAM, in a file of the host | flash for the lobe tables, then stored stimuli |
 //!
-//! The processor's clock is not the host's: samples and edges carry their own time stamps.
+//! The emulated clock does not run in real time, so samples and edges carry their own time stamps.
 #![no_std]
 #![no_main]
 #![deny(clippy::undocumented_unsafe_blocks)]
@@ -38,13 +38,13 @@ const IDENTITY: Identity = Identity {
     sensor: None,
 };
 
-/// To wake from sleep takes the emulator longer than to pass a byte: stay awake within a message.
+/// Number of idle polls before sleep. Waking takes the emulator longer than passing a byte, so the board stays awake within a message.
 const IDLE_TURNS_BEFORE_SLEEP: u32 = 2000;
 
-/// Memory for the pipeline's state, which the device resets. With all bits zero it takes no room in the program.
+/// Memory for the state of the signal chain, which the device resets. All-zero bits take no space in the image.
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(NO_BITS);
 
-// SAFETY: the compiler refuses a constant whose bits are no value of its type.
+// SAFETY: the compiler refuses a constant whose bits are not a valid value of its type.
 const NO_BITS: State = unsafe { core::mem::zeroed() };
 
 #[entry]
@@ -84,16 +84,16 @@ fn main() -> ! {
     }
 }
 
-/// Waits for a byte, unless one is there.
+/// Sleeps until a byte arrives, unless one is available.
 ///
-/// The ports' interrupts are on here only, and all interrupts are off: none is served, but one ends the wait, also
-/// where it came between the look and the wait.
+/// The ports' interrupts are enabled in this function only, while interrupts are masked globally. A pending one is not served, but ends
+/// the sleep, also if it occurs between the check and the sleep.
 fn sleep() {
     cortex_m::interrupt::disable();
     for (port, irq) in [(LINK, Irq::Link), (SPINDLE, Irq::Spindle)] {
         port.clear_interrupt();
         NVIC::unpend(irq);
-        // SAFETY: the section begun above keeps it from being served.
+        // SAFETY: the critical section begun above prevents that it is served.
         unsafe { NVIC::unmask(irq) };
     }
     if !LINK.has_received() && !SPINDLE.has_received() {
@@ -106,7 +106,7 @@ fn sleep() {
     unsafe { cortex_m::interrupt::enable() };
 }
 
-/// The interrupts of this board that are used, by their number.
+/// The used interrupts of this board, by number.
 #[derive(Clone, Copy)]
 enum Irq {
     Link = 0,
@@ -121,7 +121,7 @@ unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
     }
 }
 
-/// Takes every interrupt: without a device crate all of them have this one handler.
+/// Handler of all interrupts, since there is no device crate.
 // SAFETY: the handler touches shared data through an atomic only, so that it may interrupt anything.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {
@@ -132,7 +132,7 @@ unsafe fn DefaultHandler(number: i16) {
     }
 }
 
-/// Says why, and ends the emulator with a status other than 0.
+/// Logs the panic and ends the emulator with a non-zero status.
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
     defmt::error!("{}", defmt::Display2Format(info));

@@ -1,4 +1,4 @@
-//! What the virtual spindle sends, in place of sensor and tachometer.
+//! Receiver of the simulated signals, in place of sensor and tachometer.
 
 use heapless::Vec;
 use quietcut_core::protocol::message::MAX_BLOCK_EDGES;
@@ -11,14 +11,14 @@ use crate::cost::Cost;
 use crate::flash::{Flash, PSRAM_BASE};
 use crate::uart::Uart;
 
-/// Takes stimuli and gives them to the device.
+/// Receives stimuli and passes them to the device.
 pub(crate) struct Spindle {
     frame: Vec<u8, MAX_FRAME_BYTES>,
-    /// True while the rest of a frame that is too long is passed over.
+    /// True while the rest of an overlong frame is skipped.
     is_skipping: bool,
-    /// Edges for the next block.
+    /// Tachometer edges for the next block.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
-    /// What the device costs.
+    /// Costs of the device.
     pub(crate) cost: Cost,
 }
 
@@ -34,7 +34,7 @@ impl Spindle {
         }
     }
 
-    /// Takes a byte from the port; at the end of a frame the answer.
+    /// Processes a byte of the port. Returns the answer at the end of a frame.
     pub(crate) fn take(&mut self, byte: u8, device: &mut BoardDevice, line: &mut Uart) -> Option<u8> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -58,7 +58,7 @@ impl Spindle {
         Some(if is_done.is_some() { TAKEN } else { REFUSED })
     }
 
-    /// Gives all stimuli in the board's memory to the device.
+    /// Passes all stimuli in the board's memory to the device.
     fn play(&mut self, bytes: usize, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         if bytes > MEMORY_BYTES - STORE_OFFSET {
             return None;
@@ -75,14 +75,14 @@ impl Spindle {
         Some(())
     }
 
-    /// `None` where the stimulus cannot be taken.
+    /// Processes a stimulus; `None` if it is refused.
     fn give(&mut self, stimulus: Stimulus, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         match stimulus {
             Stimulus::Edge(edge) => self.edges.push(edge).ok()?,
             Stimulus::Block(block) => {
                 self.cost.of_block(|| device.take(&block, &self.edges));
                 self.edges.clear();
-                // Unlike a real spindle this one waits for the line, so that no report is dropped.
+                // A simulated spindle can wait for the line, so that no report is dropped.
                 loop {
                     let Ok(is_busy) = device.poll(line);
                     if !is_busy && device.outgoing().is_empty() {

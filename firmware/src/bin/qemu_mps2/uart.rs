@@ -1,7 +1,7 @@
 //! The board's serial ports.
 //!
-//! They hold one byte each way. Nothing is lost for that: where a byte was not taken yet the emulator holds back the
-//! sender. So the ports are polled, and their interrupts only end the board's sleep.
+//! Each holds one byte per direction. While a byte is not read, the emulator stops the sender, so that none is lost. The ports are
+//! polled, and their interrupts only wake the board.
 
 use core::convert::Infallible;
 
@@ -34,14 +34,14 @@ impl Uart {
     const RX_INTERRUPT_ON: u32 = 8;
     const RX_INTERRUPT: u32 = 2;
 
-    /// Turns the port on, for sending only or for both directions.
+    /// Enables the port, for sending only or for both directions.
     pub(crate) fn open(self, receive: bool) {
-        // 16 is the smallest divider; the emulator sends at once whatever it says.
+        // 16 is the smallest divider; the emulator ignores the baud rate.
         self.write(Self::DIVIDER, 16);
         self.write(Self::CONTROL, Self::TX_ON);
         if receive {
             self.write(Self::CONTROL, Self::TX_ON | Self::RX_ON | Self::RX_INTERRUPT_ON);
-            // Only a read tells QEMU to look at its end again: else the first byte waits for a second.
+            // A read makes QEMU check its input again. Otherwise the first byte waits for a second.
             self.read(Self::DATA);
         }
     }
@@ -65,7 +65,7 @@ impl Uart {
         self.read(Self::STATE) & Self::TX_FULL == 0
     }
 
-    /// Takes the interrupt back that the last byte raised.
+    /// Clears the interrupt of the last byte.
     pub(crate) fn clear_interrupt(self) {
         self.write(Self::INTERRUPT, Self::RX_INTERRUPT);
     }
@@ -92,7 +92,7 @@ impl ReadReady for Uart {
 }
 
 impl Read for Uart {
-    /// Takes what is there: 0 bytes where nothing is.
+    /// Reads the available bytes; 0 if there are none.
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
         let bytes = core::iter::from_fn(|| self.receive());
         Ok(buffer
