@@ -8,6 +8,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::eigenvalues::of_real;
+use quietcut_numerics::singular_values::{Vectors, decompose};
 
 /// Rounds of moving the poles; they settle within a few.
 const ROUNDS: usize = 20;
@@ -119,7 +121,7 @@ fn moved(frequency_hz: &[f64], functions: &[&[Complex64]], poles: &[Complex64]) 
     if left.nrows() < own {
         return None;
     }
-    let c = left.svd(true, true).solve(&right, 1e-13).ok()?;
+    let c = decompose(left, Vectors::Both).ok()?.solve(&right, 1e-13).ok()?;
     zeros(poles, &c)
 }
 
@@ -147,11 +149,8 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Option<Vec<Complex64>> {
             matrix[(at, column)] -= 2.0 * c[column];
         }
     }
-    if matrix.iter().any(|value| !value.is_finite()) {
-        return None;
-    }
-    let mut upper: Vec<Complex64> = matrix
-        .complex_eigenvalues()
+    let mut upper: Vec<Complex64> = of_real(matrix)
+        .ok()?
         .iter()
         .filter(|value| value.im > 0.0)
         .map(|value| Complex64::new(-value.re.abs(), value.im))
@@ -182,7 +181,7 @@ pub fn residues(
     }
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
     balance(&mut matrix, width);
-    let decomposed = matrix.clone().svd(true, true);
+    let decomposed = decompose(matrix.clone(), Vectors::Both).ok()?;
     let (mut all, mut rest) = (0.0, 0.0);
     let mut residues = Vec::with_capacity(functions.len());
     for function in functions {

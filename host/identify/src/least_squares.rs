@@ -1,6 +1,7 @@
 //! Weighed least squares of steady motions, whose weights move with the parameters.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use quietcut_numerics::singular_values::{Vectors, decompose};
 
 /// Why no law can be fitted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -215,7 +216,7 @@ pub(super) fn scaled_least_squares(matrix: &DMatrix<f64>, right: &DVector<f64>) 
     for (mut column, length) in scaled.column_iter_mut().zip(lengths.iter()) {
         column /= *length;
     }
-    let svd = scaled.svd(true, true);
+    let svd = decompose(scaled, Vectors::Both).ok()?;
     let largest = svd.singular_values.max();
     // Below the rounding of the data nothing is determined.
     if svd.singular_values.min() < 1e-12 * largest {

@@ -1,6 +1,5 @@
 //! Numerical methods that know nothing of milling.
 
-pub mod complex_eigenvalues;
 pub mod crossing;
 pub mod dormand_prince;
 pub mod eigenvalues;

@@ -10,6 +10,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Cholesky, DMatrix};
 use num_complex::Complex64;
+use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
+use quietcut_numerics::singular_values::{SingularValueError, Vectors, decompose, singular_values};
 use rayon::prelude::*;
 
 use super::recording::Ambient;
@@ -61,6 +63,12 @@ pub enum AmbientError {
         "nothing between {0} and {1} Hz stands out of the noise: the data cannot tell; record longer, or shake it more"
     )]
     Nothing(f64, f64),
+    /// The singular values of the covariances cannot be computed.
+    #[error(transparent)]
+    SingularValues(#[from] SingularValueError),
+    /// The poles of the state-space model cannot be computed.
+    #[error(transparent)]
+    Poles(#[from] EigenvalueError),
 }
 
 /// Fewest and most blocks of a record.
@@ -108,12 +116,12 @@ pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientMo
         mean,
         of_blocks,
     };
-    let order = record.order();
+    let order = record.order()?;
     if order == 0 {
         return Err(AmbientError::Nothing(low_hz, high_hz));
     }
-    let found = record.modes(order);
-    let larger = record.poles(&record.mean, order + 4).unwrap_or_default();
+    let found = record.modes(order)?;
+    let larger = record.poles(&record.mean, order + 4)?.unwrap_or_default();
     let modes: Vec<AmbientMode> = found
         .into_iter()
         .filter(|mode| {
@@ -164,52 +172,54 @@ fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> 
 
 impl Record {
     /// Number of singular values above the scatter: even, since poles come in conjugate pairs.
-    fn order(&self) -> usize {
-        let values = self.mean.singular_values();
+    fn order(&self) -> Result<usize, AmbientError> {
+        let values = singular_values(self.mean.clone())?;
         // The mean of two halves that alternate, one taken from the other: noise of the size of that of the mean.
         let count = self.of_blocks.len() as f64;
         let mut noise = DMatrix::zeros(self.mean.nrows(), self.mean.ncols());
         for (index, block) in self.of_blocks.iter().enumerate() {
             noise += (block - &self.mean) * (if index % 2 == 0 { 1.0 } else { -1.0 } / count);
         }
-        let level = noise.singular_values().max();
+        let level = singular_values(noise)?.max();
         let above = values.iter().filter(|value| **value > level).count();
         // With as many states as rows there is no shift.
-        (above.div_ceil(2) * 2).min(self.mean.nrows() - self.channels - 4) & !1
+        Ok((above.div_ceil(2) * 2).min(self.mean.nrows() - self.channels - 4) & !1)
     }
 
     /// Poles of a Hankel matrix above the real axis, rad/s; `None` where there is no such model.
-    fn poles(&self, hankel: &DMatrix<f64>, order: usize) -> Option<Vec<Complex64>> {
-        let mut svd = hankel.clone().svd(true, false);
-        svd.sort_by_singular_values();
-        let u = svd.u?;
+    fn poles(&self, hankel: &DMatrix<f64>, order: usize) -> Result<Option<Vec<Complex64>>, AmbientError> {
+        let Some(u) = decompose(hankel.clone(), Vectors::Left)?.u else {
+            return Ok(None);
+        };
         if order > u.ncols() {
-            return None;
+            return Ok(None);
         }
         let rows = u.nrows() - self.channels;
         let (up, down) = (
             u.view((0, 0), (rows, order)),
             u.view((self.channels, 0), (rows, order)),
         );
-        let flow = Cholesky::new(up.tr_mul(&up))?.solve(&up.tr_mul(&down));
-        let poles = flow.complex_eigenvalues();
-        Some(
+        let Some(gram) = Cholesky::new(up.tr_mul(&up)) else {
+            return Ok(None);
+        };
+        let poles = of_real(gram.solve(&up.tr_mul(&down)))?;
+        Ok(Some(
             poles
                 .iter()
                 .filter(|pole| pole.im > 0.0)
                 .map(|pole| pole.ln() * self.rate_hz)
                 .collect(),
-        )
+        ))
     }
 
     /// Modes within the band, with deviations by the moves of the blocks.
-    fn modes(&self, order: usize) -> Vec<AmbientMode> {
+    fn modes(&self, order: usize) -> Result<Vec<AmbientMode>, AmbientError> {
         let [low_hz, high_hz] = self.band_hz;
         let is_mode = |pole: &Complex64| {
             let (hz, damping) = (pole.norm() / TAU, -pole.re / pole.norm());
             (low_hz..=high_hz).contains(&hz) && damping > 0.0 && damping < LARGEST_AMBIENT_DAMPING
         };
-        let mut poles: Vec<Complex64> = self.poles(&self.mean, order).unwrap_or_default();
+        let mut poles: Vec<Complex64> = self.poles(&self.mean, order)?.unwrap_or_default();
         poles.retain(is_mode);
         poles.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
         let moved: Vec<Vec<Complex64>> = self
@@ -217,12 +227,12 @@ impl Record {
             .par_iter()
             .map(|block| {
                 let there = &self.mean + (block - &self.mean) * STEP;
-                self.poles(&there, order).unwrap_or_default()
+                Ok(self.poles(&there, order)?.unwrap_or_default())
             })
-            .collect();
+            .collect::<Result<_, AmbientError>>()?;
         let count = self.of_blocks.len() as f64;
         let few = ninety_percent(self.of_blocks.len() - 1) / NINETY_PERCENT;
-        poles
+        let modes = poles
             .iter()
             .map(|pole| {
                 let (mut frequency, mut damping) = (0.0, 0.0);
@@ -242,6 +252,7 @@ impl Record {
                     damping_deviation: deviation(damping),
                 }
             })
-            .collect()
+            .collect();
+        Ok(modes)
     }
 }

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 use super::receptances::Receptances;
-use quietcut_numerics::complex_eigenvalues::eigenvalues;
+use quietcut_numerics::eigenvalues::of_complex;
 
 /// Part of the unit circle that the band takes: the receptances need not close to a circle.
 const ARC: f64 = 0.9;
@@ -135,7 +135,7 @@ fn roots(a: &[Complex64]) -> Option<Vec<Complex64>> {
             companion[(i + 1, i)] = Complex64::ONE;
         }
     }
-    let inverses = eigenvalues(companion)?;
+    let inverses = of_complex(companion).ok()?;
     Some(
         inverses
             .into_iter()

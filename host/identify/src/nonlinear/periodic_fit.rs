@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use quietcut_numerics::singular_values::{Vectors, decompose};
 use rustfft::{Fft, FftPlanner};
 
 use crate::least_squares::scaled_least_squares;
@@ -248,7 +249,10 @@ fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> 
         });
         let mut target = DVector::zeros(step + 2);
         target[0] = size;
-        let y = hessenberg.clone().svd(true, true).solve(&target, 0.0).ok()?;
+        let y = decompose(hessenberg.clone(), Vectors::Both)
+            .ok()?
+            .solve(&target, 0.0)
+            .ok()?;
         let left = (&target - hessenberg * &y).norm();
         if left <= 1e-9 * size || length <= 1e-14 * size {
             let mut solution = vec![0.0; right.len()];

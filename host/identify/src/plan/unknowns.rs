@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use quietcut_numerics::eigenvalues::of_symmetric;
 
 use super::means::Means;
 use quietcut_model::case::{Case, Deviation, Parameter};
@@ -230,7 +231,9 @@ fn of_matrices(matrices: &Matrices) -> Vec<(String, [Vec<Deviation>; 3])> {
     let Some(inverse) = root.clone().try_inverse() else {
         return Vec::new();
     };
-    let eigen = SymmetricEigen::new(&inverse * &stiffness * inverse.transpose());
+    let Ok(eigen) = of_symmetric(&inverse * &stiffness * inverse.transpose()) else {
+        return Vec::new();
+    };
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let mode = |index: usize| {

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use nalgebra::DMatrix;
+use quietcut_numerics::eigenvalues::of_symmetric;
 
 use super::{Direction, Matrices};
 
@@ -133,7 +134,10 @@ fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     let scaled = DMatrix::from_fn(symmetric.nrows(), symmetric.ncols(), |i, j| {
         symmetric[(i, j)] * scale[i] * scale[j]
     });
-    let eigenvalues = scaled.symmetric_eigenvalues();
+    // Entries that are not finite define no definite matrix.
+    let Ok(eigenvalues) = of_symmetric(scaled).map(|eigen| eigen.eigenvalues) else {
+        return false;
+    };
     let threshold = ZERO * eigenvalues.amax();
     if strict {
         eigenvalues.min() > threshold
@@ -143,7 +147,7 @@ fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
 }
 
 fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
-    symmetric.symmetric_eigenvalues().min()
+    of_symmetric(symmetric.clone()).map_or(f64::NAN, |eigen| eigen.eigenvalues.min())
 }
 
 /// Searches one change, then two: a turned sign, or a turned sign and a larger diagonal entry.

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use quietcut_numerics::eigenvalues::EigenvalueError;
+
 use super::Indefinite;
 
 /// Why the structure of a case cannot be used.
@@ -11,6 +13,8 @@ pub enum StructureError {
     Indefinite(Vec<Indefinite>),
     /// The mass matrix has no inverse.
     SingularMass,
+    /// The poles of the structure cannot be computed.
+    Poles(EigenvalueError),
 }
 
 impl fmt::Display for StructureError {
@@ -23,6 +27,10 @@ impl fmt::Display for StructureError {
                 Ok(())
             }
             Self::SingularMass => f.write_str("the mass matrix has no inverse"),
+            Self::Poles(error) => write!(
+                f,
+                "the poles of mass, damping and stiffness cannot be computed ({error}); check their units"
+            ),
         }
     }
 }

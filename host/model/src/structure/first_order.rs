@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3};
 use num_complex::Complex64;
 
 use super::{Direction, Form, Matrices, Mode, Structure, StructureError, feed_axes};
-use quietcut_numerics::eigenvalues::eigenvalues;
+use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 
 /// ẋ = A x + B F, u = C x with F and u the force on and the displacement of the tool centre point in x, y, z.
 ///
@@ -73,11 +73,17 @@ impl FirstOrder {
     }
 
     /// Poles of the structure, rad/s, sorted by imaginary part.
+    ///
+    /// [`Structure::first_order`] refuses a structure whose poles cannot be computed. If an entry of A is set to a value that is
+    /// not finite afterwards, the list is empty.
     pub fn poles(&self) -> Vec<Complex64> {
-        let mut poles = eigenvalues(self.a.clone())
-            .unwrap_or_else(|| self.a.complex_eigenvalues().iter().copied().collect());
+        self.try_poles().unwrap_or_default()
+    }
+
+    fn try_poles(&self) -> Result<Vec<Complex64>, EigenvalueError> {
+        let mut poles = of_real(self.a.clone())?;
         poles.sort_by(|p, q| p.im.total_cmp(&q.im).then(p.re.total_cmp(&q.re)));
-        poles
+        Ok(poles)
     }
 }
 
@@ -85,14 +91,16 @@ impl Structure {
     /// The structure in first-order form, in the machine's directions; cubic terms are left out.
     ///
     /// # Errors
-    /// Mass, damping or stiffness is indefinite.
+    /// Mass, damping or stiffness is indefinite, or the poles cannot be computed.
     pub fn first_order(&self) -> Result<FirstOrder, StructureError> {
         self.check()?;
-        match &self.form {
-            Form::Matrices(matrices) => from_matrices(matrices, &self.directions),
-            Form::Modes(modes) => Ok(from_modes(modes, &self.directions)),
-            Form::Joints(robot) => from_second_order(&robot.matrices(), &robot.jacobian()),
-        }
+        let first_order = match &self.form {
+            Form::Matrices(matrices) => from_matrices(matrices, &self.directions)?,
+            Form::Modes(modes) => from_modes(modes, &self.directions),
+            Form::Joints(robot) => from_second_order(&robot.matrices(), &robot.jacobian())?,
+        };
+        first_order.try_poles().map_err(StructureError::Poles)?;
+        Ok(first_order)
     }
 }
 
@@ -235,6 +243,22 @@ mod tests {
         assert!(close(turned[(0, 0)], machine[(1, 1)]));
         assert!(close(turned[(1, 1)], machine[(0, 0)]));
         assert!(close(turned[(0, 1)], -machine[(1, 0)]));
+    }
+
+    #[test]
+    fn an_overflow_of_the_poles_reaches_the_caller() {
+        // Positive definite, but ω² = 1e400 (rad/s)².
+        let mut structure = case("staubli-tx200").structure().unwrap().clone();
+        let Form::Matrices(matrices) = &mut structure.form else {
+            panic!("no matrices")
+        };
+        matrices.mass *= 1e-200;
+        matrices.stiffness *= 1e200;
+        let error = structure.first_order().unwrap_err();
+        assert!(matches!(error, StructureError::Poles(_)), "{error}");
+        // The dynamics of the simulation pass it on, with the remedy.
+        let error = crate::dynamics::Dynamics::new(&structure).unwrap_err();
+        assert!(error.to_string().contains("check their units"), "{error}");
     }
 
     #[test]

@@ -23,7 +23,6 @@ pub use real::of_real;
 pub use symmetric::{of_symmetric, of_symmetric_pencil};
 
 use nalgebra::{ComplexField, DMatrix};
-use num_complex::Complex64;
 
 /// Why a matrix has no eigenvalues that can be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -62,11 +61,6 @@ pub enum EigenvalueError {
         /// The bound.
         iterations: usize,
     },
-}
-
-/// [`of_real`], `None` for an error.
-pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex64>> {
-    of_real(matrix).ok()
 }
 
 /// The number of rows of a square matrix with finite entries.

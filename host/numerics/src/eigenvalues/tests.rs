@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 
 use super::*;

@@ -7,7 +7,7 @@ use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::FrequencyProblem;
 use crate::error::StabilityError;
 use crate::spectrum::stability_loss::StabilityLoss;
-use quietcut_numerics::complex_eigenvalues;
+use quietcut_numerics::eigenvalues;
 
 /// u = H (κ α₀ − β₀) u with the averages α₀ (times K_tc) and β₀ = β_e + β_f over a tooth period.
 ///
@@ -109,7 +109,7 @@ impl OpenLoop for AveragedLoop<'_> {
         let seen = DMatrix::from_fn(self.axes.len(), self.axes.len(), |i, j| {
             matrix[(self.axes[i], self.axes[j])]
         });
-        complex_eigenvalues::eigenvalues(seen)
+        eigenvalues::of_complex(seen).ok()
     }
 
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64> {

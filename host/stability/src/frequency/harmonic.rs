@@ -8,7 +8,6 @@ use super::open_loop::{OpenLoop, RealEnd, around, ascending};
 use super::problem::{FrequencyProblem, Resonance};
 use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::Harmonic;
-use quietcut_numerics::complex_eigenvalues;
 use quietcut_numerics::eigenvalues;
 
 /// u(t) = e^{st} Σ_p u_p e^{ipΩt}: u_p = H(s + ipΩ) Σ_q (κ α_{p−q} − β_{p−q}) u_q, with p, q from −K−1 to K.
@@ -154,7 +153,7 @@ impl<'a> HarmonicLoop<'a> {
     fn flips(&self) -> Option<Vec<f64>> {
         let matrix = self.matrix(Complex64::new(0.0, 0.5 * self.passing))?;
         let real = real_form(&matrix, self.count(), self.axes.len());
-        let all = eigenvalues::eigenvalues(real)?;
+        let all = eigenvalues::of_real(real).ok()?;
         Some(
             all.iter()
                 .filter(|value| value.im == 0.0)
@@ -259,7 +258,7 @@ impl OpenLoop for HarmonicLoop<'_> {
     }
 
     fn eigenvalues(&self, s: Complex64, floor: f64) -> Option<Vec<Complex64>> {
-        complex_eigenvalues::dominant(&self.matrix(s)?, floor)
+        eigenvalues::dominant(&self.matrix(s)?, floor).ok()
     }
 
     fn determinant(&self, s: Complex64, kappa: Complex64) -> Option<Complex64> {

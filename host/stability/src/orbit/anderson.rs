@@ -6,6 +6,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
+use quietcut_numerics::singular_values::{Vectors, decompose};
 
 /// What is left out of the singular values of the last residuals, as a share of the largest.
 const RANK: f64 = 1e-10;
@@ -41,7 +42,9 @@ impl Anderson {
         let differences = DMatrix::from_fn(residual.len(), before, |row, column| {
             residual[row] - self.rounds[column].0[row]
         });
-        let decomposed = differences.svd(true, true);
+        let Ok(decomposed) = decompose(differences, Vectors::Both) else {
+            return at + &residual * 0.5;
+        };
         let least = RANK * decomposed.singular_values.max();
         let Ok(shares) = decomposed.solve(&residual, least) else {
             return at + &residual * 0.5;

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use super::eigenvector::eigenvector;
 use super::hessenberg::Shifted;
 use crate::criteria::{CROWD, KRYLOV_ANY};
-use quietcut_numerics::eigenvalues::eigenvalues;
+use quietcut_numerics::eigenvalues;
 
 /// Vectors in a block: as many directions may have the same mode.
 const BLOCK: usize = 3;
@@ -250,7 +250,7 @@ fn are_settled(
 
 /// The eigenvalues of a matrix that are larger than `least`, largest first, of pairs the upper one first.
 fn larger(matrix: &DMatrix<f64>, least: f64) -> Option<Vec<Complex64>> {
-    let mut values = eigenvalues(matrix.clone())?;
+    let mut values = eigenvalues::of_real(matrix.clone()).ok()?;
     values.retain(|value| value.norm() > least);
     values.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
     Some(values)

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::krylov::{self, LinearMap};
 use crate::problem::period::Period;
-use quietcut_numerics::eigenvalues::eigenvalues;
+use quietcut_numerics::eigenvalues;
 
 /// Up to this size all eigenvalues of the map are computed from its matrix: it is as fast.
 const WHOLE: usize = 110;
@@ -66,7 +66,7 @@ pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64
 
 /// All eigenvalues of the matrix of a map over a period, largest first, of pairs the upper one first.
 pub(crate) fn of_matrix(map: DMatrix<f64>) -> Option<Vec<Complex64>> {
-    let mut multipliers = eigenvalues(map)?;
+    let mut multipliers = eigenvalues::of_real(map).ok()?;
     multipliers.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
     Some(multipliers)
 }

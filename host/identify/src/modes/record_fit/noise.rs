@@ -13,6 +13,7 @@ use super::unknowns::{Transient, Unknowns};
 use super::variances::Variances;
 use crate::criteria::LEAST_RELATIVE_NOISE;
 use quietcut_frf::ChannelLines;
+use quietcut_numerics::eigenvalues::of_symmetric;
 
 /// Steps of scoring in one round.
 const STEPS: usize = 10;
@@ -177,7 +178,8 @@ fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut V
             let sum: Complex64 = lines.clone().map(|k| a[k] * b[k].conj()).sum();
             sum / (lines.len() as f64 * (variances.forces[i] * variances.forces[j]).sqrt())
         });
-        power.symmetric_eigenvalues().min()
+        // Spectra that are not finite say nothing of independent forces.
+        of_symmetric(power).map_or(0.0, |eigen| eigen.eigenvalues.min())
     };
     let least = (0..bands).map(eigenvalue).fold(f64::INFINITY, f64::min);
     let part = (least / EIGENVALUE).clamp(0.0, 1.0);

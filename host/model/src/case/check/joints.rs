@@ -1,6 +1,6 @@
 //! The structure as a robot: joints, links, and the posture that they are at.
 
-use nalgebra::{Matrix3, Unit, Vector3};
+use nalgebra::{Cholesky, Matrix3, Unit, Vector3};
 use toml::Spanned;
 
 use super::Check;
@@ -151,7 +151,7 @@ impl Check<'_> {
             }
         };
         let is_finite = inertia.iter().all(|entry| entry.is_finite());
-        if is_finite && inertia.symmetric_eigenvalues().min() > 0.0 {
+        if is_finite && Cholesky::new(inertia).is_some() {
             Ok(inertia)
         } else {
             let found = format!("{:?}", file.get_ref());
