@@ -1,12 +1,14 @@
-//! Where a smooth function of a step first goes below zero.
+//! First zero crossing of a smooth function within a time step.
 
-/// Places that are looked at: dense at the start, where contact that has just changed may change back.
+/// Fractions of the step at which the function is evaluated. They are dense at the start, since a contact that has just
+/// changed may change back there. Unfounded.
 const LOOKED_AT: [f64; 7] = [0.03, 0.12, 0.3, 0.5, 0.7, 0.85, 1.0];
 
-/// The last u in [0, 1] before `f` is first negative, to 1e-12; `None` where it stays at or above zero.
+/// Last u in [0, 1] before `f` first becomes negative, to 1e-12; `None` if `f` stays at or above zero.
 ///
-/// Found are all stretches below zero that contain a place looked at, and those between two such places into which a
-/// parabola through three of them dips. A value below zero at 0 itself counts as zero: contact that has just changed.
+/// Detects every negative interval that contains one of the evaluated points, and those between two evaluated points
+/// into which a parabola through three points falls. A negative value at 0 itself counts as zero, since a contact has
+/// just changed there.
 pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut before, mut last) = ((0.0, f64::NAN), (0.0, f(0.0).max(0.0)));
     for u in LOOKED_AT {
@@ -25,8 +27,8 @@ pub fn first_below_zero(f: impl Fn(f64) -> f64) -> Option<f64> {
     None
 }
 
-/// Where a parabola through three points, the middle one lowest, comes down to less than half of the middle one: there
-/// the function itself may be below zero.
+/// Minimum of the parabola through three points, of which the middle one is lowest, if it lies below half the middle
+/// value; the function itself may then be negative there.
 fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
     if a.1.is_nan() || b.1 > a.1 || b.1 > c.1 {
         return None;
@@ -38,7 +40,7 @@ fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
     (bend > 0.0 && lowest < 0.5 * b.1 && (a.0..c.0).contains(&u)).then_some(u)
 }
 
-/// The change of sign between `above`, where `f` is not negative, and `below`, where it is, by bisection.
+/// Sign change between `above`, where `f` is not negative, and `below`, where `f` is negative, by bisection.
 fn last_not_below(f: &impl Fn(f64) -> f64, mut above: f64, mut below: f64) -> f64 {
     while below - above > 1e-12 {
         let u = 0.5 * (above + below);
@@ -61,7 +63,7 @@ mod tests {
 
     #[test]
     fn a_dip_between_two_places_is_found() {
-        // Below zero from 0.605 to 0.615 only.
+        // The function is negative from 0.605 to 0.615 only.
         let found = first_below_zero(|u| (u - 0.61).powi(2) - 2.5e-5).unwrap();
         assert!((found - 0.605).abs() < 1e-9, "{found}");
     }
@@ -69,7 +71,7 @@ mod tests {
     #[test]
     fn what_has_just_changed_is_not_changed_back_by_rounding() {
         assert_eq!(first_below_zero(|u| u - 1e-18), None);
-        // But where it really goes on below, it changes at once.
+        // A function that is negative at 0 and stays negative crosses at once.
         assert_eq!(first_below_zero(|u| -1e-18 - u), Some(0.0));
     }
 }

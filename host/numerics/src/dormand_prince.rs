@@ -4,13 +4,14 @@
 //! II.6 (code DOPRI5). With a local error O(h⁶) of the step and O(h⁵) of the interpolant, delayed values taken
 //! from the interpolant keep the global order 5.
 
-/// Degree 4 in u = (t − t₀)/h on [0, 1]: coefficients of 1, u, … u⁴.
+/// Polynomial of degree 4 in u = (t − t₀)/h on [0, 1]: coefficients of 1, u, … u⁴.
 pub type Quartic = [f64; 5];
 
-/// Where the stages are taken, as fractions of the step.
+/// Times c_i of the stages, as fractions of the step (Dormand–Prince tableau).
 const NODES: [f64; 7] = [0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0];
 
-/// Row i: how stage i + 1 is made from the stages before it; the last row is the fifth-order solution.
+/// Coefficients a_ij of the stages: row i combines the preceding stages to stage i + 1; the last row is the fifth-order
+/// solution.
 const STAGES: [[f64; 6]; 6] = [
     [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
@@ -41,7 +42,7 @@ const STAGES: [[f64; 6]; 6] = [
     ],
 ];
 
-/// Fifth minus fourth order.
+/// Coefficients of the difference between the fifth- and the fourth-order solution, the error estimate.
 const ERROR: [f64; 7] = [
     71.0 / 57600.0,
     0.0,
@@ -52,7 +53,7 @@ const ERROR: [f64; 7] = [
     -1.0 / 40.0,
 ];
 
-/// The fifth coefficient of the interpolant.
+/// Coefficients of the term r5 of the interpolant (DOPRI5).
 const INTERPOLANT: [f64; 7] = [
     -12715105075.0 / 11282082432.0,
     0.0,
@@ -63,7 +64,7 @@ const INTERPOLANT: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
-/// The stages of a step and its result; made once, used for every step.
+/// Dormand–Prince step: stages, result and error estimate. One value serves all steps of an integration.
 #[derive(Clone, Debug)]
 pub struct DormandPrince {
     stages: [Vec<f64>; 7],
@@ -72,7 +73,7 @@ pub struct DormandPrince {
 }
 
 impl DormandPrince {
-    /// Room for y of this many elements.
+    /// Allocates the stages for a state y of this dimension.
     pub fn new(dimension: usize) -> Self {
         Self {
             stages: std::array::from_fn(|_| vec![0.0; dimension]),
@@ -81,17 +82,17 @@ impl DormandPrince {
         }
     }
 
-    /// Computes ẏ at the start of the next step; needed at the first step and wherever ẏ has jumped.
+    /// Computes ẏ at the start of the next step; required before the first step and after every jump of ẏ.
     pub fn start(&mut self, t: f64, y: &[f64], mut rate: impl FnMut(f64, &[f64], &mut [f64])) {
         rate(t, y, &mut self.stages[0]);
     }
 
-    /// Takes ẏ at the end of the accepted step as that at the start of the next.
+    /// Reuses ẏ at the end of the accepted step as ẏ at the start of the next.
     pub fn follow(&mut self) {
         self.stages.swap(0, 6);
     }
 
-    /// Tries the step from y at t to t + h.
+    /// Computes a trial step from y at t to t + h.
     pub fn attempt(&mut self, t: f64, h: f64, y: &[f64], mut rate: impl FnMut(f64, &[f64], &mut [f64])) {
         for (index, weights) in STAGES.iter().enumerate() {
             let stage = index + 1;
@@ -107,16 +108,16 @@ impl DormandPrince {
             }
             rate(t + NODES[stage] * h, &self.at_stage, &mut self.stages[stage]);
         }
-        // The last stage stands at the solution.
+        // The last stage is evaluated at the solution (first same as last).
         self.end.copy_from_slice(&self.at_stage);
     }
 
-    /// y at the end of the step tried last.
+    /// State y at the end of the last trial step.
     pub fn end(&self) -> &[f64] {
         &self.end
     }
 
-    /// Root mean square of the estimated error of the step, each element in units of its `tolerance`.
+    /// Root mean square of the estimated error of the step, each element divided by its `tolerance`.
     pub fn error(&self, h: f64, tolerance: impl Fn(usize) -> f64) -> f64 {
         let sum: f64 = (0..self.end.len())
             .map(|element| {
@@ -127,7 +128,7 @@ impl DormandPrince {
         (sum / self.end.len() as f64).sqrt()
     }
 
-    /// Writes the interpolant of the step tried last, one quartic per element of y.
+    /// Writes the interpolant of the last trial step: one quartic per element of y.
     pub fn interpolant(&self, h: f64, y: &[f64], quartics: &mut [Quartic]) {
         for (element, quartic) in quartics.iter_mut().enumerate() {
             let rise = self.end[element] - y[element];
@@ -138,13 +139,13 @@ impl DormandPrince {
                 .zip(&self.stages)
                 .map(|(d, k)| h * d * k[element])
                 .sum();
-            // y + u(rise + (1 − u)(r3 + u(r4 + (1 − u) r5))), multiplied out.
+            // Interpolant y + u(rise + (1 − u)(r3 + u(r4 + (1 − u) r5))), expanded in powers of u.
             *quartic = [y[element], rise + r3, r4 + r5 - r3, -r4 - 2.0 * r5, r5];
         }
     }
 }
 
-/// The quartic at u.
+/// Value of a quartic at u.
 pub fn at(quartic: &Quartic, u: f64) -> f64 {
     quartic
         .iter()
@@ -156,7 +157,7 @@ pub fn at(quartic: &Quartic, u: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// ẏ = [y₁, −y₀]: a turn of the plane.
+    /// Harmonic oscillator ẏ = [y₁, −y₀]: rotation of the plane.
     fn turn(_: f64, y: &[f64], rate: &mut [f64]) {
         rate.copy_from_slice(&[y[1], -y[0]]);
     }
@@ -177,7 +178,8 @@ mod tests {
     #[test]
     fn local_errors_have_the_orders_of_the_method() {
         let (coarse, fine) = (one_step(0.2), one_step(0.1));
-        // 2⁶ for the step, 2⁵ for the interpolant and the estimate; 15 % for the next order.
+        // Halving h divides the error by 2⁶ for the step and 2⁵ for the interpolant; 0.25 in the exponent allows for
+        // higher orders.
         assert!((coarse.0 / fine.0).log2() > 6.0 - 0.25, "{coarse:?} {fine:?}");
         assert!((coarse.1 / fine.1).log2() > 5.0 - 0.25, "{coarse:?} {fine:?}");
         assert!((coarse.2 / fine.2).log2() > 5.0 - 0.25, "{coarse:?} {fine:?}");

@@ -1,4 +1,4 @@
-//! Why stability cannot be computed.
+//! Errors of stability computations.
 
 use std::path::PathBuf;
 
@@ -7,37 +7,37 @@ use quietcut_model::ModelError;
 use quietcut_model::case::CaseError;
 use quietcut_model::structure::StructureError;
 
-/// Why stability cannot be computed.
+/// Reason why stability cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum StabilityError {
     /// The case lacks a section, or has an extension that linear stability cannot treat.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// The structure is none.
+    /// The matrices or modes of the structure are invalid.
     #[error("{}: {cause}", path.display())]
     Structure {
         /// The case file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Reason from the structure.
         cause: StructureError,
     },
-    /// An extension that the case cannot have.
+    /// An extension has invalid keys or values, or cannot be applied to the case.
     #[error("{}: {cause}", path.display())]
     Extension {
         /// The case file.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason from the model of the extension.
         cause: Box<ModelError>,
     },
-    /// The method does not cover the case.
+    /// The method does not cover a feature of the case.
     #[error("{}: {what}", path.display())]
     NotCovered {
         /// The case file.
         path: PathBuf,
-        /// What is not covered, and what can be done instead.
+        /// The feature, and what to do instead.
         what: &'static str,
     },
-    /// Receptances are infinite.
+    /// A mode has no damping, so that its receptance is infinite.
     #[error(
         "a mode of {frequency_hz:.4} Hz has no damping: its receptance is infinite there; damping is needed, or a method \
          that does not go through receptances"
@@ -46,32 +46,32 @@ pub enum StabilityError {
         /// Frequency of the mode, Hz.
         frequency_hz: f64,
     },
-    /// Nothing can couple.
+    /// The structure does not allow mode coupling.
     #[error(
         "mode coupling is not defined here: {found}; two modes that move the tool in feed and normal direction are needed"
     )]
     NoModeCoupling {
-        /// What there is.
+        /// Reason: number or direction of the modes.
         found: &'static str,
     },
-    /// A table of frequency response functions cannot be used.
+    /// A table of frequency response functions is invalid.
     #[error(transparent)]
     Frf(#[from] FrfError),
-    /// A table ends before the loop has become small.
+    /// The table of receptances ends at a frequency at which the loop gain is still 1 or more.
     #[error(
         "depths from {deepest_mm:.3} mm on cannot be judged, and {depth_mm} mm was asked for: the frequency response \
          functions end at {last_hz} Hz, where the gain of the loop then reaches 1; measure to higher frequencies, or ask \
          for less depth"
     )]
     EndsEarly {
-        /// The depth asked for, mm.
+        /// Requested axial depth, mm.
         depth_mm: f64,
-        /// The largest depth that can be judged, mm.
+        /// Largest axial depth for which the table suffices, mm.
         deepest_mm: f64,
         /// Last frequency of the table, Hz.
         last_hz: f64,
     },
-    /// What was asked depends on frequencies that a table does not have.
+    /// The result depends on receptances outside the frequency range of the table.
     #[error(
         "at {rpm} rev/min and {depth_mm:.4} mm the cut vibrates at {frequency_hz:.3} Hz, but the frequency response \
          functions were measured from {first_hz} to {last_hz} Hz only; measure there too, or ask for less depth"
@@ -88,7 +88,7 @@ pub enum StabilityError {
         /// Last frequency of the table, Hz.
         last_hz: f64,
     },
-    /// Deviations so large that much of what they describe does not exist.
+    /// The standard deviations of the case are so large that many drawn machines are not physical.
     #[error(
         "{}: with its deviations (keys that end in _std) {percent:.0} % of the machines are impossible: a damping ratio \
          or a frequency below 0, or indefinite matrices; smaller deviations are needed",
@@ -97,27 +97,27 @@ pub enum StabilityError {
     Deviations {
         /// The case file.
         path: PathBuf,
-        /// How many machines of a hundred.
+        /// Percentage of drawn machines that are not physical.
         percent: f64,
     },
-    /// A speed or depth that no cut has.
+    /// A speed or depth that is out of range.
     #[error("{quantity} {value}: {expected} is needed")]
     Argument {
-        /// Which quantity.
+        /// Name of the quantity.
         quantity: &'static str,
         /// Its value.
         value: f64,
-        /// What would be right.
+        /// Description of valid values.
         expected: &'static str,
     },
-    /// The numbers left the range in which they mean something.
+    /// The numerical computation failed.
     #[error("at {rpm} rev/min and {depth_mm} mm the computation broke down: {what}")]
     BrokeDown {
         /// Spindle speed, rev/min.
         rpm: f64,
         /// Axial depth, mm.
         depth_mm: f64,
-        /// Where.
+        /// Reason of the failure.
         what: &'static str,
     },
 }

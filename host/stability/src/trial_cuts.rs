@@ -1,4 +1,4 @@
-//! Cuts that were tried, and how often a chart calls them right.
+//! Trial cuts with observed outcomes, and how often a method predicts them correctly.
 
 use std::path::{Path, PathBuf};
 
@@ -9,75 +9,75 @@ use crate::limits::method::Method;
 use crate::limits::speed_line::SpeedLine;
 use quietcut_recording::file::{FileError, read_text};
 
-/// Steps in depth at which multipliers are followed.
+/// Number of steps in depth at which Floquet multipliers are computed. A choice: half more than the least of a chart.
 const SAMPLES: usize = 60;
 
-/// What came of a cut.
+/// Observed outcome of a trial cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// Vibrations died away.
+    /// The vibration decayed.
     Stable,
-    /// They grew, or stayed large.
+    /// The vibration grew, or stayed large.
     Chatter,
-    /// It could not be told.
+    /// The outcome could not be classified.
     Marginal,
 }
 
-/// A cut that was tried.
+/// Trial cut: spindle speed, axial depth and observed outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TestCut {
     /// Spindle speed, rev/min.
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// What came of it.
+    /// Observed outcome.
     pub outcome: Outcome,
 }
 
-/// How a method calls cuts that were tried.
+/// Number of correct and wrong predictions of a method over trial cuts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Calls {
-    /// Cuts in all.
+    /// Number of trial cuts.
     pub cuts: usize,
-    /// Cuts that were called wrong: the two below.
+    /// Number of wrong predictions: `missed_chatter` plus `false_alarms`.
     pub wrong: usize,
-    /// Called stable, and chattered.
+    /// Number of cuts predicted stable that chattered.
     pub missed_chatter: usize,
-    /// Called unstable, and were stable.
+    /// Number of cuts predicted unstable that were stable.
     pub false_alarms: usize,
-    /// Cuts that could not be told, or at depths where two stable orbits exist: they are not counted as wrong.
+    /// Number of cuts with marginal outcome, or at depths where two stable orbits exist; they do not count as wrong.
     pub undecided: usize,
 }
 
-/// Why a file of cuts cannot be read.
+/// Error on reading a file of trial cuts.
 #[derive(Debug, thiserror::Error)]
 pub enum TestCutsError {
-    /// The file.
+    /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Something in it.
+    /// A line of the file is not a valid trial cut.
     #[error(
         "{}, line {line}: {found}; `rpm [rev/min],depth [mm],outcome` is needed with outcomes stable, chatter and marginal",
         path.display()
     )]
     Wrong {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Where, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What stands there.
+        /// Text of the line.
         found: String,
     },
 }
 
-/// The columns of a file of cuts.
+/// Column heads of a file of trial cuts.
 const HEADER: [&str; 3] = ["rpm [rev/min]", "depth [mm]", "outcome"];
 
-/// Cuts from a CSV file: `rpm [rev/min],depth [mm],outcome`.
+/// Reads trial cuts from a CSV file with the columns `rpm [rev/min],depth [mm],outcome`.
 ///
 /// # Errors
-/// The file cannot be read, has other columns, or a speed, depth or outcome that cannot be.
+/// The file cannot be read, has other columns, or contains an invalid speed, depth or outcome.
 pub fn read(path: &Path) -> Result<Vec<TestCut>, TestCutsError> {
     let text = read_text(path)?;
     let wrong = |line: usize, found: String| TestCutsError::Wrong {
@@ -113,7 +113,7 @@ fn cut(line: &str) -> Option<TestCut> {
     })
 }
 
-/// The text of a file of cuts.
+/// Trial cuts as the text of a CSV file; the inverse of [`read`].
 pub fn text(cuts: &[TestCut]) -> String {
     let lines = cuts.iter().map(|cut| {
         let outcome = match cut.outcome {
@@ -129,15 +129,15 @@ pub fn text(cuts: &[TestCut]) -> String {
 }
 
 impl Calls {
-    /// What the limits by a method say of these cuts, each at its own speed.
+    /// Compares the predictions of a method, computed at the speed of each cut, with the observed outcomes.
     ///
     /// # Errors
-    /// Those of [`Method::lines`].
+    /// As [`Method::lines`].
     pub fn new<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Self, StabilityError> {
         Ok(Self::of(&calls(method, cuts)?))
     }
 
-    /// The sum of what was said of each cut.
+    /// Counts the results of single cuts.
     pub fn of(calls: &[Call]) -> Self {
         let count = |call: Call| calls.iter().filter(|other| **other == call).count();
         let (missed_chatter, false_alarms) = (count(Call::MissedChatter), count(Call::FalseAlarm));
@@ -151,30 +151,30 @@ impl Calls {
     }
 }
 
-/// What a method says of one cut.
+/// Result of comparing the prediction for one cut with its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call {
-    /// What came of it.
+    /// Prediction and outcome agree.
     Right,
-    /// Stable, and it chattered.
+    /// The cut was predicted stable, and chattered.
     MissedChatter,
-    /// Unstable, and it was stable.
+    /// The cut was predicted unstable, and was stable.
     FalseAlarm,
-    /// It could not be told, or two stable orbits exist at its depth.
+    /// The outcome is marginal, or two stable orbits exist at the depth of the cut.
     Undecided,
 }
 
 impl Call {
-    /// True where what came of the cut is the opposite.
+    /// True if the outcome contradicts the prediction.
     pub fn is_wrong(self) -> bool {
         matches!(self, Self::MissedChatter | Self::FalseAlarm)
     }
 }
 
-/// What the limits by a method say of cuts, in their order, each at its own speed.
+/// Compares predictions with outcomes for each cut, in the order of the cuts, each at its own speed.
 ///
 /// # Errors
-/// Those of [`Method::lines`].
+/// As [`Method::lines`].
 pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Vec<Call>, StabilityError> {
     let mut speeds_rpm: Vec<f64> = cuts.iter().map(|cut| cut.rpm).collect();
     speeds_rpm.sort_by(f64::total_cmp);
@@ -184,7 +184,8 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Vec<Cal
     Ok(cuts.iter().map(|cut| call(&lines, cut)).collect())
 }
 
-/// What lines say of a cut, of which one must be at its speed and go as deep.
+/// Compares the prediction for one cut with its outcome. One of the lines must have the speed of the cut and reach its
+/// depth.
 pub fn call(lines: &[SpeedLine], cut: &TestCut) -> Call {
     let line = lines.iter().find(|line| line.rpm == cut.rpm);
     let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {

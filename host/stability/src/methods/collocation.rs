@@ -1,4 +1,4 @@
-//! The default method: collocation of the one-period map, limits and exact multipliers from the characteristic matrix.
+//! The default method: collocation of the map over one tooth period.
 
 use crate::error::StabilityError;
 use crate::limits::cell::Cell;
@@ -11,10 +11,11 @@ use crate::problem::linear::Problem;
 use crate::problem::period::check_length;
 use crate::spectrum::collocated::Collocated;
 
-/// The default method: collocation of the one-period map, limits from the characteristic matrix.
+/// Collocation over one tooth period; limits and multipliers are refined with the characteristic matrix. The default
+/// method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collocation {
-    /// The problem that it solves.
+    /// Milling problem with equal pitch.
     pub problem: Problem,
 }
 

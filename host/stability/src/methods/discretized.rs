@@ -1,4 +1,4 @@
-//! Methods that discretize the period into steps, as the field knows them: with the steps asked for, and with an error.
+//! Methods that divide the period into a given number of steps, with an error estimate from finer steps.
 
 use num_complex::Complex64;
 
@@ -14,33 +14,33 @@ use crate::problem::pitched::Pitched;
 use crate::spectrum::krylov::Dominant;
 use crate::spectrum::map_spectrum::{MapSpectrum, PeriodMap};
 
-/// Relative error that rounding leaves in multipliers of a period of some hundred steps.
+/// Relative rounding error of the multipliers of a period of some hundred steps. Unfounded: an estimate.
 const ROUNDING: f64 = 1e-9;
 
-/// How a step is made.
+/// Scheme of one time step, such as semi-discretization.
 pub(crate) trait Discretization: Sync {
-    /// The name in answers.
+    /// Name of the method in results.
     fn name(&self) -> &'static str;
 
-    /// The power of the step with which multipliers converge.
+    /// Order p of convergence: the error of multipliers falls with the p-th power of the step.
     fn order(&self) -> u32;
 
-    /// The map of a period at a depth, m; `None` where a step has no solution.
+    /// Map over one period at an axial depth, m; `None` if the equations of a step are singular.
     fn map<'a>(&self, pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64) -> Option<Stepped<'a>>;
 }
 
-/// A discretization with a number of steps on a problem.
+/// Time-stepping method with a given number of steps, applied to a problem.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Discretized<D> {
-    /// The problem that it solves.
+    /// Milling problem, with equal or unequal pitch.
     pub pitched: Pitched,
-    /// How a step is made.
+    /// Scheme of one time step.
     pub discretization: D,
-    /// Steps in each tooth period, at least 1.
+    /// Number of steps in each tooth period, at least 1.
     pub steps: usize,
 }
 
-/// What `answer` says of the largest multipliers of a method at a point, with `steps` steps.
+/// Applies `answer` to the dominant Floquet multipliers of the period map with `steps` steps per tooth period.
 pub(crate) fn with_dominant<D: Discretization, T>(
     method: &Discretized<D>,
     rpm: f64,
@@ -64,7 +64,7 @@ pub(crate) fn with_dominant<D: Discretization, T>(
 
 #[expect(private_bounds, reason = "sealed: discretizations are those of this module")]
 impl<D: Discretization> Discretized<D> {
-    /// The dominant multiplier of the steps asked for, without an estimate of its error: a seventh of the work of
+    /// Dominant Floquet multiplier with the configured number of steps, without an error estimate; costs a seventh of
     /// [`point()`](Method::point).
     ///
     /// # Errors
@@ -77,7 +77,7 @@ impl<D: Discretization> Discretized<D> {
         })
     }
 
-    /// The error of a multiplier of the steps asked for, from twice and four times as many.
+    /// Error of a multiplier computed with the configured steps, from twice and four times as many steps.
     fn error(&self, rpm: f64, depth_mm: f64, multiplier: Complex64) -> Result<f64, StabilityError> {
         let finer = |times: usize| {
             with_dominant(self, rpm, depth_mm, times * self.steps, |dominant, _| {
@@ -104,7 +104,7 @@ impl<D: Discretization> Method for Discretized<D> {
         ))
     }
 
-    /// The multiplier is that of the steps asked for; its error is told from twice and four times as many.
+    /// Computes the multiplier with the configured steps and its error from twice and four times as many.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
@@ -119,7 +119,7 @@ impl<D: Discretization> Method for Discretized<D> {
         Ok(CutStability::new(rpm, depth_mm, multiplier, error, chatter_hz))
     }
 
-    /// Limits are those of the steps asked for, their errors those of the multipliers there.
+    /// Computes limits with the configured steps; their errors follow from those of the multipliers.
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError> {
         check_speed(rpm)?;
         let mesh = Mesh::new(&self.pitched, rpm, self.steps);

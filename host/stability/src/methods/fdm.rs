@@ -1,13 +1,13 @@
-//! Full discretization: coefficients, state and delayed displacement are all straight lines within a step, and the
-//! free structure is solved exactly.
+//! Full discretization: coefficients, state and delayed displacement are linear in time within a step; the free
+//! structure is solved exactly.
 //!
 //! With V = B (w K − β) C and σ = s/h within the step from t_i to t_i + h
 //!
 //!   x_{i+1} = e^{Ah} x_i + ∫₀^h e^{A(h−s)} [V(σ) x(σ) − w B K_d(σ) y_d(σ)] ds,
 //!
-//! each factor a straight line in σ between its values at both ends (Ding, Zhu, Zhang & Ding, Int. J. Mach. Tools
-//! Manuf. 50 (2010) 502). Matrix exponentials depend on h alone. Steps end where a tooth enters or leaves, and the
-//! coefficients at their ends are those within, so that multipliers converge with h² at any immersion.
+//! each factor being linear in σ between its values at both ends (Ding, Zhu, Zhang & Ding, Int. J. Mach. Tools Manuf.
+//! 50 (2010) 502). Matrix exponentials depend on h alone. Steps end where a tooth enters or leaves, with one-sided
+//! limits of the coefficients at their ends, so that multipliers converge with h² at any immersion.
 
 use nalgebra::{DMatrix, Matrix3};
 
@@ -15,22 +15,22 @@ use super::discretized::{Discretization, Discretized};
 use super::stepped::{Mesh, Step, Stepped, moments, pushed};
 use crate::problem::pitched::Pitched;
 
-/// First-order full discretization.
+/// First-order full discretization (Ding et al. 2010).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FullDiscretization;
 
-/// The method on a problem.
+/// Full discretization with a given number of steps, applied to a problem.
 pub type Fdm = Discretized<FullDiscretization>;
 
-/// e^{Ah} and ∫ e^{A(h−s)} B p(σ) ds for the products of both straight lines, n × 3.
+/// Matrix exponential e^{Ah} and integrals ∫ e^{A(h−s)} B p(σ) ds for the products p of two linear functions, n × 3.
 struct Weights {
     duration_s: f64,
     flow: DMatrix<f64>,
-    /// p = (1 − σ)².
+    /// Integral with p = (1 − σ)².
     start: DMatrix<f64>,
-    /// p = σ (1 − σ).
+    /// Integral with p = σ (1 − σ).
     mixed: DMatrix<f64>,
-    /// p = σ².
+    /// Integral with p = σ².
     end: DMatrix<f64>,
 }
 
@@ -65,13 +65,13 @@ impl Discretization for FullDiscretization {
         let mut steps = Vec::with_capacity(mesh.count());
         for index in 0..mesh.count() {
             let (start_s, duration_s) = mesh.step(index);
-            // Between two switches all steps are equal but for rounding.
+            // Between two entries or exits all steps are equal except for rounding.
             let weights = known
                 .take()
                 .filter(|weights| (weights.duration_s - duration_s).abs() < 1e-9 * duration_s)
                 .unwrap_or_else(|| Weights::new(&structure.a, &b, duration_s));
             let (first, last) = (mesh.at(pitched, index, 0.0), mesh.at(pitched, index, 1.0));
-            // ∫ of a straight coefficient times what is 1 − σ, and σ.
+            // Integrals of a linear coefficient times 1 − σ (`falling`) and times σ (`rising`).
             let falling =
                 |a: &Matrix3<f64>, b: &Matrix3<f64>| pushed(&weights.start, a) + pushed(&weights.mixed, b);
             let rising =

@@ -10,25 +10,26 @@ use crate::limits::method::Method;
 use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 
-/// Mode coupling by the eigenvalues of the equations of motion, with the cut as a constant stiffness.
+/// Mode-coupling criterion: eigenvalues of the equations of motion with the cut as a constant stiffness.
 ///
-/// F = w K_tc α₀ u: averaged coefficients, and no vibration one tooth period ago. α₀ is not symmetric, so that two modes
-/// may feed each other: eigenvalues of M⁻¹(K − w K_tc α₀) become complex. Gasparetto states it for two degrees of freedom without damping;
-/// here it has the damping and all modes of the structure, and is solved along the frequency, which measured receptances
-/// allow too. Limits do not depend on the speed.
+/// F = w K_tc α₀ u, with averaged directional coefficients α₀ and without the displacement one tooth period ago. α₀ is
+/// not symmetric, so that two modes can exchange energy: eigenvalues of M⁻¹(K − w K_tc α₀) become complex. Gasparetto
+/// states the criterion for two degrees of freedom without damping. This implementation includes damping and all modes,
+/// and solves along the frequency axis, so that measured receptances can be used. Limits do not depend on the spindle
+/// speed.
 ///
-/// It neglects regeneration, which in most cuts limits the depth first, and it is blind to flips.
+/// The criterion neglects regeneration, which limits the depth first in most cuts, and does not see flips.
 #[derive(Clone, Debug)]
 pub struct ModeCoupling {
     problem: FrequencyProblem,
 }
 
 impl ModeCoupling {
-    /// The criterion for a problem.
+    /// Sets up the criterion for a problem.
     ///
     /// # Errors
-    /// The tool does not move in both directions in which the chip thickness is cut, or there is one mode only: nothing
-    /// can couple.
+    /// The structure has a single mode, or does not move in both directions that change the chip thickness, so that
+    /// modes cannot couple.
     pub fn new(problem: FrequencyProblem) -> Result<Self, StabilityError> {
         let [feed, normal, _] = problem.moves();
         let has_modes = problem.resonances().len() >= 2;

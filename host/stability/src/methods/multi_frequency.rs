@@ -1,4 +1,5 @@
-//! The multi-frequency solution (Budak & Altintas 1998, Merdol & Altintas 2004): the harmonics of the coefficients.
+//! The multi-frequency solution (Budak & Altintas 1998, Merdol & Altintas 2004), with harmonics of the directional
+//! coefficients.
 
 use num_complex::Complex64;
 
@@ -15,18 +16,18 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// The most harmonics: beyond them the matrices are too large to be of use.
+/// Largest number of harmonics; larger matrices take too long. A choice.
 const HARMONICS_MAX: usize = 400;
 
-/// The multi-frequency solution on modelled or measured receptances.
+/// Multi-frequency solution on modelled or measured receptances.
 ///
-/// The harmonic transfer matrix with harmonics from −K−1 to K of the tooth-passing frequency: flips included. Without
-/// a given K there are as many harmonics as limits need to settle, tried by doubling.
+/// The harmonic transfer matrix contains harmonics from −K−1 to K of the tooth-passing frequency and includes flips. If
+/// K is not set, it is doubled until the limits settle.
 #[derive(Clone, Debug)]
 pub struct MultiFrequency {
     /// Receptances and cutting process.
     pub problem: FrequencyProblem,
-    /// K; `None` for as many as it takes.
+    /// Number K of harmonics; `None` doubles K until the limits settle.
     pub harmonics: Option<usize>,
 }
 
@@ -35,7 +36,7 @@ impl MultiFrequency {
         HarmonicLoop::new(&self.problem, rpm, harmonics)
     }
 
-    /// The limits with as many harmonics as they need, the loop they belong to, and the limits with another number of harmonics.
+    /// Limits with as many harmonics as they need, their loop, and the limits with another number of harmonics.
     fn settled(&self, rpm: f64, depth_mm: f64) -> Result<Settled<'_>, StabilityError> {
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
         let find = |harmonics| {
@@ -68,9 +69,9 @@ impl MultiFrequency {
 
 type Settled<'a> = (HarmonicLoop<'a>, Vec<AxisCrossing>, Vec<AxisCrossing>);
 
-/// The largest relative change from one list of limits to another; `None` where they are not the same limits.
+/// Largest relative change between two lists of limits; `None` if the lists do not contain the same limits.
 fn largest_change(coarse: &[AxisCrossing], fine: &[AxisCrossing], depth_m: f64) -> Option<f64> {
-    // Near the last depth a limit may come or go.
+    // A limit close to the last depth may appear in one list only.
     let inside = |limits: &[AxisCrossing]| -> Vec<AxisCrossing> {
         let within = limits
             .iter()
@@ -105,7 +106,7 @@ impl Method for MultiFrequency {
         "multi-frequency"
     }
 
-    /// The error is what changes with twice the harmonics; the multiplier is that with twice the harmonics.
+    /// Computes the multiplier with twice the harmonics; its error is the change from the single to the doubled number.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
@@ -147,7 +148,7 @@ impl Method for MultiFrequency {
 }
 
 impl MultiFrequency {
-    /// The point of a root, with the error that fewer harmonics and a table make.
+    /// Stability of a cut from a root s, with the error due to the truncated harmonics and to the table of receptances.
     fn judged(
         &self,
         open_loop: &HarmonicLoop<'_>,
@@ -168,7 +169,7 @@ impl MultiFrequency {
             }
             None => 0.0,
         };
-        // On the real axis to what the harmonics leave: a flip is one exactly.
+        // Multipliers within the truncation error of the real axis are taken as real: a flip lies exactly on it.
         let is_real = multiplier.im.abs() <= 1e-9 * multiplier.norm();
         let multiplier = if is_real {
             Complex64::from(multiplier.re)

@@ -1,4 +1,4 @@
-//! The Nyquist criterion: unstable roots counted by the turns of a determinant, limits by the characteristic loci.
+//! The Nyquist criterion: unstable roots from the winding of a determinant, limits from the characteristic loci.
 
 use super::multi_frequency::MultiFrequency;
 use crate::error::StabilityError;
@@ -15,25 +15,25 @@ use crate::limits::method::Method;
 use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 
-/// The generalized Nyquist criterion (MacFarlane & Postlethwaite) on modelled or measured receptances.
+/// Generalized Nyquist criterion (MacFarlane & Postlethwaite) on modelled or measured receptances.
 ///
-/// With averaged coefficients (K = 0) the line s = iω from 0 to infinity says all, and the criterion is exact for the
-/// averaged cut. With K > 0 the coefficients are periodic: s from 0 to iΩ/2, and the determinant is that of the
-/// harmonic transfer matrix with harmonics up to K (Wereley & Hall), exact but for what is truncated. Every depth between
-/// two limits is confirmed by a count of the unstable roots, which does not use the loci.
+/// With averaged coefficients (K = 0) the line s = iω from 0 to infinity suffices, and the criterion is exact for the
+/// averaged cut. With K > 0 the coefficients are periodic: s runs from 0 to iΩ/2, with the determinant of the harmonic
+/// transfer matrix with harmonics up to K (Wereley & Hall); the only error is truncation. Between every two limits the
+/// number of unstable roots is verified by a count that does not use the loci.
 #[derive(Clone, Debug)]
 pub struct Nyquist {
     /// Receptances and cutting process.
     pub problem: FrequencyProblem,
-    /// K, the highest harmonic of the coefficients; 0 for their average.
+    /// Highest harmonic K of the coefficients; 0 uses their average.
     pub harmonics: usize,
 }
 
 impl Nyquist {
-    /// How many roots are unstable at a speed, rev/min, and a depth, mm: 2 for each complex pair.
+    /// Number of unstable roots at a spindle speed (rev/min) and an axial depth (mm); a complex pair counts as 2.
     ///
     /// # Errors
-    /// Speed not positive, depth negative, a depth that is a limit, or receptances that are infinite.
+    /// Speed not positive, depth negative, depth at a limit, or infinite receptances.
     pub fn unstable_roots(&self, rpm: f64, depth_mm: f64) -> Result<i32, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
@@ -60,7 +60,7 @@ impl Nyquist {
     }
 }
 
-/// The limits, with the number of unstable roots between them counted.
+/// Limits, with the number of unstable roots between them verified.
 fn confirmed(
     open_loop: &impl OpenLoop,
     rpm: f64,
@@ -79,7 +79,7 @@ fn confirmed(
         let count = limit.kind.count();
         outside += if limit.outward { count } else { -count };
         let next_m = found.get(index + 1).map_or(depth_m, |next| next.depth_m);
-        // Between limits that are as good as one there is nothing to count.
+        // Limits that agree within rounding leave no interval in which roots could be counted.
         if next_m - limit.depth_m < 1e-6 * depth_m {
             continue;
         }

@@ -18,13 +18,13 @@ use crate::spectrum::krylov::Dominant;
 use crate::spectrum::map_spectrum::{self, MapSpectrum, PeriodMap};
 use crate::spectrum::revolution_map::RevolutionMap;
 
-/// Collocation over the revolution, for teeth at any angles.
+/// Collocation over the revolution, for teeth at any pitch.
 ///
-/// Multipliers are over the revolution: with N equal pitches they are the N-th power of those over the tooth period, and
-/// Hopf, flip and fold are meant with respect to the revolution.
+/// Floquet multipliers are those over one revolution: with N equal pitches they are the N-th powers of those over the
+/// tooth period. Hopf, flip and fold refer to the revolution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RevolutionCollocation {
-    /// The problem that it solves.
+    /// Milling problem, with equal or unequal pitch.
     pub pitched: Pitched,
 }
 
@@ -80,7 +80,8 @@ impl Method for RevolutionCollocation {
     }
 }
 
-/// The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
+/// Error estimate |coarse − fine|: the coarse mesh errs by far more than the fine one, so that the difference bounds
+/// the error of the fine multiplier.
 fn error(coarse: Complex64, fine: Complex64) -> f64 {
     (MESH_ROOM * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
 }

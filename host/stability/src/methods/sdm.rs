@@ -1,14 +1,14 @@
-//! Semi-discretization: on every step the coefficients are their mean and the delayed displacement is a polynomial;
-//! the rest is solved exactly.
+//! Semi-discretization: in each step the coefficients are averaged and the delayed displacement is a polynomial; the
+//! resulting equation is solved exactly.
 //!
 //! With means K̄ and β̄ over the step from t_i to t_i + h
 //!
 //!   ẋ = (A + B (w K̄ − β̄) C) x − w B K̄_d ŷ_d,   ŷ_d ≈ y(t − τ_d),
 //!
-//! ŷ constant, y(t_i − τ_d) (order 0), or a straight line from y(t_i − τ_d) to y(t_i + h − τ_d) (order 1): Insperger &
-//! Stépán, Int. J. Numer. Meth. Engng 61 (2004) 117; Insperger, Stépán & Turi, J. Sound Vib. 313 (2008) 334.
+//! where ŷ is the constant y(t_i − τ_d) (order 0) or linear from y(t_i − τ_d) to y(t_i + h − τ_d) (order 1): Insperger
+//! & Stépán, Int. J. Numer. Meth. Engng 61 (2004) 117; Insperger, Stépán & Turi, J. Sound Vib. 313 (2008) 334.
 //! Multipliers converge with h for order 0 and with h² for order 1. Steps end where a tooth enters or leaves, so that
-//! the mean never mixes cut and air.
+//! no mean covers both cutting and free flight.
 
 use nalgebra::DMatrix;
 
@@ -16,21 +16,21 @@ use super::discretized::{Discretization, Discretized};
 use super::stepped::{Mesh, Step, Stepped, moments, pushed};
 use crate::problem::pitched::Pitched;
 
-/// The polynomial that stands for the delayed displacement within a step.
+/// Polynomial that approximates the delayed displacement within a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SdmOrder {
-    /// A constant.
+    /// Constant: the value at the start of the step.
     Zeroth,
-    /// A straight line.
+    /// Linear between the values at both ends of the step.
     #[default]
     First,
 }
 
-/// Semi-discretization.
+/// Semi-discretization of order 0 or 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SemiDiscretization(pub SdmOrder);
 
-/// The method on a problem.
+/// Semi-discretization with a given number of steps, applied to a problem.
 pub type Sdm = Discretized<SemiDiscretization>;
 
 impl Discretization for SemiDiscretization {

@@ -1,15 +1,15 @@
-//! The error of a method of some order in its step (Richardson).
+//! Richardson's error estimate for a method of known order in its step.
 
 use num_complex::Complex64;
 
 use crate::criteria::STEP_ROOM;
 
-/// An estimate of |error| of a multiplier from a method of an order p in its step, by comparison with a half and a
+/// Error estimate |error| of a multiplier from a method of order p in its step, from the results with half and a
 /// quarter of the step (Richardson).
 ///
-/// Of what changes with the k-th halving 2^{kp}/(2^{kp} − 1) is the error, by its leading term; the larger of both counts,
-/// since with one halving terms may cancel, and three times that, since p holds for small steps only. It is not
-/// below `least`, which says what the numbers can hold, relative to max(1, |μ|).
+/// By the leading term, the error is 2^{kp}/(2^{kp} − 1) times the change after k halvings. The larger of the estimates
+/// for k = 1 and 2 is used, since terms may cancel after one halving, times three, since the order holds for small
+/// steps only. The result is at least `least` (rounding), relative to max(1, |μ|).
 pub(crate) fn step_error(
     whole: Complex64,
     half: Complex64,
@@ -36,7 +36,7 @@ mod tests {
             let with = |step: f64| exact + Complex64::new(0.2, 0.1) * step.powi(order);
             let error = (with(0.1) - exact).norm();
             let stated = step_error(with(0.1), with(0.05), with(0.025), order as u32, 1e-12);
-            // The leading term alone is exact: what is stated is three times the error, to rounding.
+            // The error has the leading term alone, so that the stated error is three times the true one.
             assert!((stated - 3.0 * error).abs() < 1e-12, "{order}");
         }
         assert_eq!(step_error(exact, exact, exact, 2, 1e-9), 1e-9);

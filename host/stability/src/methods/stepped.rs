@@ -1,8 +1,8 @@
-//! One period in steps: x_{i+1} = P_i x_i + Σ_j R_ij y_j with y = C x at earlier steps. What semi-discretization and
-//! full discretization have in common.
+//! Map of one period in time steps, x_{i+1} = P_i x_i + Σ_j R_ij y_j with y = C x at earlier steps; shared by
+//! semi-discretization and full discretization.
 //!
-//! Of the delayed state only displacements act. The map of a period is never formed: a step changes n states and
-//! appends one displacement, everything else moves along by one place.
+//! Only displacements of the delayed state act. The matrix of the period map is never formed: a step updates n states,
+//! appends one displacement and shifts the others by one place.
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 use num_complex::Complex64;
@@ -14,26 +14,27 @@ use crate::spectrum::chatter_frequency::dominant_frequency_hz;
 use crate::spectrum::krylov::LinearMap;
 use crate::spectrum::map_spectrum::PeriodMap;
 
-/// Share of a step within which a delay ends at a step.
+/// Distance from a step, as a share of the step, within which a delayed time counts as the time of that step. Larger
+/// than rounding, far below the discretization error.
 const ON_STEP: f64 = 1e-9;
 
-/// Nodes and shares of the mean over a step: three Gauss nodes, exact for coefficients of fifth order.
+/// Nodes and weights of the mean over a step: three Gauss nodes, exact for polynomial coefficients up to degree 5.
 const GAUSS: [(f64, f64); 3] = [
     (0.112_701_665_379_258_3, 5.0 / 18.0),
     (0.5, 8.0 / 18.0),
     (0.887_298_334_620_741_7, 5.0 / 18.0),
 ];
 
-/// The times of the steps of a period, with every entry and exit of a tooth among them.
+/// Times of the steps of a period, including every entry and exit of a tooth.
 #[derive(Clone, Debug)]
 pub(crate) struct Mesh {
-    /// From 0 to the period, s.
+    /// Times from 0 to the period, s, ascending.
     pub(crate) times_s: Vec<f64>,
     pub(crate) passages: ToothPassages,
 }
 
 impl Mesh {
-    /// About `steps` steps in each tooth period, at least one between two switches.
+    /// Mesh with about `steps` steps in each tooth period, at least one between two entries or exits.
     pub(crate) fn new(pitched: &Pitched, rpm: f64, steps: usize) -> Self {
         let passages = ToothPassages::new(pitched, rpm);
         let shortest_s = passages
@@ -62,7 +63,7 @@ impl Mesh {
         (start_s, self.times_s[index + 1] - start_s)
     }
 
-    /// The mean of the coefficients over a step.
+    /// Mean of the force coefficients over a step.
     pub(crate) fn mean(&self, pitched: &Pitched, index: usize) -> Coefficients {
         let (start_s, duration_s) = self.step(index);
         let nodes = GAUSS
@@ -71,15 +72,15 @@ impl Mesh {
         Coefficients::mean(pitched, &self.passages, start_s + 0.5 * duration_s, nodes)
     }
 
-    /// The coefficients at a share of a step; at its ends those of the teeth that cut within it.
+    /// Force coefficients at the fraction `share` of a step; at its ends the one-sided limits from within.
     pub(crate) fn at(&self, pitched: &Pitched, index: usize, share: f64) -> Coefficients {
         let (start_s, duration_s) = self.step(index);
         let node = std::iter::once((start_s + duration_s * share, 1.0));
         Coefficients::mean(pitched, &self.passages, start_s + 0.5 * duration_s, node)
     }
 
-    /// The two steps between which a time up to 0 or within the period lies, with their shares in a straight line;
-    /// negative numbers are steps of the period before.
+    /// The two steps adjacent to a time (at most the period, or negative), with their weights in linear interpolation.
+    /// Negative indices are steps of the preceding period.
     fn around(&self, time_s: f64) -> [(isize, f64); 2] {
         let (period_s, count) = (self.passages.period_s, self.count() as isize);
         let turns = (time_s / period_s).floor();
@@ -101,17 +102,17 @@ impl Mesh {
     }
 }
 
-/// One step.
+/// One time step.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
-    /// P, n × n.
+    /// Matrix P of the present state, n × n.
     pub(crate) flow: DMatrix<f64>,
-    /// The steps whose displacements act, and how, n × 3.
+    /// Indices of earlier steps whose displacements act, with their matrices R, n × 3.
     past: Vec<(isize, DMatrix<f64>)>,
 }
 
 impl Step {
-    /// A step that so far knows the present only.
+    /// Time step in which only the present state acts so far.
     pub(crate) fn new(flow: DMatrix<f64>) -> Self {
         Self {
             flow,
@@ -119,7 +120,7 @@ impl Step {
         }
     }
 
-    /// Adds `response` (n × 3) times the displacement at a time, s, in a straight line between steps.
+    /// Adds `response` (n × 3) times the displacement at a time, s, interpolated linearly between steps.
     pub(crate) fn add_past(&mut self, mesh: &Mesh, time_s: f64, response: &DMatrix<f64>) {
         for (index, share) in mesh.around(time_s) {
             if share == 0.0 {
@@ -133,23 +134,23 @@ impl Step {
     }
 }
 
-/// The map of one period at one depth: (x_0, y_{−1}, …, y_{−K}) one period later.
+/// Map of one period at one axial depth: it advances (x_0, y_{−1}, …, y_{−K}) by one period.
 #[derive(Clone, Debug)]
 pub(crate) struct Stepped<'a> {
     pitched: &'a Pitched,
     mesh: &'a Mesh,
     depth_m: f64,
     steps: Vec<Step>,
-    /// K.
+    /// Number K of earlier displacements in the state.
     history: usize,
-    /// Number of displacements d that are kept: those of directions that move.
+    /// Indices of the d displacement components that are stored: those of directions in which the tool moves.
     seen: Vec<usize>,
-    /// The rows of C of those directions, d × n.
+    /// Rows of C of the stored components, d × n.
     observe: DMatrix<f64>,
 }
 
 impl<'a> Stepped<'a> {
-    /// From all steps of a mesh at a depth, m.
+    /// Period map from all steps of a mesh at an axial depth, m.
     pub(crate) fn new(pitched: &'a Pitched, mesh: &'a Mesh, depth_m: f64, mut steps: Vec<Step>) -> Self {
         let structure = &pitched.problem.structure;
         let seen: Vec<usize> = (0..3)
@@ -178,7 +179,7 @@ impl<'a> Stepped<'a> {
         self.observe.ncols()
     }
 
-    /// The last state, and the displacements y_{−K} … y_N below one another.
+    /// State at the end of the period, and the displacements y_{−K} … y_N stacked in order of time.
     fn trace(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let (order, kept, width) = (self.order(), self.seen.len(), columns.ncols());
         let mut trace = DMatrix::zeros((self.history + self.steps.len() + 1) * kept, width);
@@ -195,7 +196,7 @@ impl<'a> Stepped<'a> {
         for step in &self.steps {
             step.flow.mul_to(&state, &mut next);
             for (index, response) in &step.past {
-                // The earliest index is −K: the row is not negative.
+                // The earliest index is −K, so that the row is not negative.
                 let row = (index + self.history as isize) as usize * kept;
                 next.gemm(1.0, response, &trace.rows(row, kept), 1.0);
             }
@@ -259,14 +260,14 @@ impl PeriodMap for Stepped<'_> {
     }
 }
 
-/// B K as n × 3.
+/// Product B K, n × 3.
 pub(crate) fn pushed(response: &DMatrix<f64>, force: &Matrix3<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(response.nrows(), 3, |i, j| {
         (0..3).map(|axis| response[(i, axis)] * force[(axis, j)]).sum()
     })
 }
 
-/// ∫₀^h e^{A(h−s)} (s/h)^q ds B for q = 0 … `moments` − 1, each n × 3, after e^{Ah}.
+/// Matrix exponential e^{Ah}, and moments ∫₀^h e^{A(h−s)} (s/h)^q ds B for q = 0 … `moments` − 1, each n × 3.
 pub(crate) fn moments(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -275,7 +276,7 @@ pub(crate) fn moments(
 ) -> (DMatrix<f64>, Vec<DMatrix<f64>>) {
     let order = a.nrows();
     let inputs = b.ncols();
-    // ẋ = A x + B z_0, ż_0 = z_1/h, …: z_0 = (s/h)^q/q! where z_q starts at 1 (Van Loan 1978).
+    // Augmented system ẋ = A x + B z_0, ż_0 = z_1/h, …: z_0 = (s/h)^q/q! if z_q starts at 1 (Van Loan 1978).
     let mut augmented = DMatrix::zeros(order + inputs * moments, order + inputs * moments);
     augmented
         .view_mut((0, 0), (order, order))

@@ -18,21 +18,22 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// How straight loci must be between two frequencies: a tenth of what following them needs, so that the phase between two is
-/// monotone but for touching lobes.
+/// Largest deviation of a locus from a straight line between two sampled frequencies, relative to the default of locus
+/// tracing. A tenth keeps the phase between two samples monotone except for touching lobes. Unfounded.
 const STRAIGHT: f64 = 0.1;
 
-/// By how much, rad, the phase may fail to close: depths then are right to as much, relative.
+/// Tolerance, rad, to which the phase condition ωτ = π − 2 arg(1/λ) + 2πk is solved; depths have the same relative
+/// error.
 const CLOSED: f64 = 1e-11;
 
-/// The zeroth-order approximation on modelled or measured receptances.
+/// Zeroth-order approximation on modelled or measured receptances.
 ///
-/// At a chatter frequency ω each eigenvalue λ of H̃ α₀ with Re(1/λ) > 0 gives one depth, w = |1/λ|²/(2 Re(1/λ)), and one
-/// speed for every lobe k: ωτ = π − 2 arg(1/λ) + 2πk. All eigenvalues count, in two directions or three; edge and feed
-/// terms (eqs 3.6–3.12) are in H̃. At a given speed the frequencies are those where the phase closes for some k. The
-/// eigenvalues do not depend on the speed and are followed along the frequency once for a chart.
+/// At a chatter frequency ω each eigenvalue λ of H̃ α₀ with Re(1/λ) > 0 gives one depth, w = |1/λ|²/(2 Re(1/λ)), and
+/// one speed for every lobe k: ωτ = π − 2 arg(1/λ) + 2πk. All eigenvalues are used, in two directions or three; edge
+/// and feed terms (eqs 3.6–3.12) are in H̃. At a given speed the chatter frequencies are those that fulfil the phase
+/// condition for some k. The eigenvalues do not depend on the speed and are traced along the frequency once per chart.
 ///
-/// It is exact for the averaged cut and an approximation of the periodic one: blind to flips.
+/// The approximation is exact for the averaged cut; for the periodic one it neglects flips.
 #[derive(Clone, Debug)]
 pub struct Zoa {
     /// Receptances and cutting process.
@@ -40,10 +41,10 @@ pub struct Zoa {
 }
 
 impl Zoa {
-    /// The eigenvalues over all frequencies at which a limit may lie up to a depth, m.
+    /// Eigenvalues at all frequencies at which a limit may lie, up to an axial depth in m.
     fn samples(&self, depth_m: f64) -> Option<Vec<Sample>> {
         let open_loop = AveragedLoop::new(&self.problem, None);
-        // 1 − e^{−iωτ} is at most 2: |λ| is at least half of 1/w.
+        // |1 − e^{−iωτ}| is at most 2, so that a limit requires |λ| ≥ 1/(2 w).
         let floor = 0.5 / depth_m;
         let grid = open_loop.grid(2.0 * floor)?;
         trace(
@@ -54,13 +55,13 @@ impl Zoa {
         )
     }
 
-    /// With every second line of a table; `None` where there is no table.
+    /// The same method on every second line of its table of receptances; `None` for a modelled structure.
     fn thinned(&self) -> Option<Self> {
         let problem = self.problem.thinned()?;
         Some(Self { problem })
     }
 
-    /// `others` are other tables with their eigenvalues, from which errors are told.
+    /// Limits at one speed; `others` are thinned tables with their eigenvalues, from which errors are estimated.
     fn line_of(
         &self,
         samples: &[Sample],
@@ -86,18 +87,18 @@ impl Zoa {
         speed_line(&open_loop, rpm, depth_mm, &find(self, samples)?, &others, hertz)
     }
 
-    /// All limits at a delay, s, up to a depth, m.
+    /// All limits with a tooth period `delay_s` (s), up to an axial depth in m.
     fn limits(&self, samples: &[Sample], delay_s: f64, depth_m: f64) -> Option<Vec<AxisCrossing>> {
         let open_loop = AveragedLoop::new(&self.problem, None);
         let loci = |omega: f64| open_loop.eigenvalues(Complex64::new(0.0, omega), 0.0);
         let mut limits = solve_steps(&loci, samples, &|[(low, from), (high, to)]: Step| {
             let mut limits = Vec::new();
-            // Only a positive real part makes a depth, and only a large one a depth within reach.
+            // A depth requires a positive real part of λ, and a depth within range a large λ.
             if from.re.max(to.re) <= 0.0 || from.norm().max(to.norm()) < 0.45 / depth_m {
                 return Some(limits);
             }
             let start = phase(low, from, delay_s);
-            // Along the locus the phase is continuous, whatever branch the argument is on.
+            // The phase is continuous along the locus, independent of the branch of the argument.
             let end = start + (high - low) * delay_s + 2.0 * (from / to).arg();
             let (least, most) = (start.min(end), start.max(end));
             let mut lobe = (least / TAU).ceil() * TAU;
@@ -133,7 +134,7 @@ impl Zoa {
     }
 }
 
-/// ωτ − π + 2 arg(1/λ), which is a multiple of 2π on a lobe.
+/// Phase mismatch ωτ − π + 2 arg(1/λ), rad: a multiple of 2π at a limit.
 fn phase(omega: f64, eigenvalue: Complex64, delay_s: f64) -> f64 {
     omega * delay_s - PI + 2.0 * eigenvalue.inv().arg()
 }

@@ -1,4 +1,4 @@
-//! One element of the period: the four matrices of its collocation.
+//! One element of the tooth period: the four matrices of its collocation.
 
 use nalgebra::{DMatrix, Matrix3xX, MatrixXx3, Vector3};
 
@@ -6,65 +6,67 @@ use super::exponential::Exponential;
 use super::gauss::Gauss;
 use super::linear::Problem;
 
-/// One element: p = E x + Q f, x⁺ = G x + T f.
+/// Collocated element: p = E x + Q f and x⁺ = G x + T f, with x and x⁺ the states at its start and end, p the
+/// displacements along the chip normals at the nodes, and f = p − p_τ.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
-    /// G, n × n.
+    /// State transition G without regenerative force, n × n.
     pub(crate) flow: DMatrix<f64>,
-    /// E, ports × n.
+    /// Observation E of the state at the start, ports × n.
     pub(crate) observe: DMatrix<f64>,
-    /// Q, ports × ports, per meter of depth.
+    /// Response Q of the ports to the regenerative chips f, ports × ports, per meter of axial depth.
     pub(crate) kernel: DMatrix<f64>,
-    /// T, n × ports, per meter of depth.
+    /// Response T of the state at the end to the regenerative chips f, n × ports, per meter of axial depth.
     pub(crate) drive: DMatrix<f64>,
-    /// What each port is, in the order of the rows of E.
+    /// Time, weight and force of each port, in the order of the rows of E.
     pub(crate) ports: Vec<Port>,
-    /// The axial displacement, where edge and feed forces depend on it.
+    /// The axial displacement; `Some` where edge and feed forces depend on it (axial-depth modulation).
     pub(crate) axial: Option<Axial>,
 }
 
-/// The axial displacement at the nodes, z = E_z x + Q_z f, and the force that it makes by itself.
+/// Axial displacement at the nodes, z = E_z x + Q_z f, and the edge and feed force that it causes.
 #[derive(Clone, Debug)]
 pub(crate) struct Axial {
-    /// E_z, nodes × n.
+    /// Observation E_z of the state at the start, nodes × n.
     pub(crate) observe: DMatrix<f64>,
-    /// Q_z, nodes × ports, per meter of depth.
+    /// Response Q_z of the axial displacement to the regenerative chips f, nodes × ports, per meter of axial depth.
     pub(crate) kernel: DMatrix<f64>,
-    /// The forces, N/m.
+    /// Force per axial displacement at each node, N/m.
     pub(crate) ports: Vec<Port>,
 }
 
-/// One cutting tooth at one node.
+/// One cutting tooth at one collocation node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Port {
     /// Time from the start of the period, s.
     pub(crate) time_s: f64,
     /// Quadrature weight, s.
     pub(crate) weight_s: f64,
-    /// Force on the tool per depth and displacement along the chip normal, Pa; per axial displacement, N/m, of [`Axial`].
+    /// Force on the tool, Pa, per axial depth and per displacement along the chip normal. In [`Axial`]: force per axial
+    /// displacement, N/m.
     pub(crate) force: Vector3<f64>,
 }
 
-/// A tooth that cuts throughout an element.
+/// One tooth that cuts during the whole element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CuttingTooth {
-    /// Its immersion angle at phase 0, rad.
+    /// Immersion angle of the tooth at phase 0 of the period, rad.
     pub(crate) immersion: f64,
-    /// How far the tool feeds between the tooth before and this one, m.
+    /// Feed of the tool between the preceding tooth and this one, m.
     pub(crate) feed_m: f64,
 }
 
-/// What all elements of one duration share: the structure between the nodes.
+/// Response of the free structure at the nodes, shared by all elements of one duration h.
 pub(crate) struct Step<'a> {
     gauss: &'a Gauss,
     duration: f64,
-    /// e^{A h}.
+    /// Matrix exponential e^{A h}, n × n.
     flow: DMatrix<f64>,
-    /// C e^{A t_i}.
+    /// Displacement response C e^{A t_i} at each node, 3 × n.
     observe: Vec<Matrix3xX<f64>>,
-    /// e^{−A t_j} B.
+    /// Backward response e^{−A t_j} B to a force at each node, n × 3.
     backward: Vec<MatrixXx3<f64>>,
-    /// e^{A (h − t_j)} B.
+    /// Response e^{A (h − t_j)} B of the state at the end to a force at each node, n × 3.
     drive: Vec<MatrixXx3<f64>>,
 }
 
@@ -76,7 +78,7 @@ impl<'a> Step<'a> {
             .iter()
             .map(|&node| exponential.at(duration * node))
             .collect();
-        // Gauss nodes are symmetric: h − t_j is the node counted from the other end.
+        // Gauss nodes are symmetric: h − t_j is the time of the node with the mirrored index.
         let drive: Vec<MatrixXx3<f64>> = forward.iter().rev().map(|flow| flow * &structure.b).collect();
         // e^{−A t} = e^{−A h} e^{A (h − t)}
         let back = exponential.at(-duration);
@@ -90,7 +92,8 @@ impl<'a> Step<'a> {
         }
     }
 
-    /// The element of a tooth period that begins at `phase` and turns by `turn`, rad, while `teeth` teeth cut.
+    /// Element of a tooth period from the phase `phase`, over the rotation `turn` of the tool, both rad, with `teeth`
+    /// cutting teeth.
     pub(crate) fn element(&self, problem: &Problem, teeth: usize, phase: f64, turn: f64) -> Element {
         let process = &problem.process;
         let cutting: Vec<CuttingTooth> = (0..teeth)
@@ -102,7 +105,7 @@ impl<'a> Step<'a> {
         self.element_of(problem, &cutting, phase, turn)
     }
 
-    /// The element that begins at `phase` and turns by `turn`, rad, while these teeth cut.
+    /// Element from the phase `phase`, over the rotation `turn` of the tool, both rad, with these cutting teeth.
     pub(crate) fn element_of(
         &self,
         problem: &Problem,
@@ -138,7 +141,7 @@ impl<'a> Step<'a> {
         }
         let mut kernel = &observe * backward;
         for (index, entry) in kernel.iter_mut().enumerate() {
-            // By columns.
+            // Entries in column-major order.
             let (i, j) = (index % size / count, index / size / count);
             *entry *= self.gauss.integrals[(i, j)] * self.duration;
         }
@@ -164,13 +167,13 @@ impl<'a> Step<'a> {
     }
 }
 
-/// Where forces act and displacements are seen, at every node: first the cutting teeth, then, with axial depth
+/// Directions of observation and of force of all ports, node by node: first the cutting teeth, then, with axial-depth
 /// modulation, the axial displacement.
 struct Ports {
     per_node: usize,
-    /// What of the displacement a port sees.
+    /// Unit vector along which each port observes the displacement.
     seen: Vec<Vector3<f64>>,
-    /// The force that a port makes, per what it sees (and per depth, for teeth).
+    /// Force of each port per observed displacement; for teeth also per axial depth.
     force: Vec<Vector3<f64>>,
 }
 
@@ -203,9 +206,9 @@ impl Ports {
     }
 }
 
-/// Solves for the axial displacement at the nodes, so that only ports of teeth remain.
+/// Eliminates the axial displacement at the nodes, so that only the ports of teeth remain.
 ///
-/// With o all that is seen and z its axial part: o = E x + Q_t f + Q_z z is solved for o.
+/// With o all observed displacements and z their axial part, solves o = E x + Q_t f + Q_z z for o.
 fn without_modulation(whole: &Element, nodes: usize, per_node: usize) -> Element {
     let axial: Vec<usize> = (0..nodes).map(|node| node * per_node + per_node - 1).collect();
     let teeth: Vec<usize> = (0..nodes * per_node)
@@ -217,7 +220,7 @@ fn without_modulation(whole: &Element, nodes: usize, per_node: usize) -> Element
         implicit.set_column(column, &change);
     }
     let lu = implicit.lu();
-    // The matrix is the identity plus a Volterra kernel over a short element: it is regular.
+    // The matrix is the identity plus a Volterra kernel over a short element, hence regular.
     let solve = |right: &DMatrix<f64>| lu.solve(right).unwrap_or_else(|| right.clone());
     let observe = solve(&whole.observe);
     let kernel = solve(&whole.kernel.select_columns(&teeth));

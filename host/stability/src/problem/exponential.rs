@@ -1,23 +1,24 @@
-//! e^{At} of a small matrix at many times.
+//! Matrix exponential e^{At} of a small matrix at many times.
 
 use nalgebra::DMatrix;
 
-/// The largest ‖At‖ for which the series is summed; larger ones are halved first and squared afterwards.
+/// Largest norm ‖At‖ for which the Taylor series is summed directly. Larger arguments are halved first and the result
+/// squared. With 1/2 the truncation error of degree 16 is 2e-20.
 const RADIUS: f64 = 0.5;
 
-/// A square matrix of which exponentials are taken: by a Taylor polynomial of degree 16 and squaring.
+/// Square matrix A whose exponential e^{At} is computed by a Taylor polynomial of degree 16 with scaling and squaring.
 ///
-/// With ‖At‖ ≤ 1/2 the first term left out is 0.5¹⁷/17! = 2e-20. Each squaring may double the relative error, so that
-/// over an angle of z radians rounding grows to about z·1e-16.
+/// With ‖At‖ ≤ 1/2 the first omitted term is 0.5¹⁷/17! = 2e-20. Each squaring may double the relative error, so that
+/// rounding grows to about z·1e-16 over an angle of z radians.
 #[derive(Clone, Debug)]
 pub(crate) struct Exponential {
     matrix: DMatrix<f64>,
-    /// ‖A‖, the largest column sum.
+    /// Norm ‖A‖: the largest column sum.
     norm: f64,
 }
 
 impl Exponential {
-    /// For e^{At} of a square A.
+    /// Prepares the exponential of a square matrix A.
     pub(crate) fn new(matrix: &DMatrix<f64>) -> Self {
         let norm = matrix
             .column_iter()
@@ -29,7 +30,7 @@ impl Exponential {
         }
     }
 
-    /// e^{At}.
+    /// Matrix exponential e^{At}.
     pub(crate) fn at(&self, time: f64) -> DMatrix<f64> {
         let n = self.matrix.nrows();
         let squarings = (self.norm * time.abs() / RADIUS).log2().ceil().max(0.0) as i32;
@@ -40,7 +41,8 @@ impl Exponential {
         multiply(&square, &x, &mut cube);
         multiply(&square, &square, &mut fourth);
         let powers = [DMatrix::identity(n, n), x, square, cube];
-        // Σ x^k/k! by blocks of four powers (Paterson & Stockmeyer), from the highest: x¹⁶/16! is the fourth power alone.
+        // Σ x^k/k! in blocks of four powers (Paterson & Stockmeyer), highest block first; x¹⁶/16! is the fourth power
+        // alone.
         let mut inverse_factorials = [1.0; 17];
         for k in 1..inverse_factorials.len() {
             inverse_factorials[k] = inverse_factorials[k - 1] / k as f64;
@@ -64,7 +66,7 @@ impl Exponential {
     }
 }
 
-/// `out` = a b, for square matrices too small for a blocked product to pay.
+/// Writes the product a b of two small square matrices into `out`; they are too small for a blocked product to pay.
 fn multiply(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
     match a.nrows() {
         2 => multiply_sized::<2>(a.as_slice(), b.as_slice(), out.as_mut_slice()),
@@ -75,7 +77,7 @@ fn multiply(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
     }
 }
 
-/// The same by columns of known size.
+/// Product a b of two N × N matrices stored by columns, N known at compile time.
 fn multiply_sized<const N: usize>(a: &[f64], b: &[f64], out: &mut [f64]) {
     for (b, out) in b.chunks_exact(N).zip(out.chunks_exact_mut(N)) {
         let mut sum = [0.0; N];
@@ -100,7 +102,7 @@ mod tests {
         for time in [0.0, 1e-9, 0.1, -0.7, 2.0, 13.0] {
             let (sin, cos) = (omega * time).sin_cos();
             let exact = DMatrix::from_row_slice(2, 2, &[cos, -sin, sin, cos]) * (decay * time).exp();
-            // z·1e-16 with z up to 40, and room.
+            // Rounding grows as z·1e-16 with the angle z, here up to 40 rad; 3e-14 leaves a factor of 7.
             assert!((spiral.at(time) - &exact).norm() < 3e-14 * exact.norm(), "{time}");
         }
         let seed = 11;
@@ -112,8 +114,8 @@ mod tests {
             for time in [0.01, 0.9, -2.5] {
                 let theirs = (&matrix * time).exp();
                 let error = (exponential.at(time) - &theirs).norm() / theirs.norm();
-                // The condition of the exponential, up to e^{2·2.5·‖A‖} with ‖A‖ about 4 in the largest case, of which
-                // little is seen.
+                // The condition number of the exponential reaches e^{2·2.5·‖A‖} with ‖A‖ about 4; the measured error
+                // stays far below that bound.
                 assert!(error < 1e-12, "{size} {time}: {error}");
             }
         }

@@ -5,10 +5,11 @@ use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 
-/// m nodes c in (0, 1), their weights b, and integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange polynomials.
+/// Gauss–Legendre rule: m nodes c in (0, 1), their weights b, and integrals S_ij = ∫₀^{c_i} ℓ_j of the Lagrange
+/// polynomials ℓ_j.
 ///
-/// Quadrature with b is exact for polynomials up to degree 2m − 1, integration with S up to degree m − 1. A
-/// collocation step on these nodes has order 2m (Hairer, Nørsett & Wanner, Solving ODEs I, II.7).
+/// Quadrature with b is exact for polynomials up to degree 2m − 1, integration with S up to degree m − 1. A collocation
+/// step on these nodes has order 2m (Hairer, Nørsett & Wanner, Solving ODEs I, II.7).
 #[derive(Clone, Debug)]
 pub(crate) struct Gauss {
     pub(crate) nodes: Vec<f64>,
@@ -16,18 +17,18 @@ pub(crate) struct Gauss {
     pub(crate) integrals: DMatrix<f64>,
 }
 
-/// The rules with up to 40 nodes.
+/// Number of cached rules: those with 0 to 40 nodes.
 const SHARED: usize = 41;
 
 impl Gauss {
-    /// The rule with `count` nodes, computed once; the one with 40 where more are asked for.
+    /// Cached rule with `count` nodes, at most 40.
     pub(crate) fn shared(count: usize) -> &'static Self {
         static RULES: [OnceLock<Gauss>; SHARED] = [const { OnceLock::new() }; SHARED];
         let count = count.clamp(1, SHARED - 1);
         RULES[count].get_or_init(|| Self::new(count))
     }
 
-    /// The rule with `count` nodes, at least 1.
+    /// Computes the rule with `count` nodes, at least 1.
     pub(crate) fn new(count: usize) -> Self {
         let (points, weights): (Vec<f64>, Vec<f64>) = (0..count).map(|i| root(count, i)).unzip();
         // ℓ_j(x) = Σ_k (2k + 1)/2 w_j P_k(x_j) P_k(x) for k < m, exact since the rule integrates ℓ_j P_k exactly;
@@ -48,7 +49,7 @@ impl Gauss {
 }
 
 impl Gauss {
-    /// The Lagrange polynomials of the nodes at a place; nodes lie in (0, 1).
+    /// Values of the Lagrange polynomials of the nodes at the coordinate `place`; the nodes lie in (0, 1).
     pub(crate) fn lagrange(&self, place: f64) -> Vec<f64> {
         let nodes = &self.nodes;
         let weight = |i: usize| -> f64 {
@@ -61,7 +62,7 @@ impl Gauss {
     }
 }
 
-/// P_0 … P_{count} at x.
+/// Legendre polynomials P_0 … P_{count} at x.
 fn legendre(count: usize, x: f64) -> Vec<f64> {
     let mut values = vec![1.0, x];
     for k in 1..count {
@@ -71,12 +72,13 @@ fn legendre(count: usize, x: f64) -> Vec<f64> {
     values
 }
 
-/// The i-th root of P_count from the left, and its weight on [−1, 1], by Newton from Tricomi's estimate.
+/// The i-th root of the Legendre polynomial P_count from the left and its weight on [−1, 1], by Newton from Tricomi's
+/// estimate.
 fn root(count: usize, i: usize) -> (f64, f64) {
     let n = count as f64;
     let mut x = -(PI * (i as f64 + 0.75) / (n + 0.5)).cos();
     let mut slope = 1.0;
-    // Newton doubles the digits: from 1e-3 five steps reach machine precision.
+    // Newton's method doubles the number of correct digits: five steps from 1e-3 reach machine precision.
     for _ in 0..6 {
         let values = legendre(count, x);
         slope = n * (x * values[count] - values[count - 1]) / (x * x - 1.0);
@@ -100,7 +102,7 @@ mod tests {
                     .zip(&gauss.weights)
                     .map(|(c, w)| w * c.powi(power as i32))
                     .sum();
-                // Rounding of `count` terms below one.
+                // Tolerance: rounding of a sum of `count` terms smaller than one.
                 assert!(
                     (sum - 1.0 / (power as f64 + 1.0)).abs() < 1e-14,
                     "{count} {power}"

@@ -1,4 +1,4 @@
-//! The linear milling problem: a structure and a cutting process.
+//! The linear milling problem: structure and cutting process.
 
 use crate::error::StabilityError;
 use crate::process::extension;
@@ -8,12 +8,14 @@ use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Process;
 use quietcut_model::structure::FirstOrder;
 
-/// ẋ = A x + B F, u = C x, F = w K α(φ)(u − u_τ) − (β_e + β_f)(φ) u (eqs 3.7, 7.1), about the forced motion.
+/// Linear delay equation of a cut with equal pitch, about the forced motion:
 ///
-/// Everything in feed, normal and axial direction. The delay τ is the tooth period.
+///   ẋ = A x + B F,   u = C x,   F = w K α(φ)(u − u_τ) − (β_e + β_f)(φ) u   (eqs 3.7, 7.1).
+///
+/// All vectors are in feed, normal and axial direction. The delay τ is the tooth period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
-    /// The structure, turned into the feed direction.
+    /// Structure in first-order form, rotated into the feed direction.
     pub structure: FirstOrder,
     /// The cutting process.
     pub process: Process,
@@ -21,14 +23,14 @@ pub struct Problem {
     pub teeth: usize,
 }
 
-/// How cubic terms of a structure are treated.
+/// Treatment of cubic stiffness and damping of a structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CubicTerms {
-    /// A case that has them is refused: limits then depend on the forced motion.
+    /// Cases with cubic terms are refused, since their limits depend on the forced motion.
     Refuse,
-    /// They are left out: the limits for vanishing feed.
+    /// Cubic terms are omitted: the limits are those for vanishing feed.
     LeaveOut,
-    /// Whoever asks knows them, and whatever else acts about a forced orbit: this is the linear part.
+    /// Only the linear part is requested: the caller treats cubic terms and other effects about a forced orbit itself.
     Kept,
 }
 
@@ -43,16 +45,16 @@ impl CubicTerms {
 }
 
 impl Problem {
-    /// The problem that a case poses.
+    /// Builds the linear problem of a case.
     ///
     /// # Errors
-    /// A section is missing, the structure is indefinite, or the case has what the equation above has not:
-    /// variable pitch, cubic terms and other smooth ones (see `cubic`), extensions that it cannot treat.
+    /// A section is missing, the structure is indefinite, or the case has a feature that the equation does not cover:
+    /// variable pitch, cubic or other smooth terms (see `cubic`), or an extension that cannot be treated.
     pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
         Self::of(case, cubic, cutting(case, cubic.treated())?)
     }
 
-    /// As [`new`](Self::new), but unequal pitches are replaced by their mean.
+    /// Builds the linear problem like [`new`](Self::new), but replaces unequal pitches by their mean.
     pub(crate) fn with_mean_pitch(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
         Self::of(case, cubic, cutting_with_mean_pitch(case, cubic.treated())?)
     }
@@ -77,12 +79,12 @@ impl Problem {
         })
     }
 
-    /// Tooth period, s.
+    /// Tooth period τ at a spindle speed in rev/min, s.
     pub fn tooth_period_s(&self, rpm: f64) -> f64 {
         60.0 / (rpm * self.teeth as f64)
     }
 
-    /// The largest decay rate −Re λ of the structure, 1/s; 0 where nothing decays.
+    /// Largest decay rate −Re λ over the poles λ of the structure, 1/s; 0 if no pole decays.
     pub(crate) fn fastest_decay(&self) -> f64 {
         self.structure
             .poles()
@@ -92,11 +94,11 @@ impl Problem {
     }
 }
 
-/// The cutting process of a case and its number of teeth, whatever the structure.
+/// Cutting process and number of teeth of a case; the structure is not used.
 ///
 /// # Errors
-/// A section is missing, or there is variable pitch, an extension that is not treated, or runout with
-/// axial-depth-modulation.
+/// A section is missing, or the case has variable pitch, an untreated extension, or runout together with axial-depth
+/// modulation.
 pub(crate) fn cutting(case: &Case, treated: Treated) -> Result<(Process, usize), StabilityError> {
     if case.tool()?.has_variable_pitch() {
         return Err(StabilityError::NotCovered {
@@ -107,7 +109,7 @@ pub(crate) fn cutting(case: &Case, treated: Treated) -> Result<(Process, usize),
     cutting_with_mean_pitch(case, treated)
 }
 
-/// The same, with unequal pitches replaced by their mean.
+/// Cutting process and number of teeth of a case, with unequal pitches replaced by their mean.
 fn cutting_with_mean_pitch(case: &Case, treated: Treated) -> Result<(Process, usize), StabilityError> {
     let (tool, cut) = (case.tool()?, case.cut()?);
     treatment::refuse_others(case, treated)?;

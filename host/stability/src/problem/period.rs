@@ -1,16 +1,17 @@
-//! One tooth period, cut into elements on which collocation is exact to rounding.
+//! One tooth period, divided into elements on which collocation is exact to rounding.
 //!
-//! A chip sees displacement only along its normal: tooth k at immersion φ_k sees the number p_k = n(φ_k)ᵀ u, and the
-//! tooth before it saw p_k one period earlier. So the state of the delay equation is x at the start of the period and
-//! the numbers p while teeth cut: not the whole history of all displacements.
+//! The chip thickness depends only on the displacement along the chip normal: tooth k at immersion φ_k observes p_k =
+//! n(φ_k)ᵀ u, and the preceding tooth observed p_k one period earlier. The state of the delay equation is therefore x
+//! at the start of the period and the values p while teeth cut. The history of all displacements is not needed.
 //!
-//! On an element with Gauss nodes t_i, from x(t) = e^{At} x₀ + ∫ e^{A(t−s)} B D(s) f(s) ds with f = w (p − p_τ):
+//! On an element with Gauss nodes t_i, x(t) = e^{At} x₀ + ∫ e^{A(t−s)} B D(s) f(s) ds with f = w (p − p_τ) gives
 //!
 //!   p = E x₀ + Q f,   x₁ = G x₀ + T f,
 //!
-//! with p and f the values of all cutting teeth at all nodes. The structure's own motion is exact (matrix
-//! exponentials), and only the product of motion and turning coefficients is interpolated. Edge and feed terms
-//! −β(φ) u are solved for within the element, so that the same four matrices describe it. In free flight G = e^{Ah}.
+//! with p and f the values of all cutting teeth at all nodes. The free motion of the structure is exact (matrix
+//! exponentials); only the product of motion and rotating directional coefficients is interpolated. Edge and feed terms
+//! −β(φ) u are eliminated within the element, so that the same four matrices describe it. In free flight (no tooth
+//! cuts) G = e^{Ah}.
 
 use nalgebra::DMatrix;
 
@@ -22,46 +23,48 @@ use crate::error::StabilityError;
 
 pub(crate) use crate::problem::element::{Element, Port};
 
-/// How finely a period is cut.
+/// Element length and tolerance of the mesh over a tooth period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Resolution {
-    /// The largest angle, rad, by which the fastest motion turns within an element.
+    /// Largest phase angle, rad, of the fastest motion over one element.
     pub(crate) angle: f64,
-    /// Collocation error per element, relative, that is aimed at.
+    /// Target for the relative collocation error of one element.
     pub(crate) tolerance: f64,
 }
 
 impl Resolution {
-    /// For following all multipliers along a line: few nodes, since all eigenvalues of the map are computed.
+    /// Mesh to compute all Floquet multipliers along a line in depth: few nodes, since the whole map is diagonalized.
     pub(crate) const SCAN: Self = Self {
         angle: 20.0,
         tolerance: 1e-8,
     };
-    /// For the characteristic matrix, whose polynomials want short elements: limits are computed with this one.
+    /// Working mesh, for limits from the characteristic matrix, whose polynomials in κ need short elements.
     pub(crate) const WORKING: Self = Self {
         angle: 5.0,
         tolerance: 1e-13,
     };
-    /// A second one: what changes from the working one to this is an estimate of the error of the former.
+    /// Finer mesh: the change of a result from the working to this mesh estimates the error of the former.
     pub(crate) const FINE: Self = Self {
         angle: 3.0,
         tolerance: 1e-16,
     };
 }
 
-/// The most e-folds by which a mode may decay within an element: e^{−A t} appears in it, and its size is lost in digits.
+/// Largest decay of a mode within an element, as exponent of e. Collocation uses e^{−A t}, and a decay of e^{−5} costs
+/// two digits.
 pub(crate) const DECAY_MAX: f64 = 5.0;
 
-/// The most nodes of an element.
+/// Largest number of Gauss nodes in an element: the largest rule that is cached.
 const NODES_MAX: u32 = 40;
 
 /// The most elements of the working resolution that a period may have: of five radians each, some thousand vibrations.
 const ELEMENTS_MAX: f64 = 4000.0;
 
-/// Refuses a speed and depth, mm, at which the motion turns too often in a tooth period to be followed.
+/// Refuses speeds and depths (mm) at which the motion oscillates too often within a tooth period.
 ///
 /// # Errors
-/// [`StabilityError::BrokeDown`] with the reason. Speeds and depths that are none pass: others refuse them.
+/// [`StabilityError::BrokeDown`] with the reason. Speeds and depths that are not positive pass this check; the methods
+/// refuse them.
 pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<(), StabilityError> {
     let rate = Rates::new(problem).at(2e-3 * depth_mm) + problem.fastest_decay();
     if rate * problem.tooth_period_s(rpm) > ELEMENTS_MAX * Resolution::WORKING.angle {
@@ -75,17 +78,19 @@ pub(crate) fn check_length(problem: &Problem, rpm: f64, depth_mm: f64) -> Result
     Ok(())
 }
 
-/// One tooth period at one speed.
+/// Mesh of one tooth period at one spindle speed.
 #[derive(Clone, Debug)]
 pub(crate) struct Period {
-    /// The elements while teeth cut, in order.
+    /// Elements during which teeth cut, in order of time.
     pub(crate) elements: Vec<Element>,
-    /// The flow of free flight after them; the identity where there is none.
+    /// State transition e^{Ah} of the free flight after the elements, n × n; the identity if teeth cut until the end of
+    /// the period.
     pub(crate) flight: DMatrix<f64>,
 }
 
 impl Period {
-    /// Cuts the period of a problem at a speed; `depth_m` is the largest |w (1 − 1/μ)| that it will be used for.
+    /// Divides the tooth period at a spindle speed into elements; `depth_m` is the largest complex depth |w (1 − 1/μ)|
+    /// to resolve.
     pub(crate) fn new(problem: &Problem, rpm: f64, depth_m: f64, resolution: Resolution) -> Self {
         let structure = &problem.structure;
         let engagement = &problem.process.engagement;
@@ -101,7 +106,8 @@ impl Period {
                 flight = exponential.at(duration);
                 continue;
             }
-            // The coefficients turn as products of two sines: twice the angle of the tool.
+            // Directional coefficients are products of two sines of the immersion angle and oscillate at twice the
+            // rotation of the tool.
             let angle = rate * duration + 2.0 * length;
             let decay = problem.fastest_decay() * duration;
             let count = (angle / resolution.angle).max(decay / DECAY_MAX).ceil().max(1.0);
@@ -116,26 +122,28 @@ impl Period {
         Self { elements, flight }
     }
 
-    /// Number of ports of all elements.
+    /// Number of ports (cutting tooth at a node) of all elements.
     pub(crate) fn ports(&self) -> usize {
         self.elements.iter().map(|element| element.kernel.nrows()).sum()
     }
 
-    /// Number of states.
+    /// Number n of states of the structure.
     pub(crate) fn order(&self) -> usize {
         self.flight.nrows()
     }
 }
 
-/// How fast things move: the structure by itself, and under the stiffness of the cut.
+/// Rates of the fastest motion: poles of the free structure, and stiffening by the cut.
 pub(crate) struct Rates {
-    /// Fastest pole, rad/s.
+    /// Largest magnitude of a pole of the free structure, rad/s.
     poles: f64,
-    /// nᵀ C B D, 1/s per meter of depth: velocity along the chip normal that the chip's own force makes at once.
+    /// Velocity along the chip normal that the cutting force causes immediately, nᵀ C B D, 1/s per meter of axial
+    /// depth.
     direct: f64,
-    /// nᵀ C A B D, 1/s² per meter of depth: acceleration along the chip normal that the chip's own force makes at once.
+    /// Acceleration along the chip normal that the cutting force causes immediately, nᵀ C A B D, 1/s² per meter of
+    /// axial depth.
     inertial: f64,
-    /// The depth, m, to which edge and feed forces amount.
+    /// Axial depth, m, at which the cutting force is as large as edge and feed forces.
     modulation_m: f64,
 }
 
@@ -147,7 +155,8 @@ impl Rates {
         let response = &structure.c * &structure.b;
         let response_rate = &structure.c * &structure.a * &structure.b;
         let (mut direct, mut inertial, mut force, mut forced) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
-        // All of it varies slowly with the angle; seventeen angles find the largest to a percent or so.
+        // The coefficients vary slowly with the immersion angle: seventeen angles find the maximum to about one
+        // percent.
         for i in 0..=16 {
             let share = f64::from(i) / 16.0;
             let angle = engagement.start + (engagement.exit - engagement.start) * share;
@@ -174,17 +183,17 @@ impl Rates {
         }
     }
 
-    /// An estimate, rad/s, of how fast the solution turns or grows at a depth.
+    /// Estimate of the rate at which the solution oscillates or grows at an axial depth, rad/s.
     pub(crate) fn at(&self, depth_m: f64) -> f64 {
         let depth_m = depth_m + self.modulation_m;
         self.poles + (self.inertial * depth_m).sqrt() + self.direct * depth_m
     }
 }
 
-/// The fewest nodes, from 4 to 40, with which a step over `angle` has a relative error below `tolerance`:
-/// (m!)² z^{2m+1} / ((2m)! (2m+1)!), that of the Padé approximant to e^{iz}.
+/// Fewest Gauss nodes, from 4 to 40, for which a step over the phase angle `angle` has a relative error below
+/// `tolerance`. The error is that of the Padé approximant to e^{iz}: (m!)² z^{2m+1} / ((2m)! (2m+1)!).
 pub(crate) fn degree(angle: f64, tolerance: f64) -> usize {
-    // For m = 0 the expression is z; each further node multiplies it by z² m² / ((2m)² (4m² − 1)).
+    // For m = 0 the error expression is z; each further node multiplies it by z² m² / ((2m)² (4m² − 1)).
     let mut error = angle;
     for m in 1..=NODES_MAX {
         let m_f = f64::from(m);

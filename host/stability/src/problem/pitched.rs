@@ -1,25 +1,29 @@
-//! A milling problem whose teeth may stand at unequal angles.
+//! The linear milling problem of a tool with equal or unequal pitch.
 
 use super::linear::{CubicTerms, Problem};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
 
-/// ẋ = A x + B F, u = C x, F = Σ_j w K α(φ_j)(u − u(t − τ_j)) − β u, with the delay τ_j of each tooth j that cuts.
+/// Linear delay equation of a cut whose teeth may have unequal pitch:
 ///
-/// Where the pitches differ the period of the equation is the revolution, else the tooth period.
+///   ẋ = A x + B F,   u = C x,   F = Σ_j w K α(φ_j)(u − u(t − τ_j)) − β u,
+///
+/// with the delay τ_j of each cutting tooth j. With unequal pitch the period of the equation is the revolution,
+/// otherwise the tooth period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pitched {
-    /// The problem; where pitches differ, with their mean: only structure and process are then what they say.
+    /// Problem with the mean pitch. If pitches differ, only its structure and cutting process are valid.
     pub(crate) problem: Problem,
-    /// Angles between the teeth as in [`Tool::pitch_deg`](quietcut_model::milling::Tool), rad; `None` where they are equal.
+    /// Angles between the teeth as in [`Tool::pitch_deg`](quietcut_model::milling::Tool), rad; `None` for equal pitch
+    /// with the tooth period as period.
     pub(crate) pitch_rad: Option<Vec<f64>>,
 }
 
 impl Pitched {
-    /// The problem that a case poses.
+    /// Builds the problem of a case.
     ///
     /// # Errors
-    /// As [`Problem::new`], but for variable pitch, which is taken as it is.
+    /// As [`Problem::new`], but variable pitch is accepted.
     pub fn new(case: &Case, cubic: CubicTerms) -> Result<Self, StabilityError> {
         let problem = Problem::with_mean_pitch(case, cubic)?;
         let tool = case.tool()?;
@@ -29,12 +33,12 @@ impl Pitched {
         Ok(Self { problem, pitch_rad })
     }
 
-    /// The problem with unequal pitches replaced by their mean: its structure, process and number of teeth are those of this one.
+    /// The problem with the mean pitch; it shares structure, cutting process and number of teeth with this one.
     pub fn with_mean_pitch(&self) -> &Problem {
         &self.problem
     }
 
-    /// The same with the revolution as its period, also where the pitches are equal.
+    /// The same problem with the revolution as its period, for equal pitch too.
     #[must_use]
     pub(crate) fn over_revolution(mut self) -> Self {
         let problem = &self.problem;
@@ -43,7 +47,7 @@ impl Pitched {
         self
     }
 
-    /// True where teeth stand at unequal angles: there are then several delays.
+    /// True if pitches are unequal, so that there are several delays.
     pub fn has_variable_pitch(&self) -> bool {
         self.pitch_rad.is_some()
     }

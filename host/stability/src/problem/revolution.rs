@@ -1,7 +1,7 @@
-//! One revolution of a tool with variable pitch, collocated: several delays that end between the nodes.
+//! Collocation of one revolution of a tool with variable pitch, whose delays end between the nodes.
 //!
-//! The state of the delay equation is x at the start of the revolution, and p of the subintervals of the revolution before
-//! that are still to be cut again.
+//! The state of the delay equation is x at the start of the revolution, and the displacements p along the chip normals
+//! in those subintervals of the preceding revolution whose surface is still to be cut.
 
 use nalgebra::DMatrix;
 
@@ -10,21 +10,22 @@ use super::exponential::Exponential;
 use super::pitched::Pitched;
 use super::revolution_mesh::{Fineness, Flight, RevolutionMesh, Subinterval};
 
-/// One revolution at one speed.
+/// Collocated revolution at one spindle speed.
 pub(crate) struct Revolution<'a> {
     pub(crate) pitched: &'a Pitched,
     pub(crate) mesh: RevolutionMesh,
-    /// Of each subinterval.
+    /// Element of each subinterval.
     pub(crate) elements: Vec<Element>,
 }
 
 impl<'a> Revolution<'a> {
-    /// Cuts the revolution at a speed for depths up to `depth_m`; `None` where a tooth finds no surface before it.
+    /// Divides the revolution at a spindle speed, for depths up to `depth_m`; `None` if no preceding tooth has cut the
+    /// surface in front of some tooth.
     pub(crate) fn new(pitched: &'a Pitched, rpm: f64, depth_m: f64, fineness: Fineness) -> Option<Self> {
         let mesh = RevolutionMesh::new(pitched, rpm, depth_m, fineness, Flight::Whole)?;
         let exponential = Exponential::new(&pitched.problem.structure.a);
         let mut elements: Vec<Element> = Vec::with_capacity(mesh.subintervals.len());
-        // Subintervals between the same two kinks are equally long.
+        // Subintervals between the same two kinks have equal lengths and share a step.
         let mut step: Option<(usize, f64, Step<'_>)> = None;
         for subinterval in &mesh.subintervals {
             if subinterval.cutting.is_empty() {

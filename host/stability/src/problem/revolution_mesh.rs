@@ -1,35 +1,36 @@
-//! One revolution of a tool with several delays, cut into subintervals, and where every chip finds the surface before it.
+//! Mesh of one revolution with several delays, and the location of the previously cut surface for every chip.
 //!
-//! Tooth j at an immersion angle sees p_j = nᵀ u, and the tooth before it saw p_{j−1} at the same angle, one pitch
-//! earlier: a number of another subinterval, between its nodes, in this revolution or the one before. It is interpolated by
-//! the polynomial through the nodes of that subinterval, for which p must be smooth there. Displacement has a kink of some
-//! order wherever a tooth enters or leaves; the surface hands it on to the next tooth, one delay later and smoother by
-//! what the structure smooths. So subintervals end at all of these times, for several generations.
+//! Tooth j at an immersion angle observes p_j = nᵀ u; the preceding tooth observed p_{j−1} at the same angle, one pitch
+//! earlier. That value lies in another subinterval, between its nodes, in this revolution or the preceding one. It is
+//! interpolated by the polynomial through the nodes of that subinterval, which requires p to be smooth there. The
+//! displacement has a kink (a jump in some derivative) wherever a tooth enters or leaves. The surface passes the kink
+//! to the next tooth one delay later, smoothed by the structure. Subintervals therefore end at all of these times, for
+//! several generations of kinks.
 
 use super::gauss::Gauss;
 use super::period::{DECAY_MAX, Rates};
 use super::pitched::Pitched;
 use super::tooth_passages::{ToothPassage, ToothPassages, distinct};
 
-/// How finely a revolution is cut.
+/// Subinterval length, tolerance and number of kink generations of the mesh over a revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fineness {
-    /// The largest angle, rad, by which the fastest motion turns within a subinterval.
+    /// Largest phase angle, rad, of the fastest motion over one subinterval.
     pub(crate) angle: f64,
-    /// Error of interpolation within a subinterval, relative to the motion at the fastest rate, that is aimed at.
+    /// Target for the interpolation error within a subinterval, relative to the motion at the fastest rate.
     pub(crate) tolerance: f64,
-    /// Generations of kinks at which subintervals end.
+    /// Number of generations of kinks at which subintervals end.
     pub(crate) generations: u32,
 }
 
 impl Fineness {
-    /// For answers.
+    /// Working mesh, on which results are computed.
     pub(crate) const WORKING: Self = Self {
         angle: 5.0,
         tolerance: 1e-9,
         generations: 3,
     };
-    /// What changes from the working one to this is an estimate of the error of the former.
+    /// Finer mesh: the change of a result from the working to this mesh estimates the error of the former.
     pub(crate) const FINE: Self = Self {
         angle: 4.0,
         tolerance: 1e-11,
@@ -37,71 +38,73 @@ impl Fineness {
     };
 }
 
-/// Treatment of the times at which no tooth cuts.
+/// Subdivision of the times at which no tooth cuts (free flight).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Flight {
-    /// Each is one subinterval without nodes of use: the structure's own motion is known in closed form.
+    /// Each free flight is one subinterval; its nodes are not used, since the free motion is known in closed form.
     Whole,
-    /// Cut as finely as the others.
+    /// Free flight is divided as finely as the cutting times.
     Cut,
 }
 
-/// No further generation of kinks is added to so many: subintervals are then short, and kinks of later generations small.
+/// Number of kinks beyond which no further generation is added. Subintervals are then short, and kinks of later
+/// generations are smooth. Unfounded.
 const KINKS_MAX: usize = 300;
 
-/// The values of one tooth in a subinterval, at all of its nodes.
+/// Displacements p of one tooth at all nodes of one subinterval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Series {
-    /// Number of the subinterval.
+    /// Index of the subinterval.
     pub(crate) subinterval: usize,
-    /// Which of the teeth that cut there.
+    /// Index of the tooth among those that cut in the subinterval.
     pub(crate) tooth: usize,
 }
 
-/// Where the values of the tooth before are found.
+/// Location of the displacements of the preceding tooth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Source {
-    /// In this revolution.
+    /// In the present revolution.
     Own(Series),
-    /// In the revolution before: in the state, from this row on.
+    /// In the preceding revolution: in the state vector, from this row on.
     Earlier(usize),
 }
 
-/// Where the tooth before was when it cut what a port sees now.
+/// Displacement of the preceding tooth that left the surface at one port.
 #[derive(Clone, Debug)]
 pub(crate) struct Past {
     pub(crate) source: Source,
-    /// Lagrange polynomials of the nodes at that time.
+    /// Values at that time of the Lagrange polynomials of the nodes.
     pub(crate) weights: Vec<f64>,
 }
 
-/// A part of the revolution without a kink.
+/// Subinterval of the revolution in which the displacement is smooth.
 #[derive(Clone, Debug)]
 pub(crate) struct Subinterval {
-    /// When it begins, s.
+    /// Start of the subinterval, s.
     pub(crate) start_s: f64,
-    /// How long it takes, s.
+    /// Duration of the subinterval, s.
     pub(crate) duration_s: f64,
     pub(crate) gauss: &'static Gauss,
-    /// The teeth that cut, in the order of the ports of a node.
+    /// Cutting teeth, in the order of the ports of a node.
     pub(crate) cutting: Vec<ToothPassage>,
-    /// Of each port, node by node.
+    /// Previously cut surface at each port, node by node.
     pub(crate) pasts: Vec<Past>,
 }
 
-/// One revolution at one speed.
+/// Mesh of one revolution at one spindle speed.
 #[derive(Clone, Debug)]
 pub(crate) struct RevolutionMesh {
     pub(crate) passages: ToothPassages,
     pub(crate) subintervals: Vec<Subinterval>,
-    /// What of the revolution before acts in this one, with the first row in the state.
+    /// Displacements of the preceding revolution that act in this one, with their first row in the state.
     pub(crate) kept: Vec<(Series, usize)>,
-    /// Number of rows of the state: those of the structure, then those of what is kept.
+    /// Number of rows of the state: the states of the structure, then the `kept` displacements.
     pub(crate) size: usize,
 }
 
 impl RevolutionMesh {
-    /// Cuts the revolution at a speed for depths up to `depth_m`; `None` where a tooth finds no surface before it.
+    /// Divides the revolution at a spindle speed, for depths up to `depth_m`; `None` if no preceding tooth has cut the
+    /// surface in front of some tooth.
     pub(crate) fn new(
         pitched: &Pitched,
         rpm: f64,
@@ -110,7 +113,7 @@ impl RevolutionMesh {
         flight: Flight,
     ) -> Option<Self> {
         let passages = ToothPassages::new(pitched, rpm);
-        // At the unit circle |w (1 − 1/μ)| ≤ 2 w. Coefficients turn as products of two sines: twice the angle of the tool.
+        // At the unit circle |w (1 − 1/μ)| ≤ 2 w. Directional coefficients oscillate at twice the rotation of the tool.
         let rate = Rates::new(&pitched.problem).at(2.0 * depth_m) + 2.0 * passages.rad_per_s;
         let decay = pitched.problem.fastest_decay();
         let mut subintervals = Vec::new();
@@ -148,7 +151,7 @@ impl RevolutionMesh {
         Some(mesh)
     }
 
-    /// Finds what every port sees of the past.
+    /// Finds the previously cut surface of every port; `None` if there is none.
     fn link(&mut self) -> Option<()> {
         let period_s = self.passages.period_s;
         let starts_s: Vec<f64> = self
@@ -185,7 +188,7 @@ impl RevolutionMesh {
         Some(())
     }
 
-    /// The first row of a series in the state, which gets it if need be.
+    /// First row in the state of the displacements `series`; adds them to the state if missing.
     fn keep(&mut self, series: Series) -> usize {
         if let Some((_, first)) = self.kept.iter().find(|(known, _)| *known == series) {
             return *first;
@@ -197,7 +200,7 @@ impl RevolutionMesh {
     }
 }
 
-/// All times at which displacement may have a kink, s, ascending, with both ends of the period.
+/// All times at which the displacement may have a kink, s, ascending, with both ends of the period.
 fn kinks(passages: &ToothPassages, generations: u32) -> Vec<f64> {
     let mut all = passages.switches_s();
     let mut youngest = all.clone();
@@ -224,8 +227,8 @@ fn kinks(passages: &ToothPassages, generations: u32) -> Vec<f64> {
     all
 }
 
-/// The fewest Gauss nodes, from 4 to 40, through which e^{iz} over an angle z is interpolated to a tolerance:
-/// z^m/m! times the largest value of the monic Legendre polynomial on [0, 1], (m!)²/(2m)!.
+/// Fewest Gauss nodes, from 4 to 40, that interpolate e^{iz} over a phase angle z to a tolerance. The error is z^m/m!
+/// times the maximum (m!)²/(2m)! of the monic Legendre polynomial on [0, 1].
 fn nodes_for(angle: f64, tolerance: f64) -> usize {
     let mut error = 1.0;
     for m in 1..=40_u32 {
@@ -261,7 +264,7 @@ mod tests {
                 (value - Complex64::cis(angle * place)).norm()
             });
             let worst = worst.fold(0.0, f64::max);
-            // Of the remainder both parts of e^{iz} have their share.
+            // The real and the imaginary part of e^{iz} each have a remainder up to the tolerance, hence √2.
             assert!(worst < 2.0_f64.sqrt() * tolerance, "{angle} {tolerance}: {worst}");
         }
     }

@@ -1,4 +1,4 @@
-//! Which tooth cuts when, and how long after the tooth before it: what methods need that step through the period.
+//! Entry, exit and delay of each tooth, for methods that step through the period.
 
 use std::f64::consts::TAU;
 
@@ -6,38 +6,38 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::pitched::Pitched;
 
-/// One tooth on its way through the cut.
+/// Passage of one tooth through the cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ToothPassage {
-    /// When it enters, s; may lie before the period.
+    /// Time of entry, s; may lie before the start of the period.
     pub(crate) entry_s: f64,
-    /// When it leaves, s; may lie after the period.
+    /// Time of exit, s; may lie after the end of the period.
     pub(crate) exit_s: f64,
-    /// Time since the tooth before it was at the same place, s.
+    /// Regenerative delay τ, s: the time since the preceding tooth had the same immersion angle.
     pub(crate) delay_s: f64,
-    /// How far the tool feeds in that time, m.
+    /// Feed of the tool during the delay, m.
     pub(crate) feed_m: f64,
-    /// Number of the tooth, and of the one before it in the cut; both 0 where one tooth is like the other.
+    /// Index of the tooth; 0 if all teeth are alike.
     pub(crate) tooth: usize,
-    /// See `tooth`.
+    /// Index of the preceding tooth in the cut; 0 if all teeth are alike.
     pub(crate) before: usize,
 }
 
-/// All teeth that cut within one period, at one speed.
+/// Passages of all teeth that cut within one period, at one spindle speed.
 ///
-/// The period is the tooth period where the teeth stand evenly, else the revolution. It starts when a tooth enters.
+/// The period is the tooth period for equal pitch, otherwise the revolution. It starts at the entry of a tooth.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ToothPassages {
     /// Period T, s.
     pub(crate) period_s: f64,
     /// Spindle speed, rad/s.
     pub(crate) rad_per_s: f64,
-    /// By entry, the latest first.
+    /// Passages by time of entry, latest first.
     pub(crate) list: Vec<ToothPassage>,
 }
 
 impl ToothPassages {
-    /// The passages of a problem at a speed.
+    /// Passages of a problem at a spindle speed in rev/min.
     pub(crate) fn new(pitched: &Pitched, rpm: f64) -> Self {
         let rad_per_s = rpm * TAU / 60.0;
         match &pitched.pitch_rad {
@@ -50,7 +50,7 @@ impl ToothPassages {
         let process = &pitched.problem.process;
         let period_s = process.engagement.pitch / rad_per_s;
         let width_s = (process.engagement.exit - process.engagement.start) / rad_per_s;
-        // A tooth that leaves within rounding of the start of the period is out.
+        // A tooth that leaves within rounding of the start of the period does not cut in it.
         let count = (width_s / period_s - 1e-9).ceil().max(1.0) as usize;
         let list = (0..count).map(|index| {
             let entry_s = -(index as f64) * period_s;
@@ -76,7 +76,7 @@ impl ToothPassages {
         let count = pitch_rad.len();
         let period_s = TAU / rad_per_s;
         let mut list = Vec::with_capacity(2 * count);
-        // Tooth j stands at the angle ψ_j = Σ_{k ≤ j} pitch_k ahead of tooth 0, which enters at time 0.
+        // Tooth j is ahead of tooth 0 by the angle ψ_j = Σ_{k ≤ j} pitch_k; tooth 0 enters at time 0.
         let mut ahead_rad = 0.0;
         for tooth in 0..count {
             if tooth > 0 {
@@ -108,7 +108,7 @@ impl ToothPassages {
         }
     }
 
-    /// Where a tooth enters or leaves, s, ascending, with both ends of the period.
+    /// Times at which a tooth enters or leaves, s, ascending, with both ends of the period.
     pub(crate) fn switches_s(&self) -> Vec<f64> {
         let ends = self
             .list
@@ -117,22 +117,22 @@ impl ToothPassages {
         distinct(ends.chain([0.0, self.period_s]).collect(), self.period_s)
     }
 
-    /// The passages that cut at a time, s, which is not that of a switch.
+    /// Passages in the cut at a time, s; the time must not be an entry or exit.
     pub(crate) fn cutting_at(&self, time_s: f64) -> impl Iterator<Item = &ToothPassage> {
         self.list
             .iter()
             .filter(move |passage| passage.entry_s < time_s && time_s < passage.exit_s)
     }
 
-    /// Immersion angle of a passage at a time, rad.
+    /// Immersion angle of a passage at a time (s), rad.
     pub(crate) fn angle(&self, pitched: &Pitched, passage: &ToothPassage, time_s: f64) -> f64 {
         pitched.problem.process.engagement.start + (time_s - passage.entry_s) * self.rad_per_s
     }
 }
 
-/// The times within [0, period], ascending, no two closer than rounding.
+/// Times within [0, period], s, ascending; times closer than rounding are merged.
 pub(crate) fn distinct(mut times_s: Vec<f64>, period_s: f64) -> Vec<f64> {
-    // Angles are given in degrees with a few digits: what is closer than this is the same angle.
+    // Angles are given in degrees with a few digits: times closer than 1e-9 of the period belong to the same angle.
     let least = 1e-9 * period_s;
     for time_s in &mut times_s {
         if time_s.abs() < least {
@@ -147,17 +147,17 @@ pub(crate) fn distinct(mut times_s: Vec<f64>, period_s: f64) -> Vec<f64> {
     times_s
 }
 
-/// What a displacement makes of forces at one time, or in the mean over a while.
+/// Force coefficients of the displacement at one time, or averaged over an interval of time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coefficients {
-    /// Σ K α of the teeth with one delay, Pa, with that delay, s.
+    /// For each delay: the delay, s, and the sum Σ K α over the teeth with that delay, Pa.
     pub(crate) regenerative: Vec<(f64, Matrix3<f64>)>,
-    /// β_e + β_f, N/m²: −β u is the force of edges and feed (eq. 3.7). It acts on the axial displacement only.
+    /// Coefficient β_e + β_f of edge and feed forces −β u, N/m² (eq. 3.7); only the axial displacement contributes.
     pub(crate) modulation: Matrix3<f64>,
 }
 
 impl Coefficients {
-    /// The mean of the passages that cut at `inside_s` over Gauss nodes (time, share of the whole).
+    /// Mean over Gauss nodes (time, weight) of the passages that cut at the time `inside_s`.
     pub(crate) fn mean(
         pitched: &Pitched,
         passages: &ToothPassages,
@@ -193,7 +193,7 @@ impl Coefficients {
         coefficients
     }
 
-    /// w Σ K α − β: force on the tool per displacement, N/m, without what the surface before did.
+    /// Force per present displacement, w Σ K α − β, N/m; the delayed displacement is excluded.
     pub(crate) fn present(&self, depth_m: f64) -> Matrix3<f64> {
         let regenerative: Matrix3<f64> = self.regenerative.iter().map(|(_, directional)| directional).sum();
         regenerative * depth_m - self.modulation

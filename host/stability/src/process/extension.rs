@@ -9,7 +9,7 @@ use quietcut_model::milling::Material;
 use quietcut_model::structure::FirstOrder;
 use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, Term};
 
-/// The effects of a case that are wanted.
+/// Effects of a case whose specification fulfils `wanted`.
 fn effects(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Effects, StabilityError> {
     let all = Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
     Ok(Effects(
@@ -24,10 +24,10 @@ pub(super) fn wrong(case: &Case, cause: ModelError) -> StabilityError {
     }
 }
 
-/// The linear structure with its extensions, in the machine's axes.
+/// Linear structure of a case with its extensions, in the machine's axes.
 ///
 /// # Errors
-/// The case has none, it is indefinite, or it cannot have an extension.
+/// The case has no structure, the structure is indefinite, or an extension cannot be applied to it.
 pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
     let structure = case.structure()?;
     let effects = effects(case, |spec| spec.treatment == Treatment::LinearStructure)?;
@@ -47,10 +47,10 @@ pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
     })
 }
 
-/// The coefficients of the material with those that extensions give.
+/// Cutting coefficients of a case with those set by extensions.
 ///
 /// # Errors
-/// The case has none.
+/// The case has no material.
 pub(crate) fn material(case: &Case) -> Result<Material, StabilityError> {
     let has_own =
         |spec: &EffectSpec| spec.treatment == Treatment::LinearProcess && spec.class == Class::CuttingForce;
@@ -60,24 +60,24 @@ pub(crate) fn material(case: &Case) -> Result<Material, StabilityError> {
     Ok(law(case, has_own)?.material())
 }
 
-/// The force law with these extensions.
+/// Cutting force law of a case with the extensions that fulfil `wanted`.
 fn law(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<ForceLaw, StabilityError> {
     Ok(cutter(case, wanted)?.force)
 }
 
-/// The tool with these extensions.
+/// Cutter geometry of a case with the extensions that fulfil `wanted`.
 fn cutter(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Cutter, StabilityError> {
-    // The depth is no part of what is asked.
+    // The geometry does not depend on the axial depth, which is set to an arbitrary value.
     let cutter = Cutter::new(case.tool()?, case.material()?, case.cut()?, 1e-3);
     let effects = effects(case, wanted)?;
     let cutter = cutter.and_then(|cutter| effects.cutter(cutter));
     cutter.map_err(|cause| wrong(case, cause))
 }
 
-/// How far the radius of each tooth exceeds the mean, m, in the order of the teeth: runout.
+/// Radial runout of each tooth: its radius minus the mean radius, m, in the order of the teeth.
 ///
 /// # Errors
-/// A section is missing, or an extension that the case cannot have.
+/// A section is missing, or an extension cannot be applied to the case.
 pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
     let teeth = cutter(case, |spec| {
         spec.treatment == Treatment::LinearProcess && spec.class == Class::Geometry
@@ -86,10 +86,10 @@ pub(crate) fn radial_m(case: &Case) -> Result<Vec<f64>, StabilityError> {
     Ok(teeth.iter().map(|tooth| tooth.radial_m).collect())
 }
 
-/// The terms that act about a forced orbit: smooth terms, the chip law, process damping.
+/// Extensions that are linearized about a forced orbit: smooth restoring forces, the chip law and process damping.
 ///
 /// # Errors
-/// An extension that the case cannot have.
+/// An extension cannot be applied to the case.
 pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
     let structure = case.structure()?;
     let mut terms = Vec::new();
@@ -105,10 +105,10 @@ pub(crate) fn about_orbit(case: &Case) -> Result<AboutOrbit, StabilityError> {
     })
 }
 
-/// The terms of a case that are not smooth, on the structure as the other extensions leave it.
+/// Extensions that are not smooth (friction, backlash, hysteresis), on the structure with all other extensions.
 ///
 /// # Errors
-/// An extension that the case cannot have.
+/// An extension cannot be applied to the case.
 pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn Term>>, StabilityError> {
     let structure = case.structure()?;
     let wanted =
@@ -123,7 +123,7 @@ pub(crate) fn not_smooth(case: &Case) -> Result<Vec<Box<dyn Term>>, StabilityErr
     }
 }
 
-/// See [`about_orbit`].
+/// Extensions that are linearized about a forced orbit: smooth restoring forces, the chip law and process damping.
 pub(crate) struct AboutOrbit {
     pub(crate) terms: Vec<Arc<dyn Term>>,
     pub(crate) law: ForceLaw,

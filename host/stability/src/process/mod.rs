@@ -1,4 +1,4 @@
-//! The extensions of a case in the stability problem: what they make of structure and cutting process.
+//! Extensions of a case in the stability problem: their effect on structure and cutting process.
 
 pub(crate) mod extension;
 pub(crate) mod treatment;

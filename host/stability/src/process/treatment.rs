@@ -1,23 +1,23 @@
-//! The extensions of a case that a method treats, and the reasons against the others.
+//! Which extensions of a case a method treats, and why it refuses the others.
 
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{EffectSpec, Treatment};
 
-/// How much of the extensions a method treats.
+/// Set of extensions that a method treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Treated {
-    /// The process alone, whose structure is not that of the case.
+    /// Linear extensions of the cutting process alone; the structure is given by receptances.
     LinearProcess,
-    /// Linear structure and linear process.
+    /// Linear extensions of structure and cutting process.
     Linear,
-    /// The same, and smooth terms are left out: the limits for vanishing feed.
+    /// Linear extensions; smooth nonlinear terms are omitted, which gives the limits for vanishing feed.
     WithoutSmooth,
-    /// All effects with a Jacobian or an equivalent about a forced orbit.
+    /// All extensions with a Jacobian or an equivalent linearization about a forced orbit.
     AboutOrbit,
 }
 
-/// True where the limits of a case depend on its forced orbit.
+/// True if the stability limits of a case depend on its forced orbit.
 pub fn needs_orbit(case: &Case) -> bool {
     case.structure
         .as_ref()
@@ -30,20 +30,20 @@ pub fn needs_orbit(case: &Case) -> bool {
         })
 }
 
-/// True where a case has an effect that acts by its equivalent stiffness and damping: friction, backlash or hysteresis.
+/// True if a case has friction, backlash or hysteresis, which act by equivalent stiffness and damping.
 pub(crate) fn is_not_smooth(case: &Case) -> bool {
     case.effects().any(|spec| spec.treatment == Treatment::Equivalent)
 }
 
-/// Refuses the extensions that a method cannot treat, with the reason.
+/// Refuses a case with extensions that a method does not treat.
 ///
 /// # Errors
-/// The first such extension.
+/// The first such extension, with the reason.
 pub(crate) fn refuse_others(case: &Case, treated: Treated) -> Result<(), StabilityError> {
     Ok(case.refuse_extensions(|spec| reason(spec, treated))?)
 }
 
-/// The reason against an effect; `None` for one that is treated.
+/// Reason why an extension is refused; `None` if it is treated.
 fn reason(spec: &EffectSpec, treated: Treated) -> Option<&'static str> {
     let (is_treated, reason) = match spec.treatment {
         Treatment::Sensor | Treatment::LinearProcess => return None,

@@ -1,4 +1,4 @@
-//! Wear and drift as coefficients and a stiffness of one moment.
+//! Wear and drift, evaluated at one moment as cutting coefficients and stiffness.
 
 use super::extension::{material, wrong};
 use crate::error::StabilityError;
@@ -6,17 +6,18 @@ use quietcut_model::Effects;
 use quietcut_model::case::Case;
 use quietcut_model::effects::EffectName;
 
-/// The case as it is after `after_s` of work: drift and wear are then a stiffness and coefficients of that moment.
+/// The case after `after_s` seconds of operation, with drift and wear replaced by the stiffness and cutting
+/// coefficients of that moment.
 ///
 /// # Errors
-/// A drift beside a stiffness of its own, forces or stiffness that have vanished by then, or an extension that the case cannot
-/// have.
+/// Drift together with an extension of the stiffness, forces or stiffness that have fallen to zero, or an extension
+/// that cannot be applied to the case.
 pub fn after(case: &Case, after_s: f64) -> Result<Case, StabilityError> {
     let not_covered = |what| StabilityError::NotCovered {
         path: case.path.clone(),
         what,
     };
-    // Keys and values are judged by those who know them.
+    // `Effects::of_case` checks keys and values of the extensions.
     Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
     let number = |table: &toml::Table, key: &str| {
         let value = table.get(key)?;
