@@ -1,4 +1,4 @@
-//! Speeds and depths that no cut has are refused.
+//! Refusal of speeds and depths that are out of range.
 
 use crate::error::StabilityError;
 

@@ -4,14 +4,14 @@ use super::point::CutStability;
 use crate::criteria::LEAST_ERROR;
 use crate::spectrum::verdict::Verdict;
 
-/// The dominant multiplier at one speed and depth.
+/// Dominant Floquet multiplier at one spindle speed and axial depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Its absolute value.
+    /// Absolute value |μ| of the multiplier.
     pub multiplier_abs: f64,
-    /// An estimate of its error.
+    /// Error estimate of |μ|.
     pub error: f64,
-    /// What follows.
+    /// Verdict from |μ| and its error.
     pub verdict: Verdict,
 }
 
@@ -24,7 +24,7 @@ impl Cell {
         }
     }
 
-    /// A multiplier from the characteristic matrix.
+    /// Cell from a multiplier of the characteristic matrix, whose error is negligible.
     pub(super) fn exact(multiplier_abs: f64) -> Self {
         Self::new(multiplier_abs, LEAST_ERROR * multiplier_abs.max(1.0))
     }

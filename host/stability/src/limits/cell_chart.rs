@@ -1,4 +1,5 @@
-//! Cell charts: the dominant multiplier over a grid of speeds and depths, by any method.
+//! Cell charts: the dominant Floquet multiplier (characteristic multiplier) over a grid of speeds and depths, by any
+//! method.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -7,37 +8,37 @@ use super::method::{Label, Method};
 use crate::error::StabilityError;
 use crate::spectrum::verdict::Verdict;
 
-/// The cells at one speed, by depth.
+/// Cells at one spindle speed, in the order of the depths of the chart.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellLine {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Absolute value of the dominant multiplier.
+    /// Absolute value |μ| of the dominant multiplier at each depth.
     pub multiplier_abs: Vec<f64>,
-    /// An estimate of the error of the multiplier.
+    /// Error estimate of |μ| at each depth.
     pub error: Vec<f64>,
-    /// What follows.
+    /// Verdict at each depth.
     pub verdict: Vec<Verdict>,
 }
 
-/// A grid of cells.
+/// Grid of cells over spindle speed and axial depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellChart {
-    /// The method that computed it.
+    /// Label of the method that computed the chart.
     #[serde(flatten)]
     pub label: Label,
-    /// The axial depths, mm, in the order asked for.
+    /// Axial depths, mm, in the requested order.
     pub depths_mm: Vec<f64>,
-    /// The cells at each speed, in the order asked for.
+    /// Cells at each spindle speed, in the requested order.
     pub speeds: Vec<CellLine>,
 }
 
-/// The dominant multiplier at every speed and depth, in parallel over speeds.
+/// Dominant multiplier at every speed and depth, in parallel over speeds.
 ///
 /// The result does not depend on the number of threads.
 ///
 /// # Errors
-/// Those of [`Method::cells`], of the first speed that fails.
+/// As [`Method::cells`], for the first speed that fails.
 pub fn cell_chart<M: Method + ?Sized>(
     method: &M,
     speeds_rpm: &[f64],

@@ -1,9 +1,9 @@
-//! Cell charts: the dominant multiplier over a grid of speeds and depths.
+//! Cells at one speed: the dominant Floquet multiplier (characteristic multiplier) at many depths from samples at few.
 //!
-//! At one speed all multipliers are computed at a few depths only. Between two of them each multiplier that may be the dominant
-//! one is a cubic in depth through both ends with their derivatives. One step of Newton on the characteristic matrix
-//! half way says how far the cubic is off there; where that is too much, or where multipliers cannot be told apart, the
-//! interval is halved, down to the cells themselves.
+//! All multipliers are computed at a few depths only. Between two of them each multiplier that may be dominant is
+//! interpolated by a cubic in depth through both ends with their derivatives. One Newton step on the characteristic
+//! matrix at the middle gives the error of the cubic there. If it is too large, or if multipliers cannot be told apart,
+//! the interval is halved, down to single cells.
 
 use num_complex::Complex64;
 
@@ -17,14 +17,14 @@ use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::root::Root;
 use crate::spectrum::verdict::Verdict;
 
-/// Intervals in depth that are begun with; cells that are fewer are all computed.
+/// Number of intervals in depth at the start; if there are fewer cells, all are computed directly. A choice.
 const INTERVALS: usize = 10;
 
 /// Share of the depth range that is computed first; then ranges double.
 const FIRST_PART: f64 = 0.125;
 
-/// [`Method::cells`] of any method that has multipliers; `spectrum` gives them at this speed, good for depths up to its
-/// argument, m.
+/// Implements [`Method::cells`] for a method with a spectrum; `spectrum` returns the multipliers at this speed, valid
+/// for depths up to its argument, m.
 pub(crate) fn cells_of<S: Spectrum>(
     rpm: f64,
     depths_mm: &[f64],
@@ -53,7 +53,7 @@ pub(crate) fn cells_of<S: Spectrum>(
     loop {
         let depth_m = column.depths_m[index];
         if depth_m > deepest_m {
-            // The deeper, the finer must a period be cut: shallow depths need not pay for deep ones.
+            // The mesh of the period must be finer for larger depths: small depths use a coarser, cheaper one.
             deepest_m = (2.0 * deepest_m).max(depth_m).min(last_m);
             column.spectrum = spectrum(deepest_m);
         }
@@ -74,29 +74,30 @@ pub(crate) fn cells_of<S: Spectrum>(
     Ok(cells)
 }
 
-/// All multipliers that may dominate at the depth of one cell.
+/// All multipliers that may be dominant, at the depth of one cell.
 struct Sample {
     index: usize,
     depth_m: f64,
-    /// Where derivatives could be had; a multiplier without ends the sample's use for following.
+    /// Multipliers with derivatives; `None` if one of them lacks a derivative, so that the sample cannot be
+    /// interpolated.
     roots: Option<Vec<Root>>,
 }
 
 impl Sample {
-    /// The size of the largest multiplier.
+    /// Absolute value of the largest multiplier.
     fn largest(&self) -> f64 {
         let sizes = self.roots.iter().flatten().map(|root| root.multiplier.norm());
         sizes.fold(0.0, f64::max)
     }
 }
 
-/// A cubic in the share t of an interval, with a quartic that vanishes with its slope at both ends.
+/// Cubic in the fraction t of an interval, plus a quartic that vanishes with its slope at both ends.
 #[derive(Clone, Copy)]
 struct Curve {
     from: Root,
     to: Root,
     step_m: f64,
-    /// What the cubic lacks where it was checked, over t²(1 − t)² there.
+    /// Coefficient of the quartic: the error of the cubic where it was checked, divided by t²(1 − t)² there.
     correction: Complex64,
 }
 
@@ -109,7 +110,7 @@ impl Curve {
             + self.correction * (product * product)
     }
 
-    /// Corrects the curve for an error that it has at a share; returns the error that the cubic had half way.
+    /// Sets the quartic from the error of the cubic at a fraction; returns the error that the cubic had half way.
     fn correct(&mut self, share: f64, error: Complex64) -> f64 {
         let product = share * (1.0 - share);
         self.correction = error / (product * product);
@@ -117,7 +118,7 @@ impl Curve {
     }
 }
 
-/// The cells at one speed while they are computed, by ascending depth.
+/// Cells at one speed during their computation, by ascending depth.
 struct Column<S> {
     rpm: f64,
     spectrum: S,
@@ -126,7 +127,7 @@ struct Column<S> {
 }
 
 impl<S: Spectrum> Column<S> {
-    /// Computes all multipliers at a cell, and the cell.
+    /// Computes all multipliers at the depth of a cell, and fills the cell.
     fn sample(&mut self, index: usize) -> Result<Sample, StabilityError> {
         let depth_m = self.depths_m[index];
         let broke_down = StabilityError::BrokeDown {
@@ -149,7 +150,7 @@ impl<S: Spectrum> Column<S> {
                 roots = None;
                 continue;
             };
-            // What Newton changed is the error of the map; what is left after it is far less.
+            // The change by Newton's method is the error of the map; the remaining error is far smaller.
             let size = root.multiplier.norm();
             sizes = (sizes.0.max(size), sizes.1.max(LEAST_ERROR * size.max(1.0)));
             if let Some(roots) = &mut roots {
@@ -164,7 +165,7 @@ impl<S: Spectrum> Column<S> {
         })
     }
 
-    /// The cells between two samples.
+    /// Fills the cells between two samples, halving the interval if interpolation fails.
     fn between(&mut self, low: &Sample, high: &Sample) -> Result<(), StabilityError> {
         if high.index - low.index < 2 {
             return Ok(());
@@ -178,7 +179,7 @@ impl<S: Spectrum> Column<S> {
         self.between(&middle, high)
     }
 
-    /// Follows every multiplier that may dominate, and fills the cells.
+    /// Follows every multiplier that may be dominant between two samples, and fills the cells.
     fn follow(&mut self, low: &Sample, high: &Sample) -> Followed {
         let Some(mut curves) = curves(low, high) else {
             return Followed::Lost;
@@ -211,7 +212,7 @@ impl<S: Spectrum> Column<S> {
             roots: Some(roots),
         };
         self.cells[index] = Cell::exact(middle.largest());
-        // The correction makes the curve much better than the cubic was; over wide intervals less so.
+        // With the quartic the error is far below that of the cubic, less so over wide intervals.
         let error = if least > CELL_FAR {
             4.0 * worst
         } else {
@@ -224,17 +225,18 @@ impl<S: Spectrum> Column<S> {
         }
     }
 
-    /// The multiplier near a guess: a second step of Newton where the first was long.
+    /// The multiplier near a guess, with a second Newton step if the first was long.
     fn polished(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let root = self.spectrum.root_near(guess, depth_m)?;
-        // The error that is left is about the square of the step.
+        // The remaining error is about the square of the step.
         if (root.multiplier - guess).norm() < 1e-5 * guess.norm() {
             return Some(root);
         }
         self.spectrum.root_near(root.multiplier, depth_m)
     }
 
-    /// Fills the cells between two samples from curves with an error; `None` where one that is undecided cannot be solved for.
+    /// Fills the cells between two samples from curves with a given error; `None` if a cell is undecided and its
+    /// multiplier cannot be computed directly.
     fn fill(&mut self, low: &Sample, high: &Sample, curves: &[Curve], error: f64) -> Option<()> {
         for index in low.index + 1..high.index {
             if index == middle_of(low, high) {
@@ -260,15 +262,15 @@ impl<S: Spectrum> Column<S> {
 
 /// Result of following multipliers from one sample to the next.
 enum Followed {
-    /// The cells are filled.
+    /// All multipliers were followed, and the cells are filled.
     Filled,
-    /// The curves are off; the roots half way are known.
+    /// The error of the curves is too large; the multipliers at the middle are known.
     Bent(Sample),
-    /// Multipliers cannot be told apart.
+    /// Multipliers could not be told apart.
     Lost,
 }
 
-/// True where no other guess has led to the same root.
+/// True if none of `others` is the same multiplier.
 fn is_new(root: &Root, others: &[Root]) -> bool {
     let distance = |other: &Root| (other.multiplier - root.multiplier).norm();
     others
@@ -280,7 +282,7 @@ fn middle_of(low: &Sample, high: &Sample) -> usize {
     (low.index + high.index) / 2
 }
 
-/// The curves of all multipliers that may dominate between two samples.
+/// Curves of all multipliers that may be dominant between two samples; `None` if they cannot be paired.
 fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
     let step_m = high.depth_m - low.depth_m;
     let mut free = high.roots.clone()?;
@@ -303,7 +305,8 @@ fn curves(low: &Sample, high: &Sample) -> Option<Vec<Curve>> {
         .map(|curve| curve.at(0.5).norm())
         .fold(0.0, f64::max);
     let least = half_way.min(low.largest()).min(high.largest());
-    // What has no partner must stay below the largest all along: twice its way is not enough to reach it.
+    // A multiplier without a partner must stay smaller than the largest over the interval, even if it moves twice as
+    // fast.
     let reach = |root: &Root| root.multiplier.norm() + 2.0 * root.slope.norm() * step_m;
     strays.iter().all(|root| reach(root) < least).then_some(curves)
 }

@@ -1,4 +1,4 @@
-//! Charts: the line of every speed, by any method.
+//! Stability charts: the line of every spindle speed, by any method.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -10,25 +10,25 @@ use super::uncertainty::Uncertainty;
 use crate::criteria::CHART_SAMPLES_MIN;
 use crate::error::StabilityError;
 
-/// A stability chart.
+/// Stability chart over spindle speed and axial depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Chart {
-    /// The method that computed it.
+    /// Label of the method that computed the chart.
     #[serde(flatten)]
     pub label: Label,
-    /// One line per speed, in the order asked for.
+    /// One line per spindle speed, in the requested order.
     pub speeds: Vec<SpeedLine>,
-    /// The depths, mm, at which lines have a share of stable machines; empty where that was not asked for.
+    /// Depths, mm, at which lines contain the share of stable machines; empty if not requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cells_mm: Vec<f64>,
 }
 
-/// The lines at given speeds, from depth 0 to `depth_mm`, with at least `samples` steps in depth.
+/// Lines at given speeds, from depth 0 to `depth_mm`, with at least `samples` steps in depth.
 ///
 /// The result does not depend on the number of threads.
 ///
 /// # Errors
-/// Those of [`Method::line`], of the first speed that fails.
+/// As [`Method::line`], for the first speed that fails.
 pub fn chart<M: Method + ?Sized>(
     method: &M,
     speeds_rpm: &[f64],
@@ -42,24 +42,25 @@ pub fn chart<M: Method + ?Sized>(
     })
 }
 
-/// How a chart is refined in speed.
+/// Refinement of a chart in spindle speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refinement {
-    /// Between neighbouring speeds every limit may differ from the straight line by this share of the largest depth.
+    /// Largest difference between a limit and the straight line between the limits at neighbouring speeds, as a share
+    /// of the largest depth.
     pub tolerance: f64,
-    /// Speeds closer than this share of their value are not divided further.
+    /// Least relative distance between neighbouring speeds; closer ones are not divided.
     pub least_step: f64,
-    /// No further round is begun with this many speeds.
+    /// Number of speeds from which no further round of refinement begins.
     pub most_speeds: usize,
 }
 
 impl Chart {
-    /// Adds to every line how far its limit may lie from there: see [`Uncertainty::spread`].
+    /// Adds the spread of the limit to every line: see [`Uncertainty::spread`].
     ///
     /// The result does not depend on the number of threads.
     ///
     /// # Errors
-    /// Those of [`Uncertainty::spread`], of the first speed that fails.
+    /// As [`Uncertainty::spread`], for the first speed that fails.
     pub fn with_spread(
         mut self,
         uncertainty: &Uncertainty<'_>,
@@ -78,10 +79,11 @@ impl Chart {
         Ok(self)
     }
 
-    /// Adds speeds where limits bend, kinds change, and islands begin or end; speeds must be ascending.
+    /// Adds speeds where limits bend, where the kind of stability loss changes, and where islands begin or end. Speeds
+    /// must be ascending.
     ///
     /// # Errors
-    /// Those of [`Method::line`].
+    /// As [`Method::line`].
     pub fn refined<M: Method + ?Sized>(
         mut self,
         method: &M,
@@ -89,7 +91,8 @@ impl Chart {
         refinement: Refinement,
     ) -> Result<Self, StabilityError> {
         let tolerance_mm = refinement.tolerance * depth_mm;
-        // Every interval is tried once; then those whose middle was not where the ends said.
+        // Every interval is tested once; later rounds divide only intervals whose middle deviated from the straight
+        // line.
         let mut open: Vec<bool> = vec![true; self.speeds.len().saturating_sub(1)];
         while open.iter().any(|&is_open| is_open) && self.speeds.len() < refinement.most_speeds {
             let middles: Vec<f64> = self
@@ -129,7 +132,7 @@ impl Chart {
     }
 }
 
-/// True where the middle line has the same switches as both ends, each near the straight line between them.
+/// True if the middle line has the same switches as both ends, each near the straight line between them.
 fn is_between(left: &SpeedLine, middle: &SpeedLine, right: &SpeedLine, tolerance_mm: f64) -> bool {
     let share = (middle.rpm - left.rpm) / (right.rpm - left.rpm);
     let (a, m, b) = (&left.stable_mm, &middle.stable_mm, &right.stable_mm);

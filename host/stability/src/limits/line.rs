@@ -1,4 +1,5 @@
-//! One speed: every depth at which a multiplier crosses the unit circle.
+//! Stability along the depth at one spindle speed: every crossing of the unit circle by a Floquet multiplier
+//! (characteristic multiplier).
 
 use num_complex::Complex64;
 
@@ -17,15 +18,16 @@ use crate::spectrum::stability_loss::StabilityLoss;
 /// Share of the depth range that is scanned first; then ranges double.
 const FIRST_PART: f64 = 0.125;
 
-/// To what crossings are solved for, relative to the depth.
+/// Relative tolerance of the depth of a crossing.
 const ROOT: f64 = 1e-9;
 
-/// All crossings from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where needed.
+/// All crossings of the unit circle from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where
+/// needed.
 ///
-/// Crossings are solved for with the characteristic matrix, to about 1e-9 relative. Between samples each multiplier
-/// near the circle is followed with its derivative; where a cubic through both ends says that it may reach the
-/// circle and return, or where it cannot be followed, the interval is halved, up to 12 times. The number of
-/// multipliers outside must agree with the crossings found, at every sample.
+/// Crossings are computed with the characteristic matrix, to about 1e-9 relative. Between samples each multiplier near
+/// the circle is followed with its derivative. If the cubic through both ends may reach the circle and return, or if a
+/// multiplier cannot be followed, the interval is halved, up to 12 times. At every sample the number of multipliers
+/// outside must agree with the crossings found.
 ///
 /// # Errors
 /// Speed or depth out of range, or a computation that leaves the range of numbers.
@@ -36,8 +38,8 @@ pub fn line(problem: &Problem, rpm: f64, depth_mm: f64, samples: usize) -> Resul
     })
 }
 
-/// [`line()`] of any method that has multipliers; `spectrum` gives them at this speed, good for depths up to its
-/// argument, m.
+/// Implements [`line()`] for a method with a spectrum; `spectrum` returns the multipliers at this speed, valid for
+/// depths up to its argument, m.
 pub(crate) fn line_of<S: Spectrum>(
     rpm: f64,
     depth_mm: f64,
@@ -59,7 +61,7 @@ pub(crate) fn line_of<S: Spectrum>(
     for index in 1..=samples {
         let share = index as f64 / samples as f64;
         if share * depth_m > deepest_m {
-            // The deeper, the finer must a period be cut: shallow depths need not pay for deep ones.
+            // The mesh of the period must be finer for larger depths: small depths use a coarser, cheaper one.
             deepest_m = (2.0 * deepest_m).max(share * depth_m).min(depth_m);
             scan.spectrum = spectrum(deepest_m);
         }
@@ -71,7 +73,7 @@ pub(crate) fn line_of<S: Spectrum>(
     Ok(scan.finish(start, depth_mm))
 }
 
-/// True where the circle may be reached within a step.
+/// True if the multiplier may reach the unit circle within a step in depth.
 fn is_near(root: &Root, step_m: f64) -> bool {
     root.excess().abs() < (3.0 * root.slope.norm() * step_m + 0.02).min(LINE_FAR)
 }
@@ -128,7 +130,8 @@ impl<S: Spectrum> Scan<S> {
         Ok(Sample { depth_m, roots })
     }
 
-    /// A multiplier with its derivative; near the circle it is polished first, so that its side is right.
+    /// A multiplier with its derivative. Near the unit circle it is first refined by Newton's method, so that its side
+    /// is right.
     fn root(&mut self, coarse: Complex64, depth_m: f64) -> Root {
         let spectrum = &mut self.spectrum;
         let multiplier = if (coarse.norm() - 1.0).abs() < LINE_POLISHED {
@@ -149,7 +152,7 @@ impl<S: Spectrum> Scan<S> {
         }
     }
 
-    /// The crossings between two samples, by depth.
+    /// Crossings between two samples, by depth.
     fn between(
         &mut self,
         low: &Sample,
@@ -170,7 +173,7 @@ impl<S: Spectrum> Scan<S> {
         Ok(found)
     }
 
-    /// Follows each multiplier near the circle from end to end; `None` where one cannot be followed or may touch the
+    /// Follows each multiplier near the circle between two samples; `None` if one cannot be followed or may touch the
     /// circle in between.
     fn follow(&mut self, low: &Sample, high: &Sample) -> Option<Vec<DirectedCrossing>> {
         let step_m = high.depth_m - low.depth_m;
@@ -184,7 +187,7 @@ impl<S: Spectrum> Scan<S> {
                 return None;
             }
         }
-        // What is left over must be far from the circle.
+        // A multiplier without a partner must be far from the circle.
         if free.iter().any(|root| is_near(root, step_m)) {
             return None;
         }
@@ -199,7 +202,7 @@ impl<S: Spectrum> Scan<S> {
             multiplier: from.multiplier + (to.multiplier - from.multiplier) * share,
         };
         let crossing = self.spectrum.crossing_near(guess, low.depth_m, high.depth_m)?;
-        // The multiplier found must lie on this branch, not on another that crosses nearby.
+        // The crossing must lie on this branch, not on another that crosses nearby.
         let distance = (crossing.multiplier - guess.multiplier).norm();
         (distance < 0.5 * (to.multiplier - from.multiplier).norm() + 1e-6).then_some(DirectedCrossing {
             crossing,
@@ -207,7 +210,7 @@ impl<S: Spectrum> Scan<S> {
         })
     }
 
-    /// Halves on the number outside: for an interval so short that nothing else is worth while.
+    /// Bisects on the number of multipliers outside, for an interval too short for other means.
     fn by_halving(&mut self, low: &Sample, high: &Sample) -> Result<Vec<DirectedCrossing>, StabilityError> {
         let (mut low, mut high) = (low.clone(), high.clone());
         if low.outside() == high.outside() {
@@ -253,9 +256,11 @@ impl<S: Spectrum> Scan<S> {
         SpeedLine::of_switches(self.rpm, depth_mm, start, switches)
     }
 
-    /// How far from a crossing, m, |μ| of its branch is beyond the error of the multiplier on both sides.
+    /// Error of the depth of a crossing, m: the distance at which |μ| of its branch differs from 1 by more than the
+    /// error of the multiplier, on both sides.
     ///
-    /// First that error over d|μ|/dw; where |μ| bends too much for that, twice as far, and so on. `deepest_m` where it never is.
+    /// The first try is that error divided by d|μ|/dw; the distance doubles until |μ| confirms it. `deepest_m` if no
+    /// distance does.
     fn error_m(&mut self, crossing: &Crossing, outward: bool, deepest_m: f64) -> f64 {
         let Crossing { multiplier, depth_m } = *crossing;
         let (Some(error), Some(slope)) = (
@@ -268,7 +273,7 @@ impl<S: Spectrum> Scan<S> {
         while reach_m < deepest_m {
             let sides = [(-reach_m, outward), (reach_m, !outward)];
             let mut is_beyond = |(shift_m, inside): (f64, bool)| {
-                // No cut is shallower than none.
+                // A distance that reaches beyond depth 0 suffices on that side.
                 depth_m + shift_m <= 0.0 || {
                     let guess = multiplier + slope * shift_m;
                     let there = self.spectrum.multiplier_near(guess, depth_m + shift_m, 0.1);
@@ -290,7 +295,7 @@ impl<S: Spectrum> Scan<S> {
     }
 }
 
-/// By how many the number outside changes.
+/// Net change of the number of multipliers outside over the crossings found.
 fn balance(found: &[DirectedCrossing]) -> i32 {
     found
         .iter()
@@ -301,16 +306,16 @@ fn balance(found: &[DirectedCrossing]) -> i32 {
         .sum()
 }
 
-/// True where the cubic through both ends of |μ| − 1 comes near zero in between, though both ends are on one side.
+/// True if the cubic through both ends of |μ| − 1, which lie on one side, comes near zero in between.
 fn may_touch(from: &Root, to: &Root, step_m: f64) -> bool {
     let (a, b) = (from.excess(), to.excess());
     let (da, db) = (from.excess_slope() * step_m, to.excess_slope() * step_m);
-    // Only an end that heads for the circle can reach it and return.
+    // The cubic can only touch zero if |μ| moves towards the circle at both ends.
     if a.signum() * da >= 0.0 || b.signum() * db <= 0.0 {
         return false;
     }
     let side = a.signum();
-    // Nine points of the cubic: its extremum is missed by a few percent of its height at most.
+    // Nine points of the cubic miss its extremum by a few percent of its height at most.
     let nearest = (1..10)
         .map(|i| {
             let t = f64::from(i) * 0.1;

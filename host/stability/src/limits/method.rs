@@ -1,4 +1,4 @@
-//! The one interface of all methods.
+//! The common interface of all stability methods.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -8,28 +8,28 @@ use super::point::CutStability;
 use super::speed_line::SpeedLine;
 use crate::error::StabilityError;
 
-/// A method that computes where a cut is stable. Its value holds the problem, or a table of receptances.
+/// Stability method, with its problem or its table of receptances.
 ///
-/// Whoever makes one refuses a case for which the method is not defined, with the reason.
+/// The constructor of a method refuses cases for which it is not defined, with the reason.
 pub trait Method: Sync {
-    /// Its name in answers and captions.
+    /// Name in results and captions.
     fn name(&self) -> &'static str;
 
-    /// The effects that the method neglects, in words that follow "blind to"; `None` for a method that covers all of linear stability.
+    /// Effects that the method neglects, as text after "blind to"; `None` if it covers all of linear stability.
     fn blind_to(&self) -> Option<&'static str> {
         None
     }
 
-    /// Settings that its results depend on beside the case, such as a number of steps; `None` where there are none.
+    /// Settings beside the case on which results depend, such as a number of steps; `None` if there are none.
     fn settings(&self) -> Option<String> {
         None
     }
 
-    /// The dominant multiplier at a speed, rev/min, and an axial depth, mm, with its error.
+    /// Dominant Floquet multiplier at a spindle speed (rev/min) and an axial depth (mm), with its error.
     ///
-    /// The error is that of the method's own numerics against the motion of the full linear problem where the method
-    /// converges to it: of one that does so with an order p in its step, what changes with half the step, times
-    /// 2^p/(2^p − 1) and room. What the method is blind to is no part of it.
+    /// The error is the numerical error with respect to the full linear problem, if the method converges to it. For a
+    /// method of order p in its step it is the change with half the step, times 2^p/(2^p − 1) and a safety factor.
+    /// Effects that the method neglects are not included.
     ///
     /// # Errors
     /// Speed not positive, depth negative, or a computation that leaves the range of numbers.
@@ -42,7 +42,7 @@ pub trait Method: Sync {
     /// As [`point()`](Self::point).
     fn line(&self, rpm: f64, depth_mm: f64, samples: usize) -> Result<SpeedLine, StabilityError>;
 
-    /// The dominant multiplier at a speed and many depths, mm, in any order, each with its error.
+    /// Dominant multiplier at a spindle speed (rev/min) and many depths (mm), in any order, each with its error.
     ///
     /// # Errors
     /// As [`point()`](Self::point).
@@ -53,12 +53,12 @@ pub trait Method: Sync {
             .collect()
     }
 
-    /// The lines at many speeds, in their order; the same for any number of threads.
+    /// Lines at many spindle speeds, in the given order; independent of the number of threads.
     ///
-    /// A method that can use one speed for the next overrides it, in parts that do not depend on the threads.
+    /// A method that can reuse one speed for the next overrides this, in groups that do not depend on the threads.
     ///
     /// # Errors
-    /// Those of [`line()`](Self::line), of the first speed that fails.
+    /// As [`line()`](Self::line), for the first speed that fails.
     fn lines(
         &self,
         speeds_rpm: &[f64],
@@ -72,7 +72,7 @@ pub trait Method: Sync {
         lines.into_iter().collect()
     }
 }
-/// Label of a result: the method, its settings and its limits.
+/// Label of a result: method, settings and neglected effects.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Label {
     /// [`Method::name`].
@@ -86,7 +86,7 @@ pub struct Label {
 }
 
 impl Label {
-    /// The label of a method.
+    /// Label of a method.
     pub fn of<M: Method + ?Sized>(method: &M) -> Self {
         Self {
             method: method.name(),
@@ -96,7 +96,7 @@ impl Label {
     }
 }
 
-/// For captions.
+/// Formats the label for captions.
 impl std::fmt::Display for Label {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.method)?;

@@ -1,4 +1,5 @@
-//! Stability limits: one working point, one speed, charts and cells; derivatives and spread of limits. `Method` is the interface of all methods.
+//! Stability limits: one cut, one speed, charts and cells; derivatives and spread of limits. `Method` is the interface
+//! of all methods.
 
 pub(crate) mod bounds;
 pub(crate) mod cell;

@@ -1,9 +1,9 @@
-//! Percentiles of first limits, with confidence intervals from the scatter between batches.
+//! Percentiles of first limits, with confidence intervals from the scatter between batches of drawn machines.
 
 use super::speed_line::SpeedLine;
 use crate::criteria::PERCENTILE_SETTLED;
 
-/// Two-sided quantile of the standard normal distribution for 90 % confidence.
+/// Two-sided 90 % quantile of the standard normal distribution.
 const CONFIDENCE_90: f64 = 1.644_853_626_951_473;
 
 /// First limits of all machines and of every batch.
@@ -13,7 +13,8 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// The depths, mm, between which the percentile lies with 90 % confidence (Woodruff 1952); `None` beyond the last depth.
+    /// Confidence interval (90 %) of the percentile at `share`, mm (Woodruff 1952); `None` for an end beyond the last
+    /// depth.
     pub(super) fn interval(&self, share: f64) -> [Option<f64>; 2] {
         let all = &self.all.0;
         let least = 1.0 / all.len().max(1) as f64;
@@ -23,12 +24,13 @@ impl Limits {
             .iter()
             .map(|batch| batch.share_below(percentile_mm))
             .collect();
-        // A machine is the finest that shares can tell.
+        // The share below cannot be resolved more finely than one machine.
         let reach = (student_90(below.len()) * standard_error(&below)).max(least);
         [share - reach, share + reach].map(|share| self.all.quantile(share.clamp(0.0, 1.0)))
     }
 
-    /// Half the width of the interval relative to the percentile; what lies beyond the last depth counts as there.
+    /// Half the width of the confidence interval relative to the percentile; an end beyond the last depth counts as the
+    /// last depth.
     pub(super) fn relative_width(&self, share: f64, depth_mm: f64) -> f64 {
         let [low, high] = self.interval(share).map(|end| end.unwrap_or(depth_mm));
         let percentile_mm = self.all.quantile(share).unwrap_or(depth_mm);
@@ -44,8 +46,8 @@ impl Limits {
     }
 }
 
-/// Two-sided quantile of Student's distribution for 90 % confidence with `count` − 1 degrees of freedom, to 2 % from 4 values
-/// on (Abramowitz & Stegun 26.7.5).
+/// Two-sided 90 % quantile of Student's distribution with `count` − 1 degrees of freedom, to 2 % for `count` ≥ 4
+/// (Abramowitz & Stegun 26.7.5).
 fn student_90(count: usize) -> f64 {
     let freedom = count.saturating_sub(1).max(1) as f64;
     let z = CONFIDENCE_90;
@@ -56,9 +58,9 @@ fn student_90(count: usize) -> f64 {
     z * (1.0 + first / freedom + second / freedom.powi(2))
 }
 
-/// The first depth that is not surely stable: where stability is lost, or where a second stable orbit begins.
+/// First depth that is not surely stable, mm: where stability is lost, or where a second stable orbit begins.
 pub(crate) fn limit_of(line: &SpeedLine) -> Option<f64> {
-    // Where not even depth 0 is stable nothing can be lost.
+    // If depth 0 is unstable, no stability can be lost.
     if line.stable_mm.first().is_none_or(|interval| interval[0] > 0.0) {
         return Some(0.0);
     }
@@ -79,7 +81,7 @@ pub(super) fn is_stable(line: &SpeedLine, depth_mm: f64) -> bool {
     within(&line.stable_mm) && !within(&line.bistable_mm)
 }
 
-/// First limits in order; infinite where nothing is lost.
+/// First limits in ascending order; infinite for machines that stay stable.
 pub(super) struct Sorted(Vec<f64>);
 
 impl Sorted {
@@ -91,14 +93,14 @@ impl Sorted {
         Self(limits)
     }
 
-    /// The share of all that lies below a depth; a half of what lies at it.
+    /// Share of the limits that lie below a depth; limits at the depth count half.
     fn share_below(&self, depth_mm: f64) -> f64 {
         let below = self.0.partition_point(|limit| *limit < depth_mm);
         let up_to = self.0.partition_point(|limit| *limit <= depth_mm);
         0.5 * (below + up_to) as f64 / self.0.len().max(1) as f64
     }
 
-    /// The value below which a share of all lies, between the neighbours at (i + 1/2)/n (Hazen); `None` where it is infinite.
+    /// Quantile of the limits at `share`, interpolated between ranks at (i + 1/2)/n (Hazen); `None` if infinite.
     pub(super) fn quantile(&self, share: f64) -> Option<f64> {
         let position = (share * self.0.len() as f64 - 0.5).max(0.0);
         let (below, rest) = (position.floor(), position.fract());
@@ -126,10 +128,10 @@ mod tests {
 
     use super::*;
 
-    /// Machines in a batch, as drawn.
+    /// Number of machines in a batch, as drawn by `Uncertainty`.
     const BATCH: u32 = 64;
 
-    /// Nine of ten in [1, 2], the others in [4, 5]: a gap in which no percentile is known.
+    /// Limits of nine machines in ten lie in [1, 2], the others in [4, 5]; percentiles inside the gap are not defined.
     fn limit_mm(share: f64) -> f64 {
         if share < 0.9 {
             1.0 + share / 0.9
@@ -166,7 +168,8 @@ mod tests {
                     held += i32::from(low <= limit_mm(share) && limit_mm(share) <= high);
                 }
                 let coverage = f64::from(held) / f64::from(repeats);
-                // 400 repeats tell 90 % to 1.5 %; few batches know their own scatter badly, few machines are coarse steps.
+                // 400 repetitions estimate a coverage of 90 % to 1.5 %. Few batches estimate their scatter badly, and
+                // few machines have coarse ranks.
                 assert!(coverage > 0.84, "{batches} batches, {share}: {coverage}");
             }
         }
@@ -174,7 +177,7 @@ mod tests {
 
     #[test]
     fn students_quantiles_are_those_of_the_tables() {
-        // Abramowitz & Stegun, table 26.10.
+        // Reference values: Abramowitz & Stegun, table 26.10.
         for (count, expected) in [(4, 2.353), (6, 2.015), (11, 1.812), (31, 1.697), (121, 1.658)] {
             assert!((student_90(count) - expected).abs() < 0.02 * expected, "{count}");
         }

@@ -1,4 +1,5 @@
-//! Limits as planes over the variables of a case, from exact derivatives at every loss of stability.
+//! Limits as linear functions (planes) of the uncertain variables of a case, from exact derivatives at every loss of
+//! stability.
 
 use std::f64::consts::TAU;
 
@@ -10,30 +11,32 @@ use super::speed_line::{SpeedLine, Switch};
 use crate::problem::linear::{CubicTerms, Problem};
 use quietcut_model::case::Case;
 
-/// A difference over a tenth of a deviation; where only one side is a machine, over that side.
+/// Half width of the central difference of the problem along a variable, in standard deviations. If one side is no
+/// valid machine, the difference is one-sided.
 const STEP: f64 = 0.05;
 
-/// The linear problem of a case with its change along each variable, per standard deviation.
+/// Linear problem of a case with its derivative along each variable, per standard deviation.
 #[derive(Clone, Debug)]
 pub struct Linearized {
     problem: Problem,
     tangents: Vec<Tangent>,
 }
 
-/// A loss of stability as a plane over the variables.
+/// Loss of stability linearized over the variables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
-    /// Its depth, mm.
+    /// Axial depth at the nominal machine, mm.
     pub depth_mm: f64,
     /// Gradient of the depth, mm per standard deviation.
     pub gradient: DVector<f64>,
-    /// Chatter frequency, Hz, with its gradient, Hz per standard deviation; `None` at a flip, whose frequency only the
-    /// spindle sets.
+    /// Chatter frequency, Hz, with its gradient, Hz per standard deviation; `None` at a flip, whose frequency follows
+    /// from the spindle speed alone.
     pub chatter_hz: Option<(f64, DVector<f64>)>,
 }
 
 impl Linearized {
-    /// `None` where the linear part of the case is no problem, or does not stay one along some variable.
+    /// Linearizes the problem of a case along its variables; `None` if the linear part of the case, or of a varied
+    /// case, is not valid.
     pub fn new(case: &Case, variables: &[Variable]) -> Option<Self> {
         let problem = Problem::new(case, CubicTerms::LeaveOut).ok()?;
         let tangents = variables.iter().map(|variable| {
@@ -53,7 +56,7 @@ impl Linearized {
         Some(Self { problem, tangents })
     }
 
-    /// The losses of stability along a line, the first limit first; those that do not follow the variables are left out.
+    /// Linearized losses of stability along a line, the first limit first; those without a derivative are omitted.
     pub fn planes(&self, line: &SpeedLine) -> Vec<Plane> {
         let losses = line.switches.iter().filter(|switch| !switch.gain);
         losses.filter_map(|switch| self.plane(line.rpm, switch)).collect()
@@ -73,8 +76,8 @@ impl Linearized {
             .filter(|_| slopes.iter().any(|slope| slope.angle != 0.0));
         let chatter_hz = chatter_hz.map(|hz| {
             let period_s = self.problem.tooth_period_s(rpm);
-            // ωτ is the angle of the multiplier or its negative, up to whole turns; slopes are those of the angle above
-            // the real axis.
+            // ωτ is the angle of the multiplier or its negative, modulo 2π; derivatives refer to the angle above the
+            // real axis.
             let sign = if (hz * period_s).fract() > 0.5 { -1.0 } else { 1.0 };
             let per_angle = sign / (TAU * period_s);
             (

@@ -22,24 +22,26 @@ pub struct CutStability {
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// The dominant multiplier over one tooth period; of a pair the one above the real axis.
+    /// Dominant Floquet multiplier over one tooth period; of a conjugate pair the one above the real axis.
     #[serde(serialize_with = "as_pair")]
     pub multiplier: Complex64,
-    /// Its absolute value.
+    /// Absolute value |μ| of the multiplier.
     pub multiplier_abs: f64,
-    /// An estimate of the error of the multiplier, from a second, finer collocation. Where the multipliers of nearly one size are
-    /// too many to tell which is the largest, how much larger or, below 0.27, how different the largest may be.
+    /// Error estimate of the multiplier, from a second, finer collocation. If too many multipliers have nearly one size
+    /// to tell which is the largest, the excess of the largest possible one over this, or, below 0.27, the largest
+    /// possible difference.
     pub error: f64,
-    /// The verdict that follows; unstable also where it is certain that this multiplier lies outside and a larger one is not excluded.
+    /// Verdict from |μ| and its error. It is also unstable if this multiplier certainly lies outside and a larger one
+    /// is not excluded.
     pub verdict: Verdict,
-    /// How the dominant multiplier leaves, or would leave, the unit circle.
+    /// Kind of stability loss: how the dominant multiplier leaves, or would leave, the unit circle.
     pub kind: StabilityLoss,
     /// Frequency of the motion that belongs to the dominant multiplier, Hz.
     pub chatter_hz: Option<f64>,
 }
 
 impl CutStability {
-    /// A point from its dominant multiplier, either one of a pair, and the error of it: size, verdict and kind follow.
+    /// Stability of a cut from its dominant multiplier (either one of a pair) and the error of that.
     pub(crate) fn new(
         rpm: f64,
         depth_mm: f64,
@@ -66,7 +68,7 @@ fn as_pair<S: serde::Serializer>(value: &Complex64, serializer: S) -> Result<S::
     [value.re, value.im].serialize(serializer)
 }
 
-/// The dominant multiplier at a speed and depth.
+/// Dominant multiplier of a cut at a spindle speed (rev/min) and an axial depth (mm).
 ///
 /// # Errors
 /// Speed not positive, depth negative, or a computation that leaves the range of numbers.
@@ -87,7 +89,7 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
         Some(rough) => confirmed(problem, rpm, depth_m, rough),
         None => None,
     };
-    // Where Newton leads nowhere from the multipliers of a map, rounding has moved them.
+    // If Newton's method does not converge from the eigenvalues of the map, rounding has moved these.
     let found = found
         .or_else(|| searched(problem, rpm, depth_m, &candidates.multipliers))
         .or_else(of_maps)
@@ -105,26 +107,26 @@ pub fn point(problem: &Problem, rpm: f64, depth_mm: f64) -> Result<CutStability,
     })
 }
 
-/// The dominant multiplier.
+/// Dominant multiplier with its error, during the computation.
 struct Solution {
     multiplier: Complex64,
     error: f64,
-    /// The period at the working resolution.
+    /// Mesh of the tooth period at the working resolution.
     period: Period,
-    /// Where more is known than multiplier and error say.
+    /// Verdict, if more is known than follows from multiplier and error.
     verdict: Option<Verdict>,
 }
 
-/// From what changes between the working and a finer resolution; no less than `least`, relative to max(1, |μ|).
+/// Error from the change between the working and a finer mesh; at least `least`, relative to max(1, |μ|).
 fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
     (MESH_ROOM * (coarse - fine).norm()).max(least * fine.norm().max(1.0))
 }
 
-/// Multipliers of a rough map.
+/// Multipliers of a coarse period map.
 struct Rough {
-    /// Of pairs the upper ones.
+    /// Multipliers; of a conjugate pair the upper one.
     multipliers: Vec<Complex64>,
-    /// The complex depth w (1 − 1/μ) of the smallest of them, m; for those near the unit circle it is about twice the depth.
+    /// Complex depth |w (1 − 1/μ)| of the smallest of them, m; near the unit circle it is at most twice the depth.
     kappa_m: f64,
 }
 
@@ -143,7 +145,7 @@ impl Rough {
     }
 }
 
-/// The dominant multiplier at the working and at a finer resolution by Newton; `None` where that leads nowhere.
+/// Dominant multiplier on the working and a finer mesh by Newton's method; `None` if it does not converge.
 fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<Solution> {
     let dominant = |resolution, guesses: &[Complex64]| {
         let period = Period::new(problem, rpm, rough.kappa_m, resolution);
@@ -160,7 +162,7 @@ fn confirmed(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option
     })
 }
 
-/// The same from the multipliers of the maps themselves: of small ones, which are out of Newton's reach.
+/// Dominant multiplier from the maps of the working and a finer mesh, for multipliers too small for Newton's method.
 fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<Solution> {
     let kappa_m = rough.kappa_m.min(KAPPA_MAX * depth_m);
     let largest = |resolution, share| {
@@ -182,7 +184,7 @@ fn of_maps(problem: &Problem, rpm: f64, depth_m: f64, rough: &Rough) -> Option<S
     })
 }
 
-/// The dominant multiplier where maps do not tell: one that is found, and a radius beyond which none is.
+/// Dominant multiplier if the maps are not reliable: the largest found, and a radius beyond which there is none.
 fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64]) -> Option<Solution> {
     let kappa_m = (1.0 + WOUND.recip()) * depth_m;
     let working = Period::new(problem, rpm, kappa_m, Resolution::WORKING);
@@ -192,7 +194,7 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
         return None;
     }
     let Some(coarse) = beyond.multiplier else {
-        // All are small, and which is the largest may remain open.
+        // All multipliers are small; which of them is the largest may remain open.
         let within = |candidate: &&Complex64| candidate.norm() < beyond.radius;
         return Some(Solution {
             multiplier: *candidates.iter().find(within)?,
@@ -206,15 +208,15 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
     let own = error(coarse, fine, LEAST_ERROR);
     Some(Solution {
         multiplier: fine,
-        // Another may lie between this one and the radius.
+        // Another multiplier may lie between this one and the radius.
         error: own.max(beyond.radius - fine.norm()),
         period: working,
-        // Then that one lies outside as well.
+        // If this multiplier lies outside, a larger one does as well.
         verdict: (fine.norm() - own > 1.0).then_some(Verdict::Unstable),
     })
 }
 
-/// The largest of the multipliers near guesses, by Newton; `None` where one of them leads nowhere.
+/// Largest multiplier near any of the guesses, by Newton's method; `None` if it does not converge from one of them.
 fn dominant_of(period: &Period, kappa_m: f64, depth_m: f64, guesses: &[Complex64]) -> Option<Complex64> {
     let characteristic = Characteristic::new(period, kappa_m);
     let mut work = characteristic.workspace();

@@ -1,5 +1,4 @@
-//! Machines that a case with deviations stands for: which parameters vary together, and a few hundred draws of them that
-//! fill their distribution evenly.
+//! Random machines of a case with standard deviations: the independent variables, and stratified draws of them.
 
 use std::f64::consts::SQRT_2;
 
@@ -10,17 +9,17 @@ use rand_chacha::ChaCha8Rng;
 
 use quietcut_model::case::{Case, Deviation, Parameter};
 
-/// One normal variable: parameters that vary together, each by its standard deviation times the same number.
+/// One standard normal variable: parameters that vary together, each by its standard deviation times the variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
     parts: Vec<Deviation>,
 }
 
 impl Variable {
-    /// The independent variables of a case.
+    /// Independent variables of a case.
     ///
-    /// Deviations are independent, but for entries (i, j) and (j, i) of a matrix: where both have the same value and
-    /// the same deviation they are one number, and vary together.
+    /// Deviations are independent, except for entries (i, j) and (j, i) of a matrix: with equal values and equal
+    /// deviations they are one number and vary together.
     pub fn of_case(case: &Case) -> Vec<Self> {
         let mut variables: Vec<Self> = Vec::new();
         for &deviation in &case.deviations {
@@ -42,17 +41,18 @@ impl Variable {
         variables
     }
 
-    /// Parameters that vary together; a negative standard deviation is that of one that falls while others rise.
+    /// Variable of parameters that vary together; a parameter with a negative standard deviation falls when the others
+    /// rise.
     pub fn together(parts: Vec<Deviation>) -> Self {
         Self { parts }
     }
 
-    /// The parameters that vary together.
+    /// Parameters that vary together.
     pub fn parts(&self) -> &[Deviation] {
         &self.parts
     }
 
-    /// Moves the parameters by so many standard deviations; false where no machine has such a value.
+    /// Shifts the parameters of a case by a number of standard deviations; false if a value is then not valid.
     pub fn shift(&self, case: &mut Case, deviations: f64) -> bool {
         self.parts
             .iter()
@@ -60,7 +60,7 @@ impl Variable {
     }
 }
 
-/// The entry on the other side of the diagonal.
+/// Matrix entry (j, i) for (i, j); `None` for other parameters.
 fn mirrored(parameter: Parameter) -> Option<Parameter> {
     match parameter {
         Parameter::Mass(i, j) if i != j => Some(Parameter::Mass(j, i)),
@@ -72,21 +72,21 @@ fn mirrored(parameter: Parameter) -> Option<Parameter> {
     }
 }
 
-/// An orthonormal basis of the space of the variables whose first vectors span the directions that matter most.
+/// Orthonormal basis of the variables whose first vectors span the directions of largest influence on the limits.
 #[derive(Clone, Debug)]
 pub struct Basis {
     vectors: Vec<DVector<f64>>,
 }
 
 impl Basis {
-    /// `leading` by falling importance; those that the ones before them span, or that vanish, are passed over.
+    /// Basis from `leading` vectors by falling importance; vectors that vanish or depend on earlier ones are skipped.
     pub fn new(size: usize, leading: &[DVector<f64>]) -> Self {
         let unit = |index: usize| DVector::from_fn(size, |i, _| if i == index { 1.0 } else { 0.0 });
         let mut vectors: Vec<DVector<f64>> = Vec::with_capacity(size);
         for candidate in leading.iter().cloned().chain((0..size).map(unit)) {
             let length = candidate.norm();
             let mut rest = candidate;
-            // Twice is enough for orthogonality to rounding.
+            // Two passes of orthogonalization suffice to rounding.
             for _ in 0..2 {
                 for vector in &vectors {
                     let along = vector.dot(&rest);
@@ -94,7 +94,8 @@ impl Basis {
                 }
             }
             let left = rest.norm();
-            // Unit vectors lose at most all but 1/√size where there is still a direction to be found.
+            // A unit vector keeps at least 1/√size of its length while directions are missing; the threshold lies far
+            // below.
             if vectors.len() < size && left > 1e-3 * length && left.is_finite() && left > 0.0 {
                 vectors.push(rest / left);
             }
@@ -102,7 +103,7 @@ impl Basis {
         Self { vectors }
     }
 
-    /// The point with these coordinates.
+    /// Point with the given coordinates in this basis.
     fn point(&self, coordinates: &[f64]) -> DVector<f64> {
         let size = self.vectors.first().map_or(0, |vector| vector.len());
         let mut point = DVector::zeros(size);
@@ -112,16 +113,17 @@ impl Basis {
         point
     }
 
-    /// `count` points of the standard normal distribution, a power of 2: along the first vector one in each of `count` slices of
-    /// equal probability, along the first two a Hammersley set, along the others Latin, with random shifts.
+    /// Draws `count` points (a power of 2) of the standard normal distribution: stratified in `count` slices of equal
+    /// probability along the first basis vector, a Hammersley set along the first two, Latin hypercube along the
+    /// others, with random shifts.
     ///
-    /// Along the first vector the points of 2, 4, 8 … batches, counted from 0, lie between one another.
+    /// Along the first vector the points of 2, 4, 8 … batches (numbered from 0) interleave.
     pub fn points(&self, count: u32, seed: u64, stream: u64, batch: u32) -> Vec<DVector<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
         let size = self.vectors.len();
         let n = f64::from(count);
-        // The radical inverse 0, 1/2, 1/4, 3/4 …; an eighth more, and four batches have the middles of their slices.
+        // Radical inverse 0, 1/2, 1/4, 3/4 …; with 1/8 added, four batches lie at the middles of their slices.
         let first = f64::from(batch.reverse_bits()) / 2.0_f64.powi(32) + 0.125;
         let second: f64 = rng.random();
         let mut latin: Vec<Vec<f64>> = Vec::with_capacity(size.saturating_sub(2));
@@ -148,15 +150,15 @@ impl Basis {
     }
 }
 
-/// The number below which a standard normal variable stays with probability `share`, to 1e-12.
+/// Quantile of the standard normal distribution at the probability `share`, to 1e-12.
 fn normal_quantile(share: f64) -> f64 {
-    // Tails are lighter than a double can hold from 1e-300 on.
+    // Probabilities below 1e-300 are clamped: the tail underflows there.
     let share = share.clamp(1e-300, 1.0 - f64::EPSILON);
-    // By symmetry the lower half is enough, where erfc keeps its relative precision.
+    // By symmetry the lower half suffices, where erfc keeps its relative precision.
     if share > 0.5 {
         return -normal_quantile(1.0 - share);
     }
-    // Start: the tail bound; then Halley, which triples the digits.
+    // Start from the tail bound; each step of Halley's method triples the number of digits.
     let mut x = -(-2.0 * (2.0 * share).ln()).sqrt();
     for _ in 0..8 {
         let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
@@ -176,7 +178,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_tables() {
-        // Abramowitz & Stegun, table 26.5.
+        // Reference values: Abramowitz & Stegun, table 26.5.
         for (share, x) in [
             (0.05, -1.644_853_626_951_473),
             (0.5, 0.0),
@@ -208,7 +210,8 @@ mod tests {
                 .map(|point| (0.5 * libm::erfc(-vector.dot(point) / SQRT_2) * 64.0) as usize)
                 .collect();
             slices.sort_unstable();
-            // The second vector is shifted around the end: each slice still has one or its neighbour has two.
+            // The shift of the second vector wraps around: each slice contains one point, or its neighbour contains
+            // two.
             for (expected, slice) in slices.iter().enumerate() {
                 assert!(slice.abs_diff(expected) <= 1, "{slices:?}");
             }

@@ -1,11 +1,12 @@
-//! How a limit moves with the parameters of the problem: exact derivatives, all from one pair of motions.
+//! Exact derivatives of a limit with respect to all parameters of the problem, from one pair of motions.
 //!
-//! At a crossing F = lᵀ(Φ(κ; p) − μ)r = 0 with κ = w (1 − 1/μ) and μ = e^{iθ}. Along a change dp of a parameter
+//! At a crossing of a Floquet multiplier, F = lᵀ(Φ(κ; p) − μ)r = 0 with κ = w (1 − 1/μ) and μ = e^{iθ}. Along a change
+//! dp of a parameter
 //!
 //!   lᵀΦ_κ r [(1 − 1/μ) dw + (w/μ) i dθ] + lᵀΦ_p r dp − iμ lᵀr dθ = 0,
 //!
-//! two real equations for dw and dθ; at a flip μ stays −1 and the first alone is left. lᵀ dΦ r = ∫ yᵀ dG x dt is a
-//! quadrature over the motion and its adjoint, [`FloquetMode`].
+//! which are two real equations for dw and dθ. At a flip μ stays −1, and the real part alone determines dw. lᵀ dΦ r = ∫
+//! yᵀ dG x dt is a quadrature over the Floquet mode and its adjoint, [`FloquetMode`].
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -18,12 +19,12 @@ use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::{ToothForce, TurningVector};
 use quietcut_model::structure::{FirstOrder, ModalPart};
 
-/// dp ↦ change of the problem, per unit of a parameter.
+/// Derivative of the problem along one parameter, per unit of the parameter.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    /// Change of A, B and C in feed, normal and axial direction.
+    /// Derivative of A, B and C in feed, normal and axial direction.
     structure: Option<FirstOrder>,
-    /// Change of the force on a tooth.
+    /// Derivative of the force on a tooth.
     force: Option<ToothForce>,
     feed_per_tooth_m: f64,
     start: f64,
@@ -39,17 +40,18 @@ impl Tangent {
         exit: 0.0,
     };
 
-    /// Per rad/s of the natural frequency of a mode, its damping ratio and shapes kept.
+    /// Derivative per rad/s of the natural frequency of a mode, at constant damping ratio and mode shape.
     pub fn omega(problem: &Problem, mode: &ModalPart) -> Self {
         Self::of_flow(problem, mode.by_omega())
     }
 
-    /// Per unit of the damping ratio of a mode, its frequency and shapes kept.
+    /// Derivative per unit of the damping ratio of a mode, at constant frequency and mode shape.
     pub fn damping_ratio(problem: &Problem, mode: &ModalPart) -> Self {
         Self::of_flow(problem, mode.by_damping_ratio())
     }
 
-    /// Per relative change of K_tc with K_rc and K_ac in fixed ratio to it; edge coefficients stay.
+    /// Derivative per relative change of K_tc, with constant ratios K_rc/K_tc and K_ac/K_tc and constant edge
+    /// coefficients.
     pub fn cutting_force(problem: &Problem) -> Self {
         let zero = TurningVector {
             constant: Vector3::zeros(),
@@ -66,8 +68,8 @@ impl Tangent {
         }
     }
 
-    /// From one problem to another that is `length` units of the parameter further on, both with the same teeth and
-    /// the same number of states; a central difference where they lie on both sides of a problem.
+    /// Difference quotient between two problems that differ by `length` units of the parameter, with equal numbers of
+    /// teeth and states. It is a central difference if they lie on both sides of the problem.
     pub fn between(low: &Problem, high: &Problem, length: f64) -> Self {
         let (p, q) = (&low.structure, &high.structure);
         let (f, g) = (&low.process, &high.process);
@@ -108,16 +110,16 @@ fn slope(low: &TurningVector, high: &TurningVector, length: f64) -> TurningVecto
     }
 }
 
-/// How a crossing moves, per unit of a parameter.
+/// Derivatives of a crossing, per unit of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
     /// dw/dp, mm.
     pub depth_mm: f64,
-    /// dθ/dp, rad, of the angle of the multiplier; 0 at a flip.
+    /// Derivative dθ/dp of the angle of the multiplier, rad; 0 at a flip.
     pub angle: f64,
 }
 
-/// A crossing of the unit circle with all that its derivatives need.
+/// Crossing of the unit circle with the quantities that its derivatives need.
 #[derive(Clone, Debug)]
 pub struct Sensitivity<'a> {
     problem: &'a Problem,
@@ -126,15 +128,15 @@ pub struct Sensitivity<'a> {
     depth_m: f64,
     multiplier: Complex64,
     motion: FloquetMode,
-    /// lᵀΦ_κ r, 1/m.
+    /// Coefficient lᵀΦ_κ r, 1/m.
     by_kappa: Complex64,
 }
 
 impl<'a> Sensitivity<'a> {
-    /// Of one of the switches that [`line`](crate::line()) found.
+    /// Sensitivity of one of the switches found by [`line`](crate::line()).
     ///
     /// # Errors
-    /// The switch is none of this problem: no motion belongs to it.
+    /// The switch does not belong to this problem: there is no Floquet mode for it.
     pub fn new(problem: &'a Problem, rpm: f64, switch: &Switch) -> Result<Self, StabilityError> {
         let broke_down = StabilityError::BrokeDown {
             rpm,
@@ -143,12 +145,12 @@ impl<'a> Sensitivity<'a> {
         };
         let multiplier = match (switch.kind, switch.chatter_hz) {
             (StabilityLoss::Flip, _) => -Complex64::ONE,
-            // ω τ is the angle of the multiplier, up to whole turns.
+            // ωτ is the angle of the multiplier, modulo 2π.
             (StabilityLoss::Hopf, Some(hz)) => {
                 let angle = std::f64::consts::TAU * (hz * problem.tooth_period_s(rpm)).fract();
                 Complex64::new(angle.cos(), angle.sin().abs())
             }
-            // At κ = 0 the depth has no influence: such a limit does not exist.
+            // At κ = 0 the depth has no influence, so that such a limit does not exist.
             _ => return Err(broke_down),
         };
         Self::of_crossing(problem, rpm, switch.depth_mm * 1e-3, multiplier).ok_or(broke_down)
@@ -172,15 +174,15 @@ impl<'a> Sensitivity<'a> {
         Some(sensitivity)
     }
 
-    /// How the crossing moves along a change of the problem.
+    /// Derivative of the crossing along a change of the problem.
     ///
-    /// `None` where the depth of the limit does not follow the parameter: at the tip of an island.
+    /// `None` if the depth is not differentiable in the parameter: at the tip of an island.
     pub fn slope(&self, tangent: &Tangent) -> Option<Slope> {
         let by_parameter = self.by_parameter(tangent);
         let mu = self.multiplier;
         let by_depth = self.by_kappa * (Complex64::ONE - mu.inv());
         let by_angle = if mu.im == 0.0 {
-            // μ stays real: any imaginary number keeps dθ at zero where the rest is real.
+            // μ stays real: an imaginary coefficient of dθ forces dθ = 0, since the rest is real.
             None
         } else {
             let turning = self.by_kappa * self.depth_m / mu - mu * self.motion.overlap;
@@ -203,13 +205,13 @@ impl<'a> Sensitivity<'a> {
         (slope.depth_mm.is_finite() && slope.angle.is_finite()).then_some(slope)
     }
 
-    /// ∫ yᵀ … x dt.
+    /// Integral ∫ yᵀ … x dt over the tooth period.
     fn along(&self, integrand: impl Fn(&Node) -> Complex64) -> Complex64 {
         let nodes = &self.motion.nodes;
         nodes.iter().map(|node| integrand(node) * node.weight_s).sum()
     }
 
-    /// C x and Bᵀ y.
+    /// Vectors C x and Bᵀ y at a node.
     fn ends(&self, node: &Node) -> (Vector3<Complex64>, Vector3<Complex64>) {
         let structure = &self.problem.structure;
         let seen = structure.c.map(Complex64::from) * &node.right;
@@ -223,13 +225,13 @@ impl<'a> Sensitivity<'a> {
         (0..node.teeth).map(move |tooth| engagement.angle(tooth, phase))
     }
 
-    /// Σ cutting·normalᵀ of the teeth that cut.
+    /// Sum Σ cutting·normalᵀ over the cutting teeth.
     fn directional(&self, node: &Node) -> Matrix3<f64> {
         let force = &self.problem.process.force;
         self.angles(node).map(|angle| force.directional(angle)).sum()
     }
 
-    /// M of one tooth: κ cutting·normalᵀ − β.
+    /// Matrix M of one tooth: κ cutting·normalᵀ − β.
     fn of_tooth(&self, angle: f64) -> Matrix3<Complex64> {
         let process = &self.problem.process;
         let mut coupling = process.force.directional(angle).map(|entry| self.kappa * entry);
@@ -242,10 +244,11 @@ impl<'a> Sensitivity<'a> {
         coupling
     }
 
-    /// lᵀΦ_p r.
+    /// Coefficient lᵀΦ_p r.
     fn by_parameter(&self, tangent: &Tangent) -> Complex64 {
         let mut sum = self.along(|node| self.integrand(tangent, node));
-        // A later entry leaves out what a tooth at the start angle does, a later exit adds what one at the exit does.
+        // A later entry removes the force of a tooth at the start angle; a later exit adds that of a tooth at the exit
+        // angle.
         let engagement = &self.problem.process.engagement;
         for (node, angle, later) in [
             (&self.motion.entry, engagement.start, -tangent.start),
@@ -260,7 +263,7 @@ impl<'a> Sensitivity<'a> {
         sum
     }
 
-    /// yᵀ dG x with G = A + B M C.
+    /// Integrand yᵀ dG x with G = A + B M C.
     fn integrand(&self, tangent: &Tangent, node: &Node) -> Complex64 {
         let (seen, pushed) = self.ends(node);
         let mut sum = Complex64::ZERO;
@@ -283,7 +286,7 @@ impl<'a> Sensitivity<'a> {
         sum
     }
 
-    /// dM of one tooth.
+    /// Derivative dM of the matrix of one tooth.
     fn change_of_tooth(&self, tangent: &Tangent, angle: f64) -> Matrix3<Complex64> {
         let process = &self.problem.process;
         let (cutting, normal) = (process.force.cutting.at(angle), process.force.normal.at(angle));

@@ -1,4 +1,4 @@
-//! One speed: its limits, its crossings of the unit circle, its stable depths.
+//! Stability at one spindle speed: limits, crossings of the unit circle, stable depths.
 
 use serde::Serialize;
 
@@ -10,14 +10,15 @@ use crate::spectrum::stability_loss::StabilityLoss;
 pub struct Switch {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// An estimate of its error, mm: within it |μ| is as near to 1 as the error of the multiplier. Absent where the method has none.
+    /// Error estimate of the depth, mm: within it |μ| differs from 1 by no more than the error of the multiplier.
+    /// `None` if the method has no estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
-    /// How the multiplier crosses.
+    /// Kind of crossing.
     pub kind: StabilityLoss,
-    /// True where it goes inside: stability is gained (if no other is outside).
+    /// True if the multiplier moves inside: stability is gained, provided no other multiplier is outside.
     pub gain: bool,
-    /// Frequency of the vibration that is born or dies there, Hz.
+    /// Frequency of the vibration that begins or ends there, Hz.
     pub chatter_hz: Option<f64>,
 }
 
@@ -26,41 +27,41 @@ pub struct Switch {
 pub struct Limit {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// As that of its [`Switch`].
+    /// Error estimate of the depth, mm, as in [`Switch`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_mm: Option<f64>,
-    /// How.
+    /// Kind of stability loss.
     pub kind: StabilityLoss,
     /// Chatter frequency, Hz.
     pub chatter_hz: Option<f64>,
 }
 
-/// Stability at one speed: limits, crossings and stable depths.
+/// Stability at one spindle speed: limits, crossings and stable depths.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpeedLine {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Depths that are stable, mm, as intervals in order, from 0 to the last depth.
+    /// Stable depths, mm, as intervals in ascending order, from 0 to the last depth.
     pub stable_mm: Vec<[f64; 2]>,
-    /// Depths, mm, at which the error leaves open on which side they are, as intervals in order: around the ends of those that are
-    /// stable.
+    /// Depths, mm, whose stability is open within the error, as intervals in ascending order around the ends of the
+    /// stable intervals.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub undecided_mm: Vec<[f64; 2]>,
-    /// Depths at which two stable forced orbits exist, mm: only nonlinear structures have them.
+    /// Depths with two stable forced orbits, mm, as intervals; only nonlinear structures have them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bistable_mm: Vec<[f64; 2]>,
-    /// Where stability is first lost; `None` where nothing is lost up to the last depth.
+    /// Limit at which stability is first lost; `None` if it is not lost up to the last depth.
     pub first_limit: Option<Limit>,
-    /// Every crossing of the unit circle, also while another multiplier is outside, by depth.
+    /// Every crossing of the unit circle by depth, including those while another multiplier is outside.
     pub switches: Vec<Switch>,
-    /// How far the limit may lie from here; `None` where the case has no deviations, or it was not asked for.
+    /// Spread of the limit; `None` if the case has no deviations, or if it was not requested.
     #[serde(flatten)]
     pub spread: Option<LimitSpread>,
 }
 
 impl SpeedLine {
-    /// The line that switches, by depth, make of depths from 0 to `depth_mm`, where `outside` multipliers are outside
-    /// at depth 0.
+    /// Line from its switches (by depth) over depths from 0 to `depth_mm`, with `outside` multipliers outside the unit
+    /// circle at depth 0.
     pub(crate) fn of_switches(rpm: f64, depth_mm: f64, mut outside: i32, switches: Vec<Switch>) -> Self {
         let mut stable_from = (outside == 0).then_some(0.0);
         let mut stable_mm = Vec::new();
@@ -111,7 +112,7 @@ impl From<&Switch> for Limit {
     }
 }
 
-/// Overlapping intervals joined, in order.
+/// Union of intervals: overlapping ones are joined, in ascending order.
 pub(crate) fn union(mut intervals: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut joined: Vec<[f64; 2]> = Vec::with_capacity(intervals.len());

@@ -1,21 +1,22 @@
-//! Which speeds matter to a machine where nobody says.
+//! Default range of spindle speeds of a case.
 
 use std::f64::consts::TAU;
 
 use quietcut_model::case::Case;
 use quietcut_model::structure::FirstOrder;
 
-/// Slowest and fastest speed, rev/min: the machine's limits, else 1/2 to 5 teeth per vibration of the most flexible mode.
+/// Lowest and highest spindle speed, rev/min: the limits of the machine, otherwise 1/2 to 5 teeth per vibration of the
+/// most flexible mode.
 pub fn default_speeds(case: &Case, structure: &FirstOrder, teeth: usize) -> (f64, f64) {
     if let Some(limits) = case.limits {
-        // A spindle at rest cuts nothing; a hundredth of the fastest speed stands for a slowest speed of 0.
+        // A lowest speed of 0 is replaced by a hundredth of the highest speed, since no cut exists at 0.
         return (limits.rpm_min.max(0.01 * limits.rpm_max), limits.rpm_max);
     }
     let rpm = most_flexible_hz(structure) * 60.0 / teeth as f64;
     (0.5 * rpm, 5.0 * rpm)
 }
 
-/// The frequency, Hz, of the pole at which the receptance is largest.
+/// Frequency, Hz, of the pole at which the receptance is largest.
 fn most_flexible_hz(structure: &FirstOrder) -> f64 {
     let size = |omega: f64| structure.receptance(omega).map_or(f64::INFINITY, |h| h.norm());
     structure
@@ -26,7 +27,7 @@ fn most_flexible_hz(structure: &FirstOrder) -> f64 {
         .map_or(1.0, |omega| omega / TAU)
 }
 
-/// Speeds from first to last with equal ratios: lobes get narrower towards low speeds.
+/// Spindle speeds with equal ratios from first to last, since lobes become narrower towards low speeds.
 pub fn spaced(from_rpm: f64, to_rpm: f64, count: usize) -> Vec<f64> {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count)

@@ -1,47 +1,47 @@
-//! The spread of a limit: percentiles with their confidence intervals.
+//! The spread of a limit under parameter uncertainty: percentiles with confidence intervals.
 
 use serde::Serialize;
 
-/// 5, 50 and 95 % of all machines have a first limit below these depths, mm; `None` beyond the last depth.
+/// The 5, 50 and 95 % percentiles of the first limit over all machines, mm; `None` beyond the last depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Percentiles {
-    /// Nineteen machines of twenty are stable up to here.
+    /// The 5 % percentile: nineteen machines of twenty are stable up to this depth.
     #[serde(rename = "5")]
     pub low: Option<f64>,
     /// The median.
     #[serde(rename = "50")]
     pub median: Option<f64>,
-    /// One machine of twenty is stable up to here.
+    /// The 95 % percentile: one machine of twenty is stable up to this depth.
     #[serde(rename = "95")]
     pub high: Option<f64>,
 }
 
-/// For each of the [`Percentiles`] the depths, mm, between which it lies with 90 % confidence; `None` beyond the last depth.
+/// Confidence intervals (90 %) of the [`Percentiles`], mm; `None` for an end beyond the last depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PercentileIntervals {
-    /// Of the 5 % limit.
+    /// Interval of the 5 % percentile.
     #[serde(rename = "5")]
     pub low: [Option<f64>; 2],
-    /// Of the median.
+    /// Interval of the median.
     #[serde(rename = "50")]
     pub median: [Option<f64>; 2],
-    /// Of the 95 % limit.
+    /// Interval of the 95 % percentile.
     #[serde(rename = "95")]
     pub high: [Option<f64>; 2],
 }
 
-/// One percentile of the limits.
+/// One percentile of the first limit with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Percentile {
-    /// The depth, mm; `None` beyond the last depth.
+    /// Percentile, mm; `None` beyond the last depth.
     pub depth_mm: Option<f64>,
-    /// Between which depths, mm, it lies with 90 % confidence; `None` beyond the last depth.
+    /// Confidence interval (90 %) of the percentile, mm; `None` for an end beyond the last depth.
     pub ci90_mm: [Option<f64>; 2],
 }
 
 impl Percentile {
-    /// How far it may be off, mm, with 90 % confidence: the farther end of its interval, which ends at `deepest_mm` where it
-    /// goes beyond. `None` where the percentile itself lies beyond.
+    /// Error of the percentile with 90 % confidence, mm: the distance to the farther end of its interval, where an end
+    /// beyond `deepest_mm` counts as `deepest_mm`. `None` if the percentile itself lies beyond.
     pub fn error_mm(&self, deepest_mm: f64) -> Option<f64> {
         let depth_mm = self.depth_mm?;
         let [from, to] = self.ci90_mm.map(|end| end.unwrap_or(deepest_mm));
@@ -49,16 +49,16 @@ impl Percentile {
     }
 }
 
-/// Spread of the first limit at one speed.
+/// Spread of the first limit at one spindle speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimitSpread {
-    /// Of the first limit.
+    /// Percentiles of the first limit.
     pub limit_percentiles_mm: Percentiles,
-    /// Between which depths each percentile lies with 90 % confidence, mm.
+    /// Confidence intervals (90 %) of the percentiles, mm.
     pub limit_percentiles_ci90_mm: PercentileIntervals,
-    /// How many machines were drawn.
+    /// Number of machines drawn.
     pub machines: usize,
-    /// Share of machines that are stable at each depth asked for; empty where none was.
+    /// Share of machines that are stable at each requested depth; empty if none was requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stable_share: Vec<f64>,
 }

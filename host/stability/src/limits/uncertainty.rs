@@ -1,17 +1,19 @@
 //! Distribution of a limit under deviations of the parameters, and the probability that a cut is stable.
 //!
-//! Limits have cusps where lobes cross, and islands come and go: linearization alone is wrong there. So machines are drawn
-//! from the distribution of the parameters and the first limit of each is computed, by the method itself. Exact derivatives
-//! make few draws do: the space of the parameters is turned so that its first axes are those along which the limits move, and
-//! along these the draws are stratified. They also say how deep a line must be searched.
+//! Limits have cusps where lobes cross, and islands appear and vanish, so that linearization alone is wrong there.
+//! Therefore machines are drawn from the distribution of the parameters, and the method computes the first limit of
+//! each. Exact derivatives reduce the number of draws: the parameter space is rotated so that its first axes are those
+//! along which the limits move, and draws are stratified along these. The derivatives also predict how deep a line must
+//! be searched.
 //!
-//! Where limits jump (machines with and without a flip island at the same speed) derivatives at the nominal machine say little. So
-//! the first batches are a pilot: the mean of the machines whose limit lies below a percentile points, by Stein's lemma, along
-//! the mean gradient of the share of such machines, and later batches are stratified along that.
+//! Where limits jump (machines with and without a flip island at the same speed), derivatives at the nominal machine
+//! are not sufficient. The first batches are therefore a pilot: by Stein's lemma, the mean of the machines whose limit
+//! lies below a percentile points along the mean gradient of the share of such machines, and later batches are
+//! stratified along it.
 //!
-//! Percentiles have confidence intervals by Woodruff's method: the scatter of the share below, from batch to batch, says between
-//! which ranks the percentile lies. That holds where the distribution has a gap, in which no percentile is known well,
-//! and is as wide there as it must be. Batches are drawn until the intervals are narrow.
+//! Confidence intervals of percentiles follow Woodruff's method: the scatter between batches of the share below gives
+//! the ranks between which the percentile lies. This also holds if the distribution has a gap, in which no percentile
+//! is well defined; the interval is as wide as the gap there. Batches are drawn until the intervals are narrow.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -26,39 +28,41 @@ use crate::criteria::{BATCHES_OF_CELLS, IMPOSSIBLE_MAX};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
 
-/// Machines in a batch: a power of 2.
+/// Machines in a batch: a power of 2, as stratification requires. A choice.
 const BATCH: u32 = 64;
 
-/// Batches that are drawn at least, so that their scatter can be told, and at most: 8 192 machines.
+/// Least and largest number of batches: four give an estimate of the scatter, 128 are 8 192 machines, a limit on
+/// computing time.
 const BATCHES: std::ops::RangeInclusive<u32> = 4..=128;
 
-/// Batches of the pilot.
+/// Batches of the pilot: the least number of batches.
 const PILOT: u32 = 4;
 
-/// The shares of machines whose limits are told.
+/// Shares of machines at which percentiles are computed.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 
-/// Steps in depth up to the limit that derivatives predict, with some room; where nothing is found the whole depth is searched.
+/// Number of steps in depth up to the limit predicted by derivatives, with a margin; if no limit is found, the whole
+/// depth is searched.
 const SAMPLES_NEAR: usize = 16;
 
-/// Steps over the whole depth, as in a chart.
+/// Number of steps over the whole depth, as in a chart.
 const SAMPLES: usize = 40;
 
-/// Makes the method on a case; `None` where the case is no machine.
+/// Function that builds the method for a case; `None` if the case is not a valid machine.
 pub type Maker<'a> = dyn Fn(&Case) -> Option<Box<dyn Method>> + Sync + 'a;
 
-/// A case with deviations.
+/// Case with deviations, and the method for its machines.
 pub struct Uncertainty<'a> {
     case: &'a Case,
     maker: &'a Maker<'a>,
     variables: Vec<Variable>,
-    /// How limits move with the variables: where draws are stratified.
+    /// Derivatives of limits along the variables, which give the directions of stratification.
     linear: Option<Linearized>,
     seed: u64,
 }
 
 impl<'a> Uncertainty<'a> {
-    /// `None` where the case has no deviations.
+    /// Prepares the draws; `None` if the case has no deviations.
     pub fn new(case: &'a Case, maker: &'a Maker<'a>, seed: u64) -> Option<Self> {
         let variables = Variable::of_case(case);
         (!variables.is_empty()).then(|| Self {
@@ -70,13 +74,13 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// The spread of the first limit at the speed of a line, searched up to `depth_mm`, and the probability of stability at
+    /// Spread of the first limit at the speed of a line, searched up to `depth_mm`, and the probability of stability at
     /// `cells_mm`.
     ///
-    /// The result depends on the seed and the speed alone.
+    /// The result depends only on the seed and the speed.
     ///
     /// # Errors
-    /// A line of a machine cannot be computed, or more than a fifth of the machines is impossible.
+    /// The line of a machine cannot be computed, or more than a fifth of the machines are not physical.
     pub fn spread(
         &self,
         nominal: &SpeedLine,
@@ -109,7 +113,7 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// The depth below which this share of all machines has its first limit at the speed of a line.
+    /// Percentile: the depth below which the given share of all machines has its first limit, at the speed of a line.
     ///
     /// # Errors
     /// As [`spread`](Self::spread).
@@ -127,7 +131,7 @@ impl<'a> Uncertainty<'a> {
         })
     }
 
-    /// Lines of batches of machines, at least `least`, until the percentiles of these shares have settled.
+    /// Lines of batches of machines, at least `least`, until the percentiles at these shares have settled.
     fn batches(
         &self,
         nominal: &SpeedLine,
@@ -144,7 +148,7 @@ impl<'a> Uncertainty<'a> {
         let mut basis = Basis::new(self.variables.len(), &gradients);
         let mut batches = Batches(Vec::new());
         for batch in 0..*BATCHES.end() {
-            // The speed takes part in the stream: neighbouring speeds draw other machines.
+            // The random stream depends on the speed, so that neighbouring speeds draw different machines.
             let stream = nominal.rpm.to_bits().rotate_left(8) ^ u64::from(batch);
             let machines = basis.points(BATCH, self.seed, stream, batch);
             let lines: Vec<Result<Drawn, StabilityError>> = machines
@@ -183,7 +187,7 @@ impl<'a> Uncertainty<'a> {
         Ok(())
     }
 
-    /// The line of a machine, at least up to its first limit; `None` where there is no such machine.
+    /// Line of a machine, at least up to its first limit; `None` if the machine is not valid.
     fn line(
         &self,
         machine: &DVector<f64>,
@@ -204,7 +208,7 @@ impl<'a> Uncertainty<'a> {
             .iter()
             .map(|plane| plane.depth_mm + plane.gradient.dot(machine))
             .fold(f64::INFINITY, f64::min);
-        // Gradients of a steep limit can point below 0; a quarter of the nominal one is then a fair try.
+        // Linearization may predict a depth below 0 for a steep limit; a quarter of the nominal limit is tried then.
         let shallowest_mm = planes.first().map_or(depth_mm, |plane| 0.25 * plane.depth_mm);
         let near_mm = 1.2 * predicted_mm.max(shallowest_mm);
         if !whole && near_mm < 0.7 * depth_mm {
@@ -217,13 +221,13 @@ impl<'a> Uncertainty<'a> {
     }
 }
 
-/// A machine, by its standard normal variables, and its line; `None` where there is no such machine.
+/// Drawn machine, by its standard normal variables, with its line; `None` if the machine is not valid.
 struct Drawn {
     machine: DVector<f64>,
     line: Option<SpeedLine>,
 }
 
-/// Batches of machines, each evenly spread.
+/// Batches of machines, each stratified.
 struct Batches(Vec<Vec<Drawn>>);
 
 impl Batches {
@@ -239,7 +243,7 @@ impl Batches {
         }
     }
 
-    /// The directions along which the share of limits below each percentile changes, those of percentiles that are known worst
+    /// Directions along which the share of limits below each percentile changes, those of the least certain percentiles
     /// first.
     fn directions(&self, shares: &[f64], depth_mm: f64) -> Vec<DVector<f64>> {
         let limits = self.limits();

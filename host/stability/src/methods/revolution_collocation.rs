@@ -80,8 +80,8 @@ impl Method for RevolutionCollocation {
     }
 }
 
-/// Error estimate |coarse − fine|: the coarse mesh errs by far more than the fine one, so that the difference bounds
-/// the error of the fine multiplier.
+/// Error estimate of the fine multiplier: [`MESH_ROOM`] times the change from the coarse to the fine mesh. The coarse
+/// mesh errs by far more than the fine one, so that the change bounds the error of the latter.
 fn error(coarse: Complex64, fine: Complex64) -> f64 {
     (MESH_ROOM * (coarse - fine).norm()).max(LEAST_ERROR * fine.norm().max(1.0))
 }

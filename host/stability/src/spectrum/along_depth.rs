@@ -1,40 +1,43 @@
-//! The interface through which multipliers are followed along the depth.
+//! Interface of a method to follow Floquet multipliers (characteristic multipliers) along the axial depth.
 
 use num_complex::Complex64;
 
 use super::crossing::Crossing;
 use super::root::Root;
 
-/// The multipliers of one method at one speed, as functions of depth.
+/// Floquet multipliers of one method at one spindle speed, as functions of the axial depth.
 pub(crate) trait Spectrum {
-    /// All multipliers at a depth, m, that may come near the unit circle, largest first; complex ones in exact pairs.
+    /// All multipliers at an axial depth (m) that may come close to the unit circle, largest first; complex ones in
+    /// exact conjugate pairs.
     ///
-    /// `None` where the equations have no finite solution.
+    /// `None` if the equations have no finite solution.
     fn multipliers(&mut self, depth_m: f64) -> Option<Vec<Complex64>>;
 
-    /// The multiplier near a guess to rounding; real guesses stay real.
+    /// The multiplier near a guess, to rounding; a real guess gives a real multiplier.
     ///
-    /// `None` where there is none within `reach` of it.
+    /// `None` if no multiplier lies within the distance `reach`.
     fn multiplier_near(&mut self, guess: Complex64, depth_m: f64, reach: f64) -> Option<Complex64>;
 
-    /// dμ/dw, 1/m, along the branch of multipliers through (μ, w).
+    /// Derivative dμ/dw, 1/m, along the branch of multipliers through (μ, w).
     fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64>;
 
-    /// A multiplier near a guess that is good to about 1e-4, with its derivative; real guesses stay real.
+    /// The multiplier near a guess, with its derivative dμ/dw; a real guess gives a real multiplier.
     ///
-    /// What is left of the error is its square, and that of the equations. `None` where there is none.
+    /// The guess must be correct to about 1e-4. The error of the result is about the square of that, plus the error of
+    /// the discretized equations. `None` if no multiplier is found.
     fn root_near(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let multiplier = self.multiplier_near(guess, depth_m, 0.05 * guess.norm())?;
         let slope = self.sensitivity(multiplier, depth_m)?;
         Some(Root { multiplier, slope })
     }
 
-    /// The depth between `low_m` and `high_m` where the multiplier of the guess crosses the unit circle.
+    /// The crossing of the unit circle near a guess, at an axial depth between `low_m` and `high_m`.
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing>;
 
-    /// The frequency of the vibration that is born or dies at a crossing, Hz.
+    /// Chatter frequency at a crossing of the unit circle, Hz.
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64>;
 
-    /// An estimate of |error| of the multiplier of a crossing; `None` where a finer computation does not know it.
+    /// Error estimate |error| of the multiplier at a crossing; `None` if the finer computation finds no such
+    /// multiplier.
     fn error(&mut self, crossing: &Crossing) -> Option<f64>;
 }

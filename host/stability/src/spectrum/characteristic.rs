@@ -1,12 +1,12 @@
-//! The characteristic matrix: multipliers and limits to rounding, one at a time.
+//! The characteristic matrix: single Floquet multipliers and limits, to rounding.
 //!
-//! On a motion that one period multiplies by μ, u_τ = u/μ: the delay equation becomes
-//! ẋ = (A + B[κ K α(t) − β(t)] C) x with the complex depth κ = w (1 − 1/μ). Its transition matrix Φ over the period
-//! depends on κ alone, is entire in κ, and
+//! On a motion that one period multiplies by μ, u_τ = u/μ. The delay equation becomes ẋ = (A + B[κ K α(t) − β(t)] C) x
+//! with the complex depth κ = w (1 − 1/μ). Its transition matrix Φ over the period depends on κ alone and is an entire
+//! function of κ. Then
 //!
 //!   det(Φ(w (1 − 1/μ)) − μ I) = 0
 //!
-//! holds for every multiplier μ and no other number. Φ is a product over elements of real polynomials in κ.
+//! holds if and only if μ is a Floquet multiplier. Φ is a product over elements of real polynomials in κ.
 
 use num_complex::Complex64;
 
@@ -14,28 +14,30 @@ use super::crossing::Crossing;
 use super::root::Root;
 use crate::problem::period::{Element, Period};
 
-/// Coefficients are dropped once a whole term is below this share of the largest: rounding level.
+/// Share of the largest coefficient below which a term of the polynomial in κ, and all higher ones, are dropped: below
+/// rounding.
 const TERM: f64 = 1e-17;
 
-/// How far beyond their scale polynomials may be used: 20 terms lose three digits more.
+/// Largest |κ|, as a factor on the scale of the polynomials, at which they are used: 1.5^20, for 20 terms, costs three
+/// more digits.
 const RADIUS: f64 = 1.5;
 
-/// The most terms of a polynomial: elements are so short that far fewer are needed.
+/// Largest number of terms of a polynomial in κ; elements are so short that far fewer are needed.
 const TERMS_MAX: usize = 60;
 
-/// Φ(κ) at one speed.
+/// Transition matrix Φ(κ) over a tooth period at one spindle speed.
 #[derive(Clone, Debug)]
 pub(crate) struct Characteristic {
     order: usize,
-    /// The depth, m, by which κ is divided before powers are taken.
+    /// Axial depth, m, by which κ is divided before powers are taken.
     scale: f64,
-    /// For each element the coefficients of its polynomial in κ/scale, n × n by rows.
+    /// For each element the coefficients of its polynomial in κ/scale, n × n row by row.
     elements: Vec<Vec<f64>>,
-    /// Free flight, n × n by rows.
+    /// Transition matrix of the free flight, n × n row by row.
     flight: Vec<f64>,
 }
 
-/// Workspace of an evaluation, reused between evaluations.
+/// Buffers of an evaluation, reused between evaluations.
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace {
     value: Vec<Complex64>,
@@ -45,7 +47,7 @@ pub(crate) struct Workspace {
     product: Vec<Complex64>,
 }
 
-/// Logarithmic derivatives of F = det(Φ − μI) at a point.
+/// Logarithmic derivatives of the characteristic function F = det(Φ − μI) at a point (μ, w).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Logarithmic {
     /// ∂ ln F/∂μ.
@@ -55,9 +57,9 @@ pub(crate) struct Logarithmic {
 }
 
 impl Characteristic {
-    /// Φ of a period, for |κ| up to about `depth_m`.
+    /// Transition matrix Φ of a tooth period, valid for |κ| up to about `depth_m`.
     pub(crate) fn new(period: &Period, depth_m: f64) -> Self {
-        // No cut is that shallow; with a depth of 0 the polynomials are constants.
+        // The floor is below every real depth; with a scale of 0 the polynomials would be constant.
         let depth_m = depth_m.max(1e-12);
         Self {
             order: period.order(),
@@ -76,14 +78,14 @@ impl Characteristic {
         self.order
     }
 
-    /// About how many operations an evaluation takes.
+    /// Approximate number of floating-point operations of one evaluation.
     pub(crate) fn operations(&self) -> f64 {
         let n = self.order as f64;
         let entries: usize = self.elements.iter().map(Vec::len).sum();
         16.0 * entries as f64 + 32.0 * n.powi(3) * (self.elements.len() as f64 + 3.0)
     }
 
-    /// A workspace for evaluations.
+    /// Allocates the buffers for evaluations.
     pub(crate) fn workspace(&self) -> Workspace {
         let zero = vec![Complex64::ZERO; self.order * self.order];
         Workspace {
@@ -95,7 +97,7 @@ impl Characteristic {
         }
     }
 
-    /// Φ and dΦ/dκ into `work.value` and `work.slope`.
+    /// Writes Φ and dΦ/dκ to `work.value` and `work.slope`.
     fn evaluate(&self, kappa: Complex64, work: &mut Workspace) {
         let n = self.order;
         let xi = kappa / self.scale;
@@ -125,7 +127,7 @@ impl Characteristic {
         }
     }
 
-    /// Derivatives of ln F at (μ, w); `None` where F vanishes to rounding or nothing finite comes out.
+    /// Logarithmic derivatives of F at (μ, w); `None` if F vanishes to rounding or a result is not finite.
     pub(crate) fn logarithmic(
         &self,
         multiplier: Complex64,
@@ -135,7 +137,7 @@ impl Characteristic {
         let n = self.order;
         let inverse = inverse(multiplier);
         self.evaluate((Complex64::ONE - inverse) * depth_m, work);
-        // Squares of large multipliers would leave the range of numbers.
+        // Scaling: squares of large multipliers would overflow.
         let unit = multiplier.l1_norm().max(1.0);
         for i in 0..n {
             work.value[i * n + i] -= multiplier;
@@ -152,9 +154,9 @@ impl Characteristic {
         (logarithmic.by_multiplier.is_finite() && logarithmic.by_depth.is_finite()).then_some(logarithmic)
     }
 
-    /// The multiplier at a depth near a guess, by Newton; real guesses stay real.
+    /// The multiplier at a depth near a guess, by Newton's method; a real guess gives a real multiplier.
     ///
-    /// `None` where the iteration leaves the neighbourhood of the guess, |Δ| < `reach`, or does not settle.
+    /// `None` if the iteration moves from the guess by more than `reach` or does not converge.
     pub(crate) fn multiplier_near(
         &self,
         guess: Complex64,
@@ -165,7 +167,7 @@ impl Characteristic {
         let mut multiplier = guess;
         for _ in 0..20 {
             let Some(logarithmic) = self.logarithmic(multiplier, depth_m, work) else {
-                // F is zero to the last bit, or the range was left.
+                // F is exactly zero, so that this is the multiplier, or the numbers are out of range.
                 return multiplier.is_finite().then_some(multiplier);
             };
             let step = -inverse(logarithmic.by_multiplier);
@@ -173,7 +175,7 @@ impl Characteristic {
             if !multiplier.is_finite() || (multiplier - guess).norm() > reach {
                 return None;
             }
-            // Quadratic convergence: the step after this one would be below rounding.
+            // Convergence is quadratic: the next step would be below rounding.
             if step.norm() < 1e-9 * multiplier.norm() {
                 return Some(multiplier);
             }
@@ -181,12 +183,13 @@ impl Characteristic {
         None
     }
 
-    /// The multiplier near a guess, with its derivative, by one step of Newton; real guesses stay real.
+    /// The multiplier near a guess, with its derivative dμ/dw, by one Newton step; a real guess gives a real
+    /// multiplier.
     ///
-    /// Its error is about the square of that of the guess, which must be below a hundredth. `None` where it is not, or where
-    /// κ is too large for the polynomials.
+    /// Its error is about the square of that of the guess. `None` if the relative step exceeds 0.01, or if κ is too
+    /// large for the polynomials.
     pub(crate) fn root_near(&self, guess: Complex64, depth_m: f64, work: &mut Workspace) -> Option<Root> {
-        // At the root itself both logarithmic derivatives are infinite; their ratio is smooth.
+        // Both logarithmic derivatives are infinite at the root itself, but their ratio is smooth beside it.
         let beside = guess + Complex64::new(1e-7, 1e-7) * guess.norm();
         if (Complex64::ONE - beside.inv()).norm() * depth_m > RADIUS * self.scale {
             return None;
@@ -197,26 +200,28 @@ impl Characteristic {
         if guess.im == 0.0 {
             (multiplier.im, slope.im) = (0.0, 0.0);
         }
-        // A second root close by makes steps too short: the terms of two roots add up in the logarithmic derivative.
+        // Close to a second root the Newton step is too short, since the logarithmic derivative adds the terms of both
+        // roots.
         let step = (multiplier - guess).norm();
         (step < 0.01 * guess.norm() && slope.is_finite()).then_some(Root { multiplier, slope })
     }
 
-    /// dμ/dw, 1/m, along the branch of multipliers through (μ, w).
+    /// Derivative dμ/dw, 1/m, along the branch of multipliers through (μ, w).
     pub(crate) fn sensitivity(
         &self,
         multiplier: Complex64,
         depth_m: f64,
         work: &mut Workspace,
     ) -> Option<Complex64> {
-        // At the root itself both logarithmic derivatives are infinite; their ratio is smooth.
+        // Both logarithmic derivatives are infinite at the root itself, but their ratio is smooth beside it.
         let beside = multiplier + Complex64::new(1e-7, 1e-7) * multiplier.norm();
         let logarithmic = self.logarithmic(beside, depth_m, work)?;
         let ratio = -logarithmic.by_depth / logarithmic.by_multiplier;
         ratio.is_finite().then_some(ratio)
     }
 
-    /// The depth between `low_m` and `high_m` where a multiplier crosses the unit circle, by Newton in depth and angle.
+    /// The crossing of the unit circle near a guess, at a depth between `low_m` and `high_m`, by Newton's method in
+    /// depth and angle of μ.
     pub(crate) fn crossing_near(
         &self,
         guess: Crossing,
@@ -237,7 +242,7 @@ impl Characteristic {
             let (step, turn) = if real {
                 (-by_depth.re.recip(), 0.0)
             } else {
-                // 1 + (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 0, real and imaginary part.
+                // Newton step from 1 + (∂ ln F/∂w) dw + (∂ ln F/∂θ) dθ = 0, real and imaginary part.
                 let determinant = by_depth.re * by_angle.im - by_depth.im * by_angle.re;
                 (
                     -(one.re * by_angle.im - one.im * by_angle.re) / determinant,
@@ -263,7 +268,7 @@ impl Characteristic {
         })
     }
 
-    /// Φ(κ), n × n by rows.
+    /// Transition matrix Φ(κ), n × n row by row.
     #[cfg(test)]
     pub(crate) fn transition(&self, kappa: Complex64) -> Vec<Complex64> {
         let mut work = self.workspace();
@@ -272,13 +277,13 @@ impl Characteristic {
     }
 }
 
-/// 1/z, also where |z|² is no number.
+/// Reciprocal 1/z, also if |z|² overflows or underflows.
 fn inverse(z: Complex64) -> Complex64 {
     let size = z.re.abs().max(z.im.abs());
     (z / size).inv() / size
 }
 
-/// The polynomial G + κ T E + κ² T Q E + … of an element in κ/scale.
+/// Polynomial G + κ T E + κ² T Q E + … of an element, as coefficients in κ/scale.
 fn polynomial(element: &Element, scale: f64) -> Vec<f64> {
     let mut coefficients = by_rows(&element.flow);
     let mut largest = element.flow.amax();
@@ -307,7 +312,7 @@ fn by_rows(matrix: &nalgebra::DMatrix<f64>) -> Vec<f64> {
     matrix.transpose().as_slice().to_vec()
 }
 
-/// Value and derivative of a matrix polynomial.
+/// Value and derivative of a matrix polynomial in ξ = κ/scale.
 fn polynomial_at(
     coefficients: &[f64],
     n: usize,
@@ -317,7 +322,7 @@ fn polynomial_at(
 ) {
     value.fill(Complex64::ZERO);
     slope.fill(Complex64::ZERO);
-    // By powers: of complex numbers only products with real ones are taken, for all entries at once.
+    // Evaluation by powers of ξ: coefficients are real, so that each entry needs products with a real number only.
     let (mut power, mut power_slope) = (Complex64::ONE, Complex64::ZERO);
     for (j, term) in coefficients.chunks_exact(n * n).enumerate() {
         for ((value, slope), coefficient) in value.iter_mut().zip(slope.iter_mut()).zip(term) {
@@ -357,7 +362,7 @@ fn multiply_real(a: &[f64], b: &[Complex64], n: usize, out: &mut [Complex64]) {
     }
 }
 
-/// tr(M⁻¹) and tr(M⁻¹ S) by elimination with row exchange; M and S are overwritten. `None` where M is singular.
+/// Traces tr(M⁻¹) and tr(M⁻¹ S) by elimination with row exchange; overwrites M and S. `None` if M is singular.
 fn traces(
     m: &mut [Complex64],
     s: &mut [Complex64],

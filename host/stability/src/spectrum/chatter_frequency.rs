@@ -1,4 +1,4 @@
-//! The vibration frequency that belongs to a multiplier.
+//! Frequency of the vibration that belongs to a Floquet multiplier (characteristic multiplier).
 
 use std::f64::consts::TAU;
 
@@ -10,17 +10,18 @@ use crate::problem::element::Port;
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Rates};
 
-/// How much more than the motion of a multiplier anything may grow over a part of the period: as many digits are lost.
+/// Largest growth of any motion over a part of the period, relative to that of the multiplier's own motion. Solving the
+/// system of parts loses as many digits, here three.
 const GROWTH: f64 = 1e3;
 
-/// The largest system of parts that is solved.
+/// Largest number of unknowns in the cyclic system of the parts of a period: a limit on computing time. A choice.
 const CYCLIC_MAX: usize = 256;
 
-/// The vibration frequency, Hz, of the motion u(t) = e^{st} v(t) with v of tooth period τ and e^{sτ} = μ.
+/// Vibration frequency, Hz, of the motion u(t) = e^{st} v(t), with v periodic in the tooth period τ and e^{sτ} = μ.
 ///
-/// The motion has the frequencies |Im ln μ + 2πk|/(2πτ). Named is the one whose harmonic of the displacement of the tool,
-/// û_k = 1/τ ∫₀^τ u(t) e^{−s_k t} dt as a vector, is largest. With F̂_k the k-th harmonic of all forces along the eigenfunction,
-/// û_k is H(s_k) F̂_k; without forces the motion has the frequency of its mode alone.
+/// The motion contains the frequencies |Im ln μ + 2πk|/(2πτ). The result is the one whose harmonic of the tool
+/// displacement, û_k = 1/τ ∫₀^τ u(t) e^{−s_k t} dt, has the largest norm. With F̂_k the k-th harmonic of all forces
+/// along the Floquet mode, û_k = H(s_k) F̂_k; without forces the motion is free and has the frequency of its mode.
 pub(crate) fn chatter_hz(
     problem: &Problem,
     rpm: f64,
@@ -33,7 +34,8 @@ pub(crate) fn chatter_hz(
     if forces.iter().all(|(_, force)| force.norm() == 0.0) {
         return free_hz(problem, period_s, multiplier);
     }
-    // e^{−s t} at every time, and what the next exponent multiplies it by: exponentials of all would take seconds.
+    // e^{−s t} at every node, and its factor from one exponent s to the next; computing all exponentials would take
+    // seconds.
     let mut factors: Vec<(Complex64, Complex64)> = Vec::new();
     dominant_frequency_hz(problem, depth_m, period_s, multiplier, |s| {
         let mut harmonic = Vector3::<Complex64>::zeros();
@@ -50,7 +52,7 @@ pub(crate) fn chatter_hz(
     })
 }
 
-/// The frequency, Hz, of the mode that a period of free vibration multiplies by about μ.
+/// Frequency, Hz, of the structural mode that a period of free vibration multiplies by about μ.
 fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f64> {
     let miss = |pole: &Complex64| ((pole * period_s).exp() - multiplier).norm();
     let poles = problem.structure.poles();
@@ -58,8 +60,8 @@ fn free_hz(problem: &Problem, period_s: f64, multiplier: Complex64) -> Option<f6
     Some(pole.im.abs() / TAU)
 }
 
-/// The frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest; `size` gives its size at an exponent
-/// s with e^{sT} = μ, and is asked for one after the other, each 2πi/T above the one before.
+/// Frequency, Hz, among |Im ln μ + 2πk|/(2πT) at which the motion is largest. `size` gives the norm of the harmonic at
+/// an exponent s with e^{sT} = μ; it is called for ascending s in steps of 2πi/T.
 pub(crate) fn dominant_frequency_hz(
     problem: &Problem,
     depth_m: f64,
@@ -68,7 +70,7 @@ pub(crate) fn dominant_frequency_hz(
     mut size: impl FnMut(Complex64) -> Option<f64>,
 ) -> Option<f64> {
     let growth = multiplier.ln();
-    // The cut makes modes stiffer; above the fastest the motion only falls, and one harmonic beyond is enough.
+    // The cut stiffens modes. Above the fastest rate harmonics only decrease, and one further harmonic suffices.
     let kappa_m = (Complex64::ONE - multiplier.inv()).norm() * depth_m;
     let highest = (Rates::new(problem).at(kappa_m) * period_s / TAU).ceil() as i32 + 1;
     (-highest..=highest)
@@ -80,7 +82,7 @@ pub(crate) fn dominant_frequency_hz(
         .map(|(_, frequency_hz)| frequency_hz)
 }
 
-/// Force times quadrature weight of every port along the eigenfunction, with its time.
+/// Force times quadrature weight of every port along the Floquet mode, with the time of the port.
 fn eigenfunction_forces(
     period: &Period,
     multiplier: Complex64,
@@ -88,14 +90,15 @@ fn eigenfunction_forces(
 ) -> Option<Vec<(f64, Vector3<Complex64>)>> {
     let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
     let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
-    // The period in parts, each from a state of its own, and what is seen in each element from the state of its part.
+    // Divides the period into parts, each starting from its own state, and expresses the displacements in each element
+    // by the state of its part.
     let identity = DMatrix::<Complex64>::identity(period.order(), period.order());
     let mut parts = Vec::new();
     let mut part = identity.clone();
     let mut seen_from = Vec::with_capacity(period.elements.len());
     let (mut length, share) = (0.0, 1.0 / period.elements.len().max(1) as f64);
     for element in &period.elements {
-        // What grows faster than the motion itself would drown it.
+        // Ends a part before some motion outgrows that of the multiplier and its rounding dominates.
         if part.norm() > GROWTH * multiplier.norm().powf(length) {
             parts.push(std::mem::replace(&mut part, identity.clone()));
             length = 0.0;
@@ -120,7 +123,7 @@ fn eigenfunction_forces(
             for (port, seen) in ports.iter().zip(seen.iter()) {
                 let force = port.force.map(Complex64::from) * (seen * factor * port.weight_s);
                 match forces.last_mut() {
-                    // Of another tooth at the same node.
+                    // Another tooth cuts at the same node: forces add up.
                     Some((time_s, sum)) if *time_s == port.time_s => *sum += force,
                     _ => forces.push((port.time_s, force)),
                 }
@@ -134,9 +137,10 @@ fn eigenfunction_forces(
     Some(forces)
 }
 
-/// The states x_g at the start of each part with T_g x_g = x_{g+1}, and μ x_0 after the last.
+/// Solves for the states x_g at the start of each part: T_g x_g = x_{g+1}, and μ x_0 after the last part.
 ///
-/// All at once: a start that is good to rounding would be of no use where parts together grow by far more than μ.
+/// All states are solved for at once. Integration from a start that is exact to rounding would fail if the parts
+/// together grow by far more than μ.
 fn cyclic_vector(parts: &[DMatrix<Complex64>], multiplier: Complex64) -> Option<Vec<DVector<Complex64>>> {
     let [single] = parts else {
         let (order, count) = (parts.first()?.nrows(), parts.len());

@@ -1,4 +1,4 @@
-//! The multipliers at one speed by collocation of the tooth period.
+//! Floquet multipliers (characteristic multipliers) at one spindle speed by collocation of the tooth period.
 
 use num_complex::Complex64;
 
@@ -12,23 +12,23 @@ use crate::criteria::{LEAST_ERROR, MESH_ROOM, SCANNED, SCANNED_SHARE};
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Resolution};
 
-/// The multipliers at one speed: all of them by collocation, single ones from the characteristic matrix.
+/// Floquet multipliers at one speed: all of them from the collocated map, single ones from the characteristic matrix.
 pub(crate) struct Collocated<'a> {
     problem: &'a Problem,
     rpm: f64,
     deepest_m: f64,
-    /// For all multipliers at once.
+    /// Coarse mesh, for all multipliers at once.
     coarse: Period,
-    /// For limits.
+    /// Working mesh, for limits.
     period: Period,
     characteristic: Characteristic,
     workspace: Workspace,
-    /// For errors, once one is asked for.
+    /// Characteristic matrix on the finer mesh, for error estimates; built on first use.
     finer: Option<Characteristic>,
 }
 
 impl<'a> Collocated<'a> {
-    /// Fine enough for depths up to `deepest_m`.
+    /// Meshes and matrices for axial depths up to `deepest_m`.
     pub(crate) fn new(problem: &'a Problem, rpm: f64, deepest_m: f64) -> Self {
         // At the unit circle |w (1 − 1/μ)| ≤ 2 w.
         let period = Period::new(problem, rpm, 2.0 * deepest_m, Resolution::WORKING);
@@ -75,7 +75,7 @@ impl Spectrum for Collocated<'_> {
         chatter_hz(self.problem, self.rpm, &self.period, multiplier, depth_m)
     }
 
-    /// As that of a point: what a finer period changes, with room.
+    /// Error from the change between the working and the finer mesh, times a safety factor, as for a single cut.
     fn error(&mut self, crossing: &Crossing) -> Option<f64> {
         let Crossing { multiplier, depth_m } = *crossing;
         let (problem, rpm, deepest_m) = (self.problem, self.rpm, self.deepest_m);

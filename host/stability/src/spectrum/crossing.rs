@@ -2,11 +2,11 @@
 
 use num_complex::Complex64;
 
-/// A point where a multiplier crosses the unit circle.
+/// Crossing of the unit circle by a Floquet multiplier along the axial depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crossing {
-    /// Depth, m.
+    /// Axial depth, m.
     pub(crate) depth_m: f64,
-    /// The multiplier e^{iθ}, with θ in (0, π].
+    /// Multiplier e^{iθ} at the crossing, with θ in [0, π].
     pub(crate) multiplier: Complex64,
 }

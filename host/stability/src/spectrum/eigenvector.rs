@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// A vector that the matrix multiplies by about `eigenvalue`, by inverse iteration.
+/// Right eigenvector of a matrix for an approximate eigenvalue, by inverse iteration.
 pub(crate) fn eigenvector(matrix: &DMatrix<Complex64>, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
     let order = matrix.nrows();
-    // A shift a little off the eigenvalue keeps the matrix regular and separates the vector by 1e8 at each step.
+    // A shift slightly off the eigenvalue keeps the matrix regular and amplifies the eigenvector by 1e8 in each step.
     let shift = if eigenvalue.norm() > 0.0 {
         eigenvalue * (1.0 + 1e-8)
     } else {

@@ -1,12 +1,12 @@
-//! The motion that belongs to a multiplier, and its adjoint, along one tooth period.
+//! Floquet mode of a multiplier and its adjoint, along one tooth period.
 //!
-//! With G(t) = A + B M(t) C, M = κ Σ cutting·normalᵀ − β, of the characteristic matrix: ẋ = G x with x(τ) = μ x(0), and
-//! ẏ = −Gᵀ y with y(τ) = l, lᵀΦ = μ lᵀ. Then lᵀ dΦ r = ∫ yᵀ dG x dt for any change of G: one pair of motions gives
-//! the derivatives with respect to all parameters.
+//! With G(t) = A + B M(t) C and M = κ Σ cutting·normalᵀ − β of the characteristic matrix, the mode fulfils ẋ = G x with
+//! x(τ) = μ x(0). The adjoint fulfils ẏ = −Gᵀ y with y(τ) = l and lᵀΦ = μ lᵀ. Then lᵀ dΦ r = ∫ yᵀ dG x dt for any
+//! change of G: one pair of motions gives the derivatives with respect to all parameters.
 //!
-//! Both are computed on subintervals of the period with Gauss nodes, as in [`period`](super::period): the structure's own motion by
-//! matrix exponentials, the force by collocation. The adjoint is the motion of the transposed structure in reversed time,
-//! with what is seen and what is pushed exchanged.
+//! Both are computed on subintervals of the period with Gauss nodes, as in [`period`](super::period): the free motion
+//! of the structure by matrix exponentials, the force by collocation. The adjoint is the motion of the transposed
+//! structure in reversed time, with directions of observation and of force exchanged.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
@@ -17,44 +17,44 @@ use crate::problem::linear::Problem;
 use crate::problem::period::{DECAY_MAX, Rates, degree};
 use quietcut_model::structure::FirstOrder;
 
-/// Angle of the fastest motion over a subinterval, rad.
+/// Largest phase angle of the fastest motion over a subinterval, rad. A choice: with it 40 nodes reach [`TOLERANCE`].
 const ANGLE: f64 = 3.0;
 
-/// Error of a subinterval that is aimed at. States within a subinterval are good to about its root only; that root times the length is what
-/// the quadrature of yᵀ dG x keeps.
+/// Target for the collocation error of a subinterval. States at inner nodes are accurate to about its square root only;
+/// the quadrature of yᵀ dG x keeps that root times the length of the subinterval.
 const TOLERANCE: f64 = 1e-16;
 
 type Matrix = DMatrix<Complex64>;
 
-/// x and y at one node of the quadrature.
+/// Mode x and adjoint y at one node of the quadrature.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    /// Quadrature weight, s; 0 at the ends of the cut, which are given beside the nodes.
+    /// Quadrature weight, s; 0 at the entry and exit of a tooth, which are stored beside the nodes.
     pub(crate) weight_s: f64,
     /// Phase of the tooth period, rad.
     pub(crate) phase: f64,
-    /// Number of teeth that cut.
+    /// Number of cutting teeth.
     pub(crate) teeth: usize,
-    /// x.
+    /// Floquet mode x (right).
     pub(crate) right: DVector<Complex64>,
-    /// y.
+    /// Adjoint mode y (left).
     pub(crate) left: DVector<Complex64>,
 }
 
-/// Both motions.
+/// Floquet mode and its adjoint over a tooth period.
 #[derive(Clone, Debug)]
 pub(crate) struct FloquetMode {
-    /// At the nodes, in order of time.
+    /// Nodes of the quadrature, in order of time.
     pub(crate) nodes: Vec<Node>,
-    /// Where a tooth enters: the start of the period.
+    /// Values at the entry of a tooth, which is the start of the period.
     pub(crate) entry: Node,
-    /// Where a tooth leaves.
+    /// Values at the exit of a tooth.
     pub(crate) exit: Node,
-    /// lᵀ r.
+    /// Inner product lᵀ r of left and right eigenvector.
     pub(crate) overlap: Complex64,
 }
 
-/// A subinterval of the period.
+/// Subinterval of the tooth period.
 struct Subinterval {
     basis: usize,
     teeth: usize,
@@ -62,22 +62,23 @@ struct Subinterval {
     turn: f64,
 }
 
-/// What subintervals of one duration share.
+/// Exponentials shared by subintervals of one duration.
 struct Basis {
     gauss: Gauss,
     duration: f64,
     flow: DMatrix<f64>,
-    /// e^{A t_i}.
+    /// Matrix exponentials e^{A t_i}.
     forward: Vec<DMatrix<f64>>,
-    /// e^{−A t_i}.
+    /// Matrix exponentials e^{−A t_i}.
     backward: Vec<DMatrix<f64>>,
 }
 
-/// At one node: what ports see of the displacement, and what force they make of it.
+/// Ports at one node: direction in which each observes the displacement, and the force per observed displacement.
 type Ports = Vec<(Vector3<Complex64>, Vector3<Complex64>)>;
 
 impl FloquetMode {
-    /// The motions of a multiplier at a depth; `None` where it is none, or the numbers leave their range.
+    /// Floquet mode and adjoint of a multiplier at an axial depth; `None` if it is not a multiplier, or if numbers
+    /// leave their range.
     pub(crate) fn new(problem: &Problem, rpm: f64, depth_m: f64, multiplier: Complex64) -> Option<Self> {
         let kappa = (Complex64::ONE - multiplier.inv()) * depth_m;
         let (bases, subintervals) = subintervals(problem, rpm, kappa.norm());
@@ -151,7 +152,7 @@ impl FloquetMode {
                 });
             }
         }
-        // The first interval has a tooth more than the second; where there is only one, teeth leave at its end.
+        // The first interval has one tooth more than the second. If there is only one interval, teeth leave at its end.
         let most = subintervals.first().map_or(0, |subinterval| subinterval.teeth);
         let leaving = subintervals
             .iter()
@@ -175,7 +176,7 @@ impl FloquetMode {
     }
 }
 
-/// The period in subintervals over which nothing turns by more than [`ANGLE`].
+/// Divides the period into subintervals over which no motion exceeds the phase angle [`ANGLE`].
 fn subintervals(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<Subinterval>) {
     let engagement = &problem.process.engagement;
     let seconds_per_radian = problem.tooth_period_s(rpm) / engagement.pitch;
@@ -184,7 +185,7 @@ fn subintervals(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<S
     for interval in engagement.intervals() {
         let length = interval.to - interval.from;
         let duration = length * seconds_per_radian;
-        // In free flight as well: the quadrature of yᵀ dG x wants short subintervals.
+        // Free flight is divided as well: the quadrature of yᵀ dG x needs short subintervals.
         let angle = rates.at(if interval.teeth == 0 { 0.0 } else { kappa_m }) * duration + 2.0 * length;
         let decay = problem.fastest_decay() * duration;
         let count = (angle / ANGLE).max(decay / DECAY_MAX).ceil().max(1.0);
@@ -236,7 +237,7 @@ impl Basis {
         }
     }
 
-    /// That of Aᵀ.
+    /// The same basis for the transposed matrix Aᵀ.
     fn transposed(&self) -> Self {
         let transpose = |all: &[DMatrix<f64>]| all.iter().map(DMatrix::transpose).collect();
         Self {
@@ -249,22 +250,22 @@ impl Basis {
     }
 }
 
-/// How a subinterval carries the state from its start to its nodes and to its end.
+/// Transition of the state from the start of a subinterval to its nodes and to its end.
 struct MapFactor {
-    /// n × n.
+    /// Transition matrix to the end, n × n.
     transition: Matrix,
-    /// n × n, one for each node.
+    /// Transition matrix to each node, n × n.
     states: Vec<Matrix>,
 }
 
 impl MapFactor {
-    /// From x(t) = e^{At}(x₀ + ∫ e^{−As} B f ds) with f = force·seenᵀ C x collocated at the nodes.
+    /// Collocates x(t) = e^{At}(x₀ + ∫ e^{−As} B f ds) with f = force·seenᵀ C x at the nodes.
     fn new(structure: &FirstOrder, basis: &Basis, ports: &[Ports]) -> Option<Self> {
         let order = structure.order();
         let nodes = basis.gauss.nodes.len();
         let per_node = ports.first().map_or(0, Vec::len);
         let complex = |matrix: &DMatrix<f64>| matrix.map(Complex64::from);
-        // Rows seenᵀ C e^{A t_i} and columns e^{−A t_j} B force, ports by node.
+        // Rows seenᵀ C e^{A t_i} and columns e^{−A t_j} B force, port by port within each node.
         let mut rows = Matrix::zeros(nodes * per_node, order);
         let mut columns = Matrix::zeros(order, nodes * per_node);
         for (i, ports) in ports.iter().enumerate() {

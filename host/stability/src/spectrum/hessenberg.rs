@@ -1,28 +1,29 @@
-//! Eigenvectors of matrices with few diagonals below the main one, as Krylov spaces make them.
+//! Eigenvectors of band Hessenberg matrices (few diagonals below the main one), as block Arnoldi produces them.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// H − s I in triangular factors, s a little beside an eigenvalue of the real n × n matrix H.
+/// Triangular factors of H − s I, with the shift s slightly off an eigenvalue of the real n × n matrix H.
 ///
-/// With b diagonals below the main one that takes about 4 b n² operations, where full matrices take 8/3 n³.
+/// With b diagonals below the main one the factorization takes about 4 b n² operations; a full matrix takes 8/3 n³.
 #[derive(Clone, Debug)]
 pub(crate) struct Shifted {
     size: usize,
     band: usize,
-    /// U by rows.
+    /// Upper factor U, row by row.
     upper: Vec<Complex64>,
-    /// For each column the factors of the rows below it, `band` of them.
+    /// For each column the elimination factors of the `band` rows below it.
     factors: Vec<Complex64>,
-    /// The row that took the place of each row.
+    /// Index of the row exchanged with each row.
     pivots: Vec<usize>,
 }
 
-/// Relative distance of the shift from the eigenvalue: the vector is separated from others by its inverse at each step.
+/// Relative distance of the shift from the eigenvalue. Each inverse iteration amplifies the eigenvector by its inverse,
+/// 1e8, and the matrix stays regular.
 const BESIDE: f64 = 1e-8;
 
 impl Shifted {
-    /// For an eigenvalue of a matrix that is zero below its `band`th lower diagonal.
+    /// Factors H − s I for an eigenvalue of a matrix that is zero below its `band`-th lower diagonal.
     pub(crate) fn new(matrix: &DMatrix<f64>, band: usize, eigenvalue: Complex64) -> Self {
         let size = matrix.nrows();
         let shift = if eigenvalue == Complex64::ZERO {
@@ -37,7 +38,7 @@ impl Shifted {
             }
             upper[j * size + j] -= shift;
         }
-        // What takes the place of a pivot that vanishes.
+        // Value that replaces a vanishing pivot.
         let least = (f64::EPSILON * matrix.amax()).max(f64::MIN_POSITIVE);
         let mut factors = vec![Complex64::ZERO; size * band];
         let mut pivots = Vec::with_capacity(size);
@@ -77,7 +78,7 @@ impl Shifted {
         }
     }
 
-    /// x with (H − s I) x = b, in place of b.
+    /// Solves (H − s I) x = b in place.
     fn solve(&self, vector: &mut DVector<Complex64>) {
         let (size, band) = (self.size, self.band);
         for column in 0..size {
@@ -99,7 +100,7 @@ impl Shifted {
         }
     }
 
-    /// y with (H − s I)ᵀ y = b, in place of b.
+    /// Solves (H − s I)ᵀ y = b in place.
     #[cfg(test)]
     fn solve_transposed(&self, vector: &mut DVector<Complex64>) {
         let (size, band) = (self.size, self.band);
@@ -125,18 +126,18 @@ impl Shifted {
         }
     }
 
-    /// The eigenvector, of length 1; `None` where nothing finite comes out.
+    /// Right eigenvector of length 1; `None` if the result is not finite.
     pub(crate) fn right(&self) -> Option<DVector<Complex64>> {
         self.iterate(Self::solve)
     }
 
-    /// The left eigenvector y, yᵀ H = μ yᵀ, of length 1.
+    /// Left eigenvector y of length 1: yᵀ H = μ yᵀ.
     #[cfg(test)]
     fn left(&self) -> Option<DVector<Complex64>> {
         self.iterate(Self::solve_transposed)
     }
 
-    /// By how much the eigenvalue changes per change of the matrix, 1/|yᵀ x| ≥ 1.
+    /// Condition number 1/|yᵀ x| ≥ 1 of the eigenvalue: its change per change of the matrix.
     #[cfg(test)]
     pub(crate) fn condition(&self) -> Option<f64> {
         let along: Complex64 = self.left()?.dot(&self.right()?);
@@ -180,14 +181,14 @@ mod tests {
                 let (right, left) = (shifted.right().unwrap(), shifted.left().unwrap());
                 let miss = &complex * &right - &right * value;
                 let missed = complex.tr_mul(&left) - &left * value;
-                // Rounding of the matrix, whose norm is below 20.
+                // Tolerance: rounding of the matrix, whose norm is below 20.
                 assert!(
                     miss.norm() < 1e-12 && missed.norm() < 1e-12,
                     "{size} {band} {value}"
                 );
             }
         }
-        // [[1, 1e6], [0, 2]]: y = (1, −1e6)ᵀ/1e6 of eigenvalue 1, x = (1, 0)ᵀ.
+        // [[1, 1e6], [0, 2]] has y = (1, −1e6)ᵀ/1e6 and x = (1, 0)ᵀ for the eigenvalue 1.
         let far = DMatrix::from_row_slice(2, 2, &[1.0, 1e6, 0.0, 2.0]);
         let condition = Shifted::new(&far, 1, Complex64::ONE).condition().unwrap();
         assert!((condition / 1e6 - 1.0).abs() < 1e-3, "{condition}");

@@ -1,8 +1,8 @@
-//! The largest eigenvalues of a linear map that is known by what it does to vectors.
+//! Largest eigenvalues of a linear map that is given by its action on vectors (block Arnoldi).
 //!
-//! One-period maps of delay equations are compact: all but a few eigenvalues lie close to zero, and block Arnoldi finds
-//! those few in a space of some dozens of vectors. Blocks also find the eigenvalues of structures with equal modes,
-//! of which a single vector would show one only.
+//! Period maps of delay equations are compact: all but a few eigenvalues lie close to zero, and block Arnoldi finds
+//! those few in a space of some dozens of vectors. Blocks also resolve repeated eigenvalues of structures with equal
+//! modes; a single starting vector would find only one of them.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -12,63 +12,66 @@ use super::hessenberg::Shifted;
 use crate::criteria::{CROWD, KRYLOV_ANY};
 use quietcut_numerics::eigenvalues;
 
-/// Vectors in a block: as many directions may have the same mode.
+/// Number of vectors in a block: repeated eigenvalues are found up to this multiplicity, one for each direction in
+/// space.
 const BLOCK: usize = 3;
 
-/// Up to this size all eigenvalues are computed from the whole matrix: it is as fast.
+/// Largest size of a map for which all eigenvalues are computed from its matrix, which is as fast as block Arnoldi
+/// there.
 const WHOLE: usize = 90;
 
-/// After so many blocks the eigenvalues are looked at, and again after a third more, but not fewer.
+/// Number of blocks before eigenvalues are first computed. They are computed again whenever the space has grown by a
+/// third, by at least this number of blocks. A choice.
 const LOOK: usize = 10;
 
-/// Residual ‖M v − μ v‖ with ‖v‖ = 1 below which an eigenvalue is taken: rounding in a map of some hundred steps.
+/// Residual ‖M v − μ v‖ with ‖v‖ = 1 below which an eigenvalue is accepted: rounding of a map of some hundred steps.
 const RESIDUAL: f64 = 1e-11;
 
-/// The same where Newton goes on from there.
+/// Residual below which an eigenvalue is accepted as a starting value of Newton's method.
 const ROUGH: f64 = 1e-7;
 
-/// The most vectors of a space: looks at it take a second or two then, and maps that need more have a crowd of eigenvalues of one
-/// size.
+/// Largest number of vectors of a Krylov space. One eigenvalue computation then takes one or two seconds; maps that
+/// need more have many eigenvalues of nearly one size.
 const SPACE_MAX: usize = 480;
 
-/// The same where a search without the map can go on.
+/// Largest number of vectors of a Krylov space if a search without the map can take over.
 const ROUGH_SPACE_MAX: usize = 240;
 
-/// The largest map of which all eigenvalues are computed; they cost about 10 n³ operations, some ten seconds.
+/// Largest map of which all eigenvalues are computed: about 10 n³ operations, some ten seconds.
 pub(crate) const WHOLE_MAX: usize = 1200;
 
-/// What is left of a vector that depends on others, relative to it: rounding of a map of some hundred steps, and far below
-/// any residual.
+/// Norm of a vector after orthogonalization, relative to that before, below which it counts as linearly dependent:
+/// rounding of a map of some hundred steps, far below any residual used.
 const DEPENDENT: f64 = 1e-14;
 
-/// A linear map of ℝⁿ.
+/// Linear map of ℝⁿ, given by its action on vectors.
 pub(crate) trait LinearMap {
-    /// n.
+    /// Dimension n.
     fn size(&self) -> usize;
 
-    /// What the map makes of each column, n × columns; `None` where the equations have no solution.
+    /// Image of each column, n × columns; `None` if the equations have no solution.
     fn apply(&self, columns: &DMatrix<f64>) -> Option<DMatrix<f64>>;
 }
 
-/// Eigenvalues above a size, largest first, and a space that holds their eigenvectors.
+/// Eigenvalues above a given size, largest first, with a subspace that contains their eigenvectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Dominant {
-    /// The eigenvalues; complex ones in exact pairs.
+    /// Eigenvalues; complex ones in exact conjugate pairs.
     pub(crate) eigenvalues: Vec<Complex64>,
-    /// Orthonormal columns; `None` for the whole space.
+    /// Orthonormal basis of the subspace by columns; `None` for the whole space.
     basis: Option<DMatrix<f64>>,
-    /// The map within that space.
+    /// Matrix of the map projected on the subspace.
     projected: DMatrix<f64>,
 }
 
 impl Dominant {
-    /// All eigenvalues larger than `least`. `None` where nothing finite comes out, or where the map is large and the eigenvalues do
-    /// not settle.
+    /// All eigenvalues larger than `least`. `None` if a result is not finite, or if the map is large and block Arnoldi
+    /// does not converge.
     pub(crate) fn of(map: &impl LinearMap, least: f64) -> Option<Self> {
         Self::kept(map, &|values| values.retain(|value| value.norm() > least))
     }
 
-    /// All eigenvalues larger than 0.25; where there is none the largest, but no more than [`CROWD`].
+    /// All eigenvalues larger than 0.25. If there is none, the largest ones, at most [`CROWD`].
     pub(crate) fn any(map: &impl LinearMap) -> Option<Self> {
         Self::kept(map, &|values| {
             let largest = values.first().map_or(0.0, |value| value.norm());
@@ -82,7 +85,7 @@ impl Dominant {
     }
 
     fn kept(map: &impl LinearMap, keep: &dyn Fn(&mut Vec<Complex64>)) -> Option<Self> {
-        // Beyond half the size the whole matrix is cheaper.
+        // Beyond half the dimension the eigenvalues of the whole matrix are cheaper.
         let most = (map.size() / 2).min(SPACE_MAX);
         if map.size() > WHOLE
             && let Some(found) = arnoldi(map, most, RESIDUAL, keep)
@@ -103,7 +106,7 @@ impl Dominant {
         })
     }
 
-    /// The eigenvector of one of the eigenvalues, of length 1.
+    /// Right eigenvector of one of the eigenvalues, of length 1.
     pub(crate) fn vector(&self, eigenvalue: Complex64) -> Option<DVector<Complex64>> {
         let within = eigenvector(&self.projected.map(Complex64::from), eigenvalue)?;
         Some(match &self.basis {
@@ -113,20 +116,20 @@ impl Dominant {
     }
 }
 
-/// The eigenvalues that seem the largest, largest first, to begin Newton with.
+/// Approximate largest eigenvalues, largest first, as starting values of Newton's method.
 #[derive(Clone, Debug)]
 pub(crate) struct Largest {
-    /// The eigenvalues, to a residual of about 1e-7 where they are settled.
+    /// Eigenvalues, with a residual of about 1e-7 if they have converged.
     pub(crate) eigenvalues: Vec<Complex64>,
-    /// False where block Arnoldi did not settle.
+    /// False if block Arnoldi did not converge.
     pub(crate) is_settled: bool,
-    /// The largest entry of the map within the space.
+    /// Largest entry of the projected matrix of the map.
     pub(crate) norm: f64,
 }
 
-/// The eigenvalues within `share` of the largest, but no more than [`CROWD`].
+/// Eigenvalues larger than `share` of the largest, at most [`CROWD`].
 ///
-/// `None` where nothing finite comes out.
+/// `None` if a result is not finite.
 pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Option<Largest> {
     let most = (map.size() / 2).min(ROUGH_SPACE_MAX);
     let found = arnoldi(map, most, ROUGH, &|values| {
@@ -141,10 +144,10 @@ pub(crate) fn largest(map: &impl LinearMap, share: f64) -> Option<Largest> {
     })
 }
 
-/// The eigenvalues larger than `least`, or than `share` of the largest where that is less, largest first, to a relative residual of
-/// about 1e-7.
+/// Eigenvalues larger than `least`, or larger than `share` of the largest if that is less; largest first, with a
+/// relative residual of about 1e-7.
 ///
-/// `None` where block Arnoldi does not settle in a space of half the size, or nothing finite comes out.
+/// `None` if block Arnoldi does not converge in a space of half the dimension, or if a result is not finite.
 pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Option<Vec<Complex64>> {
     let most = (map.size() / 2).min(SPACE_MAX);
     let found = arnoldi(map, most, ROUGH, &|values| {
@@ -154,14 +157,14 @@ pub(crate) fn larger_than(map: &impl LinearMap, least: f64, share: f64) -> Optio
     found.is_settled.then_some(found.dominant.eigenvalues)
 }
 
-/// Result of block Arnoldi.
+/// Result of block Arnoldi: Krylov space and projected map.
 struct ArnoldiResult {
     dominant: Dominant,
     is_settled: bool,
 }
 
-/// Block Arnoldi with full orthogonalization until those eigenvalues are settled that `keep` keeps of all of them, largest
-/// first, or until the space would have to grow beyond `most`. `None` where nothing finite comes out.
+/// Block Arnoldi with full orthogonalization. It stops once the eigenvalues selected by `keep` (from all, largest
+/// first) have converged, or once the space would exceed `most` vectors. `None` if a result is not finite.
 fn arnoldi(
     map: &impl LinearMap,
     most: usize,
@@ -169,7 +172,7 @@ fn arnoldi(
     keep: &dyn Fn(&mut Vec<Complex64>),
 ) -> Option<ArnoldiResult> {
     let size = map.size();
-    // M V = V H + W K: V the blocks so far, W the next, K in the rows of H below.
+    // Arnoldi relation M V = V H + W K: V the blocks so far, W the next block, K in the lower rows of H.
     let mut room = most.min(4 * LOOK * BLOCK);
     let mut basis = DMatrix::zeros(size, room + BLOCK);
     let mut projected = DMatrix::zeros(room + BLOCK, room);
@@ -181,7 +184,8 @@ fn arnoldi(
     let mut look = LOOK;
     for count in 1.. {
         if done + width > room {
-            // Few maps need much room, and so much of it takes longer than they do.
+            // Storage grows by doubling: few maps need much of it, and filling it takes longer than the others need in
+            // all.
             room = most.min(2 * room);
             basis = basis.resize_horizontally(room + BLOCK, 0.0);
             projected = projected.resize(room + BLOCK, room, 0.0);
@@ -189,7 +193,7 @@ fn arnoldi(
         let mut image = map.apply(&basis.columns(done, width).into_owned())?;
         let scale = image.norm();
         let known = basis.columns(0, done + width);
-        // Twice is enough: what the first pass leaves in the space is rounding of the image.
+        // Two passes suffice: the first leaves in the space only the rounding of the image.
         for _ in 0..2 {
             let part = known.tr_mul(&image);
             image -= known * &part;
@@ -223,9 +227,9 @@ fn arnoldi(
     None
 }
 
-/// True where ‖K y‖ is small for the last part y of every eigenvector: the residual of M at μ.
+/// True if the residual ‖K y‖ of M at μ is small, with y the last block of the eigenvector, for every eigenvalue.
 ///
-/// Of eigenvalues that are themselves below it nothing more is asked: compact maps have a crowd of them.
+/// Eigenvalues smaller than the residual count as converged: compact maps have many of them near zero.
 fn are_settled(
     projected: &DMatrix<f64>,
     coupling: &DMatrix<f64>,
@@ -238,7 +242,7 @@ fn are_settled(
         .iter()
         .filter(|value| value.im >= 0.0 && value.norm() > residual);
     of_interest.all(|&value| {
-        // Each block is coupled to the next by a triangle.
+        // A triangular block couples each block to the next.
         Shifted::new(projected, BLOCK, value)
             .right()
             .is_some_and(|vector| {
@@ -248,7 +252,7 @@ fn are_settled(
     })
 }
 
-/// The eigenvalues of a matrix that are larger than `least`, largest first, of pairs the upper one first.
+/// Eigenvalues of a matrix larger than `least`, largest first; of a conjugate pair the upper one first.
 fn larger(matrix: &DMatrix<f64>, least: f64) -> Option<Vec<Complex64>> {
     let mut values = eigenvalues::of_real(matrix.clone()).ok()?;
     values.retain(|value| value.norm() > least);
@@ -256,15 +260,15 @@ fn larger(matrix: &DMatrix<f64>, least: f64) -> Option<Vec<Complex64>> {
     Some(values)
 }
 
-/// A block that is the same at every call and has a part along everything.
+/// Starting block: the same at every call, with components along all directions.
 fn start(size: usize) -> DMatrix<f64> {
     // Weyl sequences: multiples of irrational numbers modulo one.
     let irrational = [2.0_f64.sqrt(), 3.0_f64.sqrt(), 5.0_f64.sqrt()];
     DMatrix::from_fn(size, BLOCK, |i, j| ((i + 1) as f64 * irrational[j]).fract() - 0.5)
 }
 
-/// Q and R of a block, Q without columns that depend on those before; `scale` is the norm of what the block was made from:
-/// what is below its rounding is zero.
+/// QR factors of a block; Q omits columns that depend on those before. `scale` is the norm of the block before
+/// orthogonalization: columns below its rounding count as zero.
 fn orthonormal(block: DMatrix<f64>, scale: f64) -> (DMatrix<f64>, DMatrix<f64>) {
     let columns = block.ncols();
     let mut kept: Vec<DVector<f64>> = Vec::with_capacity(columns);
@@ -309,7 +313,8 @@ mod tests {
         }
     }
 
-    /// A matrix with a pair, a double and a negative eigenvalue outside a cloud of small ones, turned by reflections.
+    /// Test matrix with a pair, a double and a negative eigenvalue outside a cluster of small ones, rotated by
+    /// reflections.
     fn matrix(size: usize) -> Matrix {
         let mut matrix = DMatrix::from_fn(size, size, |i, j| {
             if i == j {
@@ -340,7 +345,7 @@ mod tests {
             let expected = [(-1.1, 0.0), (0.5, 0.8), (0.5, -0.8), (0.9, 0.0), (0.9, 0.0)];
             assert_eq!(found.eigenvalues.len(), expected.len());
             for (value, (re, im)) in found.eigenvalues.iter().zip(expected) {
-                // The matrix is normal: eigenvalues are as good as the residual.
+                // The matrix is normal, so that eigenvalues are as accurate as the residual.
                 assert!((value - Complex64::new(re, im)).norm() < 1e-10, "{found:?}");
                 let vector = found.vector(*value).unwrap();
                 let miss = map.0.map(Complex64::from) * &vector - &vector * *value;
@@ -348,7 +353,7 @@ mod tests {
             }
         }
     }
-    /// A map of rank 4, as that of a structure in free flight, that counts how many vectors it is applied to.
+    /// Map of rank 4, like that of a structure in free flight, which counts the vectors it is applied to.
     struct Thin {
         within: DMatrix<f64>,
         directions: DMatrix<f64>,
@@ -373,7 +378,7 @@ mod tests {
             DMatrix::from_fn(size, 4, |i, j| ((i + 1) as f64 * (j as f64 + 2.3).sqrt()).sin()),
             size as f64,
         );
-        // A double pair: two equal modes.
+        // A double conjugate pair: two equal modes.
         let (re, im) = (0.6, -0.3);
         let within = DMatrix::from_row_slice(
             4,
@@ -388,7 +393,7 @@ mod tests {
             applied: std::cell::Cell::new(0),
         };
         let found = Dominant::of(&map, 0.3).unwrap();
-        // The first block, and what its images need to fill four dimensions.
+        // Cost: the first block, plus the images needed to fill four dimensions.
         assert!(map.applied.get() <= 3 * BLOCK, "{}", map.applied.get());
         assert_eq!(found.eigenvalues.len(), 4);
         for value in &found.eigenvalues {

@@ -1,4 +1,4 @@
-//! Multipliers of methods that have a map over one period, along the depth.
+//! Floquet multipliers (characteristic multipliers) of methods with an explicit period map, along the axial depth.
 
 use num_complex::Complex64;
 
@@ -8,36 +8,36 @@ use super::krylov::{Dominant, LinearMap};
 use super::stability_loss::StabilityLoss;
 use crate::criteria::MAPPED;
 
-/// Share of the largest depth over which a difference stands for the derivative: its error, and that of multipliers
-/// divided by it, are then both near 1e-6, and slopes are used as predictions only.
+/// Step of the difference quotient dμ/dw, as a share of the largest depth. Truncation error, and rounding of
+/// multipliers divided by the step, are then both near 1e-6; derivatives serve as predictions only.
 const DIFFERENCE: f64 = 1e-6;
 
-/// The map over one period at one depth: its eigenvalues are the multipliers.
+/// Map over one period at one axial depth; its eigenvalues are the Floquet multipliers.
 pub(crate) trait PeriodMap: LinearMap {
-    /// The frequency, Hz, of the vibration of a multiplier, from its eigenvector.
+    /// Vibration frequency of a multiplier, Hz, from its eigenvector.
     fn chatter_hz(&self, multiplier: Complex64, vector: &nalgebra::DVector<Complex64>) -> Option<f64>;
 }
 
-/// All multipliers of the map at one depth.
+/// All multipliers of the map at one axial depth.
 struct Known {
     depth_m: f64,
     dominant: Dominant,
-    /// The multipliers a little deeper.
+    /// Multipliers at a slightly larger depth, for the difference quotient.
     beside: Option<Vec<Complex64>>,
 }
 
-/// The multipliers of maps at any depth; `map` makes that of a depth, m, and `error` says how far a multiplier at a depth, m,
-/// may be off.
+/// Floquet multipliers of maps at any axial depth: `map` returns the map at a depth (m), `error` the error of a
+/// multiplier at a depth (m).
 pub(crate) struct MapSpectrum<F, E> {
     map: F,
     error: E,
-    /// The step for differences, m.
+    /// Step of the difference quotient, m.
     step_m: f64,
     known: Option<Known>,
 }
 
 impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>> MapSpectrum<F, E> {
-    /// For depths up to `deepest_m`.
+    /// Spectrum for axial depths up to `deepest_m`.
     pub(crate) fn new(deepest_m: f64, map: F, error: E) -> Self {
         Self {
             map,
@@ -58,13 +58,13 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
         self.known.as_mut()
     }
 
-    /// The multiplier nearest to a guess, real ones for real guesses.
+    /// The multiplier nearest to a guess; a real guess gives a real one.
     fn nearest(&mut self, guess: Complex64, depth_m: f64) -> Option<Complex64> {
         nearest(&self.at(depth_m)?.dominant.eigenvalues, guess)
     }
 }
 
-/// The nearest to a guess, real ones for real guesses.
+/// The multiplier of a list nearest to a guess; a real guess gives a real one.
 pub(crate) fn nearest(multipliers: &[Complex64], guess: Complex64) -> Option<Complex64> {
     multipliers
         .iter()
@@ -93,13 +93,13 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
             self.at(depth_m)?.beside = Some(beside);
         }
         let beside = self.at(depth_m)?.beside.as_deref()?;
-        // Where two real ones meet between both depths there is no derivative.
+        // If two real multipliers meet between both depths, the derivative does not exist.
         Some((nearest(beside, own)? - own) / step_m)
     }
 
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {
         let (mut depth_m, mut expected) = (guess.depth_m, guess.multiplier);
-        // Newton on |μ| = 1 along the branch.
+        // Newton's method for |μ| = 1 along the branch.
         for _ in 0..20 {
             let multiplier = self.nearest(expected, depth_m)?;
             let slope = self.sensitivity(multiplier, depth_m)?;

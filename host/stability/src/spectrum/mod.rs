@@ -1,4 +1,5 @@
-//! Floquet multipliers (characteristic multipliers): the eigenvalues of the map over one period, and how they move with depth.
+//! Floquet multipliers (characteristic multipliers): eigenvalues of the map over one period, and their dependence on
+//! the axial depth.
 
 pub(crate) mod along_depth;
 pub(crate) mod characteristic;

@@ -1,4 +1,5 @@
-//! The collocated map over one tooth period: many multipliers at one speed and depth at once.
+//! The collocated map over one tooth period, for many Floquet multipliers (characteristic multipliers) at one speed and
+//! depth.
 
 use nalgebra::linalg::LU;
 use nalgebra::{DMatrix, Dyn};
@@ -8,23 +9,25 @@ use super::krylov::{self, LinearMap};
 use crate::problem::period::Period;
 use quietcut_numerics::eigenvalues;
 
-/// Up to this size all eigenvalues of the map are computed from its matrix: it is as fast.
+/// Largest size of a map for which all eigenvalues are computed from its matrix, which is as fast as block Arnoldi
+/// there.
 const WHOLE: usize = 110;
 
-/// The same where Krylov spaces do not settle: a second.
+/// Largest size for which all eigenvalues are computed if block Arnoldi does not converge: about one second.
 const UNSETTLED_WHOLE_MAX: usize = 400;
 
-/// Multipliers so large have lost what was before: they are eigenvalues of Φ(w), up to one part in so many.
+/// Size from which a Floquet multiplier does not depend on the surface cut before: it is then an eigenvalue of Φ(w), to
+/// a relative error of 1/GROWN.
 const GROWN: f64 = 1e6;
 
-/// How much larger than the largest multiplier a map may be: Krylov spaces with residuals of 1e-7 are to see no more than roundings
-/// of that.
+/// Largest ratio of the norm of the map to its largest multiplier. Krylov spaces with residuals of 1e-7 then resolve
+/// that multiplier; beyond it they may see only rounding of a strongly non-normal map.
 const NORMAL: f64 = 1e7;
 
-/// The matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at a depth, m.
+/// Matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at an axial depth, m.
 ///
-/// p are the displacements along the chip normal at the collocation nodes while teeth cut. `None` where a depth is so
-/// large that the collocation equations are singular.
+/// p are the displacements along the chip normals at the collocation nodes while teeth cut. `None` if the collocation
+/// equations are singular, which happens at large depths only.
 pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     let order = period.order();
     let size = order + period.ports();
@@ -34,10 +37,10 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     let mut first = order;
     for element in &period.elements {
         let ports = element.kernel.nrows();
-        // p − w Q p = E x − w Q p_τ
+        // Collocation equation p − w Q p = E x − w Q p_τ
         let weighted = &element.kernel * depth_m;
         let implicit = DMatrix::identity(ports, ports) - &weighted;
-        // Chips of later elements are not in it yet.
+        // Displacements of later elements do not act on this element.
         let known = first + ports;
         let mut seen = &element.observe * state.columns(0, known);
         let mut past = seen.columns_mut(first, ports);
@@ -58,32 +61,32 @@ pub(crate) fn monodromy(period: &Period, depth_m: f64) -> Option<DMatrix<f64>> {
     Some(map)
 }
 
-/// All multipliers of the collocated map, largest first; those of the history that have no physical meaning are near
+/// All multipliers of the collocated map, largest first. Those that only represent the discretized history are near
 /// zero.
 pub(crate) fn multipliers(period: &Period, depth_m: f64) -> Option<Vec<Complex64>> {
     of_matrix(monodromy(period, depth_m)?)
 }
 
-/// All eigenvalues of the matrix of a map over a period, largest first, of pairs the upper one first.
+/// All eigenvalues of the matrix of a period map, largest first; of a conjugate pair the upper one first.
 pub(crate) fn of_matrix(map: DMatrix<f64>) -> Option<Vec<Complex64>> {
     let mut multipliers = eigenvalues::of_real(map).ok()?;
     multipliers.sort_by(|p, q| q.norm().total_cmp(&p.norm()).then(q.im.total_cmp(&p.im)));
     Some(multipliers)
 }
 
-/// The multipliers that seem the largest, to begin Newton with.
+/// Approximate largest multipliers, as starting values of Newton's method.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Candidates {
-    /// Largest first.
+    /// Multipliers, largest first.
     pub(crate) multipliers: Vec<Complex64>,
-    /// False where larger ones may have been missed: a Krylov space did not settle, or the map is so far from normal that rounding
+    /// False if larger ones may be missing: block Arnoldi did not converge, or the map is so non-normal that rounding
     /// moves its eigenvalues.
     pub(crate) is_certain: bool,
 }
 
-/// The multipliers within `share` of the largest.
+/// Multipliers larger than `share` of the largest.
 ///
-/// Of large maps by block Arnoldi. `None` where nothing finite comes out.
+/// Large maps are treated by block Arnoldi. `None` if a result is not finite.
 pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candidates> {
     let (order, size) = (period.order(), period.order() + period.ports());
     let of = |mut multipliers: Vec<Complex64>, norm: f64, is_settled: bool| {
@@ -94,7 +97,7 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candi
             is_certain: is_settled && norm <= NORMAL * largest.max(1.0),
         }
     };
-    // Φ(w) is what the map makes of a surface at rest: without a tooth before, κ is w.
+    // Without a previously cut surface κ = w, and the map from rest is Φ(w).
     let grown = |transition: DMatrix<f64>| {
         let norm = transition.amax();
         let multipliers = of_matrix(transition)?;
@@ -121,11 +124,11 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candi
     Some(of(of_matrix(map)?, norm, true))
 }
 
-/// All multipliers larger than `least`, or than `share` of the largest where that is less, largest first; with others that are
-/// smaller where the map is small.
+/// Multipliers larger than `least`, or larger than `share` of the largest if that is less, largest first. Small maps
+/// return smaller multipliers too.
 ///
-/// Of large maps by block Arnoldi, to begin Newton with. `None` where nothing finite comes out, or where that does not settle and the
-/// map is too large for all eigenvalues.
+/// Large maps are treated by block Arnoldi, accurate enough to start Newton's method. `None` if a result is not finite,
+/// or if block Arnoldi does not converge and the map is too large for all eigenvalues.
 pub(crate) fn larger_than(period: &Period, depth_m: f64, least: f64, share: f64) -> Option<Vec<Complex64>> {
     let size = period.order() + period.ports();
     if size > WHOLE
@@ -139,11 +142,11 @@ pub(crate) fn larger_than(period: &Period, depth_m: f64, least: f64, share: f64)
     multipliers(period, depth_m)
 }
 
-/// The map (x, p_τ) → (x⁺, p) by what it does, element by element.
+/// Map (x, p_τ) → (x⁺, p), applied element by element without forming its matrix.
 struct Map<'a> {
     period: &'a Period,
     depth_m: f64,
-    /// I − w Q of each element.
+    /// Matrix I − w Q of each element, factored.
     implicit: Vec<LU<f64, Dyn, Dyn>>,
 }
 

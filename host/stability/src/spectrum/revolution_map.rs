@@ -1,4 +1,5 @@
-//! What one revolution of a tool with variable pitch makes of the state: the map whose eigenvalues are the multipliers.
+//! Map of the state over one revolution of a tool with variable pitch; its eigenvalues are the Floquet multipliers
+//! (characteristic multipliers).
 
 use std::rc::Rc;
 
@@ -11,26 +12,26 @@ use super::map_spectrum::PeriodMap;
 use crate::problem::revolution::Revolution;
 use crate::problem::revolution_mesh::{Series, Source};
 
-/// The map of a revolution at one depth.
+/// Map over one revolution at one axial depth.
 pub(crate) struct RevolutionMap<'a> {
     revolution: Rc<Revolution<'a>>,
     depth_m: f64,
-    /// I − w Q of each element.
+    /// Matrix I − w Q of each element, factored.
     factors: Vec<LU<f64, Dyn, Dyn>>,
 }
 
-/// A revolution of several columns at once.
+/// Motion over a revolution, for several initial states (columns) at once.
 struct Trace {
-    /// x at the end, n × columns.
+    /// State x at the end, n × columns.
     state: DMatrix<f64>,
-    /// p of each element, columns × ports.
+    /// Displacements p along the chip normals in each element, columns × ports.
     seen: Vec<DMatrix<f64>>,
-    /// p − p_τ of each element, ports × columns.
+    /// Regenerative chips p − p_τ in each element, ports × columns.
     chips: Vec<DMatrix<f64>>,
 }
 
 impl<'a> RevolutionMap<'a> {
-    /// The map at a depth, m; `None` where the collocation equations are singular.
+    /// Map over one revolution at an axial depth, m; `None` if the collocation equations are singular.
     pub(crate) fn new(revolution: Rc<Revolution<'a>>, depth_m: f64) -> Option<Self> {
         let factors = revolution.elements.iter().map(|element| {
             let size = element.kernel.nrows();
@@ -67,7 +68,8 @@ impl<'a> RevolutionMap<'a> {
                     let seen = match of.source {
                         Source::Earlier(first) => before.column(first + node),
                         Source::Own(Series { subinterval, tooth }) => {
-                            // A delay shorter than a subinterval would end in the subinterval itself.
+                            // `None` if a delay is shorter than a subinterval, so that it ends in the subinterval
+                            // itself.
                             let values = trace.seen.get(subinterval)?;
                             values.column(node * subintervals[subinterval].cutting.len() + tooth)
                         }
@@ -75,7 +77,7 @@ impl<'a> RevolutionMap<'a> {
                     sum.axpy(*weight, &seen, 1.0);
                 }
             }
-            // p − w Q p = E x − w Q p_τ
+            // Collocation equation p − w Q p = E x − w Q p_τ
             let past = past.transpose();
             let mut seen = &element.observe * &trace.state;
             seen.gemm(-self.depth_m, &element.kernel, &past, 1.0);

@@ -1,30 +1,31 @@
-//! A multiplier at one depth and where it goes.
+//! A Floquet multiplier (characteristic multiplier) at one axial depth, with its derivative.
 
 use num_complex::Complex64;
 
 use super::stability_loss::StabilityLoss;
 
-/// One multiplier at one depth, in the upper half plane or on the real axis.
+/// Floquet multiplier at one axial depth, in the upper half plane or on the real axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Root {
     pub(crate) multiplier: Complex64,
-    /// dμ/dw, 1/m.
+    /// Derivative dμ/dw, 1/m.
     pub(crate) slope: Complex64,
 }
 
 impl Root {
-    /// Distance from the unit circle, positive outside.
+    /// Distance |μ| − 1 from the unit circle, positive outside.
     pub(crate) fn excess(&self) -> f64 {
         self.multiplier.norm() - 1.0
     }
 
-    /// d|μ|/dw.
+    /// Derivative d|μ|/dw, 1/m.
     pub(crate) fn excess_slope(&self) -> f64 {
         (self.multiplier.conj() * self.slope).re / self.multiplier.norm()
     }
 
-    /// Takes from `free` the root a step deeper that lies on the same branch: of the same kind, and both tangents meet half way
-    /// to within a quarter of the way.
+    /// Removes from `free` the multiplier, one step deeper, on the same branch as this one. Both must be real of equal
+    /// sign or both complex, and the tangents from both ends must meet half way to within a quarter of the distance
+    /// travelled.
     pub(crate) fn take_next(&self, free: &mut Vec<Self>, step_m: f64) -> Option<Self> {
         let middle = self.multiplier + self.slope * (0.5 * step_m);
         let miss = |to: &Self| (middle - (to.multiplier - to.slope * (0.5 * step_m))).norm();

@@ -7,16 +7,18 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StabilityLoss {
-    /// As a complex pair: chatter with a frequency of its own (Neimark–Sacker, secondary Hopf, torus).
+    /// Complex pair (Neimark–Sacker, secondary Hopf, torus): chatter at a frequency independent of the tooth-passing
+    /// frequency.
     Hopf,
-    /// Through −1: period doubling.
+    /// Through −1 (period doubling).
     Flip,
     /// Through +1.
     Fold,
 }
 
 impl StabilityLoss {
-    /// The kind of a multiplier. Real multipliers must be real to the last bit.
+    /// Kind of a multiplier from its sign and imaginary part. A real multiplier must have an imaginary part of exactly
+    /// 0.
     pub fn of(multiplier: Complex64) -> Self {
         if multiplier.im != 0.0 {
             Self::Hopf
@@ -27,7 +29,7 @@ impl StabilityLoss {
         }
     }
 
-    /// The word in answers.
+    /// Name in results: `hopf`, `flip` or `fold`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Hopf => "hopf",
@@ -36,7 +38,7 @@ impl StabilityLoss {
         }
     }
 
-    /// How many multipliers cross together.
+    /// Number of multipliers that cross together.
     pub(crate) fn count(self) -> i32 {
         match self {
             Self::Hopf => 2,

@@ -1,4 +1,4 @@
-//! The verdict on a cut, from its dominant Floquet multiplier and the error of it.
+//! The verdict on a cut, from its dominant Floquet multiplier (characteristic multiplier) and the error of that.
 
 use serde::Serialize;
 
@@ -10,12 +10,12 @@ pub enum Verdict {
     Stable,
     /// |μ| − error > 1.
     Unstable,
-    /// The error bar straddles 1.
+    /// The error interval contains 1.
     Undecided,
 }
 
 impl Verdict {
-    /// The verdict on a multiplier of this size.
+    /// Verdict for a multiplier of this absolute value and error.
     pub fn of(multiplier_abs: f64, error: f64) -> Self {
         if multiplier_abs + error < 1.0 {
             Self::Stable
@@ -26,7 +26,7 @@ impl Verdict {
         }
     }
 
-    /// The word in answers.
+    /// Name in results: `stable`, `unstable` or `undecided`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Stable => "stable",

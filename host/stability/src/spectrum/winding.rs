@@ -1,12 +1,14 @@
-//! The largest multiplier from the characteristic function alone: roots by Newton, and none missed by a winding number.
+//! Largest Floquet multiplier (characteristic multiplier) from the characteristic function alone: roots by Newton's
+//! method, completeness by a winding number.
 //!
-//! Where motions grow within a period by far more than over the whole of it, the map of the period is so far from normal that
-//! rounding moves its eigenvalues, and where very many of them are of one size Krylov spaces do not settle. With z = 1/μ
+//! The period map fails in two cases. If motions grow within a period by far more than over the whole of it, the map is
+//! so non-normal that rounding moves its eigenvalues. If very many eigenvalues have nearly one size, Krylov spaces do
+//! not converge. With z = 1/μ
 //!
 //!   G(z) = det(I − z Φ(w (1 − z)))
 //!
-//! is entire, a matter of n × n matrices, and its zeros are 1/μ of all multipliers. The mean of z G'/G over the circle of radius 1/R
-//! is the number of multipliers beyond R.
+//! is an entire function of z, computed from n × n matrices. Its zeros are 1/μ of all multipliers. The mean of z G'/G
+//! over the circle of radius 1/R is the number of multipliers with |μ| > R.
 
 use num_complex::Complex64;
 
@@ -22,25 +24,25 @@ const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
 /// How many operations all evaluations together may take: seconds.
 const OPERATIONS_MAX: f64 = 3e9;
 
-/// The most points on half of a circle.
+/// Largest number of evaluation points on half of a circle: a limit on computing time.
 const POINTS_MAX: usize = 8192;
 
 /// From so many candidates Newton begins.
 const CANDIDATES_MAX: usize = 6;
 
-/// The most multipliers that are looked for one by one.
+/// Largest number of multipliers that are searched one by one: a limit on computing time.
 const ROOTS_MAX: usize = 12;
 
-/// The largest multiplier found, and a radius beyond which there is none.
+/// Largest multiplier found, and a radius beyond which there is none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beyond {
-    /// The largest that was found, if it is larger than [`WOUND`]; of a pair the upper one.
+    /// Largest multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
     pub(crate) multiplier: Option<Complex64>,
-    /// No multiplier is larger than this; infinite where that could not be shown.
+    /// Proven bound: no multiplier has a larger absolute value. Infinite if no bound could be shown.
     pub(crate) radius: f64,
 }
 
-/// A characteristic function with what may still be spent on it.
+/// Search for the largest multiplier with a limited number of evaluations of the characteristic function.
 pub(crate) struct Search<'a> {
     characteristic: &'a Characteristic,
     depth_m: f64,
@@ -49,7 +51,7 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// At a depth, m; the characteristic must be one for five times that.
+    /// Search at an axial depth, m; the characteristic matrix must be valid for five times that depth.
     pub(crate) fn new(characteristic: &'a Characteristic, depth_m: f64) -> Self {
         Self {
             characteristic,
@@ -59,7 +61,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// z G'/G at z; `None` on a zero, or where nothing finite comes out or nothing may be spent.
+    /// Logarithmic derivative z G'/G at z; `None` at a zero, if the result is not finite, or if no evaluations are
+    /// left.
     fn slope(&mut self, z: Complex64) -> Option<Complex64> {
         self.evaluations_left = self.evaluations_left.checked_sub(1)?;
         let multiplier = z.inv();
@@ -71,11 +74,12 @@ impl<'a> Search<'a> {
         slope.is_finite().then_some(slope)
     }
 
-    /// How many multipliers are larger than a radius; `None` where one is so near to it that the points allowed do not tell.
+    /// Number of multipliers with |μ| larger than a radius; `None` if one lies so close to the circle that the allowed
+    /// points do not resolve it.
     pub(crate) fn count_beyond(&mut self, radius: f64) -> Option<usize> {
         use std::f64::consts::PI;
         let at = |angle: f64| Complex64::from_polar(radius.recip(), angle);
-        // Values at conjugate points are conjugate: half of the circle will do.
+        // Values at conjugate points are conjugate, so that half of the circle suffices.
         let mut points = 8;
         let mut sum = 0.5 * (self.slope(at(0.0))?.re + self.slope(at(PI))?.re);
         for i in 1..points {
@@ -85,7 +89,8 @@ impl<'a> Search<'a> {
         while points <= POINTS_MAX {
             let mean = sum / points as f64;
             let whole = mean.round();
-            // Errors fall as a power of the number of points: three rounds near the same whole number have arrived.
+            // The error falls exponentially with the number of points: three means in succession close to the same
+            // integer have converged.
             if (mean - whole).abs() < 0.02 && (last - whole).abs() < 0.1 && (before - whole).abs() < 0.4 {
                 return (whole >= 0.0).then_some(whole as usize);
             }
@@ -98,7 +103,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// A multiplier beyond a radius that is none of those known, by Newton with these divided out.
+    /// A multiplier beyond a radius that is not among the known ones, by Newton's method with the known ones deflated.
     fn another_beyond(&mut self, radius: f64, known: &[Complex64]) -> Option<Complex64> {
         const ANGLES: usize = 6;
         for share in [0.95, 0.7, 0.3] {
@@ -115,7 +120,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// The multiplier to which Newton leads from z = `start`.
+    /// The multiplier to which Newton's method converges from z = `start`.
     fn newton(&mut self, start: Complex64, known: &[Complex64]) -> Option<Complex64> {
         let mut z = start;
         for _ in 0..15 {
@@ -129,7 +134,7 @@ impl<'a> Search<'a> {
             }
             let step = -z / slope;
             z += step;
-            // Beyond, the polynomials of the elements are not good.
+            // The polynomials of the elements are not valid for larger |z|.
             if !z.is_finite() || z.norm() > WOUND.recip() {
                 return None;
             }
@@ -143,7 +148,8 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// The largest multiplier, and a radius beyond which there is none; `candidates` are where Newton may begin.
+    /// Largest multiplier, and a radius beyond which there is none; `candidates` are starting values of Newton's
+    /// method.
     pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> Beyond {
         let mut known: Vec<Complex64> = Vec::new();
         let mut best: Option<Complex64> = None;
@@ -157,7 +163,7 @@ impl<'a> Search<'a> {
         }
         let mut radius = f64::INFINITY;
         for margin in MARGINS.into_iter().chain(FINE_MARGINS) {
-            // A multiplier outside is enough, and so is a radius inside.
+            // A verdict follows from a multiplier outside the unit circle, or from a bound inside it.
             let is_decided = radius < 1.0 || best.is_some_and(|best| best.norm() > 1.0);
             if FINE_MARGINS.contains(&margin) && is_decided {
                 break;
@@ -192,7 +198,7 @@ mod tests {
     use crate::spectrum::period_map;
     use crate::tests::problem;
 
-    /// All multipliers of the collocated map, by the QR iteration, against zeros of G.
+    /// Reference: all multipliers of the collocated map, by QR iteration, against zeros of G.
     #[test]
     fn counts_and_the_largest_multiplier_are_those_of_the_whole_map() {
         let mut numbers = std::collections::BTreeSet::new();
@@ -205,7 +211,7 @@ mod tests {
                 let characteristic = Characteristic::new(&period, kappa_m);
                 let mut search = Search::new(&characteristic, depth_m);
                 for radius in [0.3, 0.5, 0.8, 1.1] {
-                    // Next to a multiplier the points allowed do not tell.
+                    // Skips circles so close to a multiplier that the allowed points do not resolve it.
                     if all
                         .iter()
                         .any(|multiplier| (multiplier.norm() / radius - 1.0).abs() < 0.01)
@@ -222,7 +228,7 @@ mod tests {
                 }
                 let beyond = search.largest(&[]);
                 let largest = all[0].norm();
-                // The map is good to 1e-9, the last margin 2e-3 or better.
+                // Tolerances: the map is accurate to 1e-9, the last margin is at most 2e-3.
                 match beyond.multiplier {
                     Some(found) => assert!((found.norm() - largest).abs() < 1e-8, "{beyond:?} {largest}"),
                     None => assert!(largest < WOUND * 1.05),
@@ -233,7 +239,7 @@ mod tests {
                 );
             }
         }
-        // Not always the same: none, and several.
+        // The test covers different counts: none, and several multipliers.
         assert!(numbers.contains(&0) && numbers.len() >= 3, "{numbers:?}");
     }
 }
