@@ -6,6 +6,7 @@ use toml::{Table, Value};
 
 use crate::modes::{IdentifiedMode, ModalModel};
 use crate::robot::joints::JointParameter;
+use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Runout;
 use quietcut_model::structure::{Direction, Joint, Mode, Robot};
 
@@ -206,13 +207,14 @@ pub fn cutting(
 
 /// The extension of a key.
 fn extension_of(key: &str) -> Option<&'static str> {
-    Some(match key {
-        "k2_n_per_m2" => "quadratic-stiffness",
-        "k5_n_per_m5" => "softening-hardening",
-        "fc_n" => "coulomb-friction",
-        "kxyy_n_per_m3" | "kxxy_n_per_m2" => "mode-coupling",
+    let effect = match key {
+        "k2_n_per_m2" => EffectName::QuadraticStiffness,
+        "k5_n_per_m5" => EffectName::SofteningHardening,
+        "fc_n" => EffectName::CoulombFriction,
+        "kxyy_n_per_m3" | "kxxy_n_per_m2" => EffectName::ModeCoupling,
         _ => return None,
-    })
+    };
+    Some(effect.name())
 }
 
 /// The text of a case with mass, damping, stiffness and cubic terms as matrices, and everything else as extensions.
@@ -269,7 +271,7 @@ fn extensions(
     let mut extensions = Table::new();
     for estimate in estimates {
         let extension = match estimate.key {
-            "k3_n_per_m3" if turned => Some("softening-hardening"),
+            "k3_n_per_m3" if turned => Some(EffectName::SofteningHardening.name()),
             key => extension_of(key),
         };
         let Some(extension) = extension else { continue };

@@ -1,6 +1,6 @@
 //! A cause: a physical term with few parameters that the baseline may lack.
 //!
-//! To add one: write its file in `causes/` and name it in `causes::all`.
+//! To add one: write its file and name it in [`all`](super::all), whose match asks for it.
 
 use std::fmt;
 
@@ -11,6 +11,7 @@ use crate::motion::cut_force::CutForce;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_model::structure::Direction;
 use quietcut_recording::Quantity;
 
@@ -197,8 +198,13 @@ pub(crate) struct Part {
 /// It is linear in its coefficients once its shape (gap, yield, time constant …) is given:
 /// residual = Σ coefficient · regressor(shape, measured motion) + free decays + noise.
 pub(crate) trait Cause: Send + Sync {
+    /// The effect that it is.
+    fn effect(&self) -> EffectName;
+
     /// Its name, as in `[extension.NAME]`.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &'static str {
+        self.effect().name()
+    }
 
     /// All names that it has in an answer: one, unless it is several that act through each other.
     fn names(&self) -> Vec<&'static str> {

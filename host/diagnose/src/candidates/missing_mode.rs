@@ -19,8 +19,9 @@ use crate::records::channel::Observed;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
-pub(crate) struct MissingMode;
+pub(super) struct MissingMode;
 
 /// Damping ratios that are tried first.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
@@ -28,8 +29,8 @@ const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
 const KEPT: usize = 4;
 
 impl Cause for MissingMode {
-    fn name(&self) -> &'static str {
-        "missing-mode"
+    fn effect(&self) -> EffectName {
+        EffectName::MissingMode
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

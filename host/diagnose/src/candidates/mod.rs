@@ -1,23 +1,90 @@
-//! The library of causes, one file each.
+//! The candidates of each effect: what depends on records. One file of the name of each effect, beside the rooms that several share:
+//! [`linear_parameter`], [`restoring`], [`process`] and [`sensor`].
 
+mod axial_depth_modulation;
+mod backlash;
 pub(crate) mod cause;
 pub(crate) mod closed_loop;
+mod coefficients;
+mod coulomb_friction;
+mod cross_axis;
+mod cubic_damping;
+mod cubic_stiffness;
+mod damping;
+mod drift;
+mod edge_force;
 pub(crate) mod extension_tables;
-mod linear;
+mod force_coefficients;
+mod force_coefficients_by_one_factor;
+mod force_exponent;
+mod hysteresis;
+mod linear_parameter;
+mod mass;
 mod missing_mode;
+mod mode_coupling;
 mod process;
+mod process_damping;
+mod quadratic_stiffness;
 mod restoring;
+mod runout;
 mod sensor;
+mod sensor_delay;
+mod sensor_gain;
+mod sensor_gain_of_force;
+mod sensor_offset_from_tool_tip;
+mod softening_hardening;
+mod speed_fluctuation;
+mod stiffness;
+mod wear;
+
+use quietcut_model::effects::EffectName;
 
 use self::cause::Cause;
 
-/// All causes.
+/// The candidates of all effects.
 pub(crate) fn all() -> Vec<Box<dyn Cause>> {
-    let mut all: Vec<Box<dyn Cause>> = Vec::new();
-    all.extend(linear::all());
-    all.push(Box::new(missing_mode::MissingMode));
-    all.extend(restoring::all());
-    all.extend(process::all());
-    all.extend(sensor::all());
-    all
+    EffectName::ALL.into_iter().flat_map(of).collect()
+}
+
+/// The forms that compete under the name of an effect. There is no wildcard: a new effect does not compile without its candidates.
+fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
+    match effect {
+        EffectName::Mass => vec![Box::new(mass::CAUSE)],
+        EffectName::Stiffness => vec![Box::new(stiffness::CAUSE)],
+        EffectName::Damping => vec![Box::new(damping::CAUSE)],
+        EffectName::MissingMode => vec![Box::new(missing_mode::MissingMode)],
+        EffectName::CubicStiffness => vec![Box::new(cubic_stiffness::CAUSE)],
+        EffectName::QuadraticStiffness => vec![Box::new(quadratic_stiffness::CAUSE)],
+        EffectName::CubicDamping => vec![Box::new(cubic_damping::CAUSE)],
+        EffectName::SofteningHardening => vec![Box::new(softening_hardening::CAUSE)],
+        EffectName::CoulombFriction => vec![
+            Box::new(coulomb_friction::ALIKE),
+            Box::new(coulomb_friction::EACH_WAY),
+            Box::new(coulomb_friction::BEHIND_PLAY),
+            Box::new(coulomb_friction::BEHIND_CLEARANCE),
+        ],
+        EffectName::Backlash => vec![Box::new(backlash::CAUSE)],
+        EffectName::Hysteresis => vec![Box::new(hysteresis::CAUSE)],
+        EffectName::ModeCoupling => vec![Box::new(mode_coupling::QUARTIC), Box::new(mode_coupling::CUBIC)],
+        EffectName::Drift => vec![Box::new(drift::RATE), Box::new(drift::SETTLING)],
+        EffectName::ForceCoefficients => vec![
+            Box::new(force_coefficients_by_one_factor::CommonFactor { with_edge: false }),
+            Box::new(force_coefficients_by_one_factor::CommonFactor { with_edge: true }),
+            Box::new(force_coefficients::FORCE_COEFFICIENTS),
+        ],
+        EffectName::EdgeForce => vec![Box::new(edge_force::EDGE_FORCE)],
+        EffectName::ForceExponent => vec![Box::new(force_exponent::ForceExponent)],
+        EffectName::Runout => vec![Box::new(runout::OfTool)],
+        EffectName::ProcessDamping => vec![Box::new(process_damping::OfFlank)],
+        EffectName::AxialDepthModulation => vec![Box::new(axial_depth_modulation::OfDepth)],
+        EffectName::SpeedFluctuation => vec![Box::new(speed_fluctuation::OfSpindle)],
+        EffectName::Wear => vec![Box::new(wear::OfEdge)],
+        EffectName::SensorGain => vec![
+            Box::new(sensor_gain::Gain),
+            Box::new(sensor_gain_of_force::ForceGain),
+        ],
+        EffectName::SensorDelay => vec![Box::new(sensor_delay::Delay)],
+        EffectName::CrossAxis => vec![Box::new(cross_axis::CrossAxis)],
+        EffectName::SensorOffsetFromToolTip => vec![Box::new(sensor_offset_from_tool_tip::Offset)],
+    }
 }

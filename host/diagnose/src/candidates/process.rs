@@ -4,41 +4,15 @@
 //! [`ForceLaw`](quietcut_simulate::ForceLaw). What it adds is filtered by the structure where motion is compared, and compared
 //! as it is where the force was measured.
 
-mod axial_depth_modulation;
-mod coefficients;
-mod common_factor;
-mod edge_force;
-mod force_coefficients;
-mod force_exponent;
-mod process_damping;
-mod runout;
-mod speed_fluctuation;
-mod wear;
-
-use crate::candidates::cause::{Cause, Location, Regressor};
+use crate::candidates::cause::{Location, Regressor};
 use crate::motion::cut_force::CutForce;
 use crate::records::cutting::Cutting;
 use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_simulate::Cutter;
 
-pub(crate) fn all() -> Vec<Box<dyn Cause>> {
-    vec![
-        Box::new(common_factor::CommonFactor { with_edge: false }),
-        Box::new(common_factor::CommonFactor { with_edge: true }),
-        Box::new(force_coefficients::FORCE_COEFFICIENTS),
-        Box::new(edge_force::EDGE_FORCE),
-        Box::new(force_exponent::ForceExponent),
-        Box::new(runout::OfTool),
-        Box::new(process_damping::OfFlank),
-        Box::new(axial_depth_modulation::OfDepth),
-        Box::new(speed_fluctuation::OfSpindle),
-        Box::new(wear::OfEdge),
-    ]
-}
-
 /// The whole cut, where the scene has one that is not known to have the cause already.
-fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
+pub(super) fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
     let known = study.baseline.case.extensions.contains_key(name);
     if known || cutter(study).is_none() {
         Vec::new()
@@ -48,7 +22,7 @@ fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
 }
 
 /// The tool of the first cut of a scene.
-fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
+pub(super) fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
     study
         .records
         .iter()
@@ -56,13 +30,18 @@ fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
 }
 
 /// True where the axial direction is part of the cut: it moves, or its force is seen.
-fn has_axial(study: &Study<'_>) -> bool {
+pub(super) fn has_axial(study: &Study<'_>) -> bool {
     study.baseline.axes.contains(&2)
 }
 
 /// What a cut adds per unit when its tool changes from `before` to `after`, `over` units apart; nothing in a record without a
 /// cut.
-fn added(record: &Record, before: impl Fn(&mut Cutter), after: impl Fn(&mut Cutter), over: f64) -> Regressor {
+pub(super) fn added(
+    record: &Record,
+    before: impl Fn(&mut Cutter),
+    after: impl Fn(&mut Cutter),
+    over: f64,
+) -> Regressor {
     let Some(cut) = &record.cut else {
         return Regressor::default();
     };
@@ -71,20 +50,20 @@ fn added(record: &Record, before: impl Fn(&mut Cutter), after: impl Fn(&mut Cutt
 }
 
 /// What a cut adds per unit when its tool changes from the one that is believed.
-fn changed(record: &Record, after: impl Fn(&mut Cutter), over: f64) -> Regressor {
+pub(super) fn changed(record: &Record, after: impl Fn(&mut Cutter), over: f64) -> Regressor {
     let Some(cut) = &record.cut else {
         return Regressor::default();
     };
     Regressor::of_cut(with(record, cut, after).difference(&cut.force, over))
 }
 
-fn with(record: &Record, cut: &Cutting, change: impl Fn(&mut Cutter)) -> CutForce {
+pub(super) fn with(record: &Record, cut: &Cutting, change: impl Fn(&mut Cutter)) -> CutForce {
     let mut cutter = cut.cut.cutter.clone();
     change(&mut cutter);
     cut.force_of(&cutter, &record.motion)
 }
 
 /// A step that stands for a size that may vanish.
-fn step(size: f64, least: f64) -> f64 {
+pub(super) fn step(size: f64, least: f64) -> f64 {
     if size.abs() < least { least } else { size }
 }

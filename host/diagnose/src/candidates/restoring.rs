@@ -1,74 +1,46 @@
 //! Terms of the restoring side: their equations are those of the simulation, taken along the measured motion.
 
-mod backlash;
-mod coulomb_friction;
-mod cubic_damping;
-mod cubic_stiffness;
-mod drift;
-mod hysteresis;
-mod mode_coupling;
-mod quadratic_stiffness;
-mod softening_hardening;
-
 use crate::baseline::terms_of;
 use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::restoring_along;
 
-pub(crate) fn all() -> Vec<Box<dyn Cause>> {
-    [
-        cubic_stiffness::CAUSE,
-        quadratic_stiffness::CAUSE,
-        cubic_damping::CAUSE,
-        softening_hardening::CAUSE,
-        coulomb_friction::ALIKE,
-        coulomb_friction::EACH_WAY,
-        coulomb_friction::BEHIND_PLAY,
-        coulomb_friction::BEHIND_CLEARANCE,
-        backlash::CAUSE,
-        hysteresis::CAUSE,
-        mode_coupling::QUARTIC,
-        mode_coupling::CUBIC,
-        drift::RATE,
-        drift::SETTLING,
-    ]
-    .into_iter()
-    .map(|cause| Box::new(cause) as Box<dyn Cause>)
-    .collect()
-}
-
 /// A term f_r = Σ coefficient · f(x, v, t; shape).
-struct Restoring {
-    name: &'static str,
+pub(super) struct Restoring {
+    pub(super) effect: EffectName,
     /// Keys of the coefficients.
-    linear: &'static [&'static str],
+    pub(super) linear: &'static [&'static str],
     /// Keys of the shape.
-    nonlinear_parameters: &'static [&'static str],
+    pub(super) nonlinear_parameters: &'static [&'static str],
     /// How many axes it joins.
-    axes: usize,
+    pub(super) axes: usize,
+    /// Whether two axes that it joins enter alike: they are then one location, not two.
+    pub(super) is_symmetric: bool,
     /// Whether it may also act along all axes at once, by one law.
-    everywhere: bool,
+    pub(super) everywhere: bool,
     /// Whether it may also act along each of them by a law of its own, as in joints of one kind; it has no shape then.
-    each: bool,
+    pub(super) each: bool,
     /// A grid of shapes for what moves as it does in the scene.
-    nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
+    pub(super) nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
     /// Bounds of the shape.
-    bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
+    pub(super) bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
     /// Whether it acts behind a play, which is a backlash.
-    behind_play: bool,
+    pub(super) behind_play: bool,
     /// Whether coefficients and shape are physical.
-    physical: fn(coefficients: &[f64]) -> bool,
+    pub(super) physical: fn(coefficients: &[f64]) -> bool,
 }
 
 /// A linear one that may have either sign.
-const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring {
+pub(super) const fn plain(effect: EffectName, linear: &'static [&'static str]) -> Restoring {
     Restoring {
-        name,
+        effect,
         linear,
         nonlinear_parameters: &[],
         axes: 1,
+        is_symmetric: false,
         everywhere: false,
         each: false,
         nonlinear_grid: |_, _| vec![Vec::new()],
@@ -79,7 +51,7 @@ const fn plain(name: &'static str, linear: &'static [&'static str]) -> Restoring
 }
 
 /// The largest displacement along an axis in any record, m.
-fn largest_m(study: &Study<'_>, axis: usize) -> f64 {
+pub(super) fn largest_m(study: &Study<'_>, axis: usize) -> f64 {
     study
         .records
         .iter()
@@ -88,7 +60,7 @@ fn largest_m(study: &Study<'_>, axis: usize) -> f64 {
 }
 
 /// The smallest RMS displacement along an axis of any record, m.
-fn smallest_m(study: &Study<'_>, axis: usize) -> f64 {
+pub(super) fn smallest_m(study: &Study<'_>, axis: usize) -> f64 {
     study
         .records
         .iter()
@@ -98,7 +70,7 @@ fn smallest_m(study: &Study<'_>, axis: usize) -> f64 {
 }
 
 /// The longest record, s.
-fn longest_s(study: &Study<'_>) -> f64 {
+pub(super) fn longest_s(study: &Study<'_>) -> f64 {
     study
         .records
         .iter()
@@ -122,7 +94,7 @@ fn single_places(location: &Location) -> Vec<Location> {
 }
 
 /// `count` values from `first` to `last`, evenly in their logarithm.
-fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
+pub(super) fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
     (0..count)
         .map(|index| first * (last / first).powf(index as f64 / (count - 1).max(1) as f64))
         .collect()
@@ -154,7 +126,7 @@ impl Restoring {
         let of_play = |(key, _): &&Parameter| self.behind_play && self.nonlinear_parameters.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
         let mut parts = vec![Part {
-            name: self.name,
+            name: self.name(),
             location: location.clone(),
             extension: self.extension(location, &own),
             parameters: own,
@@ -166,13 +138,13 @@ impl Restoring {
             };
             let gap: Vec<Parameter> = parameters.iter().filter(of_play).map(of_gap).collect();
             let mut extension = toml::Table::new();
-            extension.insert("before".into(), self.name.into());
+            extension.insert("before".into(), self.name().into());
             extension.extend(
                 gap.iter()
                     .map(|(key, value)| ((*key).to_owned(), (*value).into())),
             );
             parts.push(Part {
-                name: "backlash",
+                name: EffectName::Backlash.name(),
                 location: location.clone(),
                 parameters: gap,
                 extension,
@@ -194,7 +166,7 @@ impl Restoring {
             .map(|i| f64::from(u8::from(i == index)))
             .collect();
         let effects =
-            Effects::of_extension(self.name, &self.table(location, nonlinear_parameters, &unit)).ok()?;
+            Effects::of_extension(self.name(), &self.table(location, nonlinear_parameters, &unit)).ok()?;
         let mut sum: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::new());
         for term in terms_of(&effects, study.baseline.structure).ok()? {
             for (sum, force) in sum.iter_mut().zip(restoring_along(&*term, &record.motion)) {
@@ -210,15 +182,15 @@ impl Restoring {
 }
 
 impl Cause for Restoring {
-    fn name(&self) -> &'static str {
-        self.name
+    fn effect(&self) -> EffectName {
+        self.effect
     }
 
     fn names(&self) -> Vec<&'static str> {
         if self.behind_play {
-            vec![self.name, "backlash"]
+            vec![self.name(), EffectName::Backlash.name()]
         } else {
-            vec![self.name]
+            vec![self.name()]
         }
     }
 
@@ -250,7 +222,7 @@ impl Cause for Restoring {
                 .flat_map(|a| axes.iter().map(move |b| (*a, *b)))
                 .filter(|(a, b)| a != b)
                 // A potential in which both enter alike is one place, not two.
-                .filter(|(a, b)| self.name != "mode-coupling" || self.linear[0] != "kxyy_n_per_m3" || a < b)
+                .filter(|(a, b)| !self.is_symmetric || a < b)
                 .map(|(a, b)| Location::Axes(a, b))
                 .collect(),
         }

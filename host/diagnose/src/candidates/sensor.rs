@@ -1,14 +1,8 @@
 //! Sensors that do not read the truth; y_t is the truth, along the measured motion.
 
-mod cross_axis;
-mod delay;
-mod force_gain;
-mod gain;
-mod offset;
-
 use num_complex::Complex64;
 
-use crate::candidates::cause::{Cause, Location, Regressor};
+use crate::candidates::cause::{Location, Regressor};
 use crate::records::channel::Observed;
 use crate::records::channel::main_axis;
 use crate::records::domain::Domain;
@@ -17,18 +11,8 @@ use crate::records::study::Study;
 use quietcut_recording::Quantity;
 use quietcut_simulate::path::Motion;
 
-pub(crate) fn all() -> Vec<Box<dyn Cause>> {
-    vec![
-        Box::new(gain::Gain),
-        Box::new(force_gain::ForceGain),
-        Box::new(delay::Delay),
-        Box::new(cross_axis::CrossAxis),
-        Box::new(offset::Offset),
-    ]
-}
-
 /// Names of the channels of motion, where all records are predicted from their force.
-fn channels(study: &Study<'_>) -> Vec<String> {
+pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
     if !study.all_in(Domain::Response) {
         return Vec::new();
     }
@@ -42,7 +26,7 @@ fn channels(study: &Study<'_>) -> Vec<String> {
 }
 
 /// A place for each channel, and where there are several, one for all of them together.
-fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
+pub(super) fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
     if study.baseline.case.extensions.contains_key(name) {
         return Vec::new();
     }
@@ -63,7 +47,7 @@ fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
     locations
 }
 
-fn meant(location: &Location, channel: &Observed) -> bool {
+pub(super) fn meant(location: &Location, channel: &Observed) -> bool {
     match location.channel() {
         Some(name) => channel.pickup.name == name,
         None => channel.pickup.quantity != Quantity::Force,
@@ -74,7 +58,7 @@ fn meant(location: &Location, channel: &Observed) -> bool {
 ///
 /// The acceleration of a cut jumps where teeth enter and leave, so that much of a reading is folded into the band by sampling:
 /// where a channel of the same kind reads an axis of a cut, its reading is taken and not the motion between the samples.
-fn read(
+pub(super) fn read(
     record: &Record,
     channel: &Observed,
     weights: [f64; 3],
@@ -116,7 +100,7 @@ fn read(
 }
 
 /// What the channels that are meant read with the spectrum turned by `change` of ω.
-fn of_meant(
+pub(super) fn of_meant(
     record: &Record,
     location: &Location,
     weights: impl Fn(&Observed) -> [f64; 3],
@@ -134,7 +118,11 @@ fn of_meant(
 
 /// The change of what a channel reads of a cut, ω turned by `change`: of the response to its force over the finer samples, so that
 /// steps stay steps, and of what the motion has besides.
-fn in_steps(record: &Record, channel: usize, change: impl Fn(f64) -> Complex64) -> Option<Vec<f64>> {
+pub(super) fn in_steps(
+    record: &Record,
+    channel: usize,
+    change: impl Fn(f64) -> Complex64,
+) -> Option<Vec<f64>> {
     let cutting = record.cut.as_ref()?;
     let grid = &record.grid;
     let mut force = record.cut_spectra(&cutting.force);
@@ -166,7 +154,7 @@ fn in_steps(record: &Record, channel: usize, change: impl Fn(f64) -> Complex64) 
 ///
 /// With y = S x the reading of the motion x and F the force along a motion, y − H F(y) = (y − x) − H (F(y) − F(x)). Several sensors
 /// of one axis are taken to have an even share in what is known of its motion.
-fn in_cut(
+pub(super) fn in_cut(
     record: &Record,
     location: &Location,
     mut regressors: Vec<Regressor>,

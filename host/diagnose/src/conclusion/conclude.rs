@@ -16,6 +16,7 @@ use crate::records::checks;
 use crate::records::domain::Domain;
 use crate::records::study::Study;
 use crate::selection::select::{Selection, SelectionCriteria, names, select};
+use quietcut_model::effects::EffectName;
 use quietcut_recording::Recording;
 
 pub(crate) fn conclude(
@@ -128,7 +129,7 @@ fn answer(
     for cause in diagnosis
         .causes
         .iter()
-        .filter(|cause| cause.name == "sensor-gain")
+        .filter(|cause| cause.name == EffectName::SensorGain.name())
     {
         let gain = cause.parameters["gain"].value;
         if let Some(unit) = checks::unit_of_gain(gain) {

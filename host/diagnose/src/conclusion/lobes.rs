@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::conclusion::recorded_cuts::recorded_cuts;
 use quietcut_model::case::Case;
+use quietcut_model::effects::Treatment;
 use quietcut_recording::{Kind as RecordKind, Recording};
 use quietcut_stability::orbit::{ForcedProblem, collocation_of};
 use quietcut_stability::trial_cuts::{Call, Calls, TestCut, call, calls};
@@ -279,9 +280,8 @@ impl Chart {
 
 fn after_s(cases: &[&Case], recordings: &[Recording]) -> Option<f64> {
     let moves = cases.iter().any(|case| {
-        ["drift", "wear"]
-            .iter()
-            .any(|name| case.extensions.contains_key(*name))
+        case.effects()
+            .any(|spec| matches!(spec.treatment, Treatment::OfMoment(_)))
     });
     moves.then(|| recordings.iter().map(duration_s).fold(0.0, f64::max))
 }

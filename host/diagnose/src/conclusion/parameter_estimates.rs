@@ -8,9 +8,10 @@ use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use crate::criteria::{COMMON_FACTOR_CONFIDENCE, EQUIVALENT};
 use crate::fit::candidate_model::CandidateModel;
 use crate::fit::covariance::covariance;
-use crate::fit::library::Library;
+use crate::fit::library::{Library, OF_DYNAMIC_STIFFNESS};
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
 /// The causes of a candidate model with their estimated parameters.
 pub(crate) fn parameter_estimates(
@@ -95,7 +96,8 @@ pub(crate) fn by_common_factor(
     let [choice] = best.choices[..] else {
         return Vec::new();
     };
-    if !["sensor-gain", "sensor-offset-from-tool-tip"].contains(&library.cause(choice.candidate).name()) {
+    let of_reading = [EffectName::SensorGain, EffectName::SensorOffsetFromToolTip];
+    if !of_reading.contains(&library.cause(choice.candidate).effect()) {
         return Vec::new();
     }
     // Both along the measured motion.
@@ -123,7 +125,7 @@ pub(crate) fn by_common_factor(
             .filter(|known| known.location == location)
             .filter_map(|known| {
                 let cause = &*library.causes[known.cause];
-                if !["mass", "stiffness", "damping"].contains(&cause.name()) {
+                if !OF_DYNAMIC_STIFFNESS.contains(&cause.effect()) {
                     return None;
                 }
                 let of = |change: f64| cause.parameters(study, &known.location, &[], &[change]);

@@ -8,6 +8,7 @@ use crate::fit::candidate_model::{CandidateModel, Choice};
 use crate::fit::regression::{Regression, Subset};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
 /// A cause at a location, with the regression columns for each set of its nonlinear parameters.
 pub(crate) struct Candidate {
@@ -26,6 +27,10 @@ pub(crate) struct Library {
     /// Causes at their locations.
     pub candidates: Vec<Candidate>,
 }
+
+/// The parameters of the linear structure that one factor changes together.
+pub(crate) const OF_DYNAMIC_STIFFNESS: [EffectName; 3] =
+    [EffectName::Mass, EffectName::Stiffness, EffectName::Damping];
 
 impl Library {
     /// Computes the regressors of all causes and adds them to the regression.
@@ -335,12 +340,14 @@ impl Library {
 
     /// χ² with one common factor on mass, stiffness and damping at `location`, and that factor minus one.
     pub(crate) fn common_factor(&self, regression: &Regression, location: &Location) -> Option<(f64, f64)> {
-        let columns: Vec<usize> = ["mass", "stiffness", "damping"]
+        let columns: Vec<usize> = OF_DYNAMIC_STIFFNESS
             .iter()
-            .map(|name| {
+            .map(|effect| {
                 self.candidates
                     .iter()
-                    .position(|known| self.causes[known.cause].name() == *name && known.location == *location)
+                    .position(|known| {
+                        self.causes[known.cause].effect() == *effect && known.location == *location
+                    })
                     .map(|index| self.candidates[index].variants[0].1[0])
             })
             .collect::<Option<_>>()?;

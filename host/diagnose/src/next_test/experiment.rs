@@ -8,6 +8,7 @@ use super::reading::{Of, Reading, Sensors};
 use crate::conclusion::answer::NextTest;
 use crate::criteria::LARGEST_PROPOSED_MOTION;
 use quietcut_model::case::Case;
+use quietcut_model::effects::{Class, EffectName};
 use quietcut_model::milling::Cut;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Recording};
@@ -143,9 +144,11 @@ impl Experiment {
         let mounted = self.recording(bench, case)?;
         // A second sensor beside the mounted one has none of its faults.
         let mut faultless = case.clone();
-        faultless
-            .extensions
-            .retain(|name, _| !name.starts_with("sensor-") && name != "cross-axis");
+        faultless.extensions.retain(|name, _| {
+            name.parse()
+                .map(EffectName::spec)
+                .is_ok_and(|spec| spec.class != Class::Sensor)
+        });
         let second = self.recording(bench, &faultless)?;
         let mut all = Vec::new();
         for (recording, of) in [(&mounted, Of::Mounted), (&second, Of::Second)] {

@@ -3,13 +3,7 @@
 use crate::candidates::cause::Location;
 use crate::fit::candidate_model::{CandidateModel, Choice};
 use crate::fit::library::Library;
-
-/// The variable that determines the force of a cause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Law {
-    OfDisplacement,
-    OfVelocity,
-}
+use quietcut_model::effects::{Argument, Class};
 
 impl Library {
     /// True if a further cause may join a candidate model.
@@ -61,15 +55,17 @@ impl Library {
     /// True of a cubic spring beside softening-hardening, which contains one, and of a gain beside a ratio for each mode of the same
     /// channel: together they are not identifiable.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
-        let name = |choice: Choice| self.cause(choice.candidate).name();
+        let effect = |choice: Choice| self.cause(choice.candidate).effect();
+        if !effect(one).spec().shares_term_with.contains(&effect(other)) {
+            return false;
+        }
         let location = |choice: Choice| &self.candidates[choice.candidate].location;
-        let cubic = ["cubic-stiffness", "softening-hardening"];
-        let reading = ["sensor-gain", "sensor-offset-from-tool-tip"];
         let is_by_mode =
             |choice: Choice| self.candidates[choice.candidate].variants[choice.variant].1.len() > 1;
-        let are_both = |names: [&str; 2]| names.contains(&name(one)) && names.contains(&name(other));
-        are_both(cubic) && meet(location(one), location(other))
-            || are_both(reading) && location(one) == location(other) && (is_by_mode(one) || is_by_mode(other))
+        match effect(one).spec().class {
+            Class::Sensor => location(one) == location(other) && (is_by_mode(one) || is_by_mode(other)),
+            _ => meet(location(one), location(other)),
+        }
     }
 
     /// True of two terms in the same variable along a common axis.
@@ -83,18 +79,12 @@ impl Library {
     }
 
     /// The variable of a cause, and its location.
-    fn law(&self, choice: Choice) -> Option<(Law, &Location)> {
-        let law = match self.cause(choice.candidate).name() {
-            "stiffness"
-            | "drift"
-            | "quadratic-stiffness"
-            | "cubic-stiffness"
-            | "softening-hardening"
-            | "backlash" => Law::OfDisplacement,
-            "damping" | "cubic-damping" | "coulomb-friction" | "hysteresis" => Law::OfVelocity,
-            _ => return None,
-        };
-        Some((law, &self.candidates[choice.candidate].location))
+    fn law(&self, choice: Choice) -> Option<(Argument, &Location)> {
+        match self.cause(choice.candidate).effect().spec().class {
+            Class::RestoringForce(Argument::TwoDisplacements) => None,
+            Class::RestoringForce(argument) => Some((argument, &self.candidates[choice.candidate].location)),
+            _ => None,
+        }
     }
 }
 

@@ -3,9 +3,9 @@
 //! With x = X·sin ωt a force f_r(x, v) acts at the fundamental as N(X, ω)·x, N = (2/(2πX))·∫f_r·(sin + i·cos) d(ωt) over a period:
 //! the real part is a stiffness, the imaginary part a damping force per displacement.
 
-use std::f64::consts::PI;
+use quietcut_model::effects::EffectName;
 
-use num_complex::Complex64;
+pub use quietcut_model::effects::describing_functions::*;
 
 /// A kind of nonlinearity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
@@ -31,82 +31,23 @@ impl Kind {
     /// Its name, as in a case.
     pub fn name(self) -> &'static str {
         match self {
-            Self::CubicStiffness => "cubic-stiffness",
-            Self::QuadraticStiffness => "quadratic-stiffness",
-            Self::CubicDamping => "cubic-damping",
-            Self::SofteningHardening => "softening-hardening",
-            Self::CoulombFriction => "coulomb-friction",
-            Self::Backlash => "backlash",
-            Self::Hysteresis => "hysteresis",
+            Self::CubicStiffness => EffectName::CubicStiffness.name(),
+            Self::QuadraticStiffness => EffectName::QuadraticStiffness.name(),
+            Self::CubicDamping => EffectName::CubicDamping.name(),
+            Self::SofteningHardening => EffectName::SofteningHardening.name(),
+            Self::CoulombFriction => EffectName::CoulombFriction.name(),
+            Self::Backlash => EffectName::Backlash.name(),
+            Self::Hysteresis => EffectName::Hysteresis.name(),
         }
     }
 }
 
-/// k3·x³ with k3 = 1: ¾X².
-pub fn cubic_stiffness(amplitude: f64) -> Complex64 {
-    Complex64::new(0.75 * amplitude * amplitude, 0.0)
-}
-
-/// k5·x⁵ with k5 = 1: ⅝X⁴.
-pub fn quintic_stiffness(amplitude: f64) -> Complex64 {
-    Complex64::new(0.625 * amplitude.powi(4), 0.0)
-}
-
-/// c3·v³ with c3 = 1: ¾ω³X² in quadrature.
-pub fn cubic_damping(amplitude: f64, omega: f64) -> Complex64 {
-    Complex64::new(0.0, 0.75 * omega.powi(3) * amplitude * amplitude)
-}
-
-/// fc·sign(v) with fc = 1: 4/(πX) in quadrature.
-pub fn coulomb_friction(amplitude: f64) -> Complex64 {
-    Complex64::new(0.0, 4.0 / (PI * amplitude))
-}
-
-/// A spring of unit stiffness with a dead zone ±`half_gap`, minus the spring without it.
-pub fn backlash(amplitude: f64, half_gap: f64) -> Complex64 {
-    if amplitude <= half_gap {
-        return Complex64::new(-1.0, 0.0);
-    }
-    let share = half_gap / amplitude;
-    let missing = 2.0 / PI * (share.asin() + share * (1.0 - share * share).sqrt());
-    Complex64::new(-missing, 0.0)
-}
-
-/// A Bouc–Wen element of stiffness 1, n = 1 and γ = β = ½, less the spring x: (z − x) at the fundamental.
-///
-/// With n = 1 and γ = β the element is linear while it unloads and saturates exponentially while it loads.
-pub fn hysteresis(amplitude: f64, yield_m: f64) -> Complex64 {
-    // From peak to peak: unloading from +z₀ with slope 1 to z = 0, then loading z = −z_y(1 − e^{−s/z_y}) over what is
-    // left, to −z₀. z₀ is the fixed point of that.
-    let stroke = 2.0 * amplitude;
-    let mut low = 0.0;
-    let mut high = yield_m.min(stroke);
-    for _ in 0..60 {
-        let z = 0.5 * (low + high);
-        let reached = -yield_m * (-(stroke - z) / yield_m).exp_m1();
-        if reached > z { low = z } else { high = z }
-    }
-    let top = 0.5 * (low + high);
-    let count = 256;
-    let mut sum = Complex64::ZERO;
-    // Half a period from the upper peak down: x = X·cos p; the other half is the same turned around.
-    for k in 0..count {
-        let p = PI * (f64::from(k) + 0.5) / f64::from(count);
-        let gone = amplitude * (1.0 - p.cos());
-        let z = if gone <= top {
-            top - gone
-        } else {
-            yield_m * (-(gone - top) / yield_m).exp_m1()
-        };
-        let rest = z - amplitude * p.cos();
-        // Against cos p in phase, and against −sin p, the velocity, in quadrature.
-        sum += Complex64::new(rest * p.cos(), -rest * p.sin());
-    }
-    sum * (2.0 / (f64::from(count) * amplitude))
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
+    use num_complex::Complex64;
+
     use super::*;
 
     /// The describing function by a plain sum over a period, with x = X·cos p.

@@ -4,11 +4,12 @@
 //! amplitude where levels come in any order. Levels that only rise or fall with time imitate it.
 //! Fit: linear in r or a, T as a shape. Source: structures with parameters of time as in Poulimenos and Fassois, MSSP 20 (2006).
 
-use super::{Restoring, logarithmic, longest_s, plain};
+use super::restoring::{Restoring, logarithmic, longest_s, plain};
+use quietcut_model::effects::EffectName;
 
 pub(super) const RATE: Restoring = Restoring {
     everywhere: true,
-    ..plain("drift", &["relative_rate_per_s"])
+    ..plain(EffectName::Drift, &["relative_rate_per_s"])
 };
 
 pub(super) const SETTLING: Restoring = Restoring {
@@ -24,5 +25,5 @@ pub(super) const SETTLING: Restoring = Restoring {
     // A stiffness that more than doubles, or vanishes, is another machine.
     physical: |change| change.iter().all(|change| change.abs() <= 1.0),
     bounds: |study, _| vec![[0.05 * longest_s(study), 2.0 * longest_s(study)]],
-    ..plain("drift", &["relative_change"])
+    ..plain(EffectName::Drift, &["relative_change"])
 };

@@ -3,16 +3,17 @@
 //! Shows: all tooth lines grow alike along the record. Does not show: frequencies that move. A sensor whose gain drifts is the same.
 //! Fit: linear in r. Source: Altintas, Manufacturing Automation (2012), ch. 2 (forces over flank wear).
 
-use super::{changed, everywhere};
+use super::process::{changed, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
 pub(super) struct OfEdge;
 
 impl Cause for OfEdge {
-    fn name(&self) -> &'static str {
-        "wear"
+    fn effect(&self) -> EffectName {
+        EffectName::Wear
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

@@ -5,9 +5,10 @@
 //! Fit: linear in each. Source: Altintas, Manufacturing Automation (2012), ch. 2; Budak, Altintas and Armarego (1996).
 
 use super::coefficients::Coefficients;
+use quietcut_model::effects::EffectName;
 
 pub(super) const EDGE_FORCE: Coefficients = Coefficients {
-    name: "edge-force",
+    effect: EffectName::EdgeForce,
     keys: ["kte_n_per_mm", "kre_n_per_mm", "kae_n_per_mm"],
     of: |material| {
         [

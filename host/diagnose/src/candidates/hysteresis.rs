@@ -4,7 +4,8 @@
 //! with amplitude. Does not show: even harmonics. At large slip it is friction and less stiffness.
 //! Fit: linear in k_h for each shape (z_y, n, γ). Source: Wen, J. Eng. Mech. Div. ASCE 102 (1976).
 
-use super::{Restoring, largest_m, logarithmic, plain, smallest_m};
+use super::restoring::{Restoring, largest_m, logarithmic, plain, smallest_m};
+use quietcut_model::effects::EffectName;
 
 pub(super) const CAUSE: Restoring = Restoring {
     nonlinear_parameters: &["yield_m", "exponent", "gamma"],
@@ -24,5 +25,5 @@ pub(super) const CAUSE: Restoring = Restoring {
         ]
     },
     physical: |k| k[0] > 0.0,
-    ..plain("hysteresis", &["hysteretic_stiffness_n_per_m"])
+    ..plain(EffectName::Hysteresis, &["hysteretic_stiffness_n_per_m"])
 };

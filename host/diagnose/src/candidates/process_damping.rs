@@ -4,17 +4,18 @@
 //! where damping of the structure would. At one speed and depth it is damping.
 //! Fit: linear in C, along the measured velocity. Source: Altintas, Eynian and Onozuka, CIRP Annals 57 (2008).
 
-use super::{changed, cutter, everywhere};
+use super::process::{changed, cutter, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_simulate::ProcessDamping;
 
 pub(super) struct OfFlank;
 
 impl Cause for OfFlank {
-    fn name(&self) -> &'static str {
-        "process-damping"
+    fn effect(&self) -> EffectName {
+        EffectName::ProcessDamping
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

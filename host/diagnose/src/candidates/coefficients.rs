@@ -1,15 +1,16 @@
 //! A set of coefficients of the material that differs from that of the case: F is linear in each.
 
-use super::{changed, cutter, everywhere, has_axial};
+use super::process::{changed, cutter, everywhere, has_axial};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Material;
 use quietcut_simulate::Cutter;
 
 /// Tangential, radial and axial coefficient.
 pub(super) struct Coefficients {
-    pub(super) name: &'static str,
+    pub(super) effect: EffectName,
     pub(super) keys: [&'static str; 3],
     /// Where they stand in the material.
     pub(super) of: fn(&mut Material) -> [&mut f64; 3],
@@ -20,12 +21,12 @@ pub(super) struct Coefficients {
 }
 
 impl Cause for Coefficients {
-    fn name(&self) -> &'static str {
-        self.name
+    fn effect(&self) -> EffectName {
+        self.effect
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {
-        everywhere(study, self.name)
+        everywhere(study, self.name())
     }
 
     fn regressors(

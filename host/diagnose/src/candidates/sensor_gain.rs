@@ -7,10 +7,11 @@
 
 use num_complex::Complex64;
 
-use super::{in_cut, of_meant, one_or_all};
+use super::sensor::{in_cut, of_meant, one_or_all};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
 pub(super) struct Gain;
 
@@ -27,8 +28,8 @@ pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
 }
 
 impl Cause for Gain {
-    fn name(&self) -> &'static str {
-        "sensor-gain"
+    fn effect(&self) -> EffectName {
+        EffectName::SensorGain
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

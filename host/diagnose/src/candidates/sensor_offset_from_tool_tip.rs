@@ -7,8 +7,8 @@
 //! Where one mode moves the axis, or the structure is not given by its modes, there is one ratio, and it is what a gain of the channel is
 //! there. So it is in a cut, whose chip is known only along the motion that the sensor tells.
 
-use super::gain::{Gain, factor};
-use super::one_or_all;
+use super::sensor::one_or_all;
+use super::sensor_gain::{Gain, factor};
 use crate::baseline::receptance::{Receptance, response};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::channel::Observed;
@@ -16,6 +16,7 @@ use crate::records::channel::main_axis;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_model::structure::Form;
 
 pub(super) struct Offset;
@@ -79,8 +80,8 @@ fn read_of(study: &Study<'_>, record: &Record, index: usize, mode: usize) -> Vec
 }
 
 impl Cause for Offset {
-    fn name(&self) -> &'static str {
-        "sensor-offset-from-tool-tip"
+    fn effect(&self) -> EffectName {
+        EffectName::SensorOffsetFromToolTip
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

@@ -5,9 +5,10 @@
 //! Fit: linear in each. Source: Altintas, Manufacturing Automation (2012), ch. 2.
 
 use super::coefficients::Coefficients;
+use quietcut_model::effects::EffectName;
 
 pub(super) const FORCE_COEFFICIENTS: Coefficients = Coefficients {
-    name: "force-coefficients",
+    effect: EffectName::ForceCoefficients,
     keys: ["ktc_mpa", "krc_mpa", "kac_mpa"],
     of: |material| {
         [

@@ -3,10 +3,11 @@
 //! Shows: forces in the rhythm of z, with edges that are not at 90°. Does not show: anything where z is stiff or the edge angle is 90°.
 //! Fit: no parameter; the coefficient of the change must come out near 1. Source: thesis, eq. 3.5.
 
-use super::{changed, everywhere, has_axial};
+use super::process::{changed, everywhere, has_axial};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
 pub(super) struct OfDepth;
 
@@ -14,8 +15,8 @@ pub(super) struct OfDepth;
 const ROUNDING: f64 = 0.35;
 
 impl Cause for OfDepth {
-    fn name(&self) -> &'static str {
-        "axial-depth-modulation"
+    fn effect(&self) -> EffectName {
+        EffectName::AxialDepthModulation
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

@@ -4,9 +4,10 @@
 //! cubic spring below its turn, x² = −k3/(2·k5). Two regimes with an edge between them are backlash, or unexplained.
 //! Fit: linear in both. Source: Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 4 (the quintic term of the Duffing oscillator).
 
-use super::{Restoring, plain};
+use super::restoring::{Restoring, plain};
+use quietcut_model::effects::EffectName;
 
 pub(super) const CAUSE: Restoring = Restoring {
     physical: |k| k[0] < 0.0 && k[1] > 0.0,
-    ..plain("softening-hardening", &["k3_n_per_m3", "k5_n_per_m5"])
+    ..plain(EffectName::SofteningHardening, &["k3_n_per_m3", "k5_n_per_m5"])
 };

@@ -9,6 +9,7 @@
 use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_recording::Quantity;
 
 pub(super) struct ForceGain;
@@ -26,8 +27,8 @@ fn names(location: &Location) -> &[String] {
 }
 
 impl Cause for ForceGain {
-    fn name(&self) -> &'static str {
-        "sensor-gain"
+    fn effect(&self) -> EffectName {
+        EffectName::SensorGain
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

@@ -4,6 +4,7 @@
 //! spring under a static load has the same term.
 //! Fit: linear in k2. Source: Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2.
 
-use super::{Restoring, plain};
+use super::restoring::{Restoring, plain};
+use quietcut_model::effects::EffectName;
 
-pub(super) const CAUSE: Restoring = plain("quadratic-stiffness", &["k2_n_per_m2"]);
+pub(super) const CAUSE: Restoring = plain(EffectName::QuadraticStiffness, &["k2_n_per_m2"]);

@@ -4,7 +4,8 @@
 //! change of damping, or anything but less stiffness within the gap.
 //! Fit: linear in s for each gap, the gap as a shape. Source: Nordin and Gutman, Automatica 38 (2002).
 
-use super::{Restoring, largest_m, logarithmic, plain, smallest_m};
+use super::restoring::{Restoring, largest_m, logarithmic, plain, smallest_m};
+use quietcut_model::effects::EffectName;
 
 pub(super) const CAUSE: Restoring = Restoring {
     nonlinear_parameters: &["gap_mm"],
@@ -18,5 +19,5 @@ pub(super) const CAUSE: Restoring = Restoring {
     },
     bounds: |study, axis| vec![[1.0 * smallest_m(study, axis), 2e3 * largest_m(study, axis)]],
     physical: |share| share[0] > 0.0 && share[0] <= 1.02,
-    ..plain("backlash", &["stiffness_fraction"])
+    ..plain(EffectName::Backlash, &["stiffness_fraction"])
 };

@@ -6,10 +6,11 @@
 //! Fit: with a chip h* to measure by, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*): the coefficients are p − 1 and q, and
 //! their regressors are exact at the shape (p, q) that they are made for.
 
-use super::{added, changed, cutter, everywhere, step};
+use super::process::{added, changed, cutter, everywhere, step};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_simulate::ChipLaw;
 
 pub(super) struct ForceExponent;
@@ -23,8 +24,8 @@ fn reference_m(study: &Study<'_>) -> f64 {
 }
 
 impl Cause for ForceExponent {
-    fn name(&self) -> &'static str {
-        "force-exponent"
+    fn effect(&self) -> EffectName {
+        EffectName::ForceExponent
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

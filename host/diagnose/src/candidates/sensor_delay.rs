@@ -6,10 +6,11 @@
 
 use num_complex::Complex64;
 
-use super::{in_cut, in_steps, meant, of_meant, one_or_all};
+use super::sensor::{in_cut, in_steps, meant, of_meant, one_or_all};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
 pub(super) struct Delay;
 
@@ -20,8 +21,8 @@ const LONGEST: f64 = 0.4;
 const ANOTHER: f64 = 100.0;
 
 impl Cause for Delay {
-    fn name(&self) -> &'static str {
-        "sensor-delay"
+    fn effect(&self) -> EffectName {
+        EffectName::SensorDelay
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

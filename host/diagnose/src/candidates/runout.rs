@@ -6,10 +6,11 @@
 
 use std::f64::consts::TAU;
 
-use super::{added, changed, cutter, everywhere, step};
+use super::process::{added, changed, cutter, everywhere, step};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Runout;
 use quietcut_simulate::Cutter;
 
@@ -34,8 +35,8 @@ fn offset(along_um: f64, across_um: f64) -> impl Fn(&mut Cutter) {
 }
 
 impl Cause for OfTool {
-    fn name(&self) -> &'static str {
-        "runout"
+    fn effect(&self) -> EffectName {
+        EffectName::Runout
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

@@ -7,11 +7,12 @@
 //! with that swing less the one at steady speed then has the coefficient 1: that it is near 1 is what the record confirms; how
 //! large the swing is, the tachometer knows better.
 
-use super::everywhere;
+use super::process::everywhere;
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::motion::spindle_motion::{SpeedModulation, SpindleMotion, speed_modulation};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_simulate::Fluctuation;
 
 pub(super) struct OfSpindle;
@@ -30,8 +31,8 @@ fn of_tachometer(study: &Study<'_>) -> Option<SpeedModulation> {
 }
 
 impl Cause for OfSpindle {
-    fn name(&self) -> &'static str {
-        "speed-fluctuation"
+    fn effect(&self) -> EffectName {
+        EffectName::SpeedFluctuation
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

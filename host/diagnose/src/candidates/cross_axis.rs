@@ -6,10 +6,11 @@
 
 use num_complex::Complex64;
 
-use super::{channels, in_cut, of_meant};
+use super::sensor::{channels, in_cut, of_meant};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 
 pub(super) struct CrossAxis;
 
@@ -17,8 +18,8 @@ pub(super) struct CrossAxis;
 const SMALL_FRACTION: f64 = 0.05;
 
 impl Cause for CrossAxis {
-    fn name(&self) -> &'static str {
-        "cross-axis"
+    fn effect(&self) -> EffectName {
+        EffectName::CrossAxis
     }
 
     fn locations(&self, study: &Study<'_>) -> Vec<Location> {

@@ -2,10 +2,11 @@
 //!
 //! In the steady state of a stable linear cut without measured force one gain on all channels is exactly the same.
 
-use super::{changed, cutter, everywhere};
+use super::process::{changed, cutter, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Material;
 
 /// Coefficients of the cut, and those of an edge that has a force.
@@ -47,15 +48,15 @@ fn scaled(material: Material, factor: f64) -> Material {
 }
 
 impl Cause for CommonFactor {
-    fn name(&self) -> &'static str {
-        "force-coefficients"
+    fn effect(&self) -> EffectName {
+        EffectName::ForceCoefficients
     }
 
     fn names(&self) -> Vec<&'static str> {
         if self.with_edge {
-            vec!["force-coefficients", "edge-force"]
+            vec![EffectName::ForceCoefficients.name(), EffectName::EdgeForce.name()]
         } else {
-            vec!["force-coefficients"]
+            vec![EffectName::ForceCoefficients.name()]
         }
     }
 

@@ -4,9 +4,10 @@
 //! frequency that moves. At one level it is damping.
 //! Fit: linear in c3. Source: Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2.
 
-use super::{Restoring, plain};
+use super::restoring::{Restoring, plain};
+use quietcut_model::effects::EffectName;
 
 pub(super) const CAUSE: Restoring = Restoring {
     each: true,
-    ..plain("cubic-damping", &["c3_ns3_per_m3"])
+    ..plain(EffectName::CubicDamping, &["c3_ns3_per_m3"])
 };

@@ -5,9 +5,10 @@
 //! nothing tells the two apart.
 //! Fit: linear in k3. Source: Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2; Kerschen et al., MSSP 20 (2006).
 
-use super::{Restoring, plain};
+use super::restoring::{Restoring, plain};
+use quietcut_model::effects::EffectName;
 
 pub(super) const CAUSE: Restoring = Restoring {
     each: true,
-    ..plain("cubic-stiffness", &["k3_n_per_m3"])
+    ..plain(EffectName::CubicStiffness, &["k3_n_per_m3"])
 };

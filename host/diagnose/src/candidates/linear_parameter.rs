@@ -19,6 +19,7 @@ use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 use crate::records::study::Study;
+use quietcut_model::effects::EffectName;
 use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
@@ -29,20 +30,13 @@ const STEP: f64 = 1e-4;
 const VANISHING: f64 = 0.05;
 
 #[derive(Clone, Copy)]
-enum Which {
+pub(super) enum Which {
     Mass,
     Stiffness,
     Damping,
 }
 
-struct Linear(Which);
-
-pub(crate) fn all() -> Vec<Box<dyn Cause>> {
-    [Which::Mass, Which::Stiffness, Which::Damping]
-        .into_iter()
-        .map(|which| Box::new(Linear(which)) as Box<dyn Cause>)
-        .collect()
-}
+pub(super) struct Linear(pub(super) Which);
 
 impl Linear {
     fn key(&self) -> &'static str {
@@ -78,11 +72,11 @@ impl Linear {
 }
 
 impl Cause for Linear {
-    fn name(&self) -> &'static str {
+    fn effect(&self) -> EffectName {
         match self.0 {
-            Which::Mass => "mass",
-            Which::Stiffness => "stiffness",
-            Which::Damping => "damping",
+            Which::Mass => EffectName::Mass,
+            Which::Stiffness => EffectName::Stiffness,
+            Which::Damping => EffectName::Damping,
         }
     }
 

@@ -6,17 +6,18 @@
 //! Fit: linear in fc along the motion, sticking in the simulation. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica
 //! 30 (1994).
 
-use super::{Restoring, largest_m, plain};
+use super::restoring::{Restoring, largest_m, plain};
 use crate::records::domain::Domain;
+use quietcut_model::effects::EffectName;
 
 pub(super) const ALIKE: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc > 0.0),
-    ..plain("coulomb-friction", &["fc_n"])
+    ..plain(EffectName::CoulombFriction, &["fc_n"])
 };
 
 pub(super) const EACH_WAY: Restoring = Restoring {
     physical: |fc| fc.iter().all(|fc| *fc >= 0.0),
-    ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
+    ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
 /// Friction that takes hold only once a play has been crossed: no force after a reversal, then friction.
@@ -31,7 +32,7 @@ pub(super) const BEHIND_PLAY: Restoring = Restoring {
     bounds: |study, axis| vec![[largest_m(study, axis), 1.9e3 * largest_m(study, axis)]],
     physical: |fc| fc.iter().all(|fc| *fc >= 0.0) && fc.iter().any(|fc| *fc > 0.0),
     behind_play: true,
-    ..plain("coulomb-friction", &["fc_n", "fc_minus_n"])
+    ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
 /// The same where the joint that has the play closes softly. Where a structure moves freely a loop of Bouc and Wen takes its place:

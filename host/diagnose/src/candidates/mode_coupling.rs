@@ -4,14 +4,16 @@
 //! amplitude of the other. Does not show: anything where one of them rests.
 //! Fit: linear. Source: Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 6.
 
-use super::{Restoring, plain};
+use super::restoring::{Restoring, plain};
+use quietcut_model::effects::EffectName;
 
 pub(super) const QUARTIC: Restoring = Restoring {
     axes: 2,
-    ..plain("mode-coupling", &["kxyy_n_per_m3"])
+    is_symmetric: true,
+    ..plain(EffectName::ModeCoupling, &["kxyy_n_per_m3"])
 };
 
 pub(super) const CUBIC: Restoring = Restoring {
     axes: 2,
-    ..plain("mode-coupling", &["kxxy_n_per_m2"])
+    ..plain(EffectName::ModeCoupling, &["kxxy_n_per_m2"])
 };

@@ -1,0 +1,5 @@
+//! The mass differs from the case: linear in its relative change.
+
+use super::linear_parameter::{Linear, Which};
+
+pub(super) const CAUSE: Linear = Linear(Which::Mass);
