@@ -375,6 +375,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         "[extension.softening-hardening]\nk3_n_per_m3 = -4e14\nk5_n_per_m5 = 3e24\ndirection = \"x\"\n";
     let shared =
         "[extension.mode-coupling]\nkxyy_n_per_m3 = 4e14\nkxxy_n_per_m2 = 2e9\ndirections = [\"x\", \"y\"]\n";
+    let squared = "[extension.quadratic-damping]\nc2_ns2_per_m2 = 60.0\ndirection = \"x\"\n";
     let mode = "[extension.missing-mode]\nfrequency_hz = 700.0\nmodal_mass_kg = 0.1\ndirection = \"x\"\n";
     let material = "[extension.force-coefficients]\nktc_mpa = 750.0\n[extension.stiffness]\nstiffness_n_per_m = 1.5e6\ndirection = \"x\"\n";
     let two = "insperger-2dof-ad0.5";
@@ -385,6 +386,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         (two, spring),
         (two, turn),
         (two, shared),
+        (two, squared),
         (two, mode),
         (two, material),
     ] {
@@ -431,12 +433,14 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
             expected.multiplier_abs, plain.multiplier_abs
         );
         // The share of the other direction's multiplier, nearly as large; the extension itself moves the multiplier by far more.
+        // The slope of quadratic damping has a kink where the velocity changes sign: found is a difference of 4e-3, of a change of 7e-2.
+        let tolerance = if extension == squared { 6e-3 } else { 1e-3 };
         assert!(
-            (found - expected.multiplier_abs).abs() < 1e-3,
+            (found - expected.multiplier_abs).abs() < tolerance,
             "{extension}: {found} {expected:?}"
         );
         assert!(
-            (plain.multiplier_abs - expected.multiplier_abs).abs() > 1e-3,
+            (plain.multiplier_abs - expected.multiplier_abs).abs() > tolerance,
             "{extension}"
         );
     }

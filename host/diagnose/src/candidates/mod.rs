@@ -24,6 +24,7 @@ mod missing_mode;
 mod mode_coupling;
 mod process;
 mod process_damping;
+mod quadratic_damping;
 mod quadratic_stiffness;
 mod restoring;
 mod runout;
@@ -57,6 +58,7 @@ fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
         EffectName::QuadraticStiffness => vec![Box::new(quadratic_stiffness::CAUSE)],
         EffectName::CubicDamping => vec![Box::new(cubic_damping::CAUSE)],
         EffectName::SofteningHardening => vec![Box::new(softening_hardening::CAUSE)],
+        EffectName::QuadraticDamping => vec![Box::new(quadratic_damping::CAUSE)],
         EffectName::CoulombFriction => vec![
             Box::new(coulomb_friction::ALIKE),
             Box::new(coulomb_friction::EACH_WAY),

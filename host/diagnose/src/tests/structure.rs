@@ -123,6 +123,12 @@ fn single_causes_are_named_with_their_size() {
             -1e12,
         ),
         (vec!["cubic-damping=3e6"], "cubic-damping", "c3_ns3_per_m3", 3e6),
+        (
+            vec!["quadratic-damping=3000"],
+            "quadratic-damping",
+            "c2_ns2_per_m2",
+            3e3,
+        ),
         (vec!["coulomb-friction=1"], "coulomb-friction", "fc_n", 1.0),
         (
             vec!["backlash=0.1", "backlash.stiffness_fraction=0.2"],

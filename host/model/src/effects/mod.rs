@@ -26,6 +26,7 @@ pub(crate) mod nearest;
 mod pickup;
 mod place;
 mod process_damping;
+mod quadratic_damping;
 mod quadratic_stiffness;
 mod runout;
 mod sensor_delay;
@@ -76,6 +77,7 @@ list! {
     QuadraticStiffness => quadratic_stiffness::QUADRATIC_STIFFNESS,
     CubicDamping => cubic_damping::CUBIC_DAMPING,
     SofteningHardening => softening_hardening::SOFTENING_HARDENING,
+    QuadraticDamping => quadratic_damping::QUADRATIC_DAMPING,
     CoulombFriction => coulomb_friction::COULOMB_FRICTION,
     Backlash => backlash::BACKLASH,
     Hysteresis => hysteresis::HYSTERESIS,

@@ -73,3 +73,62 @@ fn the_list_is_whole_and_each_specification_names_its_own_entry() {
         }
     }
 }
+
+/// The describing function of a term by a sum over a period of x = X·sin ωt.
+#[test]
+fn closed_forms_of_describing_functions_are_the_sums() {
+    use crate::path::{Motion, restoring_along};
+    use std::f64::consts::TAU;
+
+    let structure = crate::case::tests::case("kuka-kr90-y17-low").structure.unwrap();
+    let (amplitude, omega, count, periods) = (2e-5, 110.0, 20_000, 12);
+    let angle = |sample: usize| TAU * (sample as f64 + 0.5) / f64::from(count);
+    let signal = |of: fn(f64) -> f64, size: f64| -> Vec<f64> {
+        (0..periods * count as usize)
+            .map(|n| size * of(angle(n)))
+            .collect()
+    };
+    let motion = Motion {
+        step_s: TAU / omega / f64::from(count),
+        x: [Vec::new(), signal(f64::sin, amplitude), Vec::new()],
+        v: [Vec::new(), signal(f64::cos, amplitude * omega), Vec::new()],
+        ..Motion::default()
+    };
+    let mut tried = 0;
+    for texts in [
+        &["cubic-stiffness=-5e12"][..],
+        &["quadratic-stiffness=3e9"],
+        &["cubic-damping=2.5e6"],
+        &[
+            "softening-hardening=-5e12",
+            "softening-hardening.k5_n_per_m5=4e21",
+        ],
+        &["quadratic-damping=2e4"],
+        &["coulomb-friction=3"],
+        &["backlash=0.02", "backlash.stiffness_fraction=0.4"],
+        &["hysteresis=2e5", "hysteresis.yield_m=1e-5"],
+    ] {
+        let effects = Effects::parse(texts.iter().copied()).unwrap();
+        for term in effects
+            .0
+            .iter()
+            .flat_map(|effect| effect.terms(&structure).unwrap())
+        {
+            let closed = term.describing_function(amplitude, omega).unwrap();
+            let force = &restoring_along(&*term, &motion)[1];
+            let last = (periods - 1) * count as usize..periods * count as usize;
+            let part = |of: fn(f64) -> f64| {
+                let sum: f64 = last.clone().map(|n| force[n] * of(angle(n))).sum();
+                2.0 * sum / (f64::from(count) * amplitude)
+            };
+            let summed = num_complex::Complex64::new(part(f64::sin), part(f64::cos));
+            let size = closed.norm().max(1.0);
+            assert!(
+                (summed - closed).norm() < 2e-3 * size,
+                "{texts:?}: {summed} {closed}"
+            );
+            tried += 1;
+        }
+    }
+    assert_eq!(tried, 8);
+}

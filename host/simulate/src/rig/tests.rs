@@ -44,10 +44,11 @@ fn every_smooth_term_obeys_its_equation() {
     let tones = Signal::tones(&[16.0, 17.4, 18.1], [30.0, 30.0], 3.0, 2);
     let (m, c, k) = (188.0, 305.0, 2.26e6);
     type Law = fn(f64, f64, f64) -> f64;
-    let cases: [(&[&str], Law); 6] = [
+    let cases: [(&[&str], Law); 7] = [
         (&["cubic-stiffness=-5e12"], |x, _, _| -5e12 * x.powi(3)),
         (&["quadratic-stiffness=3e9"], |x, _, _| 3e9 * x * x),
         (&["cubic-damping=2.5e6"], |_, v, _| 2.5e6 * v.powi(3)),
+        (&["quadratic-damping=2e4"], |_, v, _| 2e4 * v.abs() * v),
         (
             &[
                 "softening-hardening=-5e12",
@@ -78,6 +79,38 @@ fn every_smooth_term_obeys_its_equation() {
         // The motion is good to 1e-8 of its amplitude, the spring force of which is 300 N.
         assert!(worst < 1e-4 && largest > 0.5, "{effects:?}: {worst} of {largest}");
     }
+}
+
+#[test]
+fn the_inverse_amplitude_grows_by_the_same_in_every_cycle_of_quadratic_damping() {
+    // A cycle dissipates ∮c2·|v|³ dt = (8/3)·c2·ω²·A³ of the energy ½·m·ω²·A²: d(1/A)/dn = (8/3)·c2/m, to first order in c2·A/m.
+    let (m, c2) = (188.0, 2_000.0);
+    let effects = ["damping=-0.99999999", "quadratic-damping=2000"];
+    let release = Signal::Release {
+        force_n: 500.0,
+        pull_s: 3.0,
+        seconds: 4.0,
+    };
+    let (recording, _) = Rig {
+        sample_rate_hz: 20_000.0,
+        ..rig(release, &effects)
+    }
+    .record(&linear(), Path::new("a.csv"))
+    .unwrap();
+    let y = &samples(&recording, "y")[(3.6 * 20_000.0) as usize..];
+    // A maximum once per cycle.
+    let tops: Vec<f64> = y
+        .windows(3)
+        .filter(|top| top[1] > 0.0 && top[0] < top[1] && top[1] >= top[2])
+        .map(|top| top[1])
+        .collect();
+    assert!(tops.len() > 40 && tops[40] < 0.97 * tops[0], "{tops:?}");
+    let slope = (1.0 / tops[40] - 1.0 / tops[0]) / 40.0;
+    let exact = 8.0 / 3.0 * c2 / m;
+    assert!(
+        (slope / exact - 1.0).abs() < 3.0 * c2 * tops[0] / m,
+        "{slope} {exact}"
+    );
 }
 
 #[test]

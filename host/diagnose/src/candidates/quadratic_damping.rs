@@ -1,0 +1,9 @@
+//! f_r += c2·|v|·v: linear in c2 along the measured motion.
+
+use super::restoring::{Restoring, plain};
+use quietcut_model::effects::EffectName;
+
+pub(super) const CAUSE: Restoring = Restoring {
+    each: true,
+    ..plain(EffectName::QuadraticDamping, &["c2_ns2_per_m2"])
+};

@@ -1,0 +1,45 @@
+//! A damping force that grows with the square of the velocity: f_r += c2·|v|·v.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::local_force::LocalForce;
+use super::{Argument, Class, EffectName, EffectSpec, Locations, Parameter, Treatment};
+
+/// The specification.
+pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
+    id: EffectName::QuadraticDamping,
+    name: "quadratic-damping",
+    class: Class::RestoringForce(Argument::Velocity),
+    locations: Locations::EachDirection,
+    parameters: &[Parameter::number("c2_ns2_per_m2", "N s²/m²", "quadratic damping")
+        .linear()
+        .main()],
+    // |v|·v has the continuous derivative 2·|v|.
+    treatment: Treatment::Smooth,
+    candidates: &["one law along one direction, or a law along each"],
+    shares_term_with: &[],
+    summary: "a damping force grows with the square of the velocity",
+    equation: "f_r += c2·|v|·v",
+    shows: "damping that grows in proportion to the velocity, and odd harmonics in phase with it, at two levels or in a free decay",
+    hidden_by: "recordings at one level, where it is damping; it moves no frequency",
+    source: "Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2",
+    example: "c2_ns2_per_m2 = 600.0\ndirection = \"x\"",
+    build: |values| {
+        Ok(Arc::new(LocalForce {
+            id: EffectName::QuadraticDamping,
+            coefficients: [values.main("c2_ns2_per_m2")?, 0.0],
+            law: |[c2, _], _, v| c2 * v.abs() * v,
+            slopes: |[c2, _], _, v| [0.0, 2.0 * c2 * v.abs()],
+            describing_function: |[c2, _], amplitude, omega| c2 * describing_function(amplitude, omega),
+            direction: values.direction()?,
+        }))
+    },
+};
+
+/// The describing function for c2 = 1: the damping c_eq = (8/3π)·ω·X, that is (8/3π)·ω²·X in quadrature.
+fn describing_function(amplitude: f64, omega: f64) -> Complex64 {
+    Complex64::new(0.0, 8.0 / (3.0 * PI) * omega * omega * amplitude)
+}
