@@ -13,17 +13,18 @@ use super::{Error, Output, finite, non_negative, positive};
 use crate::case::Case;
 use crate::file;
 use crate::recording::{Quantity, Sidecar, WRITTEN};
+use crate::simulate::effect::table::help;
 use crate::simulate::{
     Accelerometer, Effects, Entry, Recorder, SimulateError, Statistics, TachometerModel, VirtualCut,
     VirtualCutError,
 };
 
+const EXAMPLE: &str = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 20 --sample-rate-hz 128 --noise-percent 1 --out steps.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment porous --rpm 820 --depth-mm 2 --start-deg 0 --exit-deg 180 --seconds 60 --sample-rate-hz 1024 --noise-percent 1 --out porous.csv";
+
 /// A virtual cut: exact switching of the teeth, loss of contact, runout, and the sensor that hears it; with --experiment
 /// a virtual test rig.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 20 --sample-rate-hz 128 --noise-percent 1 --out steps.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment porous --rpm 820 --depth-mm 2 --start-deg 0 --exit-deg 180 --seconds 60 --sample-rate-hz 1024 --noise-percent 1 --out porous.csv"
-)]
+#[command(after_help = EXAMPLE, after_long_help = format!("{}\n{EXAMPLE}", help()))]
 pub struct Args {
     /// The case file: structure, tool, material, cut.
     #[arg(value_name = "CASE")]
@@ -46,7 +47,7 @@ pub struct Args {
     no_force: bool,
     #[command(flatten)]
     milling_rig: MillingRig,
-    /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated.
+    /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated; listed below.
     #[arg(long, value_name = "NAME=VALUE")]
     effect: Vec<String>,
     /// How the tool comes into the workpiece and out: through its faces, with a depth that grows, or in full cut all
