@@ -1,4 +1,4 @@
-//! The loop of averaged coefficients: one frequency, no period (eqs 3.8–3.12).
+//! Loop with averaged directional coefficients: one frequency, no dependence on the phase of the period (eqs 3.8–3.12).
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -9,24 +9,25 @@ use crate::error::StabilityError;
 use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_numerics::eigenvalues;
 
-/// u = H (κ α₀ − β₀) u with the averages α₀ (times K_tc) and β₀ = β_e + β_f over a tooth period.
+/// Open loop of the averaged cut: u = H (κ α₀ − β₀) u, with the averages α₀ (times K_tc) and β₀ = β_e + β_f over a
+/// tooth period.
 ///
-/// β₀ does not depend on the depth: with H̃ = (I + H β₀)⁻¹ H, u = κ H̃ α₀ u, and the eigenvalues of H̃ α₀ say all. Only
-/// displacements that change the chip thickness count in it.
+/// β₀ does not depend on the depth. With H̃ = (I + H β₀)⁻¹ H, u = κ H̃ α₀ u, and the eigenvalues of H̃ α₀ determine the
+/// limits. Only displacements that change the chip thickness enter.
 pub(crate) struct AveragedLoop<'a> {
     problem: &'a FrequencyProblem,
-    /// The delay, s; `None` where the displacement a tooth period ago is neglected.
+    /// Regenerative delay, s; `None` if the displacement one tooth period ago is neglected.
     delay_s: Option<f64>,
-    /// K_tc α₀, Pa.
+    /// Averaged directional coefficients K_tc α₀, Pa.
     directional: Matrix3<f64>,
-    /// The z column of β₀, N/m; zero where the depth does not follow the axial vibration.
+    /// Axial (z) column of β₀, N/m; zero without axial-depth modulation.
     forced: Vector3<f64>,
-    /// The directions that change the chip thickness.
+    /// Indices of the directions that change the chip thickness.
     axes: Vec<usize>,
 }
 
 impl<'a> AveragedLoop<'a> {
-    /// The loop at a speed, rev/min, or that of the cut without its own past.
+    /// Loop at a spindle speed in rev/min; without regeneration if the speed is `None`.
     pub(crate) fn new(problem: &'a FrequencyProblem, rpm: Option<f64>) -> Self {
         let process = &problem.process;
         let averaged = process
@@ -48,14 +49,13 @@ impl<'a> AveragedLoop<'a> {
         }
     }
 
-    /// Refuses depths at which a table ends before the loop has become smaller than 1.
+    /// Refuses depths at which a table of receptances ends while the loop gain is still 1 or more.
     ///
-    /// Beyond its last line a table is continued as inertia: that nothing becomes unstable there can be said only where
-    /// the gain of the loop is below 1 at the last line already. A mode above the table is not seen, however small the
-    /// loop is.
+    /// Beyond its last line a table is extrapolated as inertia. Instability there can be excluded only if the loop gain
+    /// is already below 1 at the last line. A mode above the table remains undetected, however small the gain.
     ///
     /// # Errors
-    /// The gain at the last line, with the displacement and its past in opposition, is 1 or more at that depth.
+    /// The gain at the last line, with the displacement and its past in opposite phase, is 1 or more at that depth.
     pub(crate) fn check_reach(problem: &FrequencyProblem, depth_mm: f64) -> Result<(), StabilityError> {
         let Some((_, last_hz)) = problem.band_hz() else {
             return Ok(());
@@ -76,12 +76,12 @@ impl<'a> AveragedLoop<'a> {
         })
     }
 
-    /// 1 + (Hβ₀)_zz, which is det(I + Hβ₀).
+    /// Factor 1 + (Hβ₀)_zz, which equals det(I + Hβ₀).
     fn modulation(&self, h: &Matrix3<Complex64>) -> Complex64 {
         Complex64::ONE + (h.row(2) * self.forced.map(Complex64::from))[0]
     }
 
-    /// H̃ α₀ by Sherman and Morrison.
+    /// Matrix H̃ α₀, by the Sherman–Morrison formula.
     fn matrix(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         let h = self.problem.transfer(s)?;
         let change = h * self.forced.map(Complex64::from) * h.row(2);
@@ -122,7 +122,7 @@ impl OpenLoop for AveragedLoop<'_> {
     }
 
     fn real_end(&self) -> Option<RealEnd> {
-        // With regeneration loci start at 0; without, at the static compliance.
+        // With regeneration loci start at 0; without it, at the static compliance.
         if self.delay_s.is_some() {
             return None;
         }
@@ -144,14 +144,14 @@ impl OpenLoop for AveragedLoop<'_> {
         let lines = self.problem.lines();
         let mut end = lines.last().copied().unwrap_or(0.0).max(1.5 * fastest);
         let size = |omega: f64| Some(2.0 * self.matrix(Complex64::new(0.0, omega))?.norm());
-        // Beyond all resonances receptances only fall.
+        // Receptances only decrease above all resonances.
         while end > 0.0 && size(end)? >= floor {
             end *= 1.4;
         }
         let mut grid = around(&resonances, end);
         grid.extend(lines.into_iter().filter(|&line| line < end));
         if let Some(delay_s) = self.delay_s {
-            // A locus turns by half of ωτ: a step turns it by a sixth of a turn at most.
+            // The locus rotates by ωτ/2: at least six steps for each revolution of it.
             let steps = (end * delay_s * 3.0 / std::f64::consts::TAU).ceil();
             grid.extend((1..steps as usize).map(|i| end * i as f64 / steps));
         }

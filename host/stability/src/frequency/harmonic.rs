@@ -1,4 +1,4 @@
-//! The loop of periodic coefficients, by its harmonics: the truncated harmonic transfer matrix.
+//! Loop with periodic directional coefficients: the truncated harmonic transfer matrix.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -10,27 +10,29 @@ use crate::spectrum::stability_loss::StabilityLoss;
 use quietcut_model::milling::Harmonic;
 use quietcut_numerics::eigenvalues;
 
-/// u(t) = e^{st} Σ_p u_p e^{ipΩt}: u_p = H(s + ipΩ) Σ_q (κ α_{p−q} − β_{p−q}) u_q, with p, q from −K−1 to K.
+/// Open loop of the periodic cut. With u(t) = e^{st} Σ_p u_p e^{ipΩt}:
 ///
-/// Ω is the tooth-passing frequency, α_k and β_k the harmonics of the coefficients. e^{−(s+ipΩ)τ} is the same for all
-/// p, so that κ stands before the whole matrix. At s = iΩ/2 the frequencies are symmetric about 0: there a multiplier −1
-/// is a real eigenvalue, and the loop is real. s from 0 to iΩ/2 and the conjugate is all there is: what is true at
-/// s is true at s + iΩ. Forces jump where a tooth enters or leaves, so α_k falls as 1/k and H as 1/k²: what is left out
+///   u_p = H(s + ipΩ) Σ_q (κ α_{p−q} − β_{p−q}) u_q,   p, q from −K−1 to K.
+///
+/// Ω is the tooth-passing frequency; α_k and β_k are the harmonics of the coefficients. e^{−(s+ipΩ)τ} is the same for
+/// all p, so that κ multiplies the whole matrix. At s = iΩ/2 the frequencies are symmetric about 0: a multiplier −1 is
+/// a real eigenvalue there, and the loop is real. The range of s from 0 to iΩ/2, with its conjugate, suffices, since
+/// roots repeat with iΩ. Forces jump where a tooth enters or leaves, so that α_k falls as 1/k and H as 1/k². Truncation
 /// changes limits as 1/K³, and as 1/K² for a structure whose residues do not sum to zero.
 pub(crate) struct HarmonicLoop<'a> {
     problem: &'a FrequencyProblem,
     /// Tooth-passing frequency Ω, rad/s.
     passing: f64,
-    /// K.
+    /// Highest harmonic K.
     harmonics: usize,
-    /// Harmonics of the coefficients from −(2K + 1) to 2K + 1.
+    /// Harmonics of the coefficients, from −(2K + 1) to 2K + 1.
     coefficients: Vec<Harmonic>,
-    /// The directions that change the chip thickness or the depth.
+    /// Indices of the directions that change the chip thickness or the axial depth.
     axes: Vec<usize>,
 }
 
 impl<'a> HarmonicLoop<'a> {
-    /// The loop at a speed, rev/min, with harmonics up to K.
+    /// Loop at a spindle speed (rev/min) with harmonics up to K.
     pub(crate) fn new(problem: &'a FrequencyProblem, rpm: f64, harmonics: usize) -> Self {
         let process = &problem.process;
         let most = 2 * harmonics as i32 + 1;
@@ -55,7 +57,7 @@ impl<'a> HarmonicLoop<'a> {
         }
     }
 
-    /// The fewest harmonics that reach beyond every resonance.
+    /// Fewest harmonics that cover every resonance.
     pub(crate) fn least_harmonics(problem: &FrequencyProblem, rpm: f64) -> usize {
         let fastest = problem
             .resonances()
@@ -66,12 +68,12 @@ impl<'a> HarmonicLoop<'a> {
         (1.25 * fastest / passing).ceil() as usize + 4
     }
 
-    /// K.
+    /// Highest harmonic K.
     pub(crate) fn harmonics(&self) -> usize {
         self.harmonics
     }
 
-    /// The limits with every second line of a table, none where they cannot be had; `None` without a table.
+    /// Limits from every second line of a table, empty if they cannot be computed; `None` without a table.
     pub(crate) fn thinned_limits(&self, depth_m: f64) -> Option<Vec<AxisCrossing>> {
         let problem = self.problem.thinned()?;
         let thinned = HarmonicLoop {
@@ -84,12 +86,12 @@ impl<'a> HarmonicLoop<'a> {
         Some(limits(&thinned, depth_m).unwrap_or_default())
     }
 
-    /// Number of frequencies.
+    /// Number of frequencies, 2K + 2.
     fn count(&self) -> usize {
         2 * self.harmonics + 2
     }
 
-    /// H at all frequencies, from the lowest up.
+    /// Receptances H at all frequencies s + ipΩ, lowest first.
     fn transfers(&self, s: Complex64) -> Option<Vec<Matrix3<Complex64>>> {
         (0..self.count())
             .map(|index| {
@@ -100,13 +102,13 @@ impl<'a> HarmonicLoop<'a> {
             .collect()
     }
 
-    /// The harmonic p − q of the coefficients.
+    /// Harmonic p − q of the coefficients.
     fn coefficient(&self, p: usize, q: usize) -> &Harmonic {
-        // Both below the count: the difference lies within what was made.
+        // Both indices are below the number of frequencies, so that the difference is within the stored harmonics.
         &self.coefficients[p + 2 * self.harmonics + 1 - q]
     }
 
-    /// Blocks H_p α_{p−q} and H_p β_{p−q}, both over the directions that are seen.
+    /// Blocks H_p α_{p−q} and H_p β_{p−q}, both restricted to `axes`.
     fn matrices(&self, s: Complex64) -> Option<(DMatrix<Complex64>, Option<DMatrix<Complex64>>)> {
         let transfers = self.transfers(s)?;
         let (count, axes) = (self.count(), &self.axes);
@@ -137,7 +139,7 @@ impl<'a> HarmonicLoop<'a> {
         Some((cut, forced))
     }
 
-    /// (I + Hβ)⁻¹ Hα: its eigenvalues are λ.
+    /// Matrix (I + Hβ)⁻¹ Hα, whose eigenvalues are λ.
     fn matrix(&self, s: Complex64) -> Option<DMatrix<Complex64>> {
         let (cut, forced) = self.matrices(s)?;
         match forced {
@@ -149,7 +151,7 @@ impl<'a> HarmonicLoop<'a> {
         }
     }
 
-    /// The real eigenvalues, 1/m, at s = iΩ/2, where multipliers are −1.
+    /// Real eigenvalues at s = iΩ/2, 1/m, where multipliers are −1.
     fn flips(&self) -> Option<Vec<f64>> {
         let matrix = self.matrix(Complex64::new(0.0, 0.5 * self.passing))?;
         let real = real_form(&matrix, self.count(), self.axes.len());
@@ -162,12 +164,13 @@ impl<'a> HarmonicLoop<'a> {
         )
     }
 
-    /// The frequency, Hz, of the largest displacement in the motion of a root s at a depth, m.
+    /// Frequency, Hz, of the harmonic with the largest displacement in the motion of a root s at a depth, m.
     pub(crate) fn vibration_hz(&self, s: Complex64, depth_m: f64) -> Option<f64> {
         let kappa = self.regeneration(s) * depth_m;
         let (cut, forced) = self.matrices(s)?;
         let size = cut.nrows();
-        // A depth a little off keeps the matrix regular and separates the vector by 1e8 at each step.
+        // A depth slightly off keeps the matrix regular; inverse iteration amplifies the eigenvector by 1e8 in each
+        // step.
         let mut matrix = DMatrix::identity(size, size) - &cut * (kappa * (1.0 + 1e-8));
         if let Some(forced) = forced {
             matrix += forced;
@@ -198,7 +201,8 @@ impl<'a> HarmonicLoop<'a> {
                     }
                 }
                 let mut displacement = h * force;
-                // The same to rounding, but for a free vibration, which no force drives.
+                // Recomputes the displacement from the forces, equal to rounding; a free vibration has no force and
+                // keeps the vector.
                 for (i, &axis) in self.axes.iter().enumerate() {
                     displacement[axis] = vector[p * self.axes.len() + i];
                 }
@@ -211,19 +215,20 @@ impl<'a> HarmonicLoop<'a> {
 }
 
 impl HarmonicLoop<'_> {
-    /// The frequency, Hz, of the largest displacement in the vibration at a limit.
+    /// Frequency, Hz, of the harmonic with the largest displacement in the vibration at a limit.
     pub(crate) fn chatter_hz(&self, limit: &AxisCrossing) -> Option<f64> {
         let s = Complex64::new(0.0, limit.omega);
         self.vibration_hz(s, limit.depth_m)
     }
 }
 
-/// The matrix at s = iΩ/2 in cosines and sines: real, since its entries for p, q are conjugate to those for −p−1, −q−1.
+/// Real form of the matrix at s = iΩ/2 in cosines and sines; its entries for (p, q) are conjugate to those for (−p−1,
+/// −q−1).
 fn real_form(matrix: &DMatrix<Complex64>, count: usize, axes: usize) -> DMatrix<f64> {
     let mirrored = |index: usize| (count - 1 - index / axes) * axes + index % axes;
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let is_upper = |index: usize| index / axes >= count / 2;
-    // Row i of the unitary matrix that makes cosines (upper half) and sines (lower half).
+    // Row i of the unitary transformation to cosines (upper half) and sines (lower half).
     let factors = |index: usize| {
         if is_upper(index) {
             (Complex64::from(half), Complex64::from(half))
@@ -275,7 +280,7 @@ impl OpenLoop for HarmonicLoop<'_> {
     fn real_end(&self) -> Option<RealEnd> {
         Some(RealEnd {
             omega: 0.5 * self.passing,
-            // κ/w is 2 there.
+            // The factor κ/w is 2 at s = iΩ/2.
             loci: self.flips()?.into_iter().map(|value| 2.0 * value).collect(),
             kind: StabilityLoss::Flip,
         })

@@ -1,4 +1,4 @@
-//! Where roots cross the imaginary axis as the depth grows, and how many are unstable.
+//! Crossings of the imaginary axis by roots as the depth grows, and the number of unstable roots.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,32 +11,33 @@ use crate::error::StabilityError;
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Distance from an end where loci are real, as a share of the frequency beside it, at which their direction is read.
+/// Distance, as a share of the neighbouring frequency, from an end with real loci, at which the direction of the loci
+/// is evaluated. Unfounded: far above rounding, far below the width of a resonance.
 const BESIDE: f64 = 1e-5;
 
-/// A root on the imaginary axis.
+/// Root on the imaginary axis at a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AxisCrossing {
     /// Depth, m.
     pub(crate) depth_m: f64,
-    /// The root is iω; rad/s.
+    /// Imaginary part ω of the root iω, rad/s.
     pub(crate) omega: f64,
-    /// How it crosses.
+    /// Kind of stability loss.
     pub(crate) kind: StabilityLoss,
-    /// True where it becomes unstable with growing depth.
+    /// True if the root becomes unstable with growing depth.
     pub(crate) outward: bool,
 }
 
-/// All crossings up to a depth, m, by depth.
+/// All crossings of the imaginary axis up to an axial depth (m), by depth.
 ///
-/// `None` where receptances are infinite or nothing finite comes out.
+/// `None` if receptances are infinite or a result is not finite.
 pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<AxisCrossing>> {
     let floor = depth_m.recip();
     let mut grid = open_loop.grid(floor)?;
     let real_end = open_loop.real_end();
     let mut limits = Vec::new();
     if let Some(end) = &real_end {
-        // Real loci at an end are exact there; beside it they would seem to cross by rounding.
+        // At an end with real loci crossings are exact; close to it, rounding would feign further crossings.
         let beside = if end.omega > 0.0 {
             let beside = end.omega * (1.0 - BESIDE);
             grid.retain(|&omega| omega < beside);
@@ -57,7 +58,7 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
                 depth_m: value.recip(),
                 omega: end.omega,
                 kind: end.kind,
-                // The conjugate follows beyond the end: the locus falls through the axis.
+                // Beyond the end the locus continues as its conjugate and falls through the axis.
                 outward: (near.im > 0.0) == (end.omega > 0.0),
             });
         }
@@ -71,7 +72,7 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
                 depth_m: crossing.value.recip(),
                 omega: crossing.omega,
                 kind: StabilityLoss::Hopf,
-                // 1 − wλκ/w turns the other way round than the locus.
+                // 1 − wλκ/w winds in the opposite direction to the locus.
                 outward: !crossing.rises,
             }),
     );
@@ -79,11 +80,11 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
     Some(limits)
 }
 
-/// The number of roots to the right of Re s = `sigma`, 1/s, at a depth, m, by the Nyquist criterion on the determinant.
+/// Number of roots with Re s > `sigma` (1/s) at an axial depth (m), by the Nyquist criterion on the determinant D(s).
 ///
-/// D(s) has the roots for zeros and the poles of the structure for poles; along the line from `sigma` to infinity its
-/// argument grows by π(P − N)/… of a full turn for each of the pair. `None` where the line meets a root, or where the table
-/// cannot be continued to it.
+/// The zeros of D are the roots, its poles the poles of the structure. Along the line Re s = `sigma` from the real axis
+/// to infinity the argument of D grows by π (P − N)/2 for P poles and N roots right of the line, conjugates included.
+/// `None` if the line meets a root, or if the table cannot be continued to it.
 pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
     let grid = open_loop.grid(depth_m.max(1e-9).recip())?;
     let determinant = |omega: f64| {
@@ -92,17 +93,17 @@ pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
     };
     let mut turned = turning(&determinant, &grid)?;
     if open_loop.real_end().is_none_or(|end| end.omega == 0.0) {
-        // Beyond the grid the loop is smaller than one: the determinant goes straight to 1.
+        // Beyond the grid the loop gain is below one, and the determinant goes straight to 1.
         turned -= determinant(*grid.last()?)?.arg();
     }
     let half_turns = turned / PI;
-    // Both ends are real to rounding, but for the truncation of harmonics at 0.
+    // Both ends are real to rounding, apart from the truncation of harmonics at 0.
     let rounded = half_turns.round();
     ((half_turns - rounded).abs() < 0.2).then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
 }
 
-/// An estimate of the error of a limit, m: what other computations change (with every second line of a table, with another number
-/// of harmonics), and what has been checked against other methods. `None` where one of them has no such limit.
+/// Error estimate of a limit, m: the change with other computations (every second line of a table, another number of
+/// harmonics), and at least the confirmed accuracy. `None` if another computation lacks the limit.
 fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
     others.iter().try_fold(LEAST_ERROR * limit.depth_m, |sum, other| {
         let changes = other
@@ -114,11 +115,11 @@ fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
     })
 }
 
-/// The line of given limits at a speed; `others` are those of computations from which errors are told, `chatter_hz` says at which
-/// frequency the cut vibrates there.
+/// Line of given limits at a spindle speed. `others` are limits of the computations for the error estimate;
+/// `chatter_hz` returns the vibration frequency at a limit.
 ///
 /// # Errors
-/// The number unstable at depth 0 cannot be told, or a vibration has a frequency that was not measured.
+/// The roots at depth 0 cannot be counted, or a vibration lies outside the measured frequencies.
 pub(crate) fn speed_line(
     open_loop: &impl OpenLoop,
     rpm: f64,
@@ -151,7 +152,7 @@ pub(crate) fn speed_line(
     Ok(SpeedLine::of_switches(rpm, depth_mm, outside, switches))
 }
 
-/// How many roots are unstable at depth 0: with edge and feed terms that act on the axial vibration there may be some.
+/// Number of unstable roots at depth 0: edge and feed forces that depend on the axial vibration may cause some.
 pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
     if open_loop.problem().process.axial_depth_modulation {
         unstable_roots(open_loop, 0.0, 0.0)
@@ -160,7 +161,7 @@ pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
     }
 }
 
-/// ω as Hz.
+/// Frequency ω of a limit, Hz.
 pub(crate) fn hertz(limit: &AxisCrossing) -> Option<f64> {
     Some(limit.omega / TAU)
 }

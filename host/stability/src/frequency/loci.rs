@@ -1,14 +1,15 @@
-//! Characteristic loci: eigenvalues followed along the frequency, where they cross the positive real axis, and how often
-//! a determinant turns about zero.
+//! Characteristic loci: eigenvalues traced along the frequency, their crossings of the positive real axis, and the
+//! winding of a determinant about zero.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-/// How often an interval of frequencies is halved where its loci cannot be followed.
+/// Number of halvings of a frequency interval in which loci cannot be told apart. Unfounded.
 const LEVELS: u32 = 16;
 
-/// Share of a locus by which its middle may be off the straight line between the ends of an interval.
+/// Largest deviation of the middle of a locus from the straight line between the ends of an interval, as a share of the
+/// locus. Unfounded.
 const BEND: f64 = 0.1;
 
 /// Eigenvalues at one frequency.
@@ -18,25 +19,25 @@ pub(crate) struct Sample {
     pub(crate) values: Vec<Complex64>,
 }
 
-/// A locus on the positive real axis.
+/// Crossing of the positive real axis by a locus.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Crossing {
     /// Frequency, rad/s.
     pub(crate) omega: f64,
-    /// Where on the axis.
+    /// Value of the locus on the axis.
     pub(crate) value: f64,
-    /// True where the imaginary part rises with the frequency.
+    /// True if the imaginary part rises with the frequency.
     pub(crate) rises: bool,
 }
 
-/// A function of frequency, rad/s, that gives its eigenvalues of absolute value `floor` and above.
+/// Function of the frequency (rad/s) that returns all eigenvalues of absolute value `floor` and above.
 pub(crate) trait Loci: Fn(f64) -> Option<Vec<Complex64>> {}
 impl<F: Fn(f64) -> Option<Vec<Complex64>>> Loci for F {}
 
-/// Samples over a grid, so dense that every locus of at least `floor` can be told from the others from one to the next,
-/// and is nearly straight in between: its middle is off by `bend` times a tenth of its size at most.
+/// Samples the loci on a grid, so densely that every locus of at least `floor` can be told from the others between
+/// samples and is nearly straight: its middle deviates by at most `bend` times a tenth of its size.
 ///
-/// `None` where the function is.
+/// `None` if the function returns `None`.
 pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Option<Vec<Sample>> {
     let sample = |omega: f64| {
         Some(Sample {
@@ -59,7 +60,7 @@ pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Op
     Some(samples)
 }
 
-/// Adds the samples between two.
+/// Adds samples between two, where needed.
 fn divide(
     sample: &impl Fn(f64) -> Option<Sample>,
     low: &Sample,
@@ -108,14 +109,14 @@ fn is_straight(low: &Sample, middle: &Sample, high: &Sample, (floor, bend): (f64
                     && (to - from).norm() <= 6.0 * bend * size
                     && is_alone(middle, index, (to - from).norm())
             }
-            // Only what is small can come from or go to nowhere.
+            // Only a locus below the floor may begin or end between samples.
             _ => value.norm() < floor,
         }
     })
 }
 
-/// True where a locus that moves by `travel` cannot be taken for another, or where that would not matter: away from the
-/// positive real axis.
+/// True if a locus that moves by `travel` cannot be confused with another, or if confusion has no effect because it is
+/// far from the positive real axis.
 fn is_alone(sample: &Sample, index: usize, travel: f64) -> bool {
     let value = sample.values[index];
     let is_near_axis = |value: Complex64| value.re > -travel && value.im.abs() <= 2.0 * travel;
@@ -127,7 +128,7 @@ fn is_alone(sample: &Sample, index: usize, travel: f64) -> bool {
     others.all(|(_, other)| (other - value).norm() > travel || !is_near_axis(value) || !is_near_axis(*other))
 }
 
-/// Which value of one sample is which of the next: nearest first. `None` where a value of at least `floor` is left over.
+/// Pairs the values of two samples, nearest first. `None` if a value of at least `floor` has no partner.
 fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
     let mut near: Vec<(f64, usize, usize)> = Vec::with_capacity(a.values.len() * b.values.len());
     for (i, p) in a.values.iter().enumerate() {
@@ -148,12 +149,12 @@ fn pairs(a: &Sample, b: &Sample, floor: f64) -> Option<Vec<(usize, usize)>> {
     (!left).then_some(pairs)
 }
 
-/// A step from one sample to the next along a locus: frequency and value at both ends.
+/// Part of a locus between two samples: frequency (rad/s) and value at both ends.
 pub(crate) type Step = [(f64, Complex64); 2];
 
-/// The steps from one sample to another, locus by locus.
+/// Steps between two samples, one for each locus.
 fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
-    // Whatever is left over is below every floor that matters.
+    // Values without a partner are below every floor in use.
     let pairs = pairs(low, high, f64::INFINITY).unwrap_or_default();
     pairs
         .into_iter()
@@ -161,17 +162,17 @@ fn steps_between(low: &Sample, high: &Sample) -> Vec<Step> {
         .collect()
 }
 
-/// The steps from each sample to the next.
+/// Steps between all neighbouring samples.
 pub(crate) fn steps(samples: &[Sample]) -> impl Iterator<Item = Step> {
     samples
         .windows(2)
         .flat_map(|pair| steps_between(&pair[0], &pair[1]))
 }
 
-/// All that `solve` finds on the steps between samples.
+/// Collects the solutions that `solve` finds on the steps between samples.
 ///
-/// Where it gives up on a step, because loci so near to each other were taken for one another, the samples are halved
-/// and all steps between them solved anew. `None` where it gives up however short the steps.
+/// If `solve` fails on a step because two close loci were exchanged, the interval is halved and solved again. `None` if
+/// it fails however short the interval.
 pub(crate) fn solve_steps<T>(
     loci: &impl Loci,
     samples: &[Sample],
@@ -208,7 +209,7 @@ fn solve_between<T>(
     Some(found)
 }
 
-/// Where loci of at least `floor` cross the positive real axis, largest first: solved for to 1e-12 of the value.
+/// Crossings of the positive real axis by loci of at least `floor`, largest first, to 1e-12 of the value.
 pub(crate) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Option<Vec<Crossing>> {
     let mut found = solve_steps(loci, samples, &|[low, high]: Step| {
         if (low.1.im > 0.0) == (high.1.im > 0.0) || low.1.re.max(high.1.re) < 0.5 * floor {
@@ -239,7 +240,7 @@ pub(crate) fn crossings(loci: &impl Loci, samples: &[Sample], floor: f64) -> Opt
     Some(found)
 }
 
-/// A point of a locus, and by how much it misses what is looked for.
+/// Point of a locus with its residual, which vanishes at the solution.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mark {
     pub(crate) omega: f64,
@@ -247,11 +248,10 @@ pub(crate) struct Mark {
     pub(crate) miss: f64,
 }
 
-/// Where the miss is zero between two points of a locus with misses of either sign: the frequency, and the locus there.
-///
-/// `at` gives all loci at a frequency with their misses; the one nearest to the straight line counts. Regula falsi with
-/// halving (Illinois), until the miss is below the tolerance. `None` where it jumps over zero: then two loci were taken for
-/// one.
+/// Zero of the residual between two points of a locus with residuals of opposite sign: the frequency, and the locus
+/// there. `at` returns all loci at a frequency with their residuals; the one nearest to the straight line is used.
+/// Regula falsi (Illinois), until the residual is below the tolerance. `None` if the residual jumps over zero, since
+/// two loci were then exchanged.
 pub(crate) fn zero(
     mut low: Mark,
     mut high: Mark,
@@ -267,7 +267,7 @@ pub(crate) fn zero(
         let (value, miss) = at(omega)?
             .into_iter()
             .min_by(|p, q| (p.0 - expected).norm().total_cmp(&(q.0 - expected).norm()))?;
-        // Rounding of the eigenvalues may keep the miss from falling further.
+        // Rounding of the eigenvalues may keep the residual above the tolerance.
         let is_narrow = (high.omega - low.omega).abs() <= 1e-15 * high.omega;
         if miss.abs() <= tolerance || is_narrow && miss.abs() <= 1e3 * tolerance {
             return Some((omega, value));
@@ -289,10 +289,10 @@ pub(crate) fn zero(
     None
 }
 
-/// By how much the argument of a function, rad, grows over a grid; steps are halved until each turns it by a fifth of a
-/// half turn at most, and its middle agrees.
+/// Increase of the argument of a function over a grid, rad. Steps are halved until each turns the argument by at most a
+/// fifth of π and agrees with the sum of its halves.
 ///
-/// `None` where the function is, or vanishes.
+/// `None` if the function returns `None` or vanishes.
 pub(crate) fn turning(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
     let mut sum = 0.0;
     let Some((&first, rest)) = grid.split_first() else {
@@ -319,7 +319,7 @@ fn turning_between(
     if !(first.is_finite() && second.is_finite()) {
         return None;
     }
-    // Twenty halvings are a millionth of a step: a function that turns there has its zero on the path.
+    // Twenty halvings reach a millionth of a step: a function that still turns has its zero on the path.
     if first.abs().max(second.abs()) < 0.2 * PI || level == 20 {
         return Some(first + second);
     }
@@ -333,7 +333,7 @@ fn turning_between(
 mod tests {
     use super::*;
 
-    /// Two loci of one pole each, turned by a delay.
+    /// Two loci of one pole each, rotated by a delay.
     fn two(omega: f64) -> Option<Vec<Complex64>> {
         let mode = |natural: f64, size: f64| {
             size / Complex64::new(natural * natural - omega * omega, 0.04 * natural * omega)
@@ -368,14 +368,15 @@ mod tests {
 
     #[test]
     fn a_polynomial_turns_by_half_a_turn_for_each_root_to_the_left() {
-        // (s + 1)(s² + 0.02 s + 4)(s − 3)(s² − 0.01 s + 9): three roots left, three right.
+        // Polynomial (s + 1)(s² + 0.02 s + 4)(s − 3)(s² − 0.01 s + 9): three roots left, three right of the axis.
         let function = |omega: f64| {
             let s = Complex64::new(0.0, omega);
             Some((s + 1.0) * (s * s + s * 0.02 + 4.0) * (s - 3.0) * (s * s - s * 0.01 + 9.0))
         };
         let grid = [0.0, 1.9, 2.1, 2.95, 3.05, 1e4];
         let turned = turning(&function, &grid).unwrap();
-        // From 0 to infinity a root left adds a quarter turn, one right takes it away; the rest at 1e4 is 1e-3.
+        // From 0 to infinity each root on the left adds π/2, each on the right subtracts it; the remainder at 1e4 rad/s
+        // is 1e-3.
         assert!(turned.abs() < 1e-2, "{turned}");
         let stable = |omega: f64| {
             let s = Complex64::new(0.0, omega);

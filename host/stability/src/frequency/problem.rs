@@ -1,4 +1,4 @@
-//! The milling problem by its receptances.
+//! The milling problem described by its receptances.
 
 use nalgebra::Matrix3;
 use num_complex::Complex64;
@@ -12,7 +12,7 @@ use quietcut_model::case::Case;
 use quietcut_model::milling::Process;
 use quietcut_model::structure::FirstOrder;
 
-/// Receptances and a cutting process, in feed, normal and axial direction.
+/// Receptances and cutting process, in feed, normal and axial direction.
 #[derive(Clone, Debug)]
 pub struct FrequencyProblem {
     receptance: Receptance,
@@ -22,16 +22,16 @@ pub struct FrequencyProblem {
     pub teeth: usize,
 }
 
-/// Where H(s) comes from.
+/// Source of the receptance matrix H(s).
 #[derive(Clone, Debug)]
 enum Receptance {
-    /// A modelled structure and its poles.
+    /// Modelled structure, with its poles.
     Model(FirstOrder, Vec<Complex64>),
-    /// Measured lines.
+    /// Interpolated table of measured receptances.
     Table(Interpolation),
 }
 
-/// A frequency, rad/s, where receptances change fast, and within how many rad/s they do.
+/// Resonance: a frequency, rad/s, near which receptances change fast, and its half bandwidth, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Resonance {
     pub(crate) omega: f64,
@@ -39,7 +39,7 @@ pub(crate) struct Resonance {
 }
 
 impl FrequencyProblem {
-    /// The problem of a case.
+    /// Builds the problem of a case.
     ///
     /// # Errors
     /// As [`Problem::new`] and [`FrequencyProblem::of_model`].
@@ -47,10 +47,10 @@ impl FrequencyProblem {
         Self::of_model(&Problem::new(case, cubic)?)
     }
 
-    /// The problem of a modelled structure.
+    /// Builds the problem of a modelled structure.
     ///
     /// # Errors
-    /// A mode has no damping, or grows: receptances are then infinite, or are not those of a motion.
+    /// A mode has zero or negative damping, so that its receptance is infinite or meaningless.
     pub fn of_model(problem: &Problem) -> Result<Self, StabilityError> {
         let poles = problem.structure.poles();
         if let Some(pole) = poles.iter().find(|pole| pole.re >= -UNDAMPED * pole.norm()) {
@@ -65,10 +65,11 @@ impl FrequencyProblem {
         })
     }
 
-    /// The problem with measured receptances in place of the structure of a case, which may be missing.
+    /// Builds the problem with measured receptances in place of the structure of a case, which may be missing.
     ///
     /// # Errors
-    /// The case lacks a section or has what the equations do not cover; the table has fewer than four lines.
+    /// The case lacks a section or has a feature that the equations do not cover, or the table has fewer than four
+    /// lines.
     pub fn of_table(case: &Case, table: &FrfTable) -> Result<Self, StabilityError> {
         let (process, teeth) = cutting(case, Treated::LinearProcess)?;
         let interpolation = Interpolation::new(table)?.turned(case.cut()?.feed_direction_deg);
@@ -84,7 +85,7 @@ impl FrequencyProblem {
         60.0 / (rpm * self.teeth as f64)
     }
 
-    /// H(s), m/N, rows displacement, columns force; s in rad/s. `None` where s is a pole.
+    /// Receptance matrix H(s), m/N; rows are displacements, columns forces; s in rad/s. `None` if s is a pole.
     pub(crate) fn transfer(&self, s: Complex64) -> Option<Matrix3<Complex64>> {
         match &self.receptance {
             Receptance::Model(structure, _) => structure.transfer(s),
@@ -94,13 +95,13 @@ impl FrequencyProblem {
         }
     }
 
-    /// Number of poles of the structure with a real part above `sigma`, 1/s, each of a pair counted; of a table none is
-    /// known.
+    /// Number of poles of the structure with a real part above `sigma` (1/s), conjugates included; 0 for a table, whose
+    /// poles are not known.
     pub(crate) fn poles_right_of(&self, sigma: f64) -> i32 {
         self.poles().iter().map(|pole| i32::from(pole.re > sigma)).sum()
     }
 
-    /// The poles of the structure, 1/s; those of a table are not known.
+    /// Poles of the structure, 1/s; empty for a table.
     pub(crate) fn poles(&self) -> &[Complex64] {
         match &self.receptance {
             Receptance::Model(_, poles) => poles,
@@ -108,7 +109,7 @@ impl FrequencyProblem {
         }
     }
 
-    /// The same with every second line of a table; `None` for a model, and for a table with too few lines.
+    /// The same problem on every second line of a table; `None` for a model, or if too few lines remain.
     pub(crate) fn thinned(&self) -> Option<Self> {
         let Receptance::Table(interpolation) = &self.receptance else {
             return None;
@@ -119,7 +120,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// The frequencies that were measured, Hz; `None` for a model, which knows all.
+    /// Measured frequency range, Hz; `None` for a model.
     pub(crate) fn band_hz(&self) -> Option<(f64, f64)> {
         match &self.receptance {
             Receptance::Model(..) => None,
@@ -127,10 +128,10 @@ impl FrequencyProblem {
         }
     }
 
-    /// Refuses what is known only from outside the measured frequencies.
+    /// Refuses results at frequencies outside the measured range.
     ///
     /// # Errors
-    /// The vibration at that speed and depth has a frequency that the table does not have.
+    /// The vibration at that speed and depth has a frequency outside the table.
     pub(crate) fn check_band(
         &self,
         frequency_hz: Option<f64>,
@@ -152,7 +153,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// The directions, of feed, normal and axial, in which the tool moves at all.
+    /// True for each direction (feed, normal, axial) in which the tool is compliant.
     pub(crate) fn moves(&self) -> [bool; 3] {
         std::array::from_fn(|axis| match &self.receptance {
             Receptance::Model(structure, _) => structure.c.row(axis).iter().any(|&entry| entry != 0.0),
@@ -163,7 +164,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// Where receptances change fast: the poles of a model, the peaks of a table.
+    /// Resonances: poles of a model, peaks of a table.
     pub(crate) fn resonances(&self) -> Vec<Resonance> {
         match &self.receptance {
             Receptance::Model(_, poles) => poles
@@ -178,7 +179,7 @@ impl FrequencyProblem {
         }
     }
 
-    /// Frequencies, rad/s, between which nothing of H is hidden: those of the lines of a table, else none.
+    /// Frequencies, rad/s, that resolve H: the lines of a table; empty for a model.
     pub(crate) fn lines(&self) -> Vec<f64> {
         match &self.receptance {
             Receptance::Model(..) => Vec::new(),
@@ -190,9 +191,9 @@ impl FrequencyProblem {
     }
 }
 
-/// The peaks of a table that stand above a hundredth of the highest, with their half bandwidth.
+/// Peaks of a table higher than a hundredth of the highest, with their half bandwidth.
 ///
-/// Noise makes peaks too; they cost time and do no harm.
+/// Peaks due to noise are harmless and only cost computing time.
 fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {
     const RAD: f64 = std::f64::consts::TAU;
     let size: Vec<f64> = interpolation.lines().iter().map(|line| line.norm()).collect();
@@ -204,7 +205,7 @@ fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {
         if peak < size[index - 1] || peak <= size[index + 1] || peak < 0.01 * highest {
             continue;
         }
-        // Down to 1/√2 on either side, or to where the next peak begins.
+        // Distance on one side to 1/√2 of the peak, or to the foot of the next peak.
         let falls = |range: &mut dyn Iterator<Item = usize>| {
             let mut last = index;
             for other in range {

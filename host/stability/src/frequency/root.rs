@@ -1,4 +1,5 @@
-//! The rightmost root at one speed and depth: the dominant multiplier.
+//! The rightmost root at one speed and depth, and the dominant Floquet multiplier (characteristic multiplier) that
+//! belongs to it.
 
 use num_complex::Complex64;
 
@@ -12,19 +13,20 @@ use crate::error::StabilityError;
 use crate::limits::point::CutStability;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Where the lines are laid along which roots are looked for: real parts as multiples of the slowest decay of a resonance.
+/// Real parts of the lines along which roots are searched, as multiples of the slowest decay rate of a resonance.
+/// Unfounded.
 const LINES: [f64; 14] = [
     0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
 ];
 
-/// A locus as small as this share of 1/w is followed too: its root may lie far from the line.
+/// Smallest locus, as a share of 1/w, that is traced for roots away from the line. Unfounded.
 const REACH: f64 = 0.05;
 
-/// The rightmost root s, 1/s, with Im s ≥ 0, at a depth, m.
+/// Rightmost root s, 1/s, with Im s ≥ 0, at an axial depth, m.
 ///
-/// First roots are looked for where they begin at depth 0, at the poles of the structure. Then loci are followed along
-/// lines Re s = σ: where one passes near 1/w its straight continuation beside the line hits a root, which is solved for.
-/// The rightmost root found so far is confirmed by counting the roots to the right of it. `None` where none is confirmed.
+/// First, roots are continued from depth 0, where they are poles of the structure. Then loci are traced along lines Re
+/// s = σ: if one passes near 1/w, its linear continuation beside the line predicts a root, which is then solved for.
+/// The rightmost root found is verified by counting the roots to its right. `None` if none is verified.
 pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
     let decay = open_loop
         .problem()
@@ -32,7 +34,7 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Compl
         .iter()
         .map(|resonance| resonance.width)
         .fold(f64::INFINITY, f64::min);
-    // Without resonances there is nothing to decay with.
+    // Without resonances no decay rate is defined.
     let decay = if decay.is_finite() { decay } else { 0.0 };
     let mut best = from_poles(open_loop, depth_m);
     if let Some(root) = best
@@ -55,7 +57,7 @@ pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Compl
     None
 }
 
-/// The rightmost of the roots that begin at the poles of the structure.
+/// Rightmost of the roots continued from the poles of the structure.
 fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
     open_loop
         .problem()
@@ -67,7 +69,7 @@ fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
         .map(|root| Complex64::new(root.re, root.im.abs()))
 }
 
-/// The rightmost of the roots that lie beside a line Re s = `sigma`.
+/// Rightmost of the roots found beside a line Re s = `sigma`.
 fn from_line(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64, decay: f64) -> Option<Complex64> {
     let target = depth_m.recip();
     if !target.is_finite() {
@@ -97,18 +99,19 @@ fn from_line(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64, decay: f64) ->
     best
 }
 
-/// True where no root lies further right.
+/// True if no root lies further right.
 fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay: f64) -> bool {
-    // A little to the right of it.
+    // Counts from slightly right of the root.
     let beside = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
     if open_loop.problem().band_hz().is_none() {
         return unstable_roots(open_loop, depth_m, beside) == Some(0);
     }
-    // Poles of a table are not known beside the axis; there the side at least must be right.
+    // The poles of a table away from the axis are not known; only the number of roots right of the axis can be
+    // verified.
     unstable_roots(open_loop, depth_m, 0.0).is_some_and(|unstable| (unstable > 0) == (root.re > 0.0))
 }
 
-/// κλ/w at any s, 1/m.
+/// Characteristic loci κλ/w at any s, 1/m.
 fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Option<Vec<Complex64>> {
     let regeneration = open_loop.regeneration(s);
     let size = regeneration.norm();
@@ -122,9 +125,9 @@ fn loci_at(open_loop: &impl OpenLoop, s: Complex64, floor: f64) -> Option<Vec<Co
     Some(loci)
 }
 
-/// The root near a guess, by secants on w − 1/locus, of the locus for which it is smallest.
+/// Root near a guess, by secant steps on w − 1/locus, with the locus for which it is smallest.
 pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) -> Option<Complex64> {
-    // Without depth roots are poles of the loop, where a locus is infinite: large ones are enough.
+    // Depth, m, that sets the floor of loci at depth 0: roots are then poles, where a locus is infinite.
     const SHALLOW_M: f64 = 1e-3;
     let floor = 0.3 / depth_m.max(SHALLOW_M);
     let miss = |s: Complex64| {
@@ -154,7 +157,7 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
         }
         miss_now = match miss(s) {
             Some(miss) => miss,
-            // A pole of the loop: without depth that is the root.
+            // A locus is infinite at a pole of the loop, which is the root at depth 0.
             None => return (depth_m == 0.0).then_some(s),
         };
         if step.norm() < 1e-13 * scale {
@@ -164,13 +167,13 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
     None
 }
 
-/// The dominant multiplier of a loop without period, as averaged methods have it.
+/// Dominant Floquet multiplier of a loop with averaged coefficients.
 ///
-/// With a table the error is what every second line changes; that of a cubic through all of them is a sixteenth of it
-/// where lines are dense, and no more where they are not.
+/// With a table the error is the change with every second line. The error of a cubic through all lines is a sixteenth
+/// of that for dense lines, and no larger otherwise.
 ///
 /// # Errors
-/// The root cannot be found or confirmed; it was not measured.
+/// The root cannot be found or verified, or lies outside the measured frequencies.
 pub(crate) fn averaged_point(
     problem: &FrequencyProblem,
     rpm: f64,
@@ -207,7 +210,7 @@ pub(crate) fn averaged_point(
     ))
 }
 
-/// A point from its multiplier and the error of it.
+/// Stability of a cut from its dominant multiplier and the error of that.
 pub(crate) fn point_of(
     rpm: f64,
     depth_mm: f64,

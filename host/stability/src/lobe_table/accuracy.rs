@@ -1,4 +1,4 @@
-//! How far a table's answers between its entries are from the method's own, and entries that keep them on the safe side.
+//! Error of a lobe table between its entries with respect to the method, and correction of entries to the safe side.
 
 use quietcut_core::lobes::{Column, InterpolationError, LobeTable};
 use quietcut_core::units::{Millimeters, Rpm};
@@ -11,24 +11,24 @@ use crate::criteria::{CHECK_GROWTH, CHECK_STEP, LEAST_CHECKS, SUSPECT, TABLE_ROO
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
 
-/// Offset of the speeds checked within the parts of a gap, in turn from gap to gap: not the middle, which is where refinement has looked,
-/// and not symmetric, so that lobes symmetric about the gap are seen.
+/// Position of the checked speeds within the parts of a gap, alternating from gap to gap. It avoids the middle, which
+/// refinement has tested, and is not symmetric, so that lobes symmetric about the gap are detected.
 const OFFSETS: [f64; 2] = [0.38, 0.62];
 
-/// How often the speeds checked in such a gap are doubled: from two to five, eleven, 23.
+/// Largest number of doublings of the checked speeds in a suspect gap: from two to five, eleven, 23.
 const ROUNDS: usize = 3;
 
-/// Depths at which a table differs from the method, by their distance from the nearest limit of the method, mm.
+/// Largest disagreement between table and method, as distance of a depth from the nearest limit of the method, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Miss {
-    /// Largest of depths that the table calls stable and the method does not.
+    /// Largest distance over depths that are stable in the table only (unsafe side).
     pub(super) unsafe_mm: f64,
-    /// Largest of depths that the method calls stable and the table does not.
+    /// Largest distance over depths that are stable by the method only (cautious side).
     pub(super) cautious_mm: f64,
 }
 
 impl Miss {
-    /// Where two sets of stable depths up to `depth_mm` disagree; depth 0 is a limit where nothing is stable.
+    /// Disagreement of two sets of stable depths up to `depth_mm`; depth 0 counts as a limit if nothing is stable.
     pub(super) fn between(truth: &[[f64; 2]], told: &[[f64; 2]], depth_mm: f64) -> Self {
         let ends = |set: &[[f64; 2]]| -> Vec<f64> { set.iter().flatten().copied().collect() };
         let mut limits: Vec<f64> = ends(truth)
@@ -41,7 +41,7 @@ impl Miss {
         let mut all = ends(truth);
         all.extend(ends(told));
         all.extend([0.0, depth_mm]);
-        // The last depth of a table is rounded, and may lie beyond.
+        // The last depth of a table is rounded and may lie beyond the last depth of the method.
         all.retain(|&end| end <= depth_mm);
         all.sort_by(f64::total_cmp);
         let is_in = |set: &[[f64; 2]], depth: f64| set.iter().any(|&[from, to]| from <= depth && depth <= to);
@@ -64,7 +64,7 @@ impl Miss {
 }
 
 impl Miss {
-    /// The larger of both, each side by itself.
+    /// The larger value on each side.
     fn max(self, other: Self) -> Self {
         Self {
             unsafe_mm: self.unsafe_mm.max(other.unsafe_mm),
@@ -72,24 +72,23 @@ impl Miss {
         }
     }
 
-    /// True where one side is larger than a factor of the other miss's.
+    /// True if one side is larger than `factor` times that of the other miss.
     fn exceeds(self, other: Self, factor: f64) -> bool {
         self.unsafe_mm > factor * other.unsafe_mm || self.cautious_mm > factor * other.cautious_mm
     }
 }
 
-/// The method's own lines at several speeds inside every gap between the speeds of a table, in every layer and half way between
-/// layers.
+/// Lines of the method at several speeds inside every gap of a table, in every layer and half way between layers.
 pub(super) struct Checks<'a> {
     spans: &'a [CheckedLayers],
     speeds: &'a [f64],
     depth_mm: f64,
-    /// By span and gap, by ascending speed.
+    /// Lines by layer span and gap, by ascending speed.
     lines: Vec<Vec<Vec<SpeedLine>>>,
 }
 
 impl<'a> Checks<'a> {
-    /// Checks at two speeds per gap, or more where the gap is wide.
+    /// Computes lines at two speeds per gap, or more if the gap is wide.
     pub(super) fn new(
         spans: &'a [CheckedLayers],
         speeds: &'a [f64],
@@ -101,7 +100,7 @@ impl<'a> Checks<'a> {
             .map(|(pair, offset)| {
                 let width = pair[1] - pair[0];
                 let count = (width / (CHECK_STEP * pair[0])).ceil().max(LEAST_CHECKS);
-                // A table covers a few decades of speed at most: the count is small.
+                // A table covers a few decades of speed at most, so that the count is small.
                 (0..count as usize)
                     .map(|index| pair[0] + width * (index as f64 + offset) / count)
                     .collect()
@@ -119,7 +118,7 @@ impl<'a> Checks<'a> {
         Ok(checks)
     }
 
-    /// Adds the lines of a span at speeds by gap.
+    /// Adds the lines of a span at given speeds by gap.
     fn add(&mut self, span: usize, places: &[Vec<f64>]) -> Result<(), StabilityError> {
         let all: Vec<f64> = places.iter().flatten().copied().collect();
         let lines = self.spans[span].family.lines(&all, self.depth_mm)?;
@@ -131,10 +130,10 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// Checks suspect gaps at more speeds, until the worst that is found grows no further.
+    /// Checks suspect gaps at more speeds, until the largest disagreement stops growing.
     ///
     /// # Errors
-    /// Those of the method.
+    /// As the method.
     pub(super) fn resolve(&mut self, table: &LobeTable<'_>, tolerance_mm: f64) -> Result<(), StabilityError> {
         let least = Miss {
             unsafe_mm: SUSPECT * tolerance_mm,
@@ -165,7 +164,7 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// The middles between the speeds of a gap that are known, both ends included.
+    /// Midpoints between the checked speeds of a gap, including its ends.
     fn middles(&self, span: usize, gap: usize) -> Vec<f64> {
         let mut known = vec![self.speeds[gap]];
         known.extend(self.lines[span][gap].iter().map(|line| line.rpm));
@@ -173,7 +172,7 @@ impl<'a> Checks<'a> {
         known.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
     }
 
-    /// The worst in every gap of a span.
+    /// Largest disagreement in every gap of a layer span.
     fn misses(&self, table: &LobeTable<'_>, span: usize) -> Vec<Miss> {
         let family = &self.spans[span].family;
         let miss = |line: &SpeedLine| {
@@ -189,11 +188,13 @@ impl<'a> Checks<'a> {
         self.lines[span].iter().map(worst).collect()
     }
 
-    /// Makes the entries around every gap in which `table` calls something stable that is unstable, by more than
-    /// `tolerance_mm`, unstable wherever one of them or the method in the gap is: steep flanks, and islands between entries.
+    /// Corrects gaps in which `table` calls depths stable that are unstable, by more than `tolerance_mm`. The entries
+    /// around such a gap become unstable wherever one of them or the method in the gap is: this covers steep flanks and
+    /// islands between entries.
     ///
-    /// Lookups in such a gap, and in those beside it, then err to the safe side. `entries` are by layer and speed. Returns the gaps
-    /// by span: lines that have shaped entries bear no witness to them, and [`check_again`](Self::check_again) adds others.
+    /// Lookups in such a gap, and in its neighbours, then err on the safe side. `entries` are by layer and speed.
+    /// Returns the corrected gaps by span: their lines have shaped entries and are no independent check, so that
+    /// [`check_again`](Self::check_again) adds others.
     pub(super) fn guard(
         &self,
         table: &LobeTable<'_>,
@@ -229,10 +230,10 @@ impl<'a> Checks<'a> {
         guarded
     }
 
-    /// Checks gaps, by span, at more speeds: half way between those that are known.
+    /// Checks gaps (by span) at more speeds, half way between the checked ones.
     ///
     /// # Errors
-    /// Those of the method.
+    /// As the method.
     pub(super) fn check_again(&mut self, gaps: &[Vec<bool>]) -> Result<(), StabilityError> {
         for (span, gaps) in gaps.iter().enumerate() {
             let places = gaps.iter().enumerate();
@@ -250,11 +251,11 @@ impl<'a> Checks<'a> {
         Ok(())
     }
 
-    /// The error that the table states.
+    /// Error that the table states.
     ///
-    /// In depth: the largest distance of a stable depth of the table from the method's, and in gaps where both have the same limits
-    /// also of the method's from the table's, times 1.5, with the rounding of the entries. In speed: how far a gap reaches, with those
-    /// beside it, in which a layer gives up more than twice the tolerance.
+    /// In depth: the largest distance of a stable depth of the table from the method's; in gaps where both have the
+    /// same limits also of the method's from the table's. It is multiplied by 1.5, plus the rounding of the entries. In
+    /// speed: the width of a gap, with its neighbours, in which a layer gives up more than twice the tolerance.
     pub(super) fn stated(&self, table: &LobeTable<'_>, tolerance_mm: f64) -> InterpolationError {
         let (mut depth, mut speed) = (0.0_f64, 0.0_f64);
         for (index, span) in self.spans.iter().enumerate() {
@@ -270,7 +271,7 @@ impl<'a> Checks<'a> {
         }
         InterpolationError {
             depth: Millimeters((TABLE_ROOM * depth + f64::from(table.depth_step().0)) as f32),
-            // A gap as wide as the speed itself bounds nothing; refinement never leaves one.
+            // A gap as wide as the speed itself is no bound; refinement never leaves one.
             speed: speed.min(0.999) as f32,
         }
     }

@@ -15,10 +15,10 @@ use crate::orbit::collocation_of;
 use quietcut_model::case::Case;
 use quietcut_testkit::case;
 
-/// Random speeds per table, at each of which all depths are compared.
+/// Number of random speeds per table, at each of which all depths are compared.
 const SPEEDS: usize = 1000;
 
-/// At one speed of a thousand a table may be wrong: the stated error is an estimate from samples and no proof.
+/// Allowed number of speeds at which the table is wrong: the stated error is an estimate from samples, not a bound.
 const WRONG_MAX: usize = SPEEDS / 1000;
 
 fn at_no_depth(case: &Case) -> WorkingPoint {
@@ -32,12 +32,13 @@ fn at_no_depth(case: &Case) -> WorkingPoint {
     }
 }
 
-/// What a table claims, and at how many of a thousand random speeds it is wrong on either side.
+/// Error stated by a table, and the number of random speeds at which it is wrong on either side.
 struct Trial {
-    /// Some depth that the table calls stable lies further than the stated depth from those that the method calls stable.
+    /// Number of speeds at which some depth that is stable in the table is further than the stated depth from the
+    /// stable depths of the method.
     unsafe_speeds: usize,
-    /// Some depth that the table gives up lies further than the stated depth from all limits of the method, and the method is stable
-    /// there at all speeds within the stated share.
+    /// Number of speeds at which some depth that is unstable in the table is further than the stated depth from all
+    /// limits of the method, although it is stable by the method at all speeds within the stated share.
     cautious_speeds: usize,
 }
 
@@ -149,7 +150,7 @@ fn check(name: &str, rpm: Option<(f64, f64)>, depth_mm: Option<f64>, speeds: Opt
     );
 }
 
-/// Whole tables of linear structures, of low and full immersion, with flip islands and without.
+/// Complete tables of linear structures, at low and full immersion, with and without flip islands.
 #[test]
 fn the_stated_error_holds_at_999_of_1000_speeds_of_whole_tables() {
     for (seed, name) in (20_261_123..).zip([
@@ -162,7 +163,7 @@ fn the_stated_error_holds_at_999_of_1000_speeds_of_whole_tables() {
     }
 }
 
-/// Few speeds over a wide range, so that refinement misses whole lobes, and a narrow range among flip islands.
+/// Few speeds over a wide range, so that refinement misses whole lobes, and a narrow range with flip islands.
 #[test]
 fn the_stated_error_holds_at_999_of_1000_speeds_of_coarse_tables() {
     for (seed, (name, rpm, depth_mm, speeds)) in (20_261_133..).zip([
@@ -175,7 +176,7 @@ fn the_stated_error_holds_at_999_of_1000_speeds_of_coarse_tables() {
     }
 }
 
-/// Three entries for an octave of lobes: only the unsafe side is bounded, since columns then give up what they cannot hold.
+/// Three entries for an octave of lobes. Only the unsafe side is bounded, since columns give up what they cannot hold.
 #[test]
 fn a_table_of_three_speeds_calls_nothing_stable_beyond_the_stated_depth() {
     let rpm = Some((5182.07, 11_876.75));

@@ -1,4 +1,4 @@
-//! From cases to the bytes of a table.
+//! Building a lobe table: from cases to bytes.
 
 use quietcut_core::lobes::{InterpolationError, LobeTable};
 
@@ -14,24 +14,26 @@ use crate::limits::chart::Refinement;
 use crate::limits::speeds::{default_speeds, spaced};
 use quietcut_model::case::Case;
 
-/// Bytes that a table should have: a quarter of a slot of the board, so that refinement, which stops only after it
-/// is exceeded, stays within. A speed takes 4 bytes, and in each layer 2 and 8 for each of one or two unstable intervals.
+/// Target size of a table, bytes: a quarter of a slot of the board, so that refinement, which stops only after
+/// exceeding it, stays within the slot. A speed takes 4 bytes, plus 2 in each layer, plus 8 for each of one or two
+/// unstable intervals.
 const BYTES: usize = 32 * 1024;
 
-/// Speeds before refinement.
+/// Default number of speeds before refinement. A choice.
 const SPEEDS: usize = 121;
 
-/// How often entries are guarded: the lines of the first time need not be the worst, and further ones change little.
+/// Number of corrections of entries. The lines of the first need not be the worst; corrections after the third change
+/// little.
 const GUARDED: usize = 3;
 
-/// The bytes of a lobe table, header and CRC included: one layer per case, feed and feed direction.
+/// Bytes of a lobe table, header and CRC included: one layer per case, feed and feed direction.
 ///
-/// Speeds are refined until every limit differs from the straight line between its neighbours by less than 0.3 % of
-/// the largest depth, or the table is as long as it should be; feeds and directions likewise. Then every gap between speeds is
-/// checked against the method itself at two more speeds, and at up to 23 where these disagree with the table, in every layer and half
-/// way between layers. Where the table is too deep there,
-/// on flanks too steep for its speeds, the entries around are made as shallow as the gap: see [`InterpolationError`] for what it
-/// states. Depths with two stable orbits, which only cubic terms make, count as unstable.
+/// Speeds are added until every limit differs from the straight line between its neighbours by less than 0.3 % of the
+/// largest depth, or until the table has its target size; feeds and directions likewise. Then every gap between speeds
+/// is checked against the method at two more speeds, and at up to 23 if these disagree with the table, in every layer
+/// and half way between layers. If the table is too deep there, on flanks too steep for its speeds, the surrounding
+/// entries become as shallow as the gap; see [`InterpolationError`] for the stated error. Depths with two stable
+/// orbits, which only cubic terms cause, count as unstable.
 ///
 /// # Errors
 /// No case, cases of different tools, two layers for the same cut, or a case whose stability cannot be computed.

@@ -1,4 +1,4 @@
-//! The derivatives of the entries of a layer, as the table wants them.
+//! Derivatives of the limits in the entries of a layer.
 
 use std::f64::consts::TAU;
 
@@ -13,9 +13,9 @@ use crate::limits::sensitivity::{Sensitivity, Tangent};
 use crate::limits::speed_line::{SpeedLine, Switch};
 use quietcut_model::structure::ModalPart;
 
-/// Derivatives of a layer.
+/// Derivatives of the entries of one layer.
 pub(super) struct Derivatives {
-    /// The modes, by rising frequency.
+    /// Modes, by ascending frequency.
     pub(super) modes: Vec<LayerMode>,
     pub(super) by_speed: Vec<SlopesOfLine>,
 }
@@ -24,7 +24,7 @@ pub(super) struct Derivatives {
 pub(super) struct SlopesOfLine(Vec<(f64, Slopes)>);
 
 impl SlopesOfLine {
-    /// Those of both ends of an entry; 0 for an end that is no limit.
+    /// Derivatives of both ends of an entry; 0 for an end that is no limit.
     pub(super) fn of(&self, entry: &Entry) -> IntervalSlopes {
         let at = |depth_mm: f64| {
             let found = self.0.iter().find(|(switch_mm, _)| *switch_mm == depth_mm);
@@ -37,7 +37,7 @@ impl SlopesOfLine {
     }
 }
 
-/// How many modes every layer can give.
+/// Number of modes for which every layer has derivatives.
 pub(super) fn mode_count(families: &[Family]) -> Result<usize, BuildError> {
     let counts = families
         .iter()
@@ -52,8 +52,7 @@ pub(super) fn mode_count(families: &[Family]) -> Result<usize, BuildError> {
     }
 }
 
-/// All derivatives of one switch, by frequency and damping of each mode of the structure and by cutting force, mm per
-/// relative change.
+/// Derivatives of one switch by frequency and damping of each mode and by cutting force, mm per relative change.
 struct All {
     depth_mm: f64,
     by_mode: Vec<[f64; 2]>,
@@ -61,7 +60,7 @@ struct All {
 }
 
 impl Derivatives {
-    /// Those of all switches; of the modes the `count` that move limits most.
+    /// Derivatives of all switches, for the `count` modes with the largest influence on limits.
     pub(super) fn new(family: &Family, lines: &[SpeedLine], count: usize) -> Result<Self, BuildError> {
         let parts = family.linear.structure.modal_parts();
         let all: Vec<Vec<All>> = lines
@@ -75,7 +74,7 @@ impl Derivatives {
             .collect();
         let influence = |mode: usize| {
             let switches = all.iter().flatten();
-            // The median would hide a mode that rules one lobe; the mean of absolute values counts it by its share.
+            // Influence as the mean of absolute values: a median would miss a mode that governs one lobe only.
             switches.map(|switch| switch.by_mode[mode][0].abs()).sum::<f64>()
         };
         let mut chosen: Vec<usize> = (0..parts.len()).collect();
@@ -116,7 +115,8 @@ impl All {
     }
 }
 
-/// `None` where the limit does not follow its parameters: at the tip of an island. The table then has zeros.
+/// Derivatives of one switch; `None` if the limit is not differentiable, at the tip of an island. The table then has
+/// zeros.
 fn of_switch(family: &Family, parts: &[ModalPart], rpm: f64, switch: &Switch) -> Option<All> {
     let problem = &family.linear;
     let sensitivity = Sensitivity::new(problem, rpm, switch).ok()?;

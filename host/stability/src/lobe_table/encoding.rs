@@ -1,4 +1,4 @@
-//! The content of a table as bytes.
+//! Encoding of the content of a table as bytes.
 
 use quietcut_core::lobes::{
     Additions, Content, InterpolationError, IntervalSlopes, Layer, LayerMode, LobeTable, encode_with,
@@ -13,7 +13,7 @@ use super::error::BuildError;
 use super::layers::Family;
 use quietcut_model::case::Case;
 
-/// The table for cuts with a feed direction, where that is known.
+/// The table for cuts in a given feed direction; unchanged if the direction is not known.
 pub(super) fn towards<'a>(table: &LobeTable<'a>, direction_deg: Option<f64>) -> LobeTable<'a> {
     match direction_deg {
         Some(degrees) => table.towards(Degrees(degrees as f32)),
@@ -26,9 +26,9 @@ pub(super) struct Table<'a> {
     pub(super) first: &'a Case,
     pub(super) families: &'a [Family],
     pub(super) speeds: &'a [f64],
-    /// By layer and speed.
+    /// Entries by layer and speed.
     pub(super) entries: &'a [Vec<Vec<Entry>>],
-    /// By layer; empty for none.
+    /// Derivatives by layer; empty if not requested.
     pub(super) derivatives: &'a [Derivatives],
     pub(super) depth_mm: f64,
 }
@@ -65,7 +65,7 @@ impl Table<'_> {
         }
         let content = Content {
             name: &self.first.name[..end],
-            // A tool has at most 64 teeth.
+            // A tool has at most 64 teeth, so that the number fits.
             teeth: self.families.first().map_or(0, |family| family.teeth as u8),
             limits: self.first.limits.map(|limits| Limits {
                 rpm_min: Rpm(limits.rpm_min as f32),

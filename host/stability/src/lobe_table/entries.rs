@@ -1,4 +1,4 @@
-//! The entries of a column: a line of the method as the table wants it.
+//! Entries of a column of the table: the unstable depths of a line.
 
 use quietcut_core::lobes::{Interval, IntervalKind, format::MAX_INTERVALS};
 use quietcut_core::units::{Hertz, Millimeters};
@@ -6,7 +6,7 @@ use quietcut_core::units::{Hertz, Millimeters};
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Depths that are not stable, with their ends in full precision.
+/// Interval of unstable depths, with both ends in full precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
     pub(super) interval: Interval,
@@ -14,9 +14,9 @@ pub(super) struct Entry {
     pub(super) to_mm: f64,
 }
 
-/// The depths up to `depth_mm` that are surely stable: with two stable orbits it depends on how the cut began.
+/// Stable depths up to `depth_mm` with a single stable orbit; with two, stability depends on how the cut began.
 pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
-    // A branch of orbits may have been followed a step beyond the last depth.
+    // A branch of orbits may extend one step beyond the last depth.
     let mut stable: Vec<[f64; 2]> = line
         .stable_mm
         .iter()
@@ -33,7 +33,7 @@ pub(super) fn surely_stable(line: &SpeedLine, depth_mm: f64) -> Vec<[f64; 2]> {
     stable
 }
 
-/// The depths that are not stable, ascending.
+/// Unstable depths up to `depth_mm`, ascending.
 pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut from_mm = 0.0;
@@ -43,7 +43,7 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     for [stable_from, stable_to] in ends {
         if stable_from > from_mm {
             let switch = line.switches.iter().find(|switch| switch.depth_mm == from_mm);
-            // Where a second orbit begins there is no switch on the line: the jump to it is a fold.
+            // At the depth where a second orbit begins the line has no switch: the jump to that orbit is a fold.
             let is_jump = line.bistable_mm.iter().any(|interval| interval[0] == from_mm);
             let kind = match switch {
                 Some(switch) => table_kind(switch.kind),
@@ -66,7 +66,7 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     limited(entries)
 }
 
-/// The entries with all depths of others: what overlaps keeps its kind.
+/// Union of the entries with `others`; overlapping entries keep their kind.
 pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
     let mut all = entries.to_vec();
     for other in others {
@@ -83,7 +83,7 @@ pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
 }
 
 impl Entry {
-    /// The part of it between two depths; `None` where there is none.
+    /// Part of the entry between two depths; `None` if there is no overlap.
     fn part(&self, from_mm: f64, to_mm: f64) -> Option<Self> {
         (from_mm < to_mm).then_some(Self {
             interval: Interval {
@@ -97,7 +97,7 @@ impl Entry {
     }
 }
 
-/// No more entries than a column holds: the narrowest stable gaps are given up, which is on the safe side.
+/// Limits the entries to the capacity of a column: the narrowest stable gaps are given up, which errs on the safe side.
 fn limited(mut entries: Vec<Entry>) -> Vec<Entry> {
     while entries.len() > MAX_INTERVALS {
         let gap = |i: usize| entries[i + 1].from_mm - entries[i].to_mm;

@@ -1,37 +1,37 @@
-//! Why no table can be made.
+//! Errors of building a lobe table.
 
 use quietcut_core::lobes::TableError;
 
 use crate::error::StabilityError;
 
-/// Why no table can be made.
+/// Reason why a lobe table cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// There is no case.
+    /// No case is given.
     #[error("a table needs at least one case")]
     NoCase,
-    /// Stability cannot be computed.
+    /// The stability of a case cannot be computed.
     #[error(transparent)]
     Stability(#[from] StabilityError),
-    /// The cases belong to different tools.
+    /// The cases have tools with different numbers of teeth.
     #[error("{}: {found} teeth; a table is for one tool, and the first case has {expected}", path.display())]
     Teeth {
         /// The case file.
         path: std::path::PathBuf,
-        /// Its number of teeth.
+        /// Number of teeth of this case.
         found: usize,
-        /// That of the first case.
+        /// Number of teeth of the first case.
         expected: usize,
     },
-    /// What was asked for does not fit a case.
+    /// The request does not fit a case.
     #[error("{}: {what}", path.display())]
     NotPossible {
         /// The case file.
         path: std::path::PathBuf,
-        /// What does not fit, and what would.
+        /// Feature that does not fit, and what to do instead.
         what: &'static str,
     },
-    /// The table format does not take it: two layers for the same cut, for instance.
+    /// The table format refuses the content, such as two layers for the same cut.
     #[error(
         "the table cannot be written: {0}; each layer must have its own feed, feed direction, immersion or posture"
     )]

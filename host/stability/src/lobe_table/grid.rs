@@ -1,4 +1,4 @@
-//! Which speeds and depths a table covers.
+//! Range of speeds and depths of a table.
 
 use super::layers::Family;
 use crate::error::StabilityError;
@@ -6,7 +6,7 @@ use crate::limits::chart::{Refinement, chart};
 use crate::limits::speed_line::SpeedLine;
 use crate::limits::speeds::spaced;
 
-/// Four times the lowest limit, found by doubling: deep enough for every pocket that is worth while.
+/// Default largest depth: four times the lowest limit, found by doubling. Deeper pockets of stability are narrow.
 pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> Result<f64, StabilityError> {
     const SHALLOWEST_MM: f64 = 0.01;
     const DEEPEST_MM: f64 = 500.0;
@@ -29,7 +29,7 @@ pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> 
     Ok(DEEPEST_MM)
 }
 
-/// The speeds that any of the layers needs, ascending, and the lines of every layer at all of them.
+/// Speeds that any of the layers needs, ascending, with the lines of every layer at all of them.
 pub(super) fn lines_of_all(
     families: &[Family],
     coarse: &[f64],
@@ -47,7 +47,7 @@ pub(super) fn lines_of_all(
     }
     let mut speeds: Vec<f64> = known.iter().flatten().map(|line| line.rpm).collect();
     speeds.sort_by(f64::total_cmp);
-    // The table holds single precision: speeds that it cannot tell apart are one.
+    // The table stores speeds in single precision: equal ones are merged.
     speeds.dedup_by_key(|rpm| *rpm as f32);
     let lines = families.iter().zip(known);
     let lines = lines

@@ -1,4 +1,4 @@
-//! The layers of a table: cases, feeds per tooth and feed directions.
+//! Layers of a table: cases, feeds per tooth and feed directions.
 
 use std::path::Path;
 
@@ -20,25 +20,25 @@ use crate::problem::pitched::Pitched;
 use crate::process::treatment::needs_orbit;
 use quietcut_model::case::Case;
 
-/// Feed per tooth, mm, up to which a layer holds whose limits do not depend on the feed.
+/// Feed per tooth, mm, stated for a layer whose limits do not depend on the feed; larger than any feed.
 const ANY_FEED_MM: f32 = 100.0;
 
-/// Speeds at which is looked how limits bend over feed and direction.
+/// Number of speeds at which the dependence of limits on feed and direction is probed. Unfounded.
 pub(super) const PROBES: usize = 16;
 
 /// The most layers that one case is divided into.
 const LAYERS_MAX: usize = 12;
 
-/// Where the draws begin that percentiles are computed with.
+/// Seed of the draws for percentiles; fixed, so that a table can be reproduced.
 const SEED: u64 = 1;
 
-/// The method and the case of one layer.
+/// Case and method of one layer.
 pub(super) struct Family {
     pub(super) method: Box<dyn Method>,
-    /// The linear problem, with the mean pitch: the method's own where the structure is linear and the teeth stand evenly.
+    /// Linear problem with the mean pitch; equal to the problem of the method if structure and pitch allow.
     pub(super) linear: Problem,
     pub(super) validity: Validity,
-    /// The feed direction, degrees, where the table states it.
+    /// Feed direction, degrees; `None` if the table does not state it.
     pub(super) direction_deg: Option<f64>,
     pub(super) teeth: usize,
     case: Case,
@@ -78,7 +78,7 @@ impl Family {
         })
     }
 
-    /// The case file.
+    /// Path of the case file.
     pub(super) fn path(&self) -> &Path {
         &self.case.path
     }
@@ -101,26 +101,27 @@ impl Family {
         (a.posture, a.start, a.exit) == (b.posture, b.start, b.exit)
     }
 
-    /// By how much, mm, its feed is larger, all else the same; `None` where it is not.
+    /// Difference of the feeds, mm, if this layer has a larger feed and equals the other in all else; otherwise `None`.
     fn feeds_beyond(&self, other: &Self) -> Option<f64> {
         let more_mm = self.feed_mm() - other.feed_mm();
         let is_same = self.is_of_cut(other) && self.direction_deg == other.direction_deg;
         (is_same && depends_on_feed(&self.case) && more_mm > 0.0).then_some(more_mm)
     }
 
-    /// By how much, degrees, its direction lies further, all else the same; `None` where that is too far for lookups.
+    /// Difference of the feed directions, degrees, if the layers are equal in all else; `None` if lookups do not
+    /// interpolate over it.
     fn turned_from(&self, other: &Self) -> Option<f64> {
         let turn = (self.direction_deg? - other.direction_deg?).rem_euclid(360.0);
         let is_same = self.is_of_cut(other) && self.feed_mm() == other.feed_mm();
         (is_same && turn > 0.0 && turn <= f64::from(FEED_DIRECTION_SPAN.0)).then_some(turn)
     }
 
-    /// The lines at these speeds; where a percentile was asked for, what it leaves of them.
+    /// Lines at these speeds; with a percentile, lines of that percentile.
     pub(super) fn lines(&self, speeds_rpm: &[f64], depth_mm: f64) -> Result<Vec<SpeedLine>, StabilityError> {
         self.lines_beside(Vec::new(), speeds_rpm, depth_mm)
     }
 
-    /// The same, where the method's lines at some of the speeds are known.
+    /// The same lines, if those of the method at some of the speeds are known.
     pub(super) fn lines_beside(
         &self,
         known: Vec<SpeedLine>,
@@ -151,7 +152,7 @@ impl Family {
     }
 }
 
-/// The line with nothing stable above a limit; the kind is that of the nominal first limit.
+/// The line with stability only up to a limit; the kind of stability loss is that of the nominal first limit.
 fn up_to(line: SpeedLine, percentile: &Percentile, depth_mm: f64) -> SpeedLine {
     let error_mm = percentile.error_mm(depth_mm);
     let limit = percentile.depth_mm.and_then(|depth_mm| {
@@ -205,14 +206,14 @@ fn depends_on_feed(case: &Case) -> bool {
     case.axial_depth_modulation() || needs_orbit(case)
 }
 
-/// The layers between which a table is checked: one layer, or half way between two that lookups interpolate between.
+/// Layers between which a table is checked: a single one, or the middle of two between which lookups interpolate.
 pub(super) struct CheckedLayers {
     pub(super) family: Family,
-    /// Index of the layer, or of both.
+    /// Index of the layer, or of both layers.
     pub(super) layers: Vec<usize>,
 }
 
-/// All layers, and the middles of all pairs of neighbours in feed or in feed direction.
+/// All layers, and the middles of all neighbours in feed or in feed direction.
 pub(super) fn spans(families: &[Family]) -> Result<Vec<CheckedLayers>, BuildError> {
     let mut spans = Vec::new();
     for (index, family) in families.iter().enumerate() {
@@ -239,7 +240,7 @@ pub(super) fn spans(families: &[Family]) -> Result<Vec<CheckedLayers>, BuildErro
     Ok(spans)
 }
 
-/// The family with the least distance from one, where it has any.
+/// The family at the least distance from another; `None` if no distance is defined.
 fn nearest(families: &[Family], index: usize, distance: impl Fn(&Family) -> Option<f64>) -> Option<usize> {
     let others = families.iter().enumerate().filter(|(other, _)| *other != index);
     others
@@ -252,7 +253,7 @@ fn nearest(families: &[Family], index: usize, distance: impl Fn(&Family) -> Opti
 #[derive(Clone)]
 struct Division {
     feeds_mm: Vec<f64>,
-    /// `None` for the direction of the case, which is not stated.
+    /// Feed directions, degrees; `None` for the direction of the case, which the table does not state.
     directions_deg: Vec<Option<f64>>,
 }
 
@@ -306,7 +307,7 @@ fn divided(
     Ok(families)
 }
 
-/// The layers as they were asked for.
+/// Layers as requested, before refinement.
 pub(super) fn families(cases: &[Case], request: &TableRequest) -> Result<Vec<Family>, BuildError> {
     let mut teeth = None;
     for case in cases {
@@ -335,8 +336,8 @@ fn divisions(cases: &[Case], request: &TableRequest) -> Result<Vec<Division>, Bu
     cases.iter().map(|case| division(case, request)).collect()
 }
 
-/// The layers with more feeds and directions between those asked for, until first limits half way differ from the mean of
-/// both sides by less than `tolerance_mm` at the probe speeds, or there are as many as there should be.
+/// Adds feeds and directions between the requested ones, until first limits half way differ from the mean of both sides
+/// by less than `tolerance_mm` at the probe speeds, or until the number of layers is exhausted.
 pub(super) fn refined(
     cases: &[Case],
     request: &TableRequest,
@@ -374,16 +375,17 @@ pub(super) fn refined(
     divided(cases, &divisions, request)
 }
 
-/// How an axis of layers is filled.
+/// Axis of the layers (feed or direction) during refinement.
 struct Axis {
     tolerance: f64,
     most: usize,
-    /// Gaps wider than this are divided whatever the limits say, since lookups do not interpolate over them.
+    /// Largest gap over which lookups interpolate; wider gaps are always divided.
     widest: f64,
 }
 
 impl Axis {
-    /// The given values, ascending, and more between them, until what `limits` says half way is near the mean of both sides.
+    /// Given values, ascending, with values added between them until `limits` half way agrees with the mean of both
+    /// sides.
     fn filled(
         &self,
         values: &[f64],

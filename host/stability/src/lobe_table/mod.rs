@@ -1,4 +1,4 @@
-//! From cases to the lobe table that goes to the device.
+//! The lobe table of the device, built from cases.
 
 mod accuracy;
 mod build;

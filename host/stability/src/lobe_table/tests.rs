@@ -41,7 +41,7 @@ fn request(rpm: (f64, f64), depth_mm: f64) -> TableRequest {
     }
 }
 
-/// The first limit that a table tells; the last depth where nothing is lost.
+/// First limit stated by a table, mm; the last depth if nothing is unstable.
 fn told_limit(table: &LobeTable, point: &WorkingPoint, direction_deg: Option<f64>, rpm: f64) -> f64 {
     let table = towards(table, direction_deg);
     let column = table.column(Rpm(rpm as f32), point).unwrap();
@@ -58,7 +58,7 @@ fn is_stable(line: &SpeedLine, depth_mm: f64) -> bool {
     entries::surely_stable(line, f64::INFINITY).iter().any(within)
 }
 
-/// What a table says at random points against the method, with the error that the table states.
+/// Comparison of a table with the method at random points, with the error stated by the table.
 struct Trial<'a> {
     table: &'a LobeTable<'a>,
     depth_mm: f64,
@@ -74,7 +74,8 @@ impl<'a> Trial<'a> {
         }
     }
 
-    /// Everything that the table calls stable at a speed of a cut must be so within the stated depth. `direct` is the method's line.
+    /// Checks that every depth the table calls stable at the speed of a cut is so within the stated depth. `direct` is
+    /// the line of the method.
     fn check(&mut self, point: &WorkingPoint, direction_deg: Option<f64>, direct: &SpeedLine) -> Miss {
         let table = towards(self.table, direction_deg);
         let column = table.column(Rpm(direct.rpm as f32), point).unwrap();
@@ -118,13 +119,14 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
     let bytes = build_table(std::slice::from_ref(&case), &request((from, to), depth_mm)).unwrap();
     let table = LobeTable::parse(&bytes).unwrap();
     let error = table.interpolation_error().unwrap();
-    // 0.3 % of the depth is the aim; half more is stated, and a step of the entries. Islands begin within half a percent.
+    // Refinement aims at 0.3 % of the depth; stated are 1.5 times that and the rounding of an entry. Islands begin
+    // within 0.5 % of speed.
     assert!(error.depth.0 < 0.05 && error.speed < 0.01, "{error:?}");
     let problem = problem(&case);
     let seed = 20_261_121;
     println!("seed {seed}");
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    // Half of the speeds around the notch and its islands.
+    // Half of the speeds lie around the notch and its islands.
     let speeds: Vec<f64> = (0..600)
         .map(|index| {
             if index % 2 == 0 {
@@ -143,7 +145,7 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
         if miss.cautious_mm <= allowed_mm {
             continue;
         }
-        // What is given up lies within the speed error of a limit: some speed within it is unstable there.
+        // Depths given up lie within the speed error of a limit: they are unstable at some speed within it.
         let reach = f64::from(error.speed) * line.rpm;
         let around = [-1.0, -0.6, -0.3, 0.3, 0.6, 1.0].map(|share| direct(line.rpm + share * reach));
         for _ in 0..50 {
@@ -231,7 +233,7 @@ fn teeth_at_unequal_pitch_have_a_table_of_their_own() {
         differs_mm = differs_mm.max((told_mm - even_mm).abs());
     }
     trial.report();
-    // Forty times the stated error: this is the table of the uneven tool.
+    // The difference is forty times the stated error, so that the table is that of the tool with unequal pitch.
     assert!(differs_mm > 0.01, "{differs_mm}");
     let derivatives = TableRequest {
         derivatives: true,
@@ -273,7 +275,7 @@ fn the_stated_error_of_a_5_percent_table_holds() {
     trial.report();
 }
 
-/// From the case with cubic terms through the table's bytes and the lookup of the device: about two CPU minutes,
+/// Follows a case with cubic terms through the bytes of its table and the lookup of the device. About two CPU minutes:
 /// `cargo test --release -p quietcut-stability --lib cubic_terms_through -- --ignored --nocapture`
 #[test]
 #[ignore = "forced orbits at some hundred speeds; see the comment above for the command"]
@@ -301,7 +303,7 @@ fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
         let forced = orbit::ForcedProblem::new(&there).unwrap();
         let direct = forced.line(rpm, depth_mm, 40).unwrap();
         trial.check(&point(&case, 1.0, feed_mm), None, &direct);
-        // It is the limit with the cubic terms, not that without.
+        // The limit is that with cubic terms, not the linear one.
         let told_mm = told_limit(&table, &point(&case, 1.0, feed_mm), None, rpm);
         let linear_mm = limit(&line(&linear, rpm, depth_mm, 40).unwrap(), depth_mm);
         assert!(
@@ -321,13 +323,13 @@ fn a_miss_is_measured_from_the_limits_of_the_method() {
     let close = |a: [f64; 2], b: [f64; 2]| (0..2).all(|i| a[i] == b[i] || (a[i] - b[i]).abs() < 1e-12);
     assert!(close(miss(&[[0.0, 2.0]], &[[0.0, 2.3]]), [0.3, 0.0]));
     assert!(close(miss(&[[0.0, 2.0]], &[[0.0, 1.5]]), [0.0, 0.5]));
-    // An island of the table's own, and one that it does not know.
+    // An island that only the table has, and one that only the method has.
     assert!(close(miss(&[[0.0, 2.0]], &[[0.0, 2.0], [3.0, 3.5]]), [1.5, 0.0]));
     assert!(close(miss(&[[0.0, 2.0], [3.0, 3.5]], &[[0.0, 2.0]]), [0.0, 0.25]));
-    // Nothing is stable; everything is.
+    // Nothing is stable on one side; everything on the other.
     assert!(close(miss(&[], &[[0.0, 0.4]]), [0.4, 0.0]));
     assert!(close(miss(&[[0.0, 5.0]], &[[0.0, 1.0]]), [0.0, f64::INFINITY]));
-    // The same, but for the rounding of the last depth.
+    // Equal sets, apart from the rounding of the last depth.
     assert!(close(miss(&[[0.0, 5.0]], &[[0.0, 5.000_000_3]]), [0.0, 0.0]));
 }
 
@@ -380,7 +382,7 @@ fn derivatives_of_entries_are_those_of_limits_of_another_machine() {
     let modes: Vec<_> = table.modes(0).collect();
     assert_eq!(modes.len(), 2);
     assert!((modes[0].frequency.0 - 16.99).abs() < 1e-3 && (modes[1].damping_ratio - 0.0996).abs() < 1e-5);
-    // A machine whose first mode is 0.2 % faster, its second damped 2 % more, in a material 3 % harder.
+    // Machine whose first mode is 0.2 % faster, whose second mode has 2 % more damping, in a material 3 % harder.
     let mut other = case.clone();
     assert!(Parameter::Frequency(0).shift(&mut other, 0.002 * 16.99));
     assert!(Parameter::DampingRatio(1).shift(&mut other, 0.02 * 0.0996));
@@ -401,7 +403,7 @@ fn derivatives_of_entries_are_those_of_limits_of_another_machine() {
         let [before, after] = [&was, &is].map(|problem| limit(&line(problem, rpm, 4.0, 40).unwrap(), 4.0));
         let corrected = table.corrected_entry(0, index, &learned).unwrap();
         let corrected = f64::from(corrected.first_limit().unwrap().from.0);
-        // What is left is of second order: a tenth of the change, and an entry's step.
+        // The remaining error is of second order: a tenth of the change, plus the rounding of an entry.
         assert!(
             (corrected - after).abs() < 0.1 * (after - before).abs() + 1e-3,
             "{rpm}: {before} {after} {corrected}"
@@ -422,7 +424,8 @@ fn feed_layers_agree_with_the_direct_solution_between_them() {
     let table = LobeTable::parse(&bytes).unwrap();
     let error = table.interpolation_error().unwrap();
     println!("{} layers, stated error {}", table.layers().len(), error.depth);
-    // Both feeds asked for, and whatever limits need between them; the error is no excuse for any difference.
+    // Layers are both requested feeds and those that limits need between them; the stated error is not enlarged in
+    // their place.
     assert!(
         table.layers().len() >= 2 && error.depth.0 < 0.02,
         "{}",
@@ -440,7 +443,7 @@ fn feed_layers_agree_with_the_direct_solution_between_them() {
         for (rpm, allowed_mm) in [
             (407.0, f64::from(error.depth.0)),
             (561.3, f64::from(error.depth.0)),
-            // At a speed of the grid only the feed is between entries: what is left is a tenth of what the feed changes.
+            // At a speed of the grid only the feed is interpolated: the error is a tenth of the change with the feed.
             (grid[0], 7e-4),
             (grid[1], 7e-4),
             (grid[2], 7e-4),
@@ -469,7 +472,7 @@ fn direction_layers_agree_with_the_direct_solution_between_them() {
     let table = LobeTable::parse(&bytes).unwrap();
     let error = table.interpolation_error().unwrap();
     println!("{} layers, stated error {}", table.layers().len(), error.depth);
-    // More than 45 degrees apart: at least one was added.
+    // The directions are more than 45 degrees apart: at least one was added.
     assert!(table.layers().len() > 2);
     for degrees in [5.0, 22.0, 48.0] {
         case.cut.as_mut().unwrap().feed_direction_deg = degrees;
@@ -515,12 +518,13 @@ fn postures_are_layers_and_a_percentile_is_that_of_the_machines() {
     };
     let families = layers::families(std::slice::from_ref(&case), &request).unwrap();
     let told = families[0].lines(&[1300.0], 5.0).unwrap();
-    // One parameter, and the limit falls with it: the machine at its 95 % is that of the 5 % limit.
+    // With one parameter on which the limit falls monotonically, the 5 % limit is that of the machine at the 95 %
+    // quantile.
     let mut hard = case.clone();
     assert!(Parameter::Ktc.shift(&mut hard, 1.644_853_6 * 12.0));
     let expected_mm = limit(&line(&problem(&hard), 1300.0, 5.0, 40).unwrap(), 5.0);
     let told_mm = limit(&told[0], 5.0);
-    // Slices of 1/256 of the machines, 0.04 deviations wide there.
+    // Tolerance: slices of 1/256 of the machines, 0.04 standard deviations wide there.
     assert!(
         (told_mm - expected_mm).abs() < 2e-3 * expected_mm,
         "{told_mm} {expected_mm}"
@@ -554,7 +558,7 @@ fn a_structure_with_cubic_terms_has_layers_over_feed() {
     let forced = orbit::ForcedProblem::new(&case).unwrap();
     let direct = forced.line(rpm, depth_mm, 40).unwrap();
     assert_eq!(families[1].lines(&[rpm], depth_mm).unwrap()[0], direct);
-    // What is not surely stable is an entry.
+    // Every depth that is not surely stable belongs to an entry.
     let entries = entries::unstable(&direct, depth_mm);
     let stable = entries::surely_stable(&direct, depth_mm);
     let length = |intervals: &[[f64; 2]]| intervals.iter().map(|[from, to]| to - from).sum::<f64>();

@@ -1,25 +1,25 @@
-//! Anderson's acceleration of a fixed-point iteration z → G(z).
+//! Anderson acceleration of a fixed-point iteration z → G(z).
 //!
-//! The next z is Σ α_i G(z_i) over the last few rounds, with Σ α_i = 1 and ‖Σ α_i (G(z_i) − z_i)‖ least. D. G. Anderson, J. ACM 12
-//! (1965) 547; H. F. Walker and P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715.
+//! The next z is Σ α_i G(z_i) over the last iterations, with Σ α_i = 1 and ‖Σ α_i (G(z_i) − z_i)‖ minimal. D. G.
+//! Anderson, J. ACM 12 (1965) 547; H. F. Walker and P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715.
 
 use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 use quietcut_numerics::singular_values::{Vectors, decompose};
 
-/// What is left out of the singular values of the last residuals, as a share of the largest.
+/// Singular values of the residual matrix below this share of the largest are dropped as rounding.
 const RANK: f64 = 1e-10;
 
-/// The last rounds.
+/// Last iterations of the accelerated fixed-point iteration.
 pub(super) struct Anderson {
     depth: usize,
-    /// (G(z) − z, G(z)) of the last rounds.
+    /// Residual G(z) − z and image G(z) of the last iterations.
     rounds: VecDeque<(DVector<f64>, DVector<f64>)>,
 }
 
 impl Anderson {
-    /// Remembers `depth` rounds.
+    /// Acceleration that stores `depth` iterations.
     pub(super) fn new(depth: usize) -> Self {
         Self {
             depth,
@@ -27,7 +27,7 @@ impl Anderson {
         }
     }
 
-    /// The next z, after G(`at`) = `to`.
+    /// Next z, after the image G(`at`) = `to`.
     pub(super) fn next(&mut self, at: &DVector<f64>, to: &DVector<f64>) -> DVector<f64> {
         let residual = to - at;
         self.rounds.push_back((residual.clone(), to.clone()));
@@ -35,7 +35,7 @@ impl Anderson {
             self.rounds.pop_front();
         }
         let before = self.rounds.len() - 1;
-        // Half of the first step: some of the maps turn around their fixed point.
+        // The first step is halved, since some of the maps oscillate about their fixed point.
         if before == 0 {
             return at + &residual * 0.5;
         }
@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn a_linear_map_that_diverges_by_itself_is_solved() {
-        // z → A z + b with an eigenvalue of −1.5.
+        // Linear map z → A z + b with an eigenvalue of −1.5, which diverges without acceleration.
         let a = DMatrix::from_row_slice(3, 3, &[-1.5, 0.2, 0.0, 0.1, 0.4, 0.3, 0.0, 0.0, 0.9]);
         let b = DVector::from_vec(vec![1.0, -2.0, 0.5]);
         let exact = (DMatrix::identity(3, 3) - &a).lu().solve(&b).unwrap();

@@ -1,4 +1,5 @@
-//! A branch of forced orbits as the depth grows, with the points where multipliers cross the unit circle.
+//! Branch of forced orbits over the axial depth, with the crossings of the unit circle by its Floquet multipliers
+//! (characteristic multipliers).
 
 use num_complex::Complex64;
 use serde::Serialize;
@@ -6,38 +7,38 @@ use serde::Serialize;
 use crate::limits::speed_line::{Limit, SpeedLine, Switch, union};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// A point on a branch.
+/// Forced orbit on a branch, by depth, amplitude and stability.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BranchPoint {
     /// Axial depth, mm.
     pub depth_mm: f64,
     /// Half the peak-to-peak displacement of the orbit in feed, normal and axial direction, mm.
     pub amplitude_mm: [f64; 3],
-    /// Absolute value of the largest multiplier.
+    /// Absolute value of the largest Floquet multiplier.
     pub multiplier_abs: f64,
     /// Number of multipliers outside the unit circle.
     pub outside: i32,
 }
 
-/// A point where a multiplier crosses the unit circle.
+/// Bifurcation: a Floquet multiplier of the orbit crosses the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// An estimate of its error, mm: within it |μ| is as near to 1 as the error of the multiplier.
+    /// Error estimate of the depth, mm: within it |μ| differs from 1 by no more than the error of the multiplier.
     pub error_mm: f64,
-    /// How it crosses; a fold is where the branch turns back in depth. With unequal teeth with respect to the revolution.
+    /// Kind of crossing; at a fold the branch turns back in depth. With unequal teeth it refers to the revolution.
     pub kind: StabilityLoss,
-    /// True where the number outside falls along the branch.
+    /// True if the number of multipliers outside the unit circle falls along the branch.
     pub gain: bool,
-    /// The multiplier there.
+    /// Multiplier at the crossing.
     #[serde(skip)]
     pub multiplier: Complex64,
-    /// Frequency of the vibration that is born or dies there, Hz; `None` at a fold.
+    /// Frequency of the vibration that begins or ends there, Hz; `None` at a fold.
     pub chatter_hz: Option<f64>,
 }
 
-/// Orbits from rest at no depth on.
+/// Branch of forced orbits that starts from rest at depth 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Branch {
     /// Spindle speed, rev/min.
@@ -48,17 +49,17 @@ pub struct Branch {
     pub events: Vec<Event>,
 }
 
-/// How far a branch is followed.
+/// Extent to which a branch is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// To the first loss of stability, which is all that a limit needs.
+    /// To the first loss of stability, which suffices for a limit.
     FirstLoss,
     /// To the last depth, through folds.
     Whole,
 }
 
 impl Branch {
-    /// Depths at which the forced orbit is stable, mm, in the order of the branch.
+    /// Depths with a stable forced orbit, mm, in the order of the branch.
     pub fn stable_mm(&self) -> Vec<[f64; 2]> {
         let mut outside = self.points.first().map_or(0, |point| point.outside);
         let mut from = (outside == 0).then_some(0.0);
@@ -85,8 +86,8 @@ impl Branch {
         stable
     }
 
-    /// Depths at which the errors of the events leave open whether some forced orbit is stable, mm: around the ends of those that
-    /// are stable.
+    /// Depths, mm, at which the errors of the events leave the stability of the orbit open: around the ends of the
+    /// stable intervals.
     fn undecided_mm(&self) -> Vec<[f64; 2]> {
         let ends = union(self.stable_mm()).into_iter().flatten();
         let around = ends.filter_map(|end_mm| {
@@ -111,9 +112,10 @@ impl Branch {
         both
     }
 
-    /// The branch as a line of the chart.
+    /// The branch as a line of a stability chart.
     ///
-    /// The first limit is the first loss along the branch; stable depths are those at which some forced orbit is stable.
+    /// The first limit is the first loss of stability along the branch. A depth is stable if some forced orbit there is
+    /// stable.
     pub fn speed_line(&self) -> SpeedLine {
         let switches: Vec<Switch> = self
             .events

@@ -1,4 +1,4 @@
-//! The collocation that a case needs.
+//! Choice of the collocation method that a case requires.
 
 use super::equivalent::EquivalentProblem;
 use super::forced::ForcedProblem;
@@ -11,11 +11,11 @@ use crate::problem::pitched::Pitched;
 use crate::process::treatment::{is_not_smooth, needs_orbit};
 use quietcut_model::case::Case;
 
-/// Collocation of the one-period map; over the revolution where teeth stand at unequal angles; about the forced orbit where
-/// limits depend on it, with equivalent stiffness and damping of what is not smooth.
+/// Collocation of the map over one tooth period; over the revolution for unequal pitch; about the forced orbit if
+/// limits depend on it, with equivalent stiffness and damping of friction, backlash and hysteresis.
 ///
 /// # Errors
-/// What the method cannot treat.
+/// A feature that no collocation method treats.
 pub fn collocation_of(case: &Case) -> Result<Box<dyn Method>, StabilityError> {
     Ok(if is_not_smooth(case) {
         Box::new(EquivalentProblem::new(case)?)

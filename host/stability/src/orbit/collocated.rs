@@ -1,20 +1,20 @@
-//! A subinterval of a period without a switch, collocated about the states at its nodes.
+//! Collocation of a subinterval without entry or exit of a tooth, linearized about the states at its nodes.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::problem::gauss::Gauss;
 
-/// A subinterval after a step of Newton from its start.
+/// Subinterval after one Newton step from its start.
 pub(super) struct Advanced {
-    /// The states at the nodes, n × m.
+    /// States at the nodes, n × m.
     pub(super) states: DMatrix<f64>,
-    /// The state at the end.
+    /// State at the end.
     pub(super) end: DVector<f64>,
-    /// The derivatives of the states at the nodes, (n m) × anything.
+    /// Derivatives of the states at the nodes, (n m) × number of variables.
     pub(super) values: DMatrix<f64>,
-    /// The derivatives of the state at the end.
+    /// Derivatives of the state at the end.
     pub(super) end_by: DMatrix<f64>,
-    /// The largest change of a state at a node, as a share of the largest there.
+    /// Largest change of a state at a node by the Newton step, relative to the largest state there.
     pub(super) moved: f64,
 }
 
@@ -22,14 +22,14 @@ pub(super) struct Advanced {
 pub(super) struct Linearized<'a> {
     gauss: &'a Gauss,
     duration_s: f64,
-    /// Jacobian at each node.
+    /// Jacobian of the rates at each node.
     jacobians: Vec<DMatrix<f64>>,
-    /// (I − h a⊗J), factored.
+    /// Factored matrix I − h a⊗J of the collocation equations.
     factored: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
 }
 
 impl<'a> Linearized<'a> {
-    /// From the Jacobians at the nodes.
+    /// Factors the collocation equations from the Jacobians at the nodes.
     pub(super) fn new(gauss: &'a Gauss, duration_s: f64, jacobians: Vec<DMatrix<f64>>) -> Self {
         let (order, nodes) = (jacobians[0].nrows(), gauss.nodes.len());
         let mut matrix = DMatrix::identity(order * nodes, order * nodes);
@@ -53,12 +53,12 @@ impl<'a> Linearized<'a> {
         self.jacobians[0].nrows()
     }
 
-    /// The values at the nodes that a right-hand side makes, (n m) × anything; `None` where the subinterval is singular.
+    /// Solves the collocation equations for the values at the nodes, (n m) × columns; `None` if they are singular.
     pub(super) fn solve(&self, right: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         self.factored.solve(right)
     }
 
-    /// What of x₁ the values at the nodes make: h Σ b_j J_j Y_j.
+    /// Contribution of the values at the nodes to x₁: h Σ b_j J_j Y_j.
     pub(super) fn gather(&self, values: &DMatrix<f64>) -> DMatrix<f64> {
         let order = self.order();
         let mut sum = DMatrix::zeros(order, values.ncols());
@@ -69,10 +69,10 @@ impl<'a> Linearized<'a> {
         sum
     }
 
-    /// Newton's step from a start with its derivatives `by`, for the states at the nodes that the subinterval is linearized about,
-    /// their rates, and what acts on them: the derivatives of the rates beside those through the states, n × anything each.
+    /// Newton step of a subinterval from a start with derivatives `by`. Arguments are the states at the nodes, their
+    /// rates, and the explicit derivatives of the rates (those not through the states), n × number of variables each.
     ///
-    /// `None` where the subinterval is singular or the numbers are no longer finite.
+    /// `None` if the equations are singular or a result is not finite.
     pub(super) fn advance(
         &self,
         start: &DVector<f64>,
@@ -82,7 +82,7 @@ impl<'a> Linearized<'a> {
         forces: &[DMatrix<f64>],
     ) -> Option<Advanced> {
         let (order, nodes, columns) = (self.order(), self.gauss.nodes.len(), by.ncols());
-        // The first column is the residual, the others are the derivatives.
+        // The first column is the residual, the others are derivatives.
         let mut right = DMatrix::zeros(order * nodes, columns + 1);
         for i in 0..nodes {
             let mut block = right.view_mut((i * order, 0), (order, columns + 1));
@@ -118,7 +118,7 @@ impl<'a> Linearized<'a> {
         })
     }
 
-    /// The values at the nodes and the end of the subinterval, both by its start.
+    /// Derivatives of the values at the nodes and of the end with respect to the start.
     pub(super) fn flow(&self) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
         let (order, nodes) = (self.order(), self.gauss.nodes.len());
         let start = DMatrix::from_fn(order * nodes, order, |row, column| {

@@ -1,16 +1,17 @@
-//! Friction, backlash and hysteresis in stability: the stiffness and damping that stand for them on the forced orbit.
+//! Friction, backlash and hysteresis in stability: their equivalent stiffness and damping on the forced orbit.
 //!
-//! Along the forced orbit x = x̄ + x̃ of period T a term that is not smooth has the force f(t). What stands for it is the line
-//! f̄ + k x̃ + c ẋ that is nearest to f in the mean square over the period,
+//! Along the forced orbit x = x̄ + x̃ of period T a term that is not smooth has the force f(t). It is replaced by the
+//! linear force f̄ + k x̃ + c ẋ that is nearest to f in the mean square over the period,
 //!
-//!   k = ⟨f x̃⟩/⟨x̃²⟩,   c = ⟨f ẋ⟩/⟨ẋ²⟩   (⟨x̃ ẋ⟩ = 0 on a periodic orbit),
+//!   k = ⟨f x̃⟩/⟨x̃²⟩,   c = ⟨f ẋ⟩/⟨ẋ²⟩   (⟨x̃ ẋ⟩ = 0 on a periodic orbit).
 //!
-//! the describing function where the orbit is harmonic, and what it becomes over all harmonics where it is not. The orbit and
-//! k, c, f̄ hang together and are solved for together. Multipliers are those of the delay equation with this spring and damper.
+//! This is the describing function for a harmonic orbit, and its generalization to all harmonics otherwise. The orbit
+//! depends on k, c and f̄ and determines them, so that all are solved for together. Floquet multipliers (characteristic
+//! multipliers) are those of the delay equation with this spring and damper.
 //!
-//! A small disturbance beside a large orbit feels something else: the change of the force over the disturbance (the incremental
-//! describing function; for dry friction on a harmonic orbit half of c). The distance to the multiplier with these slopes is the
-//! error that is stated.
+//! A small disturbance of a large orbit sees another stiffness: the change of the force per disturbance (the
+//! incremental describing function; for dry friction on a harmonic orbit half of c). The distance to the multiplier
+//! with these values is the stated error.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -33,52 +34,52 @@ use quietcut_model::Term;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{ALL, Treatment};
 
-/// Steps in depth, at least, at which multipliers are counted.
+/// Least number of steps in depth at which multipliers are counted. Unfounded.
 const SAMPLES: usize = 32;
 
-/// To what spring and orbit agree, relative to the stiffness of the structure.
+/// Relative tolerance, on the stiffness of the structure, to which equivalent spring and orbit agree.
 const SETTLED: f64 = 1e-7;
 
-/// The most rounds to there.
+/// Largest number of iterations of equivalent spring and orbit. A choice.
 const ROUNDS: usize = 200;
 
-/// Rounds that are remembered on the way.
+/// Number of iterations that Anderson acceleration stores. A choice.
 const REMEMBERED: usize = 5;
 
-/// To what a crossing is found, relative to the last depth.
+/// Tolerance of the depth of a crossing, relative to the last depth.
 const CROSSING: f64 = 1e-6;
 
-/// The depth that stands for none, mm: without any motion nothing has an amplitude.
+/// Depth in place of 0, mm: at 0 the orbit is rest and has no amplitude to linearize about.
 const NONE_MM: f64 = 1e-4;
 
-/// A case with friction, backlash or hysteresis.
+/// Stability problem of a case with friction, backlash or hysteresis.
 #[derive(Debug)]
 pub struct EquivalentProblem {
-    /// All but these terms.
+    /// Forced problem without the terms that are not smooth.
     smooth: ForcedProblem,
     terms: Vec<Box<dyn Term>>,
     feed_direction_deg: f64,
-    /// Displacement and velocity along the machine's axes by states.
+    /// Matrix from states to displacement and velocity along the machine's axes.
     displacement: DMatrix<f64>,
     velocity: DMatrix<f64>,
-    /// Static stiffness along each axis, N/m; 0 for one that does not move.
+    /// Static stiffness along each axis, N/m; 0 for a rigid axis.
     stiffness: [f64; 3],
-    /// The largest damping along each axis, N s/m.
+    /// Damper along each axis that stands for sticking, N s/m.
     most_damping: [f64; 3],
 }
 
-/// An orbit with the springs that it makes.
+/// Orbit with the equivalent springs that agree with it.
 #[derive(Clone)]
 struct Settled {
     springs: [Spring; 3],
     orbit: Orbit,
 }
 
-/// Multipliers at a depth.
+/// Floquet multipliers at one axial depth.
 #[derive(Clone)]
 struct Sample {
     settled: Settled,
-    /// In the upper half plane or on the real axis, largest first.
+    /// Multipliers in the upper half plane or on the real axis, largest first.
     roots: Vec<Complex64>,
 }
 
@@ -92,17 +93,17 @@ impl Sample {
         outside.map(|root| StabilityLoss::of(*root).count()).sum()
     }
 
-    /// The largest |μ|, less one.
+    /// Distance of the largest multiplier from the unit circle, |μ| − 1.
     fn excess(&self) -> f64 {
         self.roots.first().map_or(-1.0, |root| root.norm() - 1.0)
     }
 }
 
 impl EquivalentProblem {
-    /// The problem that a case poses.
+    /// Builds the problem of a case.
     ///
     /// # Errors
-    /// As [`ForcedProblem::new`]; a structure without a mass at the tool.
+    /// As [`ForcedProblem::new`], or the structure has no mass at the tool.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         let mut rest = case.clone();
         for spec in ALL
@@ -165,7 +166,7 @@ impl EquivalentProblem {
     }
 }
 
-/// A speed at which the branch of orbits is followed.
+/// Follows the branch of orbits at one spindle speed.
 struct Follower<'a> {
     problem: &'a EquivalentProblem,
     rpm: f64,
@@ -196,7 +197,7 @@ impl<'a> Follower<'a> {
         Samples::new(&self.map.spans(), orbit, self.period_s, seen)
     }
 
-    /// Rest, with no springs.
+    /// Rest, with zero springs.
     fn rest(&self) -> Settled {
         Settled {
             springs: [Spring::default(); 3],
@@ -204,7 +205,7 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// The orbit and the springs that belong together at a depth, from a guess.
+    /// Orbit and springs that agree with each other at a depth, from a guess.
     fn settle(&self, depth_m: f64, guess: &Settled) -> Result<Settled, StabilityError> {
         let all = self.problem;
         let mut now = guess.clone();
@@ -228,7 +229,7 @@ impl<'a> Follower<'a> {
         ))
     }
 
-    /// The orbit with these springs at the depth of a guess.
+    /// Orbit with given springs at the depth of a guess.
     fn orbit(&self, springs: &[Spring; 3], guess: &Orbit) -> Result<Orbit, StabilityError> {
         let problem = self.problem.with(springs);
         let map = self.map.of(&problem);
@@ -258,7 +259,7 @@ impl<'a> Follower<'a> {
         Ok(Sample { settled, roots })
     }
 
-    /// The multipliers with these springs about an orbit.
+    /// Floquet multipliers about an orbit with given springs.
     fn roots(&self, springs: &[Spring; 3], orbit: &Orbit) -> Result<Vec<Complex64>, StabilityError> {
         let problem = self.problem.with(springs);
         let all = self.map.of(&problem).multipliers(orbit);
@@ -277,7 +278,7 @@ impl<'a> Follower<'a> {
         self.map.of(&problem).chatter_hz(&sample.settled.orbit, root)
     }
 
-    /// How far |μ| is from that of what a small disturbance feels.
+    /// Error of |μ|: the difference from the multiplier with the stiffness and damping that a small disturbance sees.
     fn error(
         &self,
         sample: &Sample,
@@ -298,18 +299,19 @@ impl<'a> Follower<'a> {
             .iter()
             .map(|other| (other - root).norm())
             .fold(f64::INFINITY, f64::min);
-        // A multiplier that is not followed any more is far inside.
+        // A multiplier that is no longer followed lies far inside the circle.
         Ok(nearest.min(root.norm()).max(LEAST_ERROR * root.norm().max(1.0)))
     }
 
-    /// Where the number outside changes between two samples, by depth.
+    /// Switches between two samples at which the number of multipliers outside changes, by depth.
     fn between(&self, low: &Sample, high: &Sample, last_m: f64) -> Result<Vec<Switch>, StabilityError> {
         let (mut low, mut high) = (low.clone(), high.clone());
         let mut switches = Vec::new();
         let top = high.clone();
         while low.outside() != top.outside() {
             high.clone_from(&top);
-            // The largest multiplier crosses where nothing is outside on one side; else it is one of several, and halves it is.
+            // If no multiplier is outside at one end, the largest one crosses and |μ| − 1 is interpolated. Otherwise
+            // one of several crosses, and the interval is bisected.
             let is_largest = |low: &Sample, high: &Sample| (low.outside() == 0) != (high.outside() == 0);
             let mut halves = 0;
             while high.depth_m() - low.depth_m() > CROSSING * last_m {
@@ -333,7 +335,7 @@ impl<'a> Follower<'a> {
         Ok(switches)
     }
 
-    /// The switch between two samples that are as near as they come.
+    /// Switch between two samples at the tolerance of the depth.
     fn switch(&self, low: &Sample, high: &Sample, last_m: f64) -> Result<Switch, StabilityError> {
         let gain = high.outside() < low.outside();
         let outer = if gain { low } else { high };
@@ -349,7 +351,7 @@ impl<'a> Follower<'a> {
             _ => self.chatter_hz(outer, crossed),
         };
         let error = self.error(outer, crossed, chatter_hz)?;
-        // The slope of |μ| over a thousandth of the depth.
+        // Slope of |μ| from a difference over a thousandth of the depth.
         let step_m = 1e-3 * high.depth_m();
         let beyond = self.sample(high.depth_m() + step_m, &high.settled)?;
         let next = beyond
@@ -375,7 +377,7 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Units in which force, stiffness and damping of all axes are of one size.
+/// Units that scale force, stiffness and damping of all axes to one order of magnitude.
 struct Units([[f64; 3]; 3]);
 
 impl Units {
@@ -416,15 +418,15 @@ impl Method for EquivalentProblem {
         "collocation about the forced orbit, with equivalent stiffness and damping of what is not smooth"
     }
 
-    /// On the branch of orbits that is reached when the depth grows from 0. The error is the distance to the multiplier with what
-    /// a small disturbance feels in place of the equivalent stiffness and damping.
+    /// Evaluates the branch of orbits reached when the depth grows from 0. The error is the distance to the multiplier
+    /// with the stiffness and damping that a small disturbance sees.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         check_speed(rpm)?;
         check_depth(depth_mm)?;
         let follower = Follower::new(self, rpm);
         let last_m = 1e-3 * depth_mm.max(NONE_MM);
         let mut settled = follower.rest();
-        // In a few steps: at an amplitude that jumps it is the lower one.
+        // The depth grows in a few steps, so that the orbit of lower amplitude is found if two exist.
         for share in [1e-2, 0.1, 0.3, 0.6, 0.8, 1.0] {
             settled = follower.settle((share * last_m).max(1e-3 * NONE_MM), &settled)?;
         }

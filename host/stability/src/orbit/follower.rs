@@ -1,7 +1,8 @@
-//! Follows a branch of forced orbits.
+//! Follows a branch of forced orbits over the axial depth.
 //!
-//! Pseudo-arclength continuation: the branch is followed through folds. At every point all multipliers of the delay
-//! equation about the orbit are computed; steps are so short that each one near the circle is recognized again.
+//! Pseudo-arclength continuation passes folds. At every orbit all Floquet multipliers (characteristic multipliers) of
+//! the linearized delay equation are computed. Steps are so short that each multiplier near the unit circle can be
+//! identified again.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -15,10 +16,11 @@ use super::tooth_period::ToothPeriod;
 use crate::criteria::{BRANCH_STEP_MAX, BRANCH_STEP_MIN, LEAST_ERROR, ORBIT_ROOM};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// The most steps of a branch: with the longest step a branch that is followed up and down needs about a hundred.
+/// Largest number of steps of a branch. With the longest step a branch up and down takes about a hundred; the factor of
+/// ten is a choice.
 const STEPS_MAX: usize = 1000;
 
-/// Follows the forced orbits at one speed from depth 0 until the depth passes `depth_mm` or returns to 0.
+/// Follows the forced orbits at one spindle speed from depth 0 until the depth exceeds `depth_mm` or returns to 0.
 ///
 /// # Errors
 /// The branch cannot be followed further with the shortest step.
@@ -39,15 +41,15 @@ pub fn follow_depth(
     }
 }
 
-/// The dominant multiplier of an orbit.
+/// Dominant Floquet multiplier of an orbit.
 pub(super) struct Dominant {
-    /// Of a pair the one above the real axis.
+    /// Multiplier; of a conjugate pair the one above the real axis.
     pub(super) multiplier: Complex64,
-    /// Frequency of the motion that belongs to it, Hz.
+    /// Vibration frequency that belongs to it, Hz.
     pub(super) chatter_hz: Option<f64>,
 }
 
-/// The dominant multiplier about the orbit at a depth, from the working mesh and from one twice as fine.
+/// Dominant Floquet multiplier about the orbit at a depth, from the working mesh and from one twice as fine.
 pub(super) fn multiplier_at(
     problem: &ForcedProblem,
     rpm: f64,
@@ -63,7 +65,7 @@ pub(super) fn multiplier_at(
     }
 }
 
-/// The orbit at a depth, reached from depth 0.
+/// Orbit at a depth, reached by continuation from depth 0.
 #[cfg(test)]
 pub(super) fn orbit_at(problem: &ForcedProblem, rpm: f64, depth_mm: f64) -> Result<Orbit, OrbitError> {
     let depth_m = depth_mm * 1e-3;
@@ -98,7 +100,7 @@ fn dominant_of<M: PeriodMap>(map: M, rpm: f64, depth_mm: f64) -> Result<[Dominan
     Ok([at(map)?, at(finer)?])
 }
 
-/// How large the state at the start of the period is at a depth, if cubic terms are left out.
+/// Norm of the state at the start of the period at a depth, without cubic terms: the scale of an orbit.
 pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
     let rest = Orbit::rest(map);
     let linear = map
@@ -107,7 +109,7 @@ pub(super) fn size_at(map: &impl PeriodMap, depth_m: f64) -> f64 {
             let by_depth = integration.by.column(map.size()) * depth_m;
             integration.periodic().lu().solve(&by_depth)
         });
-    // Without a force the orbit is rest, and any length will do.
+    // Without forcing the orbit is rest, and any scale serves.
     linear
         .map(|state| state.norm())
         .filter(|size| *size > 0.0)
@@ -120,12 +122,12 @@ pub(super) struct Follower<M> {
     scale: Scale,
 }
 
-/// An orbit with its multipliers.
+/// Orbit with its Floquet multipliers.
 #[derive(Clone)]
 struct Sample {
     orbit: Orbit,
     tangent: Tangent,
-    /// Multipliers in the upper half plane or on the real axis that are near the circle or outside.
+    /// Multipliers near or outside the unit circle, in the upper half plane or on the real axis.
     roots: Vec<Complex64>,
     largest: f64,
 }
@@ -142,7 +144,7 @@ impl Sample {
 
 impl<M: PeriodMap> Follower<M> {
     pub(super) fn new(map: M, rpm: f64, depth_m: f64) -> Self {
-        // At depth 0 there is nothing to follow; any scale serves.
+        // At depth 0 any positive scale of the depth serves.
         let depth_m = if depth_m > 0.0 { depth_m } else { 1e-3 };
         let scale = Scale {
             state: size_at(&map, depth_m),
@@ -151,7 +153,7 @@ impl<M: PeriodMap> Follower<M> {
         Self { map, rpm, scale }
     }
 
-    /// The orbit at a depth, reached from depth 0.
+    /// Orbit with multipliers at a depth, reached by continuation from depth 0.
     fn up_to(&self, depth_m: f64) -> Result<Sample, OrbitError> {
         let order = self.map.size();
         let mut along_depth = DVector::zeros(order + 1);
@@ -165,7 +167,7 @@ impl<M: PeriodMap> Follower<M> {
                 return Err(OrbitError::Lost { depth_mm });
             }
             let next = if here.orbit.depth_m + towards * step >= depth_m {
-                // The last step ends at the depth itself.
+                // The last step ends exactly at the requested depth.
                 let rest = (depth_m - here.orbit.depth_m) / towards;
                 let mut guess = here.orbit.along(&here.tangent, rest, self.scale);
                 guess.depth_m = depth_m;
@@ -229,13 +231,13 @@ impl<M: PeriodMap> Follower<M> {
         })
     }
 
-    /// The sample a step further along the branch.
+    /// Sample one step further along the branch.
     fn step(&self, from: &Sample, step: f64) -> Result<Sample, OrbitError> {
         let guess = from.orbit.along(&from.tangent, step, self.scale);
         self.sample(&guess, &from.tangent.along)
     }
 
-    /// The depth a step further along the branch, m.
+    /// Depth one step further along the branch, m.
     fn depth_m(&self, from: &Sample, step: f64) -> Result<f64, OrbitError> {
         let guess = from.orbit.along(&from.tangent, step, self.scale);
         let (orbit, _) = Orbit::correct(&self.map, &guess, self.scale, &from.tangent.along)?;
@@ -263,9 +265,8 @@ impl<M: PeriodMap> Follower<M> {
         })
     }
 
-    /// The crossing of the multiplier that goes from one value to another over a step, with the length of the step to
-    /// it: regula falsi, in which an end that stays is weighed less by what its last step gained (Anderson and Björck), which
-    /// keeps the crossing enclosed.
+    /// Crossing of the unit circle by the multiplier that moves from one value to another over a step, with the length
+    /// of the step to it. Regula falsi with the weights of Anderson and Björck keeps the crossing enclosed.
     fn refine(&self, here: &Sample, step: f64, from: Complex64, to: Complex64) -> Option<(f64, Event)> {
         let (mut low, mut high) = ((0.0, from.norm() - 1.0), (step, to.norm() - 1.0));
         let outward = high.1 > 0.0;
@@ -305,7 +306,7 @@ impl<M: PeriodMap> Follower<M> {
             gain: !outward,
             multiplier: on_circle,
             chatter_hz: match kind {
-                // The orbit jumps to another of the same period.
+                // The orbit jumps to another one of the same period, so that no new frequency appears.
                 StabilityLoss::Fold => None,
                 _ => self.map.chatter_hz(&sample.orbit, on_circle),
             },
@@ -313,8 +314,8 @@ impl<M: PeriodMap> Follower<M> {
         Some((low.0, event))
     }
 
-    /// How far the depth of a crossing may be off, m: over as much of the branch as takes the multiplier by its error to either
-    /// side, and what a finer mesh changes of the depth itself; `None` where it cannot be told.
+    /// Error of the depth of a crossing, m: the change of depth along the branch that moves the multiplier by its error
+    /// to either side, plus the change of the depth on a finer mesh. `None` if it cannot be computed.
     fn error_m(&self, at: &Sample, root: Complex64) -> Option<f64> {
         let order = self.map.problem().order();
         let finer = Follower {
@@ -322,7 +323,7 @@ impl<M: PeriodMap> Follower<M> {
             rpm: self.rpm,
             scale: self.scale,
         };
-        // Across the branch as far as states of the structure go, which are the same on both meshes.
+        // The normal uses the states of the structure alone, which both meshes have in common.
         let mut normal = DVector::zeros(finer.map.size() + 1);
         normal
             .rows_mut(0, order)
@@ -343,7 +344,7 @@ impl<M: PeriodMap> Follower<M> {
         let depth_m = at.orbit.depth_m;
         let shift_m = |step: f64| Some((self.depth_m(at, step).ok()? - depth_m).abs());
         let along_m = shift_m(reach)?.max(shift_m(-reach)?);
-        // At a fold the depth does not change along the branch: there, what has been checked of orbits is the least.
+        // At a fold the depth is stationary along the branch; the confirmed accuracy of orbits is then the least error.
         Some(along_m.max(LEAST_ERROR * depth_m) + ORBIT_ROOM * (there.orbit.depth_m - depth_m).abs())
     }
 

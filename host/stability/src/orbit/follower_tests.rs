@@ -5,12 +5,12 @@ use super::periodic_orbit::PeriodMap;
 use super::tooth_period::ToothPeriod;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// rev/min of a tooth period of τ in the units of chapter 6.
+/// Spindle speed, rev/min, of a tooth period τ in the dimensionless units of chapter 6.
 fn rpm(tau: f64) -> f64 {
     30.0 * 109.6416 / tau
 }
 
-/// Depth, mm, to w of chapter 6.
+/// Factor from depth in mm to the dimensionless depth w of chapter 6.
 const W_PER_MM: f64 = 0.033_628;
 
 fn problem(name: &str) -> ForcedProblem {
@@ -37,8 +37,7 @@ fn limits_of_the_nonlinear_robot_are_those_of_two_other_programs() {
         (6.667, 0.335, StabilityLoss::Hopf),
     ] {
         let (ours, our_kind) = first_limit_w(&full, tau);
-        // The references hold for tables rounded to four digits, and W_PER_MM has five: 2e-5. The last is printed
-        // with three digits only.
+        // Tolerance: references have four digits and W_PER_MM has five, 2e-5; the last reference has three digits only.
         let tolerance = if tau == 6.667 { 1.5e-3 } else { 2e-5 };
         assert!((ours / w - 1.0).abs() < tolerance, "{tau}: {ours} instead of {w}");
         assert_eq!(our_kind, kind, "{tau}");
@@ -55,7 +54,7 @@ fn the_first_loss_is_a_fold_of_the_orbit_where_it_turns_back() {
             "{inverse}"
         );
     }
-    // There the branch turns back twice, and two stable orbits coexist.
+    // The branch turns back twice at this speed, and two stable orbits coexist.
     let branch = follow_depth(&full, rpm(1.0 / 0.165), 15.0, Extent::Whole).unwrap();
     let bistable = branch.bistable_mm();
     assert_eq!(bistable.len(), 1);
@@ -83,7 +82,7 @@ fn stated_errors_of_limits_hold_what_a_mesh_four_times_as_fine_changes() {
         println!("{tau}: {found:?}, {change_mm:.1e} mm from the finest");
         assert_eq!(found.kind, kind, "{tau}");
         assert!(change_mm <= found.error_mm, "{tau}: {change_mm} {found:?}");
-        // Limits are known to far more than the four digits that are asked for.
+        // The error of the limits is far below the four digits required.
         assert!(found.error_mm < 1e-5 * found.depth_mm, "{tau}: {found:?}");
     }
 }
@@ -96,7 +95,7 @@ fn cubic_terms_raise_the_pockets_of_half_immersion() {
             let branch = follow_depth(problem, speed, 20.0, Extent::FirstLoss).unwrap();
             branch.speed_line().first_limit.unwrap().depth_mm
         };
-        // The ratios are known to three digits.
+        // Reference ratios have three digits.
         assert!((limit(&cubic) / limit(&linear) - ratio).abs() < 0.005, "{speed}");
     }
 }
@@ -109,13 +108,13 @@ fn about_the_orbit_of_a_linear_structure_the_limit_is_the_linear_one() {
     let linear = crate::line(&case.linear, 900.0, 6.0, 60).unwrap();
     let linear = linear.first_limit.unwrap();
     assert_eq!(orbits.kind, linear.kind);
-    // Both solve for the crossing to 1e-9.
+    // Both methods solve for the crossing to 1e-9.
     assert!((orbits.depth_mm / linear.depth_mm - 1.0).abs() < 1e-8);
 }
 
 #[test]
 fn the_whole_regenerative_term_hardly_moves_the_limits_of_chapter_3() {
-    // The thesis states +6 % and −9 %; what comes out is +0.7 % and 0.0 %.
+    // The thesis states changes of +6 % and −9 %; this implementation gives +0.7 % and 0.0 %.
     for (speed, change) in [(500.0, 0.007), (280.0, 0.000)] {
         let case = problem("staubli-tx200");
         let branch = follow_depth(&case, speed, 2.0, Extent::FirstLoss).unwrap();

@@ -1,4 +1,4 @@
-//! The forced problem: a structure with smooth terms under the forces of feed and edges.
+//! The forced problem: a structure with smooth nonlinear terms under feed and edge forces.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -14,49 +14,51 @@ use quietcut_model::case::Case;
 use quietcut_model::structure::FirstOrder;
 use quietcut_model::{At, ChipLaw, ProcessDamping, Term};
 
-/// ẋ = A x + B F(t, x) − N(x), u = C x: eqs 6.1 and 3.6 in first-order form.
+/// Equation of the forced orbit, eqs 6.1 and 3.6 in first-order form:
 ///
-/// States x as in [`FirstOrder`](quietcut_model::structure::FirstOrder): for matrices x = (q, q̇/s). N holds the cubic terms
-/// M⁻¹(C₃ q̇∘³ + K₃ q∘³)/s in the lower half. On an orbit of the tooth period
-/// F = (w − z)·Σ_teeth (cutting·n_x f_t + edge), with z the axial displacement where the depth follows it, else 0.
+///   ẋ = A x + B F(t, x) − N(x),   u = C x.
 ///
-/// Where teeth stand at unequal angles, or run at unequal radii on a nonlinear structure, an orbit has the period of the
-/// revolution, and a chip on it is n_x f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ with the feed f_j of its own delay τ_j. It is
-/// linear through zero: a tooth that would leave the surface pulls, as in the linear problem.
+/// States x as in [`FirstOrder`](quietcut_model::structure::FirstOrder): for matrices x = (q, q̇/s). N contains the
+/// cubic terms M⁻¹(C₃ q̇∘³ + K₃ q∘³)/s in the lower half. On an orbit of the tooth period F = (w − z)·Σ_teeth
+/// (cutting·n_x f_t + edge), with z the axial displacement under axial-depth modulation, otherwise 0.
 ///
-/// Extensions of the case add smooth terms −B f_r(u, u̇), a chip law in place of n_x f_t, and the damping of the flank
-/// −w D(φ) u̇.
+/// With unequal pitch, or runout on a nonlinear structure, an orbit has the period of the revolution. Its chip is n_x
+/// f_j + n(u − u(t − τ_j)) + (r_j − r_{j−1}) sin γ, with the feed f_j during the delay τ_j. The force is linear in the
+/// chip through zero: a tooth that would leave the surface pulls, as in the linear problem.
+///
+/// Extensions of the case add smooth restoring forces −B f_r(u, u̇), a chip law in place of n_x f_t, and process
+/// damping −w D(φ) u̇.
 #[derive(Clone, Debug)]
 pub struct ForcedProblem {
-    /// The linear part and the cutting process, with the mean pitch.
+    /// Linear part and cutting process, with the mean pitch.
     pub linear: Problem,
-    /// `None` where one tooth is like the other.
+    /// Unequal pitch or runout; `None` if all teeth are alike.
     pub(super) uneven: Option<Uneven>,
-    /// The cubic terms; `None` where the structure is linear.
+    /// Cubic terms; `None` for a linear structure.
     pub(super) cubic: Option<Cubic>,
-    /// Smooth terms of the equation of motion, and the structure in whose axes they are.
+    /// Smooth restoring forces of extensions, with the structure in the machine's axes.
     smooth: Option<Smooth>,
-    /// `None` for a force in proportion to the chip.
+    /// Chip law; `None` for a force proportional to the chip.
     chip: Option<ChipLaw>,
-    /// `None` where the flank does not touch.
+    /// Process damping; `None` if absent.
     flank: Option<Flank>,
-    /// B times a constant force; empty for none.
+    /// Constant force times B; empty for none.
     push: Option<DVector<f64>>,
-    /// True where a force does not make the velocity jump.
+    /// True if a force does not make the velocity jump: the structure has a mass at the tool.
     inertial: bool,
 }
 
-/// Teeth of which one is not like the other.
+/// Teeth with unequal pitch or runout.
 #[derive(Clone, Debug)]
 pub(super) struct Uneven {
-    /// The linear problem over the revolution.
+    /// Linear problem with the revolution as its period.
     pub(super) pitched: Pitched,
-    /// By how much the chip of each tooth is thicker since the one before runs on another radius, m.
+    /// Increase of the chip of each tooth by the radius difference to the preceding tooth, m.
     pub(super) runout_m: Vec<f64>,
 }
 
 impl Uneven {
-    /// `None` where one tooth is like the other.
+    /// Unequal pitch or runout of a case; `None` if all teeth are alike.
     fn of(case: &Case, pitched: &Pitched) -> Result<Option<Self>, StabilityError> {
         let sin_edge = case.tool()?.edge_angle_deg.to_radians().sin();
         let radial_m = radial_m(case)?;
@@ -74,23 +76,23 @@ impl Uneven {
     }
 }
 
-/// f_r along the machine's axes.
+/// Smooth restoring forces f_r along the machine's axes.
 #[derive(Clone, Debug)]
 struct Smooth {
     terms: Vec<Arc<dyn Term>>,
-    /// B in the machine's axes.
+    /// Input matrix B in the machine's axes.
     b: DMatrix<f64>,
-    /// C and C A in the machine's axes.
+    /// Displacement matrix C and velocity matrix C A in the machine's axes.
     displacement: DMatrix<f64>,
     velocity: DMatrix<f64>,
 }
 
-/// The damping of the flank.
+/// Process damping by the flank of the tooth.
 #[derive(Clone, Debug)]
 struct Flank {
     law: ProcessDamping,
     radius_m: f64,
-    /// C A in feed, normal and axial direction.
+    /// Velocity matrix C A in feed, normal and axial direction.
     velocity: DMatrix<f64>,
 }
 
@@ -121,21 +123,21 @@ impl Smooth {
     }
 }
 
-/// N(x) = stiffness·q∘³ + damping·(q̇/s)∘³ in the lower half of the states.
+/// Cubic terms N(x) = stiffness·q∘³ + damping·(q̇/s)∘³, in the lower half of the states.
 #[derive(Clone, Debug)]
 pub(super) struct Cubic {
-    /// M⁻¹ K₃/s.
+    /// Coefficient M⁻¹ K₃/s.
     stiffness: DMatrix<f64>,
-    /// M⁻¹ C₃ s².
+    /// Coefficient M⁻¹ C₃ s².
     damping: DMatrix<f64>,
 }
 
 impl ForcedProblem {
-    /// The forced problem of a case.
+    /// Builds the forced problem of a case.
     ///
     /// # Errors
-    /// As [`Problem::new`], but for cubic terms, which are kept; friction, backlash or hysteresis, which
-    /// [`EquivalentProblem`](super::EquivalentProblem) treats.
+    /// As [`Problem::new`], except that cubic terms are accepted. Friction, backlash and hysteresis are refused;
+    /// [`EquivalentProblem`](super::EquivalentProblem) treats them.
     pub fn new(case: &Case) -> Result<Self, StabilityError> {
         if is_not_smooth(case) {
             return Err(StabilityError::NotCovered {
@@ -151,7 +153,7 @@ impl ForcedProblem {
         let cubic = match structure.equation() {
             Some(matrices) if structure.is_nonlinear() => {
                 let size = matrices.mass.nrows();
-                // q̇ = s·(lower half): the scale of the first-order form stands in its own upper right corner.
+                // q̇ = s·(lower half): the scale s stands in the upper right corner of A.
                 let scale = linear.structure.a[(0, size)];
                 let inverse_mass =
                     matrices
@@ -213,7 +215,7 @@ impl ForcedProblem {
             );
         }
         Ok(Self {
-            // On a linear structure runout moves the orbit and not what is about it.
+            // Runout on a linear structure moves the orbit, but not the equation linearized about it.
             uneven: uneven.filter(|_| !is_linear),
             smooth: (!about.terms.is_empty()).then(|| Smooth::new(about.terms, &machine)),
             chip: about.law.chip,
@@ -225,8 +227,9 @@ impl ForcedProblem {
         })
     }
 
-    /// The same with springs and dampers between the tool and the ground and a constant force, along the machine's axes, into
-    /// which x is turned by `feed_direction_deg`: f_r = `stiffness` x + `damping` ẋ, N/m and N s/m, under `force_n`.
+    /// The same problem with springs and dampers between tool and ground and a constant force, along the machine's
+    /// axes: f_r = `stiffness` x + `damping` ẋ (N/m, N s/m), under `force_n`. `feed_direction_deg` is the feed
+    /// direction in these axes.
     pub(super) fn with_springs(
         &self,
         feed_direction_deg: f64,
@@ -245,23 +248,23 @@ impl ForcedProblem {
         changed
     }
 
-    /// True where a force does not make the velocity jump: the structure has a mass at the tool.
+    /// True if the structure has a mass at the tool, so that a force does not make the velocity jump.
     pub(super) fn is_inertial(&self) -> bool {
         self.inertial
     }
 
-    /// True where orbits are those of the whole revolution: a speed costs a hundred times that of a tooth period.
+    /// True if orbits have the period of the revolution; a speed then costs a hundred times that of a tooth period.
     pub fn is_over_revolution(&self) -> bool {
         self.uneven.is_some()
     }
 
-    /// True where an orbit is the solution of linear equations.
+    /// True if the equation of the orbit is linear.
     pub(super) fn is_linear(&self) -> bool {
         self.cubic.is_none() && self.smooth.is_none()
     }
 
-    /// The damping of the flank per depth, N s/m², of teeth at immersion angles, rad, while the tool turns at a speed,
-    /// rad/s, in feed, normal and axial direction; `None` where there is none.
+    /// Process damping per axial depth, N s/m², in feed, normal and axial direction, for teeth at given immersion
+    /// angles (rad) and a spindle speed (rad/s); `None` if absent.
     pub(super) fn damping_per_depth(
         &self,
         angles: impl Iterator<Item = f64>,
@@ -280,7 +283,7 @@ impl ForcedProblem {
         Some(sum * size)
     }
 
-    /// B D C A: what the damping of the flank makes of a state, per depth.
+    /// Matrix B D C A of process damping, per axial depth.
     pub(super) fn damped(&self, damping: &Matrix3<f64>) -> DMatrix<f64> {
         let Some(flank) = &self.flank else {
             return DMatrix::zeros(self.order(), self.order());
@@ -288,7 +291,7 @@ impl ForcedProblem {
         &self.linear.structure.b * damping * &flank.velocity
     }
 
-    /// The slope of the chip law about the forced chip at an angle, rad.
+    /// Slope of the chip law at the forced chip at an immersion angle (rad).
     pub(super) fn chip_slope(&self, angle: f64) -> f64 {
         let process = &self.linear.process;
         self.chip.map_or(1.0, |chip| {
@@ -296,7 +299,7 @@ impl ForcedProblem {
         })
     }
 
-    /// Angular speed at which a tooth period takes `period_s`, rad/s.
+    /// Spindle speed of a tooth period `period_s`, rad/s.
     pub(super) fn speed_rad_per_s(&self, period_s: f64) -> f64 {
         TAU / (period_s * self.linear.teeth as f64)
     }
@@ -306,8 +309,8 @@ impl ForcedProblem {
         self.linear.structure.order()
     }
 
-    /// Force per depth, N/m, of all cutting teeth at a phase of the tooth period, rad, on an orbit: that of feed and
-    /// edges.
+    /// Force per axial depth, N/m, of all cutting teeth on an orbit at a phase of the tooth period (rad), due to feed
+    /// and edges.
     pub(super) fn force_per_depth(&self, teeth: usize, phase: f64) -> Vector3<f64> {
         let process = &self.linear.process;
         (0..teeth)
@@ -325,7 +328,7 @@ impl ForcedProblem {
             .sum()
     }
 
-    /// N(x) and B f_r, added to `rate` with a minus sign, and the constant force.
+    /// Subtracts N(x) and B f_r from `rate` and adds the constant force.
     pub(super) fn subtract_smooth(&self, state: &[f64], rate: &mut DVector<f64>) {
         if let Some(push) = &self.push {
             *rate += push;
@@ -348,7 +351,7 @@ impl ForcedProblem {
         }
     }
 
-    /// The depth, m, that a state leaves of a depth: less by the axial displacement where the depth follows it.
+    /// Axial depth in a state, m: reduced by the axial displacement under axial-depth modulation.
     pub(super) fn depth_at(&self, state: &DVector<f64>, depth_m: f64) -> f64 {
         if self.linear.process.axial_depth_modulation {
             depth_m - (self.linear.structure.c.row(2) * state)[0]
@@ -357,8 +360,8 @@ impl ForcedProblem {
         }
     }
 
-    /// A − ∂N/∂x − B ∂f_r/∂x − (force per depth)·∂z/∂x: the Jacobian of the orbit's equation at a state, without the damping
-    /// of the flank.
+    /// Jacobian of the orbit equation at a state, A − ∂N/∂x − B ∂f_r/∂x − (force per depth)·∂z/∂x, without process
+    /// damping.
     pub(super) fn jacobian(&self, state: &[f64], force_per_depth: &Vector3<f64>) -> DMatrix<f64> {
         let structure = &self.linear.structure;
         let mut jacobian = structure.a.clone();

@@ -1,4 +1,4 @@
-//! Charts and points of structures whose limits depend on the forced orbit.
+//! Charts and single cuts of structures whose limits depend on the forced orbit.
 
 use super::branch::Extent;
 use super::follower::{follow_depth, multiplier_at};
@@ -10,7 +10,8 @@ use crate::limits::method::Method;
 use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 
-/// Multipliers about the forced orbit at the feed of the case, followed from depth 0.
+/// Floquet multipliers (characteristic multipliers) about the forced orbit at the feed of the case, followed from depth
+/// 0.
 impl Method for ForcedProblem {
     fn name(&self) -> &'static str {
         match self.uneven {
@@ -25,12 +26,12 @@ impl Method for ForcedProblem {
             .map(|_| "teeth that leave the surface within the forced orbit")
     }
 
-    /// About the orbit that is reached when the depth grows from 0; the error is that of a mesh twice as fine.
+    /// Evaluates the orbit reached when the depth grows from 0; the error is the change with a mesh twice as fine.
     fn point(&self, rpm: f64, depth_mm: f64) -> Result<CutStability, StabilityError> {
         let fail = |cause| broke_down(rpm, depth_mm, cause);
         let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;
         let multiplier = fine.multiplier;
-        // The coarse mesh errs by far more than the fine one: their difference is a bound with room to spare.
+        // The coarse mesh errs by far more than the fine one, so that their difference bounds the error of the latter.
         let error =
             (10.0 * (coarse.multiplier - multiplier).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
         Ok(CutStability::new(
@@ -42,7 +43,7 @@ impl Method for ForcedProblem {
         ))
     }
 
-    /// The branch of orbits is followed with steps of its own; `samples` is not needed.
+    /// Follows the branch of orbits with its own steps; `samples` is not used.
     fn line(&self, rpm: f64, depth_mm: f64, _samples: usize) -> Result<SpeedLine, StabilityError> {
         follow_depth(self, rpm, depth_mm, Extent::Whole)
             .map(|branch| branch.speed_line())

@@ -1,11 +1,11 @@
 //! Forced periodic orbits of the cut, their Floquet multipliers (characteristic multipliers), and branches of orbits.
 //!
-//! With the delay equal to the tooth period, u = u_τ holds on an orbit of that period: the regenerative force
-//! vanishes, and the orbit is that of an ordinary differential equation under the forces of feed and edges.
-//! Its multipliers are those of the delay equation linearized about it.
+//! On an orbit of the tooth period u = u_τ: the regenerative force vanishes, and the orbit solves an ordinary
+//! differential equation under feed and edge forces. Its multipliers are those of the delay equation linearized about
+//! it.
 //!
-//! With unequal pitch, or with runout, the orbit has the period of the revolution, the surface cut before acts on it, and it is
-//! that of the delay equation itself.
+//! With unequal pitch, or with runout, the orbit has the period of the revolution. The previously cut surface acts on
+//! it, and it solves the delay equation itself.
 
 mod anderson;
 mod branch;

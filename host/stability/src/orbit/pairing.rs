@@ -1,17 +1,18 @@
-//! Multipliers of one orbit of a branch recognized among those of the next.
+//! Identification of the Floquet multipliers (characteristic multipliers) of one orbit of a branch among those of the
+//! next.
 
 use num_complex::Complex64;
 
 use crate::criteria::MULTIPLIER_MOVE_MAX;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Multipliers below this size are not followed: they are more than two steps away from the circle.
+/// Size below which multipliers are not followed: they are more than two of the largest moves from the unit circle.
 pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MULTIPLIER_MOVE_MAX;
 
-/// Pairs the multipliers of two samples; `None` where one near the circle cannot be recognized again.
+/// Pairs the multipliers of two samples; `None` if one near the unit circle cannot be identified.
 ///
-/// With `anyhow` the nearest is taken however far: two real multipliers that meet on the circle and leave the axis move
-/// infinitely fast there, and no step is short enough.
+/// With `anyhow` the nearest one is taken at any distance. Two real multipliers that meet and leave the real axis move
+/// infinitely fast there, so that no step is short enough.
 pub(super) fn pair(
     from: &[Complex64],
     to: &[Complex64],
@@ -36,7 +37,7 @@ pub(super) fn pair(
                 pairs.push((root, next));
                 free.swap_remove(index);
             }
-            // A multiplier that has sunk below what is followed, or half of a pair that met on the axis.
+            // The multiplier has fallen below the followed size, or belongs to a pair that met on the real axis.
             None if is_far(root) || anyhow => {}
             _ if is_far(root) => {}
             _ => return None,
@@ -45,8 +46,8 @@ pub(super) fn pair(
     (anyhow || free.iter().all(|&root| is_far(root))).then_some(pairs)
 }
 
-/// Takes out conjugate pairs of one sample that are two real multipliers in the other, on the same side of the circle: they have
-/// met on the axis over the step, and none of them has crossed.
+/// Removes conjugate pairs of one sample that are two real multipliers in the other, on the same side of the unit
+/// circle: they met on the real axis, and neither has crossed the circle.
 fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     conjugate.retain(|&root| {
         let reach = MULTIPLIER_MOVE_MAX * root.norm().max(1.0);
@@ -65,12 +66,12 @@ fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     });
 }
 
-/// True where a multiplier cannot reach the circle in a step.
+/// True if a multiplier cannot reach the unit circle within a step.
 fn is_far(multiplier: Complex64) -> bool {
     (multiplier.norm() - 1.0).abs() > MULTIPLIER_MOVE_MAX
 }
 
-/// The multiplier nearest to one that is expected.
+/// Multiplier nearest to an expected value.
 pub(super) fn nearest(roots: &[Complex64], expected: Complex64) -> Option<Complex64> {
     roots
         .iter()
@@ -94,7 +95,7 @@ mod tests {
         assert_eq!(pair(&pair_before, &real_after, false), Some(rest));
         let back = vec![(at(0.31, 0.74), at(0.3, 0.75))];
         assert_eq!(pair(&real_after, &pair_before, false), Some(back));
-        // One of the two has crossed: that is a fold to be found.
+        // One of the two has crossed the circle: the step contains a fold.
         let crossed = [at(1.01, 0.0), at(0.86, 0.0), at(0.31, 0.74)];
         assert_eq!(pair(&[at(0.95, 0.05), at(0.3, 0.75)], &crossed, false), None);
     }

@@ -1,4 +1,4 @@
-//! The forced periodic orbit at one speed and depth: the fixed point of a map over a period, by Newton.
+//! Forced periodic orbit at one speed and depth: the fixed point of a map over a period, by Newton's method.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -7,22 +7,22 @@ use super::collocated::Advanced;
 use super::forced::ForcedProblem;
 use crate::problem::gauss::Gauss;
 
-/// Why there is no orbit.
+/// Reason why no orbit was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OrbitError {
-    /// Newton did not settle.
+    /// Newton's method did not converge.
     #[error("no periodic orbit was found near the guess at {depth_mm} mm: the iteration does not settle")]
     NoConvergence {
         /// Axial depth, mm.
         depth_mm: f64,
     },
-    /// The branch turns back before the depth is reached.
+    /// The branch turns back (fold) before the depth is reached.
     #[error("the forced orbit is lost in a fold at {depth_mm} mm")]
     Lost {
         /// Axial depth of the fold, mm.
         depth_mm: f64,
     },
-    /// The equations are singular: a fold or a branch point.
+    /// The equations are singular, at a fold or a branch point.
     #[error("the equations of the periodic orbit are singular at {depth_mm} mm")]
     Singular {
         /// Axial depth, mm.
@@ -30,32 +30,32 @@ pub enum OrbitError {
     },
 }
 
-/// A periodic orbit, by its state at the start of the period, where a tooth enters.
+/// Periodic orbit, by its state at the start of the period, where a tooth enters.
 #[derive(Clone, Debug)]
 pub struct Orbit {
     /// Axial depth, m.
     pub depth_m: f64,
-    /// What the map over the period takes: the states of the structure, and behind them what else of the past acts.
+    /// State of the period map: states of the structure, followed by the delayed displacements that act.
     pub start: DVector<f64>,
-    /// For each subinterval the states at its nodes, n × m.
+    /// States at the nodes of each subinterval, n × m.
     pub(super) states: Vec<DMatrix<f64>>,
 }
 
-/// Newton's step over the period at a start and a depth: what the equations linearized about the states at the nodes make of it.
+/// Newton step over the period from a start and a depth, with the equations linearized about the states at the nodes.
 pub(super) struct PeriodIntegration {
     pub(super) end: DVector<f64>,
-    /// ∂end/∂(start, depth); the last column is that of the depth, 1/m.
+    /// Derivative ∂end/∂(start, depth); the last column is that of the depth, 1/m.
     pub(super) by: DMatrix<f64>,
-    /// For each subinterval the states at its nodes.
+    /// States at the nodes of each subinterval.
     pub(super) states: Vec<DMatrix<f64>>,
-    /// For each subinterval the derivatives of the states at its nodes, (n m) × those of the end.
+    /// Derivatives of the states at the nodes of each subinterval, (n m) × number of variables.
     pub(super) values: Vec<DMatrix<f64>>,
-    /// The largest change of a state at a node, as a share of the largest in its subinterval: what the states before were off.
+    /// Largest change of a state at a node by the Newton step, relative to the largest in its subinterval.
     pub(super) moved: f64,
 }
 
 impl PeriodIntegration {
-    /// Before the first subinterval: a state with `columns` derivatives, the first of them in its own numbers.
+    /// Start of the integration: a state with `columns` derivatives, the first of which are those of the state itself.
     pub(super) fn from(start: DVector<f64>, columns: usize) -> Self {
         Self {
             by: DMatrix::identity(start.len(), columns),
@@ -66,7 +66,7 @@ impl PeriodIntegration {
         }
     }
 
-    /// Goes over a subinterval.
+    /// Advances over a subinterval.
     pub(super) fn take(&mut self, subinterval: Advanced) {
         self.end = subinterval.end;
         self.by = subinterval.end_by;
@@ -75,7 +75,7 @@ impl PeriodIntegration {
         self.moved = self.moved.max(subinterval.moved);
     }
 
-    /// I − ∂end/∂start: what a periodic start is solved with.
+    /// Matrix I − ∂end/∂start of the periodicity condition.
     pub(super) fn periodic(&self) -> DMatrix<f64> {
         let size = self.end.len();
         let mut periodic = -self.by.columns(0, size);
@@ -86,16 +86,16 @@ impl PeriodIntegration {
     }
 }
 
-/// Which way a branch goes at an orbit.
+/// Tangent of a branch at an orbit.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent {
-    /// The unit vector along (start/size, depth/depth size).
+    /// Unit tangent in (start/size, depth/depth size).
     pub(super) along: DVector<f64>,
-    /// For each subinterval the change of the states at its nodes over a unit of length, n × m.
+    /// Change of the states at the nodes of each subinterval per unit of length, n × m.
     states: Vec<DMatrix<f64>>,
 }
 
-/// A part of the period without a switch: when, and where its nodes are.
+/// Subinterval of the period without entry or exit of a tooth: its times and nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SubintervalNodes<'a> {
     pub(super) start_s: f64,
@@ -103,27 +103,27 @@ pub(super) struct SubintervalNodes<'a> {
     pub(super) gauss: &'a Gauss,
 }
 
-/// Newton stops where the step after the last would be below this, relative to the orbit.
+/// Size of the predicted next Newton step, relative to the orbit, at which the iteration stops.
 ///
-/// Steps of Newton shrink as e' = C e², so that two of them, e and then e', foretell the next: C e'² = e'³/e².
+/// Newton steps shrink as e' = C e², so that two successive steps e and e' predict the next: C e'² = e'³/e².
 const SETTLED: f64 = 1e-12;
 
-/// Steps above this foretell nothing yet.
+/// Step size above which the quadratic prediction is not yet used. A choice.
 const NEAR: f64 = 1e-3;
 
-/// The map of a forced problem over a period at one speed, on one mesh. Orbits are its fixed points.
+/// Map of a forced problem over a period at one speed on one mesh; orbits are its fixed points.
 pub(super) trait PeriodMap: Sized {
-    /// What it is the map of.
+    /// Forced problem of the map.
     fn problem(&self) -> &ForcedProblem;
 
-    /// How many numbers it maps; the first are the states of the structure.
+    /// Dimension of the state; the first components are the states of the structure.
     fn size(&self) -> usize;
 
-    /// The subintervals of the period, in order.
+    /// Subintervals of the period, in order.
     fn spans(&self) -> Vec<SubintervalNodes<'_>>;
 
-    /// The map, with derivatives, linearized about states at the nodes: exact where `guess` holds those of the motion from the start.
-    /// `None` where a subinterval is singular.
+    /// Applies the map, with derivatives, linearized about the states at the nodes. The result is exact if `guess`
+    /// contains the states of the motion from the start. `None` if a subinterval is singular.
     fn integrate(
         &self,
         start: &DVector<f64>,
@@ -131,21 +131,21 @@ pub(super) trait PeriodMap: Sized {
         guess: &[DMatrix<f64>],
     ) -> Option<PeriodIntegration>;
 
-    /// What the map takes of a motion with a state at the start and with states at the nodes.
+    /// State of the map for a motion with given states at the start and at the nodes.
     fn start_of(&self, state: DVector<f64>, states: &[DMatrix<f64>]) -> DVector<f64>;
 
-    /// All multipliers about an orbit, largest first.
+    /// All Floquet multipliers about an orbit, largest first.
     fn multipliers(&self, orbit: &Orbit) -> Option<Vec<Complex64>>;
 
-    /// The frequency of the vibration of a multiplier about an orbit, Hz.
+    /// Vibration frequency of a Floquet multiplier about an orbit, Hz.
     fn chatter_hz(&self, orbit: &Orbit, multiplier: Complex64) -> Option<f64>;
 
-    /// The same map on a finer mesh, to tell errors by; `None` where it cannot be cut.
+    /// The same map on a finer mesh, for error estimates; `None` if there is no such mesh.
     fn finer(&self) -> Option<Self>;
 }
 
 impl Orbit {
-    /// Rest: the orbit at no depth.
+    /// Rest: the orbit at depth 0.
     pub(super) fn rest(map: &impl PeriodMap) -> Self {
         let order = map.problem().order();
         let states = map.spans().into_iter();
@@ -158,7 +158,7 @@ impl Orbit {
         }
     }
 
-    /// The orbit of one mesh on the nodes of another.
+    /// Transfers the orbit from the nodes of one mesh to those of another.
     pub(super) fn onto(&self, own: &impl PeriodMap, other: &impl PeriodMap) -> Self {
         let spans = own.spans();
         let at = |time_s: f64| -> DVector<f64> {
@@ -185,7 +185,7 @@ impl Orbit {
         }
     }
 
-    /// The orbit of a problem whose equations are linear.
+    /// Orbit of a problem with linear equations, by one solution.
     pub(super) fn of_linear(map: &impl PeriodMap, depth_m: f64) -> Result<Self, OrbitError> {
         let depth_mm = depth_m * 1e3;
         let singular = OrbitError::Singular { depth_mm };
@@ -203,7 +203,7 @@ impl Orbit {
         })
     }
 
-    /// A guess at the orbit a length further along a branch.
+    /// Predicted orbit one step length further along a branch.
     pub(super) fn along(&self, tangent: &Tangent, length: f64, scale: Scale) -> Self {
         let order = self.start.len();
         let states = self.states.iter().zip(&tangent.states);
@@ -214,10 +214,10 @@ impl Orbit {
         }
     }
 
-    /// Corrects a guess to the orbit on the hyperplane ⟨normal, (start/size, depth/depth_size) − guess⟩ = 0.
+    /// Corrects a predicted orbit on the hyperplane ⟨normal, (start/size, depth/depth_size) − guess⟩ = 0.
     ///
-    /// With a normal along depth alone this is Newton at fixed depth; with the tangent it passes folds. States at the nodes
-    /// are corrected together with the start. Returns the orbit and the tangent there, oriented along `normal`.
+    /// With a normal along the depth this is Newton's method at fixed depth; with the tangent it passes folds. States
+    /// at the nodes are corrected together with the start. Returns the orbit and its tangent, oriented along `normal`.
     pub(super) fn correct(
         map: &impl PeriodMap,
         guess: &Self,
@@ -279,13 +279,13 @@ impl Orbit {
     }
 }
 
-/// Values at the nodes, one under the other, side by side.
+/// Reshapes stacked values at the nodes to n × m.
 fn shaped(values: DVector<f64>, order: usize) -> DMatrix<f64> {
     let nodes = values.len() / order;
     DMatrix::from_column_slice(order, nodes, values.as_slice())
 }
 
-/// Scales of state and depth in lengths along a branch.
+/// Scales of state and depth that define the length along a branch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) state: f64,
@@ -293,7 +293,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// A change of (start/size, depth/depth size) as one of start and depth.
+    /// Converts a change of (start/size, depth/depth size) to one of start and depth.
     fn unscaled(&self, step: &DVector<f64>) -> DVector<f64> {
         let mut change = step * self.state;
         change[step.len() - 1] = step[step.len() - 1] * self.depth_m;

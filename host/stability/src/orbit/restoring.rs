@@ -1,4 +1,4 @@
-//! What stands for a restoring force on a forced orbit: a spring, a damper and a constant force.
+//! Linear equivalent of a restoring force on a forced orbit: spring, damper and constant force.
 
 use std::f64::consts::TAU;
 
@@ -9,30 +9,30 @@ use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
 use quietcut_model::Term;
 use quietcut_model::path::{Motion, restoring_along, restoring_from};
 
-/// Samples of a subinterval of the mesh, over which nothing turns by more than a few radians.
+/// Samples per subinterval of the mesh, over which no motion exceeds a phase angle of a few radians. A choice.
 const PER_PIECE: usize = 128;
 
-/// The least samples of a period.
+/// Least number of samples in a period. A choice.
 const LEAST: usize = 1024;
 
-/// Periods after which terms with states of their own must have come to a loop that closes.
+/// Largest number of periods for terms with internal states to reach a closed hysteresis loop. A choice.
 const PERIODS: usize = 64;
 
-/// How nearly it closes, relative to the size of the force.
+/// Relative tolerance on the force at which a hysteresis loop counts as closed.
 const CLOSED: f64 = 1e-8;
 
-/// f_r = force + stiffness·x + damping·ẋ along one axis.
+/// Linear restoring force f_r = force + stiffness·x + damping·ẋ along one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Spring {
-    /// N.
+    /// Constant force, N.
     pub(super) force_n: f64,
-    /// N/m.
+    /// Stiffness, N/m.
     pub(super) stiffness: f64,
-    /// N s/m.
+    /// Damping, N s/m.
     pub(super) damping: f64,
 }
 
-/// A period of an orbit in even steps, along the machine's axes.
+/// Orbit sampled at equal time steps over a period, along the machine's axes.
 pub(super) struct Samples {
     step_s: f64,
     x: [Vec<f64>; 3],
@@ -40,7 +40,7 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// From the states at the nodes of the subintervals of a period; `seen` gives displacement and velocity by states.
+    /// Samples the orbit from its states at the nodes; `seen` maps states to displacement and velocity.
     pub(super) fn new(
         spans: &[SubintervalNodes<'_>],
         orbit: &Orbit,
@@ -73,12 +73,12 @@ impl Samples {
         self.x[0].len()
     }
 
-    /// The largest displacement, m.
+    /// Largest displacement, m.
     pub(super) fn largest_m(&self) -> f64 {
         self.x.iter().flatten().fold(0.0, |most, x| x.abs().max(most))
     }
 
-    /// So many periods, with something added to one axis.
+    /// Motion over `periods` periods, with a disturbance added to one axis.
     fn motion(&self, periods: usize, axis: usize, added: impl Fn(f64) -> [f64; 2]) -> Motion {
         let count = self.len();
         let mut x: [Vec<f64>; 3] = std::array::from_fn(|axis| self.x[axis].repeat(periods));
@@ -88,7 +88,7 @@ impl Samples {
             x[axis][sample] += by_x;
             v[axis][sample] += by_v;
         }
-        // Where the velocity changes sign within a step, friction counts as its mean over the step.
+        // If the velocity changes sign within a step, friction acts with its mean over the step.
         let rest_m_per_s = std::array::from_fn(|axis| {
             let velocity = &self.v[axis];
             let steps = (0..count).map(|n| (velocity[(n + 1) % count] - velocity[n]).abs());
@@ -103,14 +103,14 @@ impl Samples {
         }
     }
 
-    /// The force of a term over a period, once its loop closes.
+    /// Force of a term over a period, once its hysteresis loop is closed.
     ///
-    /// A state of its own is the fixed point of what a period makes of it, by the secant: what begins later forgets earlier.
+    /// An internal state is the fixed point of its map over a period, by the secant method.
     fn force_n(&self, term: &dyn Term) -> [Vec<f64>; 3] {
         if term.states() == 0 {
             return restoring_along(term, &self.motion(1, 0, |_| [0.0; 2]));
         }
-        // One sample more: the first of the next period.
+        // One further sample: the first of the next period.
         let mut period = self.motion(1, 0, |_| [0.0; 2]);
         for signal in period.x.iter_mut().chain(&mut period.v) {
             signal.push(signal[0]);
@@ -135,7 +135,7 @@ impl Samples {
             });
             before = Some((from, to));
             start = own;
-            // What forgets has a slope between 0 and 1.
+            // A term with fading memory has a map with a slope between 0 and 1.
             if term.states() == 1 && (0.0..0.999).contains(&slope) {
                 start[0] = from + (to - from) / (1.0 - slope);
             }
@@ -157,14 +157,14 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// ⟨a b⟩/⟨b²⟩; 0 where b is nothing.
+/// Regression coefficient ⟨a b⟩/⟨b²⟩; 0 if b vanishes.
 fn share(a: &[f64], b: &[f64]) -> f64 {
     let whole = dot(b, b);
     if whole > 0.0 { dot(a, b) / whole } else { 0.0 }
 }
 
-/// The spring and damper nearest to the force of all terms along the orbit, with its mean, by axis. A damper
-/// of `most_damping` holds the tool: friction sticks.
+/// Equivalent spring, damper and mean force of all terms along the orbit, by axis. A damper of `most_damping` means
+/// that friction sticks and holds the tool.
 pub(super) fn equivalent(terms: &[Box<dyn Term>], samples: &Samples, most_damping: [f64; 3]) -> [Spring; 3] {
     let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; samples.len()]);
     for term in terms {
@@ -191,8 +191,9 @@ pub(super) fn equivalent(terms: &[Box<dyn Term>], samples: &Samples, most_dampin
     })
 }
 
-/// What a small disturbance of a frequency, Hz, feels beside the orbit, by axis: the part of the force that it changes in phase with its
-/// displacement and with its velocity. What holds the tool, of `springs`, holds it against a disturbance too.
+/// Incremental spring and damper that a small disturbance of a given frequency (Hz) sees on the orbit, by axis: the
+/// parts of the force change in phase with its displacement and with its velocity. An axis that sticks in `springs`
+/// also sticks for the disturbance.
 pub(super) fn incremental(
     terms: &[Box<dyn Term>],
     samples: &Samples,
@@ -237,7 +238,7 @@ mod tests {
     const SIZE_M: f64 = 3e-5;
     const OMEGA: f64 = 110.0;
 
-    /// A harmonic orbit along y.
+    /// Harmonic orbit along y.
     fn harmonic() -> Samples {
         let count = 2048;
         let step_s = TAU / OMEGA / count as f64;
@@ -267,15 +268,15 @@ mod tests {
     fn friction_on_a_harmonic_orbit_has_its_describing_function() {
         let friction = terms(&["coulomb-friction=2", "coulomb-friction.direction=y"]);
         let [_, spring, _] = equivalent(&friction, &harmonic(), [1e9; 3]);
-        // 4 f_c/(π A ω), and for a small disturbance half of it.
+        // Describing function of Coulomb friction, 4 f_c/(π A ω); a small disturbance sees half of it.
         let exact = 8.0 / (std::f64::consts::PI * SIZE_M * OMEGA);
         assert!((spring.damping / exact - 1.0).abs() < 1e-5, "{spring:?} {exact}");
         assert!(spring.stiffness.abs() < 1e-5 * exact * OMEGA);
         let springs = [spring; 3];
-        // A frequency that is no simple multiple.
+        // The frequency of the disturbance is no simple multiple of that of the orbit.
         let [_, small, _] = incremental(&friction, &harmonic(), OMEGA / TAU * 0.7236, &springs, [1e9; 3]);
         assert!((small.damping / exact - 0.5).abs() < 0.02, "{small:?} {exact}");
-        // Where more than the most is needed, friction holds.
+        // If the equivalent damping exceeds the limit, friction sticks.
         let [_, held, _] = equivalent(&friction, &harmonic(), [0.5 * exact; 3]);
         assert_eq!(held.damping, 0.5 * exact);
     }
@@ -292,7 +293,7 @@ mod tests {
         let case = quietcut_testkit::case("kuka-kr90-half");
         let structure = case.structure().unwrap().first_order().unwrap();
         let stiffness = 0.3 / structure.receptance(0.0).unwrap()[(1, 1)].re;
-        // Within ±g the spring is missing, beyond it pulls as if it began there: a dead zone.
+        // Dead zone: no force within ±g, beyond it a spring that starts there.
         let share = 0.5e-3 * gap_mm / SIZE_M;
         let missing = 2.0 / std::f64::consts::PI * (share.asin() + share * (1.0 - share * share).sqrt());
         let exact = -stiffness * missing;
@@ -312,7 +313,7 @@ mod tests {
         ]);
         let samples = harmonic();
         let [_, spring, _] = equivalent(&loops, &samples, [1e9; 3]);
-        // Forty periods from rest, and the area of the last one.
+        // Reference: the area of the last of forty loops from rest.
         let motion = samples.motion(40, 1, |_| [0.0; 2]);
         let force = &restoring_along(&*loops[0], &motion)[1];
         let work: f64 = (39 * samples.len()..40 * samples.len())

@@ -1,13 +1,14 @@
-//! The forced orbit of unequal teeth, over one revolution: several delays, all of them collocated.
+//! Forced orbit of unequal teeth over one revolution, with several delays, by collocation.
 //!
-//! Teeth at unequal pitch, or on unequal radii, cut unequal chips: on an orbit of the revolution u is not u(t − τ_j), and the
-//! surface that was cut before acts. With p_j = n_jᵀ u along the chip of tooth j and w − z the depth,
+//! Teeth with unequal pitch or radii cut unequal chips: on an orbit of the revolution u ≠ u(t − τ_j), and the
+//! previously cut surface acts. With p_j = n_jᵀ u along the chip of tooth j, w − z the depth, and c_j the chip due to
+//! feed and runout,
 //!
-//!   ẋ = A x + B Σ_j ((w − z)(cutting_j (c_j + p_j − p_{j−1}(t − τ_j)) + edge_j)) − N(x),
+//!   ẋ = A x + B Σ_j ((w − z)(cutting_j (c_j + p_j − p_{j−1}(t − τ_j)) + edge_j)) − N(x).
 //!
-//! with c_j what feed and runout make of the chip. The map over the revolution takes x and those p of the revolution before that are
-//! still to be cut again, as the linear one does; its fixed points are the orbits, and the eigenvalues of its derivative
-//! there are the multipliers about them.
+//! The state of the map over the revolution is x and those p of the preceding revolution whose surface is still to be
+//! cut, as in the linear problem. Its fixed points are the orbits; the eigenvalues of its derivative there are their
+//! Floquet multipliers (characteristic multipliers).
 
 use nalgebra::{DMatrix, DVector, RowDVector, Vector3};
 use num_complex::Complex64;
@@ -20,39 +21,39 @@ use crate::spectrum::chatter_frequency::dominant_frequency_hz;
 use crate::spectrum::eigenvector::eigenvector;
 use crate::spectrum::period_map;
 
-/// A cutting tooth at a node.
+/// Cutting tooth at a node.
 struct Tooth {
-    /// Force per depth and chip, Pa.
+    /// Cutting force per axial depth and chip, Pa.
     cutting: Vector3<f64>,
-    /// Force per depth, N/m, of the edge.
+    /// Edge force per axial depth, N/m.
     edge: Vector3<f64>,
-    /// What it sees of the states: nᵀ C.
+    /// Row nᵀ C that observes the displacement along the chip normal.
     seen: RowDVector<f64>,
-    /// What feed and runout make of its chip, m.
+    /// Chip due to feed and runout, m.
     chip_m: f64,
 }
 
-/// What acts in a subinterval.
+/// Forces in a subinterval.
 struct Forces {
-    /// Of all nodes, those of one node together.
+    /// Cutting teeth of all nodes, node by node.
     teeth: Vec<Tooth>,
-    /// B D C A per depth of the damping of the flank at the nodes; empty where there is none.
+    /// Process damping B D C A per axial depth at the nodes; empty if absent.
     damping: Vec<DMatrix<f64>>,
 }
 
-/// The revolution at one speed.
+/// Mesh of a revolution at one spindle speed with the forces at its nodes.
 pub(super) struct RevolutionPeriod<'a> {
     problem: &'a ForcedProblem,
     uneven: &'a Uneven,
     rpm: f64,
     depth_m: f64,
     mesh: RevolutionMesh,
-    /// Of each subinterval.
+    /// Forces in each subinterval.
     forces: Vec<Forces>,
 }
 
 impl<'a> RevolutionPeriod<'a> {
-    /// For depths up to `depth_m`; `None` where a tooth finds no surface before it.
+    /// Mesh for depths up to `depth_m`; `None` if no preceding tooth has cut the surface in front of some tooth.
     pub(super) fn new(
         problem: &'a ForcedProblem,
         uneven: &'a Uneven,
@@ -82,7 +83,7 @@ impl<'a> RevolutionPeriod<'a> {
         })
     }
 
-    /// What every port of a subinterval sees of the past, ports × 1 and its derivatives, ports × (size + 1).
+    /// Delayed displacement at every port of a subinterval, ports × 1, with its derivatives, ports × (size + 1).
     fn past(
         &self,
         subinterval: &Subinterval,
@@ -100,7 +101,7 @@ impl<'a> RevolutionPeriod<'a> {
                         by[(port, first + node)] += weight;
                     }
                     Source::Own(series) => {
-                        // A delay shorter than a subinterval would end in the subinterval itself.
+                        // `None` if a delay is shorter than a subinterval, so that it ends in the subinterval itself.
                         let (values, derivatives) = seen.get(series.subinterval)?;
                         let teeth = self.mesh.subintervals[series.subinterval].cutting.len();
                         let row = node * teeth + series.tooth;
@@ -148,13 +149,13 @@ impl Forces {
         Self { teeth, damping }
     }
 
-    /// The teeth at a node, each with the number of its port.
+    /// Teeth at a node, each with the index of its port.
     fn teeth_at(&self, node: usize, nodes: usize) -> impl Iterator<Item = (usize, &Tooth)> {
         let count = self.teeth.len() / nodes;
         self.teeth.iter().enumerate().skip(node * count).take(count)
     }
 
-    /// Force per depth, N/m, at a node.
+    /// Force per axial depth at a node, N/m.
     fn push(&self, node: usize, nodes: usize, past: &DVector<f64>, state: &DVector<f64>) -> Vector3<f64> {
         self.teeth_at(node, nodes)
             .map(|(port, tooth)| {
@@ -164,7 +165,7 @@ impl Forces {
             .sum()
     }
 
-    /// f(t_j, Y_j) at the nodes.
+    /// Rates f(t_j, Y_j) at the nodes.
     fn rates(
         &self,
         problem: &ForcedProblem,
@@ -188,7 +189,7 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// ∂f/∂x at the nodes.
+    /// Jacobians ∂f/∂x at the nodes.
     fn jacobians(
         &self,
         problem: &ForcedProblem,
@@ -214,7 +215,7 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// What the past, by its derivatives, and depth add to the rates at the nodes, n × (size + 1) each.
+    /// Derivatives of the rates at the nodes through the delayed displacements and the depth, n × (size + 1) each.
     fn pushes(
         &self,
         problem: &ForcedProblem,
@@ -244,7 +245,7 @@ impl Forces {
         (0..nodes).map(at).collect()
     }
 
-    /// p of every port and its derivatives.
+    /// Displacement p of every port, with its derivatives.
     fn seen(&self, states: &DMatrix<f64>, values: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let (order, nodes) = states.shape();
         let mut seen = DVector::zeros(self.teeth.len());
@@ -341,7 +342,7 @@ impl PeriodMap for RevolutionPeriod<'_> {
         let by_start = integration.by.columns(0, size);
         let vector = eigenvector(&by_start.map(Complex64::from), multiplier)?;
         let c = self.problem.linear.structure.c.map(Complex64::from);
-        // The displacement at every node, with its time and its weight.
+        // Displacement at every node, with time and quadrature weight.
         let mut motion: Vec<(f64, Vector3<Complex64>)> = Vec::new();
         for (subinterval, values) in self.mesh.subintervals.iter().zip(&integration.values) {
             let states = values.columns(0, size).map(Complex64::from) * &vector;

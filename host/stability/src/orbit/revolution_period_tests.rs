@@ -1,4 +1,4 @@
-//! Orbits and multipliers of unequal teeth against equal ones, against time integration, against the linear problem.
+//! Orbits and Floquet multipliers of unequal teeth against equal teeth, time integration and the linear problem.
 
 use nalgebra::DVector;
 
@@ -26,7 +26,7 @@ fn over_revolution(mut problem: ForcedProblem) -> ForcedProblem {
     problem
 }
 
-/// The robot of chapter 6 with cubic terms, its teeth at these angles.
+/// Robot of chapter 6 with cubic terms and teeth at these angles.
 fn uneven_robot(pitch_deg: [f64; 2]) -> Case {
     let mut case = case("kuka-kr90-half-cubic");
     case.tool.as_mut().unwrap().pitch_deg = pitch_deg.to_vec();
@@ -39,7 +39,7 @@ fn first_limit(line: &SpeedLine) -> crate::Limit {
 
 #[test]
 fn limits_of_equal_teeth_over_the_revolution_are_those_over_the_tooth_period() {
-    // The one before the last is a fold of the orbit.
+    // The case before the last has a fold of the orbit.
     for (name, rpm, depth_mm) in [
         ("kuka-kr90-half-cubic", 526.0, 16.0),
         ("kuka-kr90-half-cubic", 800.0, 8.0),
@@ -56,7 +56,7 @@ fn limits_of_equal_teeth_over_the_revolution_are_those_over_the_tooth_period() {
         println!("{rpm} rev/min: {tooth:?} {turn:?}");
         let both_mm = tooth.error_mm.unwrap() + turn.error_mm.unwrap();
         assert!((tooth.depth_mm - turn.depth_mm).abs() < both_mm, "{rpm}");
-        // Both state an error that leaves four digits and more.
+        // The stated errors of both leave more than four digits.
         assert!(both_mm < 1e-5 * tooth.depth_mm, "{rpm}: {both_mm}");
         assert_eq!(tooth.kind, turn.kind);
         match (tooth.chatter_hz, turn.chatter_hz) {
@@ -75,7 +75,7 @@ fn limits_of_equal_teeth_over_the_revolution_are_those_over_the_tooth_period() {
 
 #[test]
 fn where_the_orbit_is_small_unequal_teeth_have_the_limits_of_the_linear_problem() {
-    // A ten-thousandth of the feed makes orbits so small that cubic terms, by the square of it, do nothing.
+    // At a ten-thousandth of the feed the orbit is so small that cubic terms, which scale with its square, vanish.
     let mut small = uneven_robot([170.0, 190.0]);
     small.cut.as_mut().unwrap().feed_per_tooth_mm *= 1e-4;
     let linear = RevolutionCollocation {
@@ -92,7 +92,7 @@ fn where_the_orbit_is_small_unequal_teeth_have_the_limits_of_the_linear_problem(
     }
 }
 
-/// The displacement, m, when tooth 0 enters in the last of so many turns, by integration in time.
+/// Displacement, m, at the entry of tooth 0 in the last of `turns` revolutions, by time integration.
 fn settled(case: &Case, rpm: f64, depth_mm: f64, turns: usize, regeneration: Regeneration) -> [f64; 3] {
     let cut = VirtualCut {
         entry: quietcut_simulate::Entry::None,
@@ -120,7 +120,7 @@ fn settled(case: &Case, rpm: f64, depth_mm: f64, turns: usize, regeneration: Reg
     found
 }
 
-/// The orbit's displacement, m, at the start of the revolution.
+/// Displacement of the orbit at the start of the revolution, m.
 fn at_start(case: &Case, rpm: f64, depth_mm: f64) -> [f64; 3] {
     let problem = ForcedProblem::new(case).unwrap();
     let orbit = orbit_at(&problem, rpm, depth_mm).unwrap();
@@ -151,7 +151,7 @@ fn the_orbits_of_unequal_pitch_and_of_runout_are_what_integration_in_time_settle
         println!(
             "{name}: {orbit:?}, in time {time:?}, with loss of contact {surface:?}; from equal teeth {unlike:.3}"
         );
-        // What is left of the transient, and of steps good to 1e-10.
+        // Tolerance: the rest of the transient, and time steps accurate to 1e-10.
         assert!(distance(orbit, time) < 1e-6 * size, "{name}");
         assert!(unlike > 0.01, "{name}");
     }
@@ -182,7 +182,7 @@ fn linear_structures_with_unequal_pitch_and_chip_laws_with_runout_are_refused() 
     }
 }
 
-/// The map itself: Newton's steps over the revolution until the states at the nodes stay.
+/// Image of a start under the map: Newton steps over the revolution until the states at the nodes settle.
 fn image(map: &RevolutionPeriod<'_>, start: &DVector<f64>, depth_m: f64, orbit: &Orbit) -> DVector<f64> {
     let mut states = orbit.states.clone();
     loop {
@@ -213,7 +213,7 @@ fn derivatives_of_the_map_are_those_of_differences() {
         };
         let difference = (moved(step) - moved(-step)) / (2.0 * step);
         let error = (difference - at.by.column(column)).norm();
-        // The square of the step, and rounding through it.
+        // Tolerance: the square of the difference step, and rounding divided by it.
         assert!(error < 1e-7 * at.by.norm(), "{column}: {error}");
     }
     let step_m = 1e-5 * depth_m;

@@ -1,13 +1,13 @@
-//! The forced orbit of teeth at equal pitch, over one tooth period: Gauss collocation, Newton with an exact Jacobian.
+//! Forced orbit of equal teeth over one tooth period: Gauss collocation with an exact Jacobian.
 //!
-//! On a subinterval of the period with Gauss nodes c_i, integrals a_ij and weights b_j, of duration h,
+//! On a subinterval with Gauss nodes c_i, integrals a_ij, weights b_j and duration h
 //!
 //!   Y_i = x₀ + h Σ_j a_ij f(t_j, Y_j),   x₁ = x₀ + h Σ_j b_j f(t_j, Y_j),
 //!
-//! which has order 2m at the ends. Linearized about values Y, a subinterval gives Newton's step of its own values and of x₁ in x₀ and in
-//! depth; subinterval after subinterval what remains is the map x(0) → x(T) over the period with its exact derivatives. A periodic orbit is
-//! its fixed point: on it u = u_τ, and the surface that was cut before does not act.
-//! Subintervals end where teeth enter and leave the cut: no switch lies inside one.
+//! which has order 2m at the ends. Linearized about values Y, a subinterval gives the Newton step of these values, and
+//! of x₁ as a function of x₀ and depth. Composition of all subintervals gives the map x(0) → x(T) over the period with
+//! its exact derivatives. A periodic orbit is its fixed point: on it u = u_τ, and the previously cut surface does not
+//! act. Subintervals end where teeth enter and leave the cut.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -16,31 +16,31 @@ use super::forced::ForcedProblem;
 use crate::problem::gauss::Gauss;
 use quietcut_model::structure::FirstOrder;
 
-/// The largest angle, rad, by which the fastest pole turns within a subinterval.
+/// Largest phase angle, rad, of the fastest pole over a subinterval.
 const SUBINTERVAL_ANGLE: f64 = 4.0;
 
 /// Nodes per subinterval. With the angle above the local error (m!)² z^{2m+1}/((2m)!(2m+1)!) is 5e-11; halving the angle
 /// moves the limits of the robot of chapter 6, with cubic terms, by less than 1e-10.
 const NODES: usize = 9;
 
-/// A part of the tooth period without a switch.
+/// Subinterval of the tooth period without entry or exit of a tooth.
 #[derive(Clone, Debug)]
 pub(super) struct Subinterval {
-    /// Phase where it begins, rad.
+    /// Phase of the tooth period at its start, rad.
     pub(super) phase: f64,
-    /// Angle by which the tool turns, rad.
+    /// Rotation of the tool over it, rad.
     pub(super) turn: f64,
     /// Duration, s.
     pub(super) duration: f64,
     /// Number of cutting teeth.
     pub(super) teeth: usize,
-    /// Force per depth at the nodes, N/m.
+    /// Force per axial depth at the nodes, N/m.
     pub(super) forces: Vec<Vector3<f64>>,
-    /// B D C A per depth of the damping of the flank at the nodes; empty where there is none.
+    /// Process damping B D C A per axial depth at the nodes; empty if absent.
     pub(super) damping: Vec<DMatrix<f64>>,
 }
 
-/// The tooth period at one speed, cut into subintervals.
+/// Mesh of a tooth period at one spindle speed.
 #[derive(Clone, Debug)]
 pub(super) struct ToothPeriod<'a> {
     pub(super) problem: &'a ForcedProblem,
@@ -51,12 +51,12 @@ pub(super) struct ToothPeriod<'a> {
 }
 
 impl<'a> ToothPeriod<'a> {
-    /// The tooth period of a problem at a speed.
+    /// Mesh of the tooth period of a problem at a spindle speed.
     pub(super) fn new(problem: &'a ForcedProblem, rpm: f64) -> Self {
         Self::with_subintervals(problem, rpm, SUBINTERVAL_ANGLE)
     }
 
-    /// Another problem of the same cut on the same subintervals.
+    /// The same mesh for another problem of the same cut.
     pub(super) fn of<'b>(&self, problem: &'b ForcedProblem) -> ToothPeriod<'b> {
         ToothPeriod {
             problem,
@@ -67,7 +67,7 @@ impl<'a> ToothPeriod<'a> {
         }
     }
 
-    /// In subintervals over which nothing turns by more than an angle, rad.
+    /// Mesh with subintervals over which no motion exceeds a phase angle, rad.
     pub(super) fn with_subintervals(problem: &'a ForcedProblem, rpm: f64, subinterval_angle: f64) -> Self {
         let linear = &problem.linear;
         let engagement = &linear.process.engagement;
@@ -83,7 +83,7 @@ impl<'a> ToothPeriod<'a> {
         let mut subintervals = Vec::new();
         for interval in engagement.intervals() {
             let length = interval.to - interval.from;
-            // Coefficients turn with twice the angle of the tool.
+            // Directional coefficients oscillate at twice the rotation of the tool.
             let angle = fastest * length * seconds_per_radian + 2.0 * length;
             let count = (angle / subinterval_angle).ceil().max(1.0);
             let turn = length / count;
@@ -122,7 +122,7 @@ impl<'a> ToothPeriod<'a> {
     }
 }
 
-/// f(t_j, Y_j) at the nodes of a subinterval.
+/// Rates f(t_j, Y_j) at the nodes of a subinterval.
 pub(super) fn rates(
     problem: &ForcedProblem,
     subinterval: &Subinterval,
@@ -152,7 +152,7 @@ pub(super) fn rates(
         .collect()
 }
 
-/// What a meter more of depth adds to the rate at a node.
+/// Derivative of the rate at a node with respect to the axial depth, per meter.
 pub(super) fn per_depth(
     structure: &FirstOrder,
     subinterval: &Subinterval,
@@ -166,7 +166,7 @@ pub(super) fn per_depth(
     }
 }
 
-/// The Jacobians at the nodes of a subinterval.
+/// Jacobians of the rates at the nodes of a subinterval.
 fn jacobians(
     problem: &ForcedProblem,
     subinterval: &Subinterval,
@@ -186,7 +186,7 @@ fn jacobians(
 }
 
 impl ToothPeriod<'_> {
-    /// A subinterval linearized about the states at its nodes.
+    /// Collocation of a subinterval, linearized about the states at its nodes.
     pub(super) fn linearized(
         &self,
         subinterval: &Subinterval,

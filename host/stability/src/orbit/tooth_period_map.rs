@@ -1,4 +1,4 @@
-//! The map of a forced problem over a tooth period.
+//! Map of a forced problem over a tooth period.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;

@@ -1,8 +1,8 @@
-//! The delay equation linearized about a forced orbit, in the same form as the linear problem: all that is known of
-//! that, collocated multipliers and the characteristic matrix, serves for orbits too.
+//! The delay equation linearized about a forced orbit, in the form of the linear problem, so that the collocated map
+//! and the characteristic matrix apply to orbits as well.
 //!
-//! About the orbit x*(t), ẋ = J(t) x + B Σ (w − z*) cutting·n ᵀ(u − u_τ) with J the Jacobian of the orbit's own equation.
-//! With axial-depth modulation the whole of eq. 3.6 acts this way: the depth is w − z*(t) in the regenerative term.
+//! About the orbit x*(t), ẋ = J(t) x + B Σ (w − z*) cutting·nᵀ(u − u_τ), with J the Jacobian of the orbit equation.
+//! With axial-depth modulation this holds for the whole of eq. 3.6: the depth in the regenerative term is w − z*(t).
 
 use nalgebra::DMatrix;
 
@@ -11,7 +11,7 @@ use super::periodic_orbit::Orbit;
 use super::tooth_period::{Subinterval, ToothPeriod};
 use crate::problem::period::{Element, Period, Port};
 
-/// The tooth period linearized about an orbit; `None` where a subinterval is singular.
+/// Elements of the tooth period, linearized about an orbit; `None` if a subinterval is singular.
 pub(super) fn about(map: &ToothPeriod<'_>, orbit: &Orbit) -> Option<Period> {
     let order = map.problem.order();
     let mut elements = Vec::new();
@@ -78,7 +78,7 @@ fn element(
             1.0,
         );
     }
-    // What each port sees of values at its own node.
+    // Observation of each port from values at its own node.
     let look = |values: &DMatrix<f64>| {
         let mut looked = DMatrix::zeros(nodes * teeth, values.ncols());
         for port in 0..nodes * teeth {
