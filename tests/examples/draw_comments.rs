@@ -28,7 +28,7 @@ const TO_BE_REPLACED: [&str; 12] = [
     "closed_selection",
     "relinearization",
     "own_slopes",
-    "motion",
+    "motion_estimate",
     "chips",
     "amplification",
     "mean_slopes",
@@ -81,9 +81,7 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn Error>
             .and_then(|stem| stem.to_str())
             .unwrap_or_default();
         let is_test = stem == "target" || stem == "tests" || stem.ends_with("_tests") || stem == "testkit";
-        // The room `motion` is not the file that is going to be replaced.
-        let is_room = path.is_dir() && stem == "motion";
-        if is_test || (TO_BE_REPLACED.contains(&stem) && !is_room) {
+        if is_test || TO_BE_REPLACED.contains(&stem) {
             continue;
         }
         if path.is_dir() {

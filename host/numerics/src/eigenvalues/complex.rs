@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::{EigenvalueError, size_of};
+use super::error::{EigenvalueError, size_of};
 
 /// Iterations for one eigenvalue after which a matrix is given up; two or three are usual, and at 10, 20, … an
 /// exceptional shift breaks cycles.

@@ -13,67 +13,16 @@
 //! names the size and the iterations. No function spins and no function panics.
 
 mod complex;
+mod error;
 mod polynomial;
 mod real;
 mod symmetric;
 
 pub use complex::{dominant, of_complex};
+pub use error::EigenvalueError;
 pub use polynomial::polynomial_roots;
 pub use real::of_real;
 pub use symmetric::{of_symmetric, of_symmetric_pencil};
-
-use nalgebra::{ComplexField, DMatrix};
-
-/// Why a matrix has no eigenvalues that can be computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum EigenvalueError {
-    /// The matrix is not square.
-    #[error("a matrix of {rows} × {columns} has no eigenvalues; it must be square")]
-    NotSquare {
-        /// Rows.
-        rows: usize,
-        /// Columns.
-        columns: usize,
-    },
-    /// An entry is infinite or not a number.
-    #[error(
-        "a matrix of {size} × {size} has an entry that is not finite; check the data for gaps, overflow and division by zero"
-    )]
-    NotFinite {
-        /// Rows and columns.
-        size: usize,
-    },
-    /// The matrix M of a symmetric pencil is not positive definite.
-    #[error(
-        "the mass matrix of {size} × {size} is not positive definite; every degree of freedom needs a mass"
-    )]
-    NotDefinite {
-        /// Rows and columns.
-        size: usize,
-    },
-    /// The QR iteration exceeds its bound.
-    #[error(
-        "the QR iteration on a matrix of {size} × {size} does not converge within {iterations} iterations; use a lower model order, or scale the data to similar magnitudes"
-    )]
-    NotConverged {
-        /// Rows and columns.
-        size: usize,
-        /// The bound.
-        iterations: usize,
-    },
-}
-
-/// The number of rows of a square matrix with finite entries.
-fn size_of<T: ComplexField>(matrix: &DMatrix<T>) -> Result<usize, EigenvalueError> {
-    let (rows, columns) = matrix.shape();
-    if rows != columns {
-        return Err(EigenvalueError::NotSquare { rows, columns });
-    }
-    if matrix.iter().any(|entry| !entry.is_finite()) {
-        return Err(EigenvalueError::NotFinite { size: rows });
-    }
-    Ok(rows)
-}
 
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,8 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::{EigenvalueError, of_complex};
+use super::complex::of_complex;
+use super::error::EigenvalueError;
 
 /// The roots of Σₖ cₖ zᵏ, in no order, from the coefficients c₀ … cₙ in rising powers.
 ///

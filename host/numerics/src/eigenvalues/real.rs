@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use num_complex::Complex64;
 
-use super::{EigenvalueError, size_of};
+use super::error::{EigenvalueError, size_of};
 
 /// Iterations for one eigenvalue after which the matrix is given up; three are usual, and at 10, 20, … an exceptional
 /// shift breaks cycles.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::{EigenvalueError, size_of};
+use super::error::{EigenvalueError, size_of};
 
 /// Iterations per eigenvalue after which a matrix is given up; two or three are usual.
 const ITERATIONS_PER_EIGENVALUE: usize = 60;
