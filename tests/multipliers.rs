@@ -13,6 +13,7 @@ use quietcut::simulate::{
 use quietcut::stability::orbit::ForcedProblem;
 use quietcut::stability::{self, CubicTerms, Method, Pitched, Problem, RevolutionCollocation};
 use quietcut_testkit::case;
+use quietcut_tests::command::cases;
 
 fn cutter(case: &Case, depth_mm: f64) -> Cutter {
     let (tool, material, cut) = (
@@ -390,7 +391,7 @@ fn disturbances_of_extended_cases_grow_as_their_multipliers_say() {
         (two, mode),
         (two, material),
     ] {
-        let path = format!("{}/../../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let path = cases().join(format!("{name}.toml"));
         // Where the chip ends in nothing a chip law has no slope: between 60 and 120 degrees it has one.
         let text = std::fs::read_to_string(&path).unwrap();
         let text = text
