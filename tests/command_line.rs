@@ -82,7 +82,7 @@ fn a_virtual_cut_that_cannot_be_is_refused_and_leaves_no_file() {
     // The sidecar must not be written over a case of the same name.
     std::fs::copy(&acetal, folder.path().join("cut.toml")).expect("a copy of the case");
     let own = ["simulate", "cut.toml", "--rpm", "900", "--out", "cut.csv"];
-    quietcut(folder.path(), &[&own[..], &long[..]].concat()).refused(&["cut.toml", "is the case"]);
+    quietcut(folder.path(), &[&own[..], &long[..]].concat()).refused(&["cut.toml", "overwrite the case"]);
 }
 
 #[test]

@@ -214,7 +214,7 @@ fn what_a_table_lacks_is_said() {
     };
     let answer = run(&["--rpm", "900", "--depth-mm", "0.1:4:40", "--json"]);
     assert_eq!(answer.status, Some(0), "{answer:?}");
-    for said in ["frf.csv", "hxz", "hzz", "zero", "between its lines"] {
+    for said in ["frf.csv", "hxz", "hzz", "zero", "between the lines"] {
         assert!(answer.stderr.contains(said), "{answer:?}");
     }
     assert!(!answer.stderr.contains("hxy"), "{answer:?}");

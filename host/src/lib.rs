@@ -1,6 +1,6 @@
-//! What quietcut does with measured data: the library behind the `quietcut` command.
+//! The library behind the `quietcut` command: command line, device client, demonstration and report pages.
 //!
-//! The parts are crates of their own; here they stand under one roof.
+//! It re-exports the library crates of the workspace (recording, model, frf, simulate, stability, identify, diagnose).
 
 pub use quietcut_diagnose as diagnose;
 pub use quietcut_frf as frf;

@@ -1,4 +1,4 @@
-//! What `quietcut simulate` measures, and how noisily.
+//! Channels and noise of the recording that `quietcut simulate` writes.
 
 use clap::ValueEnum;
 
@@ -6,11 +6,11 @@ use super::{Error, non_negative};
 use crate::recording::{Quantity, Recording};
 use crate::simulate::rig::Noise;
 
-/// The channels of a virtual recording.
+/// Options for the channels of a simulated recording and for their noise.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Channels")]
 pub(super) struct Channels {
-    /// What is measured besides the force, in every direction of the structure.
+    /// Motions to record besides the force, in every direction of the structure.
     #[arg(
         long,
         value_name = "WHAT,…",
@@ -18,11 +18,12 @@ pub(super) struct Channels {
         default_value = "displacement,acceleration"
     )]
     measure: Vec<Measured>,
-    /// Noise of every sample of every channel, in percent of the root mean square of the channel. The accelerometer of a
-    /// cut has a noise of its own (--noise-ug), unless --ideal is given.
+    /// White noise added to every channel: standard deviation in percent of the root mean square of the channel. The
+    /// accelerometer of a cut has its own noise (--noise-ug) unless --ideal is given.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = non_negative, allow_negative_numbers = true)]
     noise_percent: f64,
-    /// Noise of one channel instead, in its SI unit, as in fx=0.02; may be repeated.
+    /// Standard deviation of the noise of one channel in its SI unit, such as fx=0.02. Replaces --noise-percent for this
+    /// channel; may be repeated.
     #[arg(long, value_name = "CHANNEL=VALUE", value_parser = channel_noise)]
     noise: Vec<(String, f64)>,
 }
@@ -32,12 +33,12 @@ enum Measured {
     Displacement,
     Velocity,
     Acceleration,
-    /// Nothing besides the force.
+    /// No motion: only the force.
     None,
 }
 
 impl Channels {
-    /// What is measured besides the force.
+    /// Motion quantities to record besides the force.
     pub(super) fn measured(&self) -> Vec<Quantity> {
         self.measure
             .iter()
@@ -50,10 +51,10 @@ impl Channels {
             .collect()
     }
 
-    /// Adds the noise that was asked for.
+    /// Adds the configured noise to the channels of `recording`; `seed` sets the random numbers.
     ///
     /// # Errors
-    /// A channel that the recording does not have.
+    /// `--noise` names a channel that the recording does not have.
     pub(super) fn add_noise(&self, recording: &mut Recording, seed: u64) -> Result<(), Error> {
         let noise = Noise {
             relative: 0.01 * self.noise_percent,

@@ -1,4 +1,4 @@
-//! `quietcut demo`: the whole chain on a virtual robot cell.
+//! `quietcut demo`: lobes, table upload, cut, chatter detection and advice on a virtual robot cell.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -19,28 +19,30 @@ use crate::report::answer::VerdictAnswer;
 use crate::report::time::seconds;
 use crate::report::words;
 
-/// The whole chain on a virtual robot cell, no hardware: lobes, upload, cut, chatter, advice, quiet.
+/// Runs the whole chain on a virtual robot cell without hardware: lobes, upload, cut, chatter, advice, quiet cut.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  quietcut demo --out quietcut-demo")]
 pub struct Args {
-    /// Folder for the report and the lobe table.
+    /// Folder where the report and the lobe table are written.
     #[arg(long, value_name = "DIR", default_value = "quietcut-demo")]
     out: PathBuf,
     #[command(flatten)]
     output: Output,
 }
 
-/// The cuts that are tried: rev/min, mm.
+/// Cuts of the demonstration, as spindle speed in rev/min and axial depth in mm. They are a choice: the table of the
+/// virtual cell predicts chatter at both.
 const CUTS: [(f64, f64); 2] = [(1045.0, 2.0), (900.0, 2.0)];
 
-/// Spindle speeds and depths of the lobe table.
+/// Lowest and highest spindle speed of the lobe table, rev/min: a choice that contains both cuts and their advised speeds.
 const TABLE_RPM: (f64, f64) = (600.0, 2400.0);
+/// Largest axial depth of the lobe table, mm: a choice, three times the depth of the cuts.
 const TABLE_DEPTH_MM: f64 = 6.0;
 
 const TITLE: &str = "quietcut demo: a milling robot, chatter, and the quiet speed";
 
 #[derive(Serialize)]
-struct Answer {
+struct DemoOutput {
     report: PathBuf,
     table: PathBuf,
     stories: Vec<StoryAnswer>,
@@ -57,11 +59,11 @@ struct StoryAnswer {
 struct TrialAnswer {
     rpm: f64,
     depth_mm: f64,
-    /// The first call of chatter; `null` where the cut is quiet.
+    /// First report of chatter; `null` if the device reports none.
     alarm: Option<VerdictAnswer>,
-    /// The last verdict before the tool leaves.
+    /// Last verdict before the tool begins to leave the workpiece.
     verdict: Option<&'static str>,
-    /// Vibration at the end of the cut along x, y, z, rms.
+    /// Root mean square of the acceleration along x, y and z over the last quarter of full engagement, m/s².
     vibration_m_per_s2: [f64; 3],
 }
 
@@ -76,8 +78,8 @@ pub fn run(args: Args) -> Result<(), Error> {
         ))
     })?;
     output.line(
-        "A milling robot with a two-tooth cutter in a block of acetal. Nothing here is recorded: lobes, cuts, sensor and\n\
-         device are computed now, and the device is the program of the real one behind a serial line.\n",
+        "A milling robot with a two-tooth cutter in a block of acetal. Lobes, cuts and sensor are computed\n\
+         now. The device runs the same program as the real board, behind a serial line.\n",
     )?;
     let cell = VirtualCell::new().map_err(Error::other)?;
     let bytes = lobes(&cell, output)?;
@@ -93,7 +95,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let html = page(TITLE, &table, &stories).map_err(Error::other)?;
     file::write(&table_file, &bytes)?;
     file::write(&report, html.as_bytes())?;
-    let answer = Answer {
+    let answer = DemoOutput {
         stories: stories.iter().map(StoryAnswer::new).collect(),
         seconds: began.elapsed().as_secs_f64(),
         report,
@@ -104,10 +106,10 @@ pub fn run(args: Args) -> Result<(), Error> {
         &answer,
         format_args!("\n{number}  Report  {report} ({seconds:.0} s in all)"),
     )?;
-    judge(&stories)
+    check(&stories)
 }
 
-/// Computes the table of the cell.
+/// Computes the lobe table of the virtual cell and prints its lowest stability limit.
 fn lobes(cell: &VirtualCell, output: Output) -> Result<Vec<u8>, Error> {
     let began = Instant::now();
     let request = TableRequest {
@@ -125,7 +127,7 @@ fn lobes(cell: &VirtualCell, output: Output) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// Switches the device on and gives it the table.
+/// Starts the simulated device and uploads the lobe table to it.
 fn switch_on(cell: &VirtualCell, table: &LobeTable<'_>, output: Output) -> Result<Bench, Error> {
     let (mut bench, info) = Bench::new(cell.clone())?;
     let port = bench.serial_port();
@@ -141,7 +143,7 @@ fn switch_on(cell: &VirtualCell, table: &LobeTable<'_>, output: Output) -> Resul
     Ok(bench)
 }
 
-/// `at the worst speed, 1045 rev/min, cuts up to 1.33 mm are stable; deeper: …`.
+/// Sentence with the lowest stability limit of the table, its spindle speed and its kind of stability loss.
 fn lowest_limit(table: &LobeTable<'_>) -> String {
     let limits = table.speeds().enumerate().filter_map(|(index, speed)| {
         let limit = *table.entry(0, index)?.first_limit()?;
@@ -159,7 +161,7 @@ fn lowest_limit(table: &LobeTable<'_>) -> String {
     }
 }
 
-/// A cut, what the device says of it, and the cut that it says.
+/// Makes one cut and, where the device advises another speed or depth, the advised cut.
 fn story(
     bench: &mut Bench,
     cell: &VirtualCell,
@@ -167,9 +169,9 @@ fn story(
     depth_mm: f64,
     output: Output,
 ) -> Result<Story, Error> {
-    tell_working_point(bench, cell, depth_mm, output)?;
+    set_working_point(bench, cell, depth_mm, output)?;
     let first = bench.cut(rpm, depth_mm)?;
-    account(&first, output)?;
+    print_events(&first, output)?;
     let advice = first.alarm().and_then(|report| report.advice);
     let target = advice
         .filter(|advice| matches!(advice.action, Action::Speed | Action::Depth))
@@ -180,14 +182,14 @@ fn story(
     let Some((rpm, depth_mm)) = target else {
         return Ok(Story { first, advised: None });
     };
-    output.line(format!("   As told {rpm:.0} rev/min, {depth_mm:.2} mm deep"))?;
-    tell_working_point(bench, cell, depth_mm, output)?;
+    output.line(format!("   Advised {rpm:.0} rev/min, {depth_mm:.2} mm deep"))?;
+    set_working_point(bench, cell, depth_mm, output)?;
     let advised = bench.cut(rpm, depth_mm)?;
-    account(&advised, output)?;
+    print_events(&advised, output)?;
     if advised.is_quiet() {
-        let (before, after) = (loudest(&first), loudest(&advised));
+        let (before, after) = (largest_vibration(&first), largest_vibration(&advised));
         output.line(format!(
-            "   Result  {before:.2} m/s² before, {after:.2} m/s² now; what is left keeps step with the teeth"
+            "   Result  {before:.2} m/s² before, {after:.2} m/s² now; the remaining vibration is synchronous with the tooth passing"
         ))?;
     }
     Ok(Story {
@@ -196,7 +198,7 @@ fn story(
     })
 }
 
-fn tell_working_point(
+fn set_working_point(
     bench: &mut Bench,
     cell: &VirtualCell,
     depth_mm: f64,
@@ -212,15 +214,15 @@ fn tell_working_point(
     };
     bench.client().set_working_point(Some(point))?;
     output.line(format!(
-        "           the device is told: {}",
+        "           working point set on the device: {}",
         WorkingPointAnswer::new(&point)
     ))
 }
 
-/// What happened, in lines for a machinist.
-fn account(trial: &Trial, output: Output) -> Result<(), Error> {
+/// Prints the events of one cut for a machinist: engagement, chatter, advice, vibration.
+fn print_events(trial: &Trial, output: Output) -> Result<(), Error> {
     let event = |t_s: f64, text: &str| output.line(format!("{t_s:9.2} s {text}"));
-    event(trial.full_cut_s[0], "the tool is in full cut")?;
+    event(trial.full_cut_s[0], "the tool is fully engaged")?;
     match trial.alarm() {
         Some(report) => {
             let teeth = trial.teeth_since_entry(seconds(report));
@@ -229,43 +231,46 @@ fn account(trial: &Trial, output: Output) -> Result<(), Error> {
                 &format!("{} (tooth pass {teeth:.0})", words::verdict(&report.judgement)),
             )?;
             if let Some(advice) = &report.advice {
-                output.line(format!("           the device says: {}", words::action(advice)))?;
+                output.line(format!("           advice: {}", words::action(advice)))?;
                 output.line(format!(
-                    "           because: {}",
+                    "           reason: {}",
                     words::why(advice, &report.judgement, report.speed)
                 ))?;
             }
         }
         None => event(
             trial.full_cut_s[1],
-            "the tool leaves; the device called no chatter: QUIET",
+            "the tool leaves; the device reported no chatter: QUIET",
         )?,
     }
     output.line(format!(
         "           vibration at the end of the cut: {:.2} m/s² rms",
-        loudest(trial)
+        largest_vibration(trial)
     ))
 }
 
-/// Vibration at the end of the cut along the axis that has most.
-fn loudest(trial: &Trial) -> f64 {
+/// Root mean square of the acceleration at the end of the cut, m/s², along the axis with the largest value.
+fn largest_vibration(trial: &Trial) -> f64 {
     trial.vibration().into_iter().fold(0.0, f64::max)
 }
 
-/// A demonstration whose device did not hear chatter, or whose advice was not quiet, has failed, whatever it printed.
-fn judge(stories: &[Story]) -> Result<(), Error> {
+/// Checks the result of the demonstration.
+///
+/// # Errors
+/// The device did not detect chatter in a cut, gave no advice, or reports chatter in the advised cut.
+fn check(stories: &[Story]) -> Result<(), Error> {
     for Story { first, advised } in stories {
         let cut = format!("{:.0} rev/min, {:.2} mm", first.rpm, first.depth_mm);
         if first.is_quiet() {
             return Err(Error::other(format!(
-                "the device heard no chatter at {cut}, where there is some"
+                "the device detected no chatter at {cut}, although this cut is unstable"
             )));
         }
         match advised {
             None => return Err(Error::other(format!("the device had no advice for {cut}"))),
             Some(advised) if !advised.is_quiet() => {
                 return Err(Error::other(format!(
-                    "the advice for {cut} was {:.0} rev/min, {:.2} mm, and the device calls chatter there too",
+                    "the advice for {cut} was {:.0} rev/min, {:.2} mm, and the device reports chatter there too",
                     advised.rpm, advised.depth_mm
                 )));
             }
@@ -300,7 +305,7 @@ impl TrialAnswer {
 
 impl From<BenchError> for Error {
     fn from(error: BenchError) -> Self {
-        // The user has named nothing that could be wrong.
+        // The demonstration has no input of the user that could cause the error.
         Self::other(error)
     }
 }

@@ -1,4 +1,4 @@
-//! `quietcut diagnose`: what the simulation gets wrong, and why.
+//! `quietcut diagnose`: compares recordings with the simulation of a case and finds the causes of the prediction error.
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -16,26 +16,26 @@ use crate::report::diagnosis::diagnosis_page;
 use crate::report::lobes_change::{called, sentences};
 use crate::trial_cuts::{self, TestCut};
 
-/// What the simulation gets wrong about recordings, why, what to add, and how much better that is.
+/// Finds why the simulation of a case differs from recordings, extends the case, and states the gain in prediction error.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-full.toml --experiment sweep --direction x --frequency-hz 10:25:2 --force-n 20 --effect cubic-stiffness=-5e12 --effect cubic-stiffness.direction=x --noise-percent 1 --out measured.csv\n  quietcut diagnose tests/cases/kuka-kr90-full.toml measured.csv --out diagnosis"
 )]
 pub struct Args {
-    /// What is believed.
+    /// The baseline model (case file).
     #[arg(value_name = "CASE.toml")]
     case: PathBuf,
-    /// What was measured.
+    /// Recordings of tests or cuts.
     #[arg(value_name = "REC", required = true)]
     recordings: Vec<PathBuf>,
-    /// Folder for what is written: extended.toml, diagnosis.json and report.html.
+    /// Folder to write: extended.toml (the extended case), diagnosis.json and report.html.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Cuts that were tried, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal): how the case
-    /// and the extended case call them.
+    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal): compared
+    /// with the stability that the case and the extended case predict.
     #[arg(long, value_name = "FILE")]
     cuts: Option<PathBuf>,
-    /// Seed of whatever is drawn; nothing is at present, and the answer does not depend on it.
+    /// Seed of random numbers. Reserved: the diagnosis draws none, and its result does not depend on the seed.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -55,11 +55,11 @@ pub fn run(args: Args) -> Result<(), Error> {
     let bar = progress_bar();
     let options = Options { seed: args.seed };
     let mut diagnosis = diagnose_watched(&case, &recordings, &options, &|stage| {
-        bar.set_message(words(stage));
+        bar.set_message(stage_message(stage));
         bar.inc(1);
     })?;
     let extended = diagnosis.extended_case(&crate::file::read_text(&args.case)?);
-    bar.set_message("limits before and after");
+    bar.set_message("stability limits before and after");
     bar.inc(1);
     add_limits(&case, &recordings, &cuts, &mut diagnosis);
     bar.finish_and_clear();
@@ -72,7 +72,8 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&diagnosis, text(&diagnosis))
 }
 
-/// Adds what the extension changes of the limits, or without one the lobes with the cuts that are known; says why where that is not known.
+/// Adds the stability limits to the diagnosis: before and after the extension, or only those of the case if there is no
+/// extension but there are trial cuts. A failure becomes a warning.
 fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TestCut], diagnosis: &mut Diagnosis) {
     let has_cuts = || !cuts.is_empty() || !recorded_cuts(case, recordings).is_empty();
     let found = match diagnosis.extended(case) {
@@ -82,11 +83,14 @@ fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TestCut], diagnosis
         None => Ok(()),
     };
     if let Err(error) = found {
-        diagnosis.warnings.push(format!("limits are not known: {error}"));
+        diagnosis
+            .warnings
+            .push(format!("the stability limits could not be computed: {error}"));
     }
 }
 
-/// Stages of a diagnosis, with that of the limits; those of records are seen a second time where a part of them was searched first.
+/// Length of the progress bar: the number of stages of a diagnosis, including the stability limits and the second search of
+/// long recordings.
 const STAGES: u64 = 9;
 
 fn progress_bar() -> ProgressBar {
@@ -102,14 +106,14 @@ fn progress_bar() -> ProgressBar {
     }
 }
 
-fn words(stage: Stage) -> &'static str {
+fn stage_message(stage: Stage) -> &'static str {
     match stage {
-        Stage::Records => "recordings beside the case",
-        Stage::Library => "what each cause would look like",
-        Stage::Causes(1) => "one cause",
-        Stage::Causes(2) => "two causes",
-        Stage::Causes(_) => "three causes",
-        Stage::Answer => "what it means",
+        Stage::Records => "comparing the recordings with the baseline model",
+        Stage::Library => "computing the response to each cause",
+        Stage::Causes(1) => "candidate models with one cause",
+        Stage::Causes(2) => "candidate models with two causes",
+        Stage::Causes(_) => "candidate models with three causes",
+        Stage::Answer => "intervals and conclusion",
     }
 }
 
@@ -127,25 +131,28 @@ fn write(folder: &Path, name: &str, diagnosis: &Diagnosis, extended: Option<&str
 
 fn text(diagnosis: &Diagnosis) -> String {
     let mut lines = vec![format!(
-        "the case misses {:.3} % of the parts of the records that are held out, {:.3} % of the whole",
+        "prediction error (NRMSE): {:.3} % on held-out segments, {:.3} % overall",
         100.0 * diagnosis.baseline.nrmse_heldout,
         100.0 * diagnosis.baseline.nrmse_whole
     )];
     lines.push(match diagnosis.outcome {
         Outcome::Cause => "cause found:".into(),
-        Outcome::None => "nothing is wrong beyond the noise".into(),
+        Outcome::None => "the case agrees with the recordings within the noise".into(),
         Outcome::Confounded => {
-            format!("these explain it equally well: {}", diagnosis.alternatives())
+            format!(
+                "these candidate models fit equally well: {}",
+                diagnosis.alternatives()
+            )
         }
-        Outcome::Unexplained => "something is wrong that no known cause explains".into(),
+        Outcome::Unexplained => "the case is wrong, and no known cause explains the residual".into(),
     });
     for cause in &diagnosis.causes {
-        let place = match cause.location() {
-            place if place.is_empty() => place,
-            place => format!(" ({place})"),
+        let location = match cause.location() {
+            location if location.is_empty() => location,
+            location => format!(" ({location})"),
         };
         lines.push(format!(
-            "  {}{place}, confidence {:.2}",
+            "  {}{location}, confidence {:.2}",
             cause.name, cause.confidence
         ));
         for (key, figure) in &cause.parameters {
@@ -158,7 +165,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     }
     if let (Some(extended), Some(gain)) = (diagnosis.extended, diagnosis.gain) {
         lines.push(format!(
-            "with it {:.3} % is missed: {:.2} % of the residual's energy beyond the noise is gone, 90 % interval {:.2} to {:.2} %",
+            "with this extension the NRMSE on held-out segments is {:.3} %; it explains {:.2} % of the residual energy above the noise (90 % interval {:.2} to {:.2} %)",
             100.0 * extended.nrmse_heldout,
             100.0 * gain.residual_energy_removed,
             100.0 * gain.ci90[0],
@@ -167,7 +174,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     }
     if diagnosis.unexplained.fraction > 0.0 {
         lines.push(format!(
-            "{:.2} % of what the case misses is not explained: {}",
+            "{:.2} % of the residual energy of the case is not explained: {}",
             100.0 * diagnosis.unexplained.fraction,
             diagnosis.unexplained.location
         ));
@@ -176,7 +183,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     lines.extend(diagnosis.lobes.iter().flat_map(sentences));
     lines.extend(diagnosis.believed.iter().map(called));
     if let Some(test) = &diagnosis.next_test {
-        lines.push(format!("next test: {}: it {}", test.what(), test.why));
+        lines.push(format!("next test: {}; it {}", test.what(), test.why));
     }
     lines.join("\n")
 }

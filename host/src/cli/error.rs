@@ -1,4 +1,4 @@
-//! What a verb can fail with, and the exit status that belongs to it.
+//! Errors of the verbs and their exit status.
 
 use std::error::Error as StdError;
 use std::io;
@@ -13,32 +13,32 @@ use crate::trial_cuts::TestCutsError;
 
 type Cause = Box<dyn StdError + Send + Sync>;
 
-/// Why a verb did not do what it was asked to.
+/// The failure of a verb.
 ///
-/// The library's errors become one or the other here and nowhere else, by `From`.
+/// The `From` conversions decide for each error of the library crates whether it is an input error.
 #[derive(Debug)]
 pub enum Error {
-    /// Bad usage or bad input: exit status 2. The message names the file, the line or key, the value found and
-    /// what would be right.
+    /// Wrong usage or wrong input: exit status 2. The message names the file, the line or key, the value found and the
+    /// allowed values.
     Input(Cause),
     /// Anything else: exit status 1.
     Other(Cause),
-    /// Whoever read standard output has stopped reading (`quietcut monitor … | head`): nothing is wrong.
+    /// The reader of standard output has closed the pipe (`quietcut monitor … | head`): exit status 0.
     ReaderGone,
 }
 
 impl Error {
-    /// Bad usage or bad input.
+    /// An error of usage or input, with exit status 2.
     pub fn input(cause: impl Into<Cause>) -> Self {
         Self::Input(cause.into())
     }
 
-    /// Anything that is not the user's to mend.
+    /// An error that the user cannot correct, with exit status 1.
     pub fn other(cause: impl Into<Cause>) -> Self {
         Self::Other(cause.into())
     }
 
-    /// 2 for bad usage or input, 1 for anything else.
+    /// Exit status of the process: 2 for wrong usage or input, 1 for other errors, 0 if the reader of standard output is gone.
     pub fn exit_status(&self) -> u8 {
         match self {
             Self::Input(_) => 2,
@@ -49,7 +49,7 @@ impl Error {
 }
 
 impl std::fmt::Display for Error {
-    /// The message and, after colons, what caused it where the message does not say so itself.
+    /// The message, followed after colons by each source error that the message does not already contain.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (Self::Input(cause) | Self::Other(cause)) = self else {
             return f.write_str("the reader of standard output has gone");
@@ -72,7 +72,7 @@ impl StdError for Error {}
 impl From<FileError> for Error {
     fn from(error: FileError) -> Self {
         match error {
-            // The folder or the file that the user named is wrong.
+            // The user gave the folder or the file.
             FileError::Read { .. } | FileError::NotText { .. } => Self::input(error),
             FileError::Write { ref cause, .. } => match cause.kind() {
                 io::ErrorKind::NotFound
@@ -136,7 +136,7 @@ impl From<DeviceError> for Error {
             DeviceError::PseudoTerminal { .. } | DeviceError::TooLarge { .. } | DeviceError::Cell(_) => {
                 Self::other(error)
             }
-            // Port, cable, device or table: all of them the user's to mend.
+            // The user can correct the port, the cable, the device or the table.
             _ => Self::input(error),
         }
     }
@@ -151,7 +151,7 @@ mod tests {
     struct Outer(#[source] io::Error);
 
     #[test]
-    fn the_cause_is_said_once() {
+    fn the_message_contains_the_source_error_once() {
         let error = Error::input(Outer(io::Error::other("line 3")));
         assert_eq!(error.to_string(), "case.toml: line 3");
         assert_eq!(error.exit_status(), 2);

@@ -1,4 +1,4 @@
-//! `quietcut simulate --experiment`: a virtual test rig.
+//! `quietcut simulate --experiment`: a simulated vibration test of the structure.
 
 use std::path::{Path, PathBuf};
 
@@ -13,69 +13,69 @@ use crate::simulate::Effects;
 use crate::simulate::rig::{Rig, Signal};
 use crate::structure::{Direction, Structure};
 
-/// The options of a rig.
+/// Options of a simulated vibration test: excitation, force levels, durations.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Test rig")]
 pub(super) struct Experiment {
-    /// Instead of a cut, a test rig.
+    /// Simulate a vibration test with this excitation instead of a cut.
     #[arg(long, value_name = "KIND")]
-    pub(super) experiment: Option<Kind>,
-    /// Direction of the force; the first of the structure where it is not given.
+    pub(super) experiment: Option<ExperimentKind>,
+    /// Direction of the force. Default: the first direction of the structure.
     #[arg(long, value_name = "x|y|z")]
     direction: Option<Direction>,
-    /// Frequencies in Hz: of the steps, first and last of a sweep, of the tones of a shaker.
+    /// Frequencies in Hz: the steps of step-sine, the first and last frequency of a sweep, or the tones of a shaker.
     #[arg(long, value_name = "R", value_parser = Range::positive, allow_negative_numbers = true)]
     frequency_hz: Option<Range>,
-    /// Amplitude in N, peak of a blow, or pull before the release. Several with commas: levels of step-sine, or what a
-    /// shaker goes from and to.
+    /// Force in N: amplitude of a sine, peak of an impact, or static force before a free decay. With commas: the levels of
+    /// step-sine, or the first and last amplitude of a shaker.
     #[arg(long, value_name = "F,…", value_parser = positive, allow_negative_numbers = true, value_delimiter = ',')]
     force_n: Vec<f64>,
-    /// How long each step of step-sine is excited, in s.
+    /// Duration of the excitation at each step of step-sine, in s.
     #[arg(long, value_name = "T", default_value_t = 25.0, value_parser = positive, allow_negative_numbers = true)]
     dwell_s: f64,
-    /// How long nothing is done after each step, in s.
+    /// Pause without force after each step of step-sine, in s.
     #[arg(long, value_name = "T", default_value_t = 3.0, value_parser = non_negative, allow_negative_numbers = true)]
     pause_s: f64,
-    /// How fast a sweep goes, in Hz per minute.
+    /// Sweep rate in Hz per minute.
     #[arg(long, value_name = "R", default_value_t = 6.0, value_parser = positive, allow_negative_numbers = true)]
     hz_per_min: f64,
-    /// The sweep goes from the last frequency to the first.
+    /// Sweep from the last frequency to the first.
     #[arg(long)]
     backward: bool,
-    /// Number of blows of the hammer.
+    /// Number of hammer impacts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
     impacts: u16,
-    /// How long a blow lasts, in ms.
+    /// Duration of an impact, in ms.
     #[arg(long, value_name = "T", default_value_t = 10.0, value_parser = positive, allow_negative_numbers = true)]
     pulse_ms: f64,
-    /// How long after a blow the next comes, in s.
+    /// Time between impacts, in s.
     #[arg(long, value_name = "T", default_value_t = 10.0, value_parser = positive, allow_negative_numbers = true)]
     spacing_s: f64,
-    /// How much less the shaker's force is per velocity, in N s/m: its drop-out at resonance.
+    /// Force drop-out of the shaker at resonance: its force decreases by this value times the velocity, in N s/m.
     #[arg(long, value_name = "C", default_value_t = 0.0, value_parser = non_negative, allow_negative_numbers = true)]
     drop_ns_per_m: f64,
 }
 
-/// The rigs.
+/// Kinds of excitation of a simulated test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum Kind {
-    /// One tone, or several at once, at a force that is constant or grows.
+pub(super) enum ExperimentKind {
+    /// Shaker with one or several simultaneous tones, whose force is constant or increases linearly.
     Shaker,
-    /// One frequency after the other, level after level.
+    /// Stepped sine: one frequency after the other at each force level.
     StepSine,
-    /// A frequency that glides.
+    /// Sine whose frequency changes linearly with time.
     Sweep,
-    /// Blows of a hammer.
+    /// Hammer impacts.
     Hammer,
-    /// Pulled and let go.
+    /// Free decay after a static force is released.
     FreeDecay,
-    /// A cut in porous material, whose force is broad-band.
+    /// Cut in porous material, with broad-band cutting force.
     Porous,
-    /// A cut at a speed that glides; one for each of three or more immersions.
+    /// Cut at a spindle speed that changes linearly. An identification needs recordings at three or more immersions.
     SpeedSweep,
 }
 
-/// What a rig shares with a cut.
+/// Options that a simulated vibration test shares with a simulated cut.
 pub(super) struct Common<'a> {
     pub(super) seconds: Option<f64>,
     pub(super) sample_rate_hz: Option<f64>,
@@ -86,7 +86,7 @@ pub(super) struct Common<'a> {
 }
 
 #[derive(Debug, Serialize)]
-struct Answer {
+struct ExperimentOutput {
     recording: PathBuf,
     kind: crate::recording::Kind,
     direction: &'static str,
@@ -98,10 +98,10 @@ struct Answer {
     branch_changes: u64,
 }
 
-/// Runs a rig, and writes what it records.
+/// Simulates a vibration test and writes its recording.
 pub(super) fn run(
     case: &Case,
-    kind: Kind,
+    kind: ExperimentKind,
     options: &Experiment,
     common: &Common<'_>,
     output: Output,
@@ -139,7 +139,7 @@ pub(super) fn run(
         .filter(|channel| channel.quantity == Quantity::Displacement)
         .flat_map(|channel| &channel.samples)
         .fold(0.0_f64, |a, b| a.max(b.abs()));
-    let answer = Answer {
+    let answer = ExperimentOutput {
         recording: common.out.into(),
         kind: rig.signal.kind(),
         direction: direction.name(),
@@ -151,7 +151,7 @@ pub(super) fn run(
         branch_changes: statistics.branch_changes,
     };
     let text = format!(
-        "{}: {} samples at {:.1} Hz, force in {}; the tool moves by up to {:.4} mm",
+        "{}: {} samples at {:.1} Hz, force in {}; largest displacement of the tool {:.4} mm",
         answer.recording.display(),
         answer.samples,
         answer.sample_rate_hz,
@@ -161,8 +161,8 @@ pub(super) fn run(
     output.answer(&answer, text)
 }
 
-impl Kind {
-    /// True where a tool cuts.
+impl ExperimentKind {
+    /// Whether the excitation is the cutting force of a milling cut.
     pub(super) fn is_milling(self) -> bool {
         matches!(self, Self::Porous | Self::SpeedSweep)
     }
@@ -179,10 +179,11 @@ fn direction(options: &Experiment, structure: &Structure) -> Result<Direction, S
         .ok_or_else(|| "the structure has no direction in which a force can act".into())
 }
 
-/// A power of two that holds the eighth harmonic of what is excited; blows and releases excite up to about 1/pulse.
-fn default_rate_hz(kind: Kind, options: &Experiment) -> f64 {
+/// Default sampling rate in Hz: a power of two of at least 20 times the highest excited frequency, so that the eighth harmonic
+/// lies below the Nyquist frequency. An impact of duration T excites up to about 1/T.
+fn default_rate_hz(kind: ExperimentKind, options: &Experiment) -> f64 {
     let highest_hz = match kind {
-        Kind::Hammer => 1e3 / options.pulse_ms,
+        ExperimentKind::Hammer => 1e3 / options.pulse_ms,
         _ => options
             .frequency_hz
             .map_or(30.0, |range| range.first().max(range.last())),
@@ -190,7 +191,7 @@ fn default_rate_hz(kind: Kind, options: &Experiment) -> f64 {
     (20.0 * highest_hz).log2().ceil().exp2()
 }
 
-fn signal(kind: Kind, options: &Experiment, common: &Common<'_>) -> Result<Signal, Error> {
+fn signal(kind: ExperimentKind, options: &Experiment, common: &Common<'_>) -> Result<Signal, Error> {
     let frequencies = || {
         options.frequency_hz.ok_or_else(|| {
             Error::input("--frequency-hz is needed: frequencies as first:last:count, or one alone")
@@ -201,15 +202,15 @@ fn signal(kind: Kind, options: &Experiment, common: &Common<'_>) -> Result<Signa
         n => Err(Error::input(format!("--force-n: {n} forces are given; {what}"))),
     };
     Ok(match kind {
-        Kind::Shaker => {
-            let force = force(1..=2, "one is needed, or two to go from and to")?;
+        ExperimentKind::Shaker => {
+            let force = force(1..=2, "one amplitude is needed, or two: the first and the last")?;
             let seconds = common
                 .seconds
                 .ok_or_else(|| Error::input("--seconds is needed for a shaker"))?;
             let levels = [force[0], force[force.len() - 1]];
             Signal::tones(&frequencies()?.values(), levels, seconds, common.seed)
         }
-        Kind::StepSine => {
+        ExperimentKind::StepSine => {
             let levels = force(1..=1000, "one or more levels are needed")?;
             Signal::step_sine(
                 &frequencies()?.values(),
@@ -218,7 +219,7 @@ fn signal(kind: Kind, options: &Experiment, common: &Common<'_>) -> Result<Signa
                 options.pause_s,
             )
         }
-        Kind::Sweep => {
+        ExperimentKind::Sweep => {
             let range = frequencies()?;
             let mut ends = [range.first(), range.last()];
             if options.backward {
@@ -227,7 +228,7 @@ fn signal(kind: Kind, options: &Experiment, common: &Common<'_>) -> Result<Signa
             let span = (ends[1] - ends[0]).abs();
             if span == 0.0 {
                 return Err(Error::input(format!(
-                    "--frequency-hz {range}: a sweep goes from one frequency to another, as in 1:30:2"
+                    "--frequency-hz {range}: a sweep needs two different frequencies, such as 1:30:2"
                 )));
             }
             Signal::Sweep {
@@ -237,20 +238,20 @@ fn signal(kind: Kind, options: &Experiment, common: &Common<'_>) -> Result<Signa
                 seconds: 60.0 * span / options.hz_per_min,
             }
         }
-        Kind::Hammer => Signal::impacts(
+        ExperimentKind::Hammer => Signal::impacts(
             usize::from(options.impacts),
-            force(1..=1, "the blows have one peak force, from which they scatter")?[0],
+            force(1..=1, "hammer impacts scatter about one peak force")?[0],
             1e-3 * options.pulse_ms,
             options.spacing_s,
             common.seed,
         ),
-        Kind::Porous | Kind::SpeedSweep => {
+        ExperimentKind::Porous | ExperimentKind::SpeedSweep => {
             return Err(Error::input(
-                "a cut drives itself; porous and speed-sweep need --rpm and --depth-mm",
+                "porous and speed-sweep are cuts; they need --rpm and --depth-mm",
             ));
         }
-        Kind::FreeDecay => Signal::Release {
-            force_n: force(1..=1, "the pull has one force")?[0],
+        ExperimentKind::FreeDecay => Signal::Release {
+            force_n: force(1..=1, "a free decay has one static force")?[0],
             pull_s: 2.0,
             seconds: common.seconds.unwrap_or(10.0),
         },

@@ -1,4 +1,4 @@
-//! `quietcut frf`: receptances from recordings.
+//! `quietcut frf`: receptances H = X/F with coherence, estimated from recordings.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -17,47 +17,47 @@ use crate::recording::UffForm;
 use crate::report::frf_chart::frf_chart;
 use crate::report::page::{figure, page};
 
-/// Receptances with their coherence, from recordings of a shaker, a hammer or a cut.
+/// Estimates receptances and their coherence from recordings of a shaker, a hammer or a cut.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out hammer.csv\n  quietcut frf hammer.csv --band-hz 10:30 --out frf.csv --out frf.svg\n\n\
-                  Recordings of the same forces are averaged, those of other forces add columns. How a record is cut follows\n\
-                  from kind in the file beside it; --excitation goes before it. Forces that are not chosen count as noise."
+                  Recordings with the same forces are averaged; recordings with other forces add columns to the matrix of receptances.\n\
+                  The sidecar key `kind` sets how a recording is divided into segments; --excitation overrides it.\n\
+                  Forces that are not selected count as noise."
 )]
 pub struct Args {
     /// The recordings: CSV, UFF 58, WAV or MAT.
     #[arg(value_name = "REC", required = true)]
     recordings: Vec<PathBuf>,
-    /// Table or picture to write: csv, uff, svg or html by its ending; may be given again.
-    #[arg(long, value_name = "FILE", value_parser = Target::parse)]
-    out: Vec<Target>,
-    /// Which noise averages out: h1 that of the responses, h2 that of the forces, mean is (h1 + h2)/2; pseudo-inverse
-    /// is for several cuts whose forces are dependent each by itself.
+    /// Table or chart to write; the ending sets the format: csv, uff, svg or html. May be repeated.
+    #[arg(long, value_name = "FILE", value_parser = OutputFile::parse)]
+    out: Vec<OutputFile>,
+    /// Estimator: h1 is unbiased by noise of the responses, h2 by noise of the forces, mean is (h1 + h2)/2. pseudo-inverse
+    /// combines several cuts, in each of which the forces are linearly dependent.
     #[arg(long, value_enum, default_value_t)]
     method: Method,
-    /// How the structure was driven, where the file beside the recording does not say, or to go before it.
+    /// Excitation of the structure; overrides the kind in the sidecar file.
     #[arg(long, value_enum)]
-    excitation: Option<Driving>,
+    excitation: Option<ExcitationKind>,
     /// First and last frequency in Hz.
     #[arg(long, value_name = "FIRST:LAST", value_parser = band)]
     band_hz: Option<(f64, f64)>,
-    /// Distance of the frequencies in Hz; by default eight segments, or eight averages of a sweep, for each force.
+    /// Frequency resolution in Hz. Default: eight segments, or eight averages of a sweep, for each force.
     #[arg(long, value_name = "D", value_parser = positive, allow_negative_numbers = true)]
     resolution_hz: Option<f64>,
     /// Window of the segments of random excitation.
     #[arg(long, value_enum, default_value_t)]
     window: WindowName,
-    /// Part by which these segments overlap.
-    #[arg(long, value_name = "PART", value_parser = overlap, default_value = "0.5", allow_negative_numbers = true)]
+    /// Overlap of these segments, as a fraction of their length.
+    #[arg(long, value_name = "FRACTION", value_parser = overlap, default_value = "0.5", allow_negative_numbers = true)]
     overlap: f64,
-    /// A channel that is meant, where a recording has several forces or several sensors of a direction; may be given
-    /// again.
+    /// Channel to use where a recording has several forces, or several sensors of one direction; may be repeated.
     #[arg(long, value_name = "NAME")]
     channel: Vec<String>,
-    /// Time constant in s of the exponential window on hammer blows. It adds 1/τ to the decay of every mode.
+    /// Time constant τ in s of the exponential window on hammer impacts. The window adds 1/τ to the decay rate of every mode.
     #[arg(long, value_name = "TAU", value_parser = positive, allow_negative_numbers = true)]
     exponential_window_s: Option<f64>,
-    /// The force in N that is meant, where a step-sine test has several levels.
+    /// Force level in N to use where a step-sine test has several levels.
     #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
     force_n: Option<f64>,
     /// Tool-tip calibration: FRF from the tool tip to the sensor on the housing.
@@ -85,7 +85,7 @@ enum Method {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Driving {
+enum ExcitationKind {
     Random,
     Sweep,
     Hammer,
@@ -100,37 +100,37 @@ enum WindowName {
     Rectangular,
 }
 
-/// A file to write.
+/// Output file with its format.
 #[derive(Clone, Debug)]
-struct Target {
+struct OutputFile {
     path: PathBuf,
-    form: Form,
+    format: FileFormat,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Form {
+enum FileFormat {
     Csv,
     Uff,
     Svg,
     Html,
 }
 
-impl Target {
+impl OutputFile {
     fn parse(text: &str) -> Result<Self, String> {
         let path = PathBuf::from(text);
         let ending = file::ending(&path);
-        let form = match ending.as_str() {
-            "csv" => Form::Csv,
-            "uff" | "unv" => Form::Uff,
-            "svg" => Form::Svg,
-            "html" => Form::Html,
+        let format = match ending.as_str() {
+            "csv" => FileFormat::Csv,
+            "uff" | "unv" => FileFormat::Uff,
+            "svg" => FileFormat::Svg,
+            "html" => FileFormat::Html,
             _ => {
                 return Err(format!(
                     "`{text}` ends in \"{ending}\"; csv, uff, svg or html is needed"
                 ));
             }
         };
-        Ok(Self { path, form })
+        Ok(Self { path, format })
     }
 }
 
@@ -159,11 +159,11 @@ fn overlap(text: &str) -> Result<f64, String> {
 impl Args {
     fn settings(&self) -> MeasurementSettings {
         MeasurementSettings {
-            excitation: self.excitation.map(|driving| match driving {
-                Driving::Random => Excitation::Random,
-                Driving::Sweep => Excitation::Sweep,
-                Driving::Hammer => Excitation::Hammer,
-                Driving::StepSine => Excitation::StepSine,
+            excitation: self.excitation.map(|kind| match kind {
+                ExcitationKind::Random => Excitation::Random,
+                ExcitationKind::Sweep => Excitation::Sweep,
+                ExcitationKind::Hammer => Excitation::Hammer,
+                ExcitationKind::StepSine => Excitation::StepSine,
             }),
             estimator: match self.method {
                 Method::H1 => Estimator::H1,
@@ -207,25 +207,25 @@ pub fn run(args: Args) -> Result<(), Error> {
     for target in &args.out {
         write(target, &table, args.uff_binary)?;
     }
-    let answer = Answer::new(&args, &measurement, &table, &calibration);
+    let answer = FrfOutput::new(&args, &measurement, &table, &calibration);
     let text = answer.text();
     args.output.answer(&answer, text)
 }
 
-fn write(target: &Target, table: &FrfTable, is_binary: bool) -> Result<(), Error> {
+fn write(target: &OutputFile, table: &FrfTable, is_binary: bool) -> Result<(), Error> {
     let title = "Frequency response functions";
     let draw = || frf_chart(title, table).map_err(Error::input);
-    match target.form {
-        Form::Csv => table.write(&target.path)?,
-        Form::Uff => {
+    match target.format {
+        FileFormat::Csv => table.write(&target.path)?,
+        FileFormat::Uff => {
             let form = if is_binary { UffForm::Binary } else { UffForm::Text };
             table.write_uff(&target.path, form)?;
         }
-        Form::Svg => file::write(&target.path, draw()?.as_bytes())?,
-        Form::Html => {
+        FileFormat::Svg => file::write(&target.path, draw()?.as_bytes())?,
+        FileFormat::Html => {
             let body = html! {
                 h1 { (title) }
-                (figure(&draw()?, "Receptance of displacement (first letter) by force (second letter)."))
+                (figure(&draw()?, "Receptances: displacement (first letter) per force (second letter)."))
             };
             file::write(&target.path, page(title, &body).as_bytes())?;
         }
@@ -233,13 +233,13 @@ fn write(target: &Target, table: &FrfTable, is_binary: bool) -> Result<(), Error
     Ok(())
 }
 
-/// What `--json` says.
+/// Output of `quietcut frf --json`.
 #[derive(Serialize)]
-struct Answer {
+struct FrfOutput {
     method: &'static str,
     frequency_hz: [f64; 2],
     lines: usize,
-    parts: Vec<PartAnswer>,
+    parts: Vec<ColumnsAnswer>,
     receptances: Vec<ReceptanceAnswer>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     calibration: Vec<RatioAnswer>,
@@ -248,20 +248,21 @@ struct Answer {
 }
 
 #[derive(Serialize)]
-struct PartAnswer {
+struct ColumnsAnswer {
     forces: Vec<&'static str>,
     excitation: &'static str,
     recordings: usize,
     averages: f64,
-    /// Smallest singular value of the forces, each divided by its root mean square; 1 where they are independent.
+    /// Smallest singular value of the matrix of forces, each normalized to unit root mean square: 1 for independent forces, 0 for
+    /// linearly dependent ones.
     least_singular_value: f64,
     left_out_hz: Vec<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    blows: Option<Blows>,
+    blows: Option<ImpactCounts>,
 }
 
 #[derive(Serialize)]
-struct Blows {
+struct ImpactCounts {
     used: usize,
     double_s: Vec<f64>,
 }
@@ -270,12 +271,12 @@ struct Blows {
 struct ReceptanceAnswer {
     name: String,
     peak_hz: f64,
-    peak_m_per_n: Interval,
+    peak_m_per_n: PeakEstimate,
     coherence: Option<CoherenceAnswer>,
 }
 
 #[derive(Serialize)]
-struct Interval {
+struct PeakEstimate {
     value: f64,
     ci90: [f64; 2],
 }
@@ -294,10 +295,10 @@ struct RatioAnswer {
     misfit: f64,
 }
 
-/// 90 % of a normal distribution lie within so many standard deviations.
+/// Half width of the 90 % interval of a normal distribution, in standard deviations (the 95 % quantile of N(0, 1)).
 const NORMAL_90: f64 = 1.644_853_626_951_472_7;
 
-impl Answer {
+impl FrfOutput {
     fn new(args: &Args, measurement: &Measurement, table: &FrfTable, calibration: &[ModeRatio]) -> Self {
         let frequency_hz = table.frequency_hz();
         let receptances = (0..table.entries().len())
@@ -310,10 +311,10 @@ impl Answer {
                 Method::Mean => "mean",
                 Method::PseudoInverse => "pseudo-inverse",
             },
-            // A table has at least one line.
+            // An FRF table has at least one frequency line.
             frequency_hz: [frequency_hz[0], frequency_hz[frequency_hz.len() - 1]],
             lines: frequency_hz.len(),
-            parts: measurement.parts.iter().map(PartAnswer::new).collect(),
+            parts: measurement.parts.iter().map(ColumnsAnswer::new).collect(),
             receptances,
             calibration: calibration
                 .iter()
@@ -335,11 +336,11 @@ impl Answer {
             self.lines, self.frequency_hz[0], self.frequency_hz[1]
         );
         for receptance in &self.receptances {
-            let Interval { value, ci90 } = &receptance.peak_m_per_n;
+            let PeakEstimate { value, ci90 } = &receptance.peak_m_per_n;
             // Writing to a String cannot fail.
             let _ = write!(
                 text,
-                "\nH{}: {:.4} µm/N at {:.3} Hz, 90 % from {:.4} to {:.4}",
+                "\nH{}: {:.4} µm/N at {:.3} Hz, 90 % interval {:.4} to {:.4}",
                 receptance.name,
                 1e6 * value,
                 receptance.peak_hz,
@@ -349,7 +350,7 @@ impl Answer {
             if let Some(coherence) = &receptance.coherence {
                 let _ = write!(
                     text,
-                    "; coherence {:.3} there, {:.3} in the middle",
+                    "; coherence {:.3} at the peak, median {:.3}",
                     coherence.at_peak, coherence.median
                 );
             }
@@ -357,7 +358,7 @@ impl Answer {
         for ratio in &self.calibration {
             let _ = write!(
                 text,
-                "\ntool tip by housing at {:.3} Hz in {}: {:.4} (misfit {:.1} %)",
+                "\nratio of tool tip to housing at {:.3} Hz in {}: {:.4} (misfit {:.1} %)",
                 ratio.frequency_hz,
                 ratio.response,
                 ratio.tip_to_housing,
@@ -371,7 +372,7 @@ impl Answer {
     }
 }
 
-impl PartAnswer {
+impl ColumnsAnswer {
     fn new(part: &Part) -> Self {
         Self {
             forces: part.forces.iter().map(|direction| direction.name()).collect(),
@@ -380,7 +381,7 @@ impl PartAnswer {
             averages: part.averages,
             least_singular_value: part.least_singular,
             left_out_hz: part.left_out_hz.clone(),
-            blows: part.blows.as_ref().map(|(used, double)| Blows {
+            blows: part.blows.as_ref().map(|(used, double)| ImpactCounts {
                 used: used.len(),
                 double_s: double.iter().map(|blow| blow.time_s).collect(),
             }),
@@ -389,14 +390,14 @@ impl PartAnswer {
 }
 
 impl ReceptanceAnswer {
-    /// The largest value of an entry, with the interval that the random error gives it.
+    /// Peak magnitude of one receptance with its 90 % interval from the random error of the estimate.
     fn new(measurement: &Measurement, table: &FrfTable, index: usize) -> Self {
         let entry = &table.entries()[index];
         let size = |line: usize| entry.receptance[line].norm();
         let at = (0..entry.receptance.len())
             .max_by(|&a, &b| size(a).total_cmp(&size(b)))
             .unwrap_or(0);
-        // Calibration scales error and value alike.
+        // The tool-tip calibration multiplies the value and its standard deviation by the same factor.
         let before = measurement.table.entries()[index].receptance[at].norm();
         let relative = if before > 0.0 {
             measurement.deviation[index][at] / before
@@ -407,7 +408,7 @@ impl ReceptanceAnswer {
         Self {
             name: entry.name(),
             peak_hz: table.frequency_hz()[at],
-            peak_m_per_n: Interval {
+            peak_m_per_n: PeakEstimate {
                 value: size(at),
                 ci90: [(size(at) - half).max(0.0), size(at) + half],
             },

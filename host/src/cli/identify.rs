@@ -1,4 +1,4 @@
-//! `quietcut identify`: a model of the structure from recordings.
+//! `quietcut identify`: structural and cutting parameters with 90 % intervals from recordings.
 
 mod answer;
 mod args;
@@ -53,7 +53,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&answer, text(&answer))
 }
 
-/// A case file as it stands, once it has been found to be one.
+/// TOML tables of the case file at `path`, after a check that it is a valid case.
 fn sections(path: &Path) -> Result<toml::Table, Error> {
     Case::read(path).map_err(Error::input)?;
     let text = crate::file::read_text(path)?;
@@ -75,7 +75,10 @@ fn text(answer: &Answer) -> String {
     }
     lines.extend(answer.said.iter().cloned());
     if let Some(error) = answer.fit_error {
-        lines.push(format!("fit error {:.3} % of the data", 100.0 * error));
+        lines.push(format!(
+            "fit error {:.3} % (root mean square, relative to the data)",
+            100.0 * error
+        ));
     }
     if let Some(path) = &answer.case {
         lines.push(format!("written to {}", path.display()));

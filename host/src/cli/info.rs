@@ -1,4 +1,4 @@
-//! `quietcut info`: asks the device who it is and what it has.
+//! `quietcut info`: identity, lobe table, settings and counters of the device.
 
 use std::fmt::Write;
 
@@ -6,11 +6,11 @@ use quietcut_core::monitor::Settings;
 use quietcut_core::protocol::{Info, Status};
 use serde::Serialize;
 
-use super::port::{PortArgs, SlotAnswer, TableAnswer, WorkingPointAnswer, direction_in_words};
+use super::port::{PortArgs, SlotAnswer, TableAnswer, WorkingPointAnswer, feed_direction_text};
 use super::{Error, Output};
 use crate::report::answer::number;
 
-/// Asks the device who it is, what table it has and how it is set.
+/// Reads the identity, the lobe table, the settings and the error counters of the device.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  quietcut info simulated")]
 pub struct Args {
@@ -21,7 +21,7 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Answer {
+struct DeviceOutput {
     port: String,
     board: String,
     firmware: String,
@@ -47,16 +47,16 @@ struct Answer {
 pub fn run(args: Args) -> Result<(), Error> {
     let (mut client, info) = args.port.connect()?;
     let (settings, status) = (client.settings()?, client.status()?);
-    // Last, since older firmware does not know of directions.
+    // The last request, since older firmware rejects requests of the feed direction.
     let direction = client.feed_direction()?;
-    let answer = Answer {
+    let answer = DeviceOutput {
         feed_direction_deg: direction.map(|direction| number(direction.0)),
-        ..Answer::new(args.port.name(), &info, &settings, &status)
+        ..DeviceOutput::new(args.port.name(), &info, &settings, &status)
     };
     args.output.answer(&answer, answer.text())
 }
 
-impl Answer {
+impl DeviceOutput {
     fn new(port: &str, info: &Info, settings: &Settings, status: &Status) -> Self {
         Self {
             port: port.into(),
@@ -82,17 +82,17 @@ impl Answer {
     }
 
     fn text(&self) -> String {
-        let none = "none: advice goes by the tooth-passing rule";
+        let none = "none: advice uses the tooth-passing rule";
         let table = self.table.as_ref().map_or(none.into(), ToString::to_string);
-        let untold = "not told: advice says what it assumes";
+        let not_set = "not set: advice states the working point that it assumes";
         let working_point = self
             .working_point
             .as_ref()
-            .map_or(untold.into(), ToString::to_string);
+            .map_or(not_set.into(), ToString::to_string);
         let wheel = match self.wheel_positions {
             None => "none".into(),
-            Some(1) => "one pulse per turn".into(),
-            Some(positions) => format!("{positions} positions per turn"),
+            Some(1) => "one pulse per revolution".into(),
+            Some(positions) => format!("{positions} positions per revolution"),
         };
         let mut text = format!("device         {} at {}\n", self.board, self.port);
         let mut line = |name: &str, value: String| {
@@ -108,14 +108,14 @@ impl Answer {
             line(&format!("slot {}", index + 1), slot.to_string());
         }
         line("working point", working_point);
-        line("feed direction", direction_in_words(self.feed_direction_deg));
+        line("feed direction", feed_direction_text(self.feed_direction_deg));
         line("tool", format!("{} teeth", self.teeth));
         line("sensor", format!("{} samples/s", self.sample_rate_hz));
         line("tachometer", wheel);
         line(
-            "heard",
+            "samples",
             format!(
-                "{} blocks, {} samples clipped, {} lost",
+                "{} blocks received, {} samples clipped, {} lost",
                 self.blocks, self.clipped, self.lost
             ),
         );

@@ -1,4 +1,4 @@
-//! `quietcut lobes`: where a case is stable.
+//! `quietcut lobes`: stability limits of a case over spindle speed, or Floquet multipliers at given points.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::report::page::{figure, page};
 use crate::stability::{Chart, CutStability, Label, LimitSpread, Method, SpeedLine, Uncertainty, chart};
 use crate::trial_cuts::{self, Calls, TestCut};
 
-/// Stability limits over speed, or the dominant multiplier at points.
+/// Computes stability limits over the spindle speed, or the dominant Floquet multiplier at given points.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --rpm 900:1200:7 --depth-mm 0.1:4:40 --out lobes.svg\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --rpm 600:2400:200 --depth-mm 0.05:5:100 --cells --out cells.svg\n  quietcut lobes tests/cases/kuka-kr90-acetal.toml --at 1045,2 --at 900,2"
@@ -33,28 +33,28 @@ pub struct Args {
     depth_mm: Option<Range>,
     #[command(flatten)]
     method: MethodChoice,
-    /// The dominant multiplier of every speed and depth, with its error, instead of the limits.
+    /// Compute the dominant Floquet multiplier and its error at every speed and depth, instead of the limits.
     #[arg(long, requires = "rpm")]
     cells: bool,
     #[command(flatten)]
     varied: Varied,
-    /// Leave out what the deviations of the case (keys that end in _std) make of the limits.
+    /// Ignore the standard deviations of the case (keys that end in _std): compute only the limits of the nominal parameters.
     #[arg(long, requires = "rpm")]
     nominal: bool,
-    /// The share of machines that are stable at every speed and depth of the ranges, where the case has deviations.
+    /// Compute the probability of a stable cut at every speed and depth from the standard deviations of the case.
     #[arg(long, requires = "rpm", conflicts_with_all = ["nominal", "cells"])]
     probability: bool,
-    /// Cuts that were tried, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal):
-    /// they are drawn, and those that are called wrong are counted.
+    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal). The chart
+    /// shows them, and wrong predictions are counted.
     #[arg(long, value_name = "FILE", requires = "rpm", conflicts_with = "cells")]
     cuts: Option<PathBuf>,
-    /// Where the draws of the deviations begin.
+    /// Seed of the random parameters that are drawn from the standard deviations.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Chart or table to write: svg, html, csv or json by its ending.
+    /// Chart or table to write; the ending sets the format: svg, html, csv or json.
     #[arg(long, value_name = "FILE", requires = "rpm")]
     out: Option<PathBuf>,
-    /// A point, RPM,MM; may be given again.
+    /// Spindle speed in rev/min and axial depth in mm, as RPM,MM; may be repeated.
     #[arg(long, value_name = "RPM,MM", conflicts_with = "rpm", value_parser = working_point)]
     at: Vec<(f64, f64)>,
     #[command(flatten)]
@@ -62,7 +62,7 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Points {
+struct PointsOutput {
     #[serde(flatten)]
     label: Label,
     points: Vec<CutStability>,
@@ -88,7 +88,7 @@ pub fn run(args: Args) -> Result<(), Error> {
                 Uncertainty::new(&case, &maker, args.seed)
             };
             let cuts = args.cuts.as_deref().map(trial_cuts::read).transpose()?;
-            let ranges = Ranges {
+            let request = ChartRequest {
                 rpm,
                 depth_mm,
                 probability: args.probability,
@@ -98,7 +98,7 @@ pub fn run(args: Args) -> Result<(), Error> {
                 &case,
                 method.as_ref(),
                 uncertainty.as_ref(),
-                ranges,
+                request,
                 args.out,
                 args.output,
             )
@@ -113,7 +113,7 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
         .map(|&(rpm, depth_mm)| method.point(rpm, depth_mm))
         .collect::<Result<Vec<_>, _>>()?;
     let label = Label::of(method);
-    let mut text = format!("by {label}");
+    let mut text = format!("method: {label}");
     for point in &points {
         let chatter = point
             .chatter_hz
@@ -130,11 +130,11 @@ fn run_points(method: &dyn Method, at: &[(f64, f64)], output: Output) -> Result<
             point.kind.name(),
         );
     }
-    output.answer(&Points { label, points }, text)
+    output.answer(&PointsOutput { label, points }, text)
 }
 
-/// What a chart covers.
-struct Ranges {
+/// Speeds, depths, probability option and trial cuts of a stability chart.
+struct ChartRequest {
     rpm: Range,
     depth_mm: Range,
     probability: bool,
@@ -142,7 +142,7 @@ struct Ranges {
 }
 
 #[derive(Serialize)]
-struct Answer<'a> {
+struct LobesOutput<'a> {
     #[serde(flatten)]
     chart: &'a Chart,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -153,19 +153,19 @@ fn run_chart(
     case: &Case,
     method: &dyn Method,
     uncertainty: Option<&Uncertainty<'_>>,
-    ranges: Ranges,
+    request: ChartRequest,
     out: Option<PathBuf>,
     output: Output,
 ) -> Result<(), Error> {
-    let Ranges {
+    let ChartRequest {
         rpm,
         depth_mm,
         probability,
         cuts,
-    } = ranges;
+    } = request;
     if probability && uncertainty.is_none() {
         return Err(Error::input(format!(
-            "{}: --probability needs deviations, keys that end in _std, such as ktc_mpa_std = 5.0 beside ktc_mpa",
+            "{}: --probability needs standard deviations in the case (keys that end in _std), such as ktc_mpa_std = 5.0 beside ktc_mpa",
             case.path.display()
         )));
     }
@@ -188,14 +188,14 @@ fn run_chart(
     if let Some(calls) = &calls {
         let _ = write!(
             text,
-            "\n{} of {} cuts are called wrong: {} chattered that are called stable, {} were stable that are called unstable; {} undecided",
+            "\n{} of {} trial cuts are predicted wrong: {} chattered and are predicted stable, {} were stable and are predicted unstable; {} undecided",
             calls.wrong, calls.cuts, calls.missed_chatter, calls.false_alarms, calls.undecided
         );
     }
     if let Some(path) = &out {
         let _ = write!(text, "\n{}", path.display());
     }
-    let answer = Answer {
+    let answer = LobesOutput {
         chart: &chart,
         cuts: calls,
     };
@@ -204,7 +204,7 @@ fn run_chart(
 
 fn limits_as_text(chart: &Chart) -> String {
     let mut text = format!(
-        "by {}\n  rev/min  first limit [mm]  kind   chatter [Hz]  stable [mm]",
+        "method: {}\n  rev/min  first limit [mm]  kind   chatter [Hz]  stable [mm]",
         chart.label
     );
     for line in &chart.speeds {
@@ -228,7 +228,7 @@ fn limits_as_text(chart: &Chart) -> String {
             stable.join(", ")
         );
         if let Some(spread) = &line.spread {
-            text.push_str("; limit of 5, 50, 95 % of the machines:");
+            text.push_str("; 5, 50, 95 % percentiles of the limit:");
             let both = percentiles(spread, "beyond")
                 .into_iter()
                 .zip(intervals(spread, "beyond"));
@@ -240,13 +240,13 @@ fn limits_as_text(chart: &Chart) -> String {
     text
 }
 
-/// The percentiles as text, mm; `beyond` for what lies beyond the last depth.
+/// 5, 50 and 95 % percentiles of the first limit as text, mm; `beyond` stands for a limit deeper than the last depth.
 fn percentiles(spread: &LimitSpread, beyond: &str) -> [String; 3] {
     let percentiles = spread.limit_percentiles_mm;
     [percentiles.low, percentiles.median, percentiles.high].map(|depth_mm| depth_or(depth_mm, beyond))
 }
 
-/// Between which depths each percentile lies with 90 % confidence, as text, mm.
+/// 90 % confidence interval of each percentile of the first limit as text, mm.
 fn intervals(spread: &LimitSpread, beyond: &str) -> [[String; 2]; 3] {
     let intervals = spread.limit_percentiles_ci90_mm;
     let intervals = [intervals.low, intervals.median, intervals.high];
@@ -265,7 +265,7 @@ fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: 
         "html" => as_page(case, chart, depth_mm, marks)?,
         _ => {
             return Err(Error::input(format!(
-                "{}: the ending says what to write; .svg, .html, .csv or .json is needed",
+                "{}: the ending of the file sets its format; .svg, .html, .csv or .json is needed",
                 path.display()
             )));
         }
@@ -276,18 +276,17 @@ fn write_chart(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark], path: 
 fn picture(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
     let mut columns: Vec<Column> = chart.speeds.iter().map(Column::from).collect();
     columns.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
-    // What can be wrong with a picture is what was asked for: a single speed.
-    let title = format!("{}, by {}", case.name, chart.label);
+    // Drawing fails if the user gives only one spindle speed: an input error.
+    let title = format!("{}, method: {}", case.name, chart.label);
     lobe_chart(&title, &columns, depth_mm, marks).map_err(Error::input)
 }
 
 fn as_page(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<String, Error> {
     let svg = picture(case, chart, depth_mm, marks)?;
     let caption = format!(
-        "Stable depths over spindle speed, by {}. Lines: where stability is first lost. Grey areas, where there are any: \
-         undecided, within the error of the method. A grey band with lines, where there is one: the first limits of 5 to \
-         95 % of the machines that the deviations of the case describe, with their median. Circles, crosses and squares, \
-         where there are any: cuts that were stable, that chattered, and of which it cannot be told.",
+        "Stable depths over spindle speed, method: {}. Lines: first loss of stability. Grey areas: undecided within the error \
+         of the method. Grey band with lines: 5 to 95 % percentiles and median of the first limit, from the standard \
+         deviations of the case. Circles: stable trial cuts; crosses: trial cuts with chatter; squares: marginal trial cuts.",
         chart.label
     );
     let body = maud::html! {
@@ -298,7 +297,7 @@ fn as_page(case: &Case, chart: &Chart, depth_mm: f64, marks: &[Mark]) -> Result<
             tr {
                 th { "rev/min" } th { "first limit [mm]" } th { "error [mm]" } th { "kind" } th { "chatter [Hz]" } th { "stable [mm]" }
                 @if chart.speeds.iter().any(|line| line.spread.is_some()) {
-                    th { "limit of 5 % (90 % interval) [mm]" } th { "of 50 %" } th { "of 95 % of the machines" }
+                    th { "5 % percentile of the limit (90 % interval) [mm]" } th { "50 %" } th { "95 %" }
                 }
             }
             @for line in &chart.speeds { (row(line)) }
@@ -334,7 +333,7 @@ fn row(line: &SpeedLine) -> maud::Markup {
     }
 }
 
-/// One row per switch; a speed without any has one row with nothing but its speed.
+/// CSV with one row per change of stability over depth; a speed without any change has one row with only its speed.
 fn as_csv(chart: &Chart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut header = vec![
@@ -350,7 +349,7 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
     ];
     if chart.speeds.iter().any(|line| line.spread.is_some()) {
         header.extend(["limit_5 [mm]", "limit_50 [mm]", "limit_95 [mm]"]);
-        // Between which depths each lies with 90 % confidence.
+        // Ends of the 90 % confidence interval of each percentile.
         header.extend(["limit_5_from [mm]", "limit_5_to [mm]"]);
         header.extend(["limit_50_from [mm]", "limit_50_to [mm]"]);
         header.extend(["limit_95_from [mm]", "limit_95_to [mm]"]);
@@ -377,7 +376,7 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
             let first = line
                 .first_limit
                 .is_some_and(|limit| limit.depth_mm == switch.depth_mm);
-            // An interval that stands around an end of what is stable.
+            // The undecided interval of depths that contains this change of stability.
             let undecided = line
                 .undecided_mm
                 .iter()
@@ -403,7 +402,7 @@ fn as_csv(chart: &Chart) -> Result<String, Error> {
     String::from_utf8(bytes).map_err(Error::other)
 }
 
-/// `RPM,MM`.
+/// Parses `RPM,MM` into spindle speed in rev/min and axial depth in mm.
 fn working_point(text: &str) -> Result<(f64, f64), String> {
     let (rpm, depth_mm) = text
         .split_once(',')

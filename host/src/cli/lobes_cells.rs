@@ -1,4 +1,4 @@
-//! `quietcut lobes --cells`: the dominant multiplier over a grid of speeds and depths.
+//! `quietcut lobes --cells`: the dominant Floquet multiplier over a grid of spindle speeds and axial depths.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::report::cell_map::cell_map;
 use crate::report::page::{figure, page};
 use crate::stability::{CellChart, Method, Verdict, cell_chart};
 
-/// Computes the cells, writes them where a file is asked for, and answers.
+/// Computes the grid, writes it to the file of `--out`, and prints the counts of stable and unstable points.
 pub(super) fn run(
     case: &Case,
     method: &dyn Method,
@@ -22,7 +22,7 @@ pub(super) fn run(
     if let Some(path) = &out {
         write(case, &chart, path)?;
     }
-    let mut text = in_words(&chart);
+    let mut text = counts_text(&chart);
     if let Some(path) = &out {
         // Writing to a String cannot fail.
         let _ = write!(text, "\n{}", path.display());
@@ -30,13 +30,13 @@ pub(super) fn run(
     output.answer(&chart, text)
 }
 
-fn in_words(chart: &CellChart) -> String {
+fn counts_text(chart: &CellChart) -> String {
     let count = |verdict: Verdict| {
         let verdicts = chart.speeds.iter().flat_map(|line| &line.verdict);
         verdicts.filter(|found| **found == verdict).count()
     };
     format!(
-        "by {}: {} cells, {} stable, {} unstable, {} undecided",
+        "method: {}: {} cells, {} stable, {} unstable, {} undecided",
         chart.label,
         chart.speeds.len() * chart.depths_mm.len(),
         count(Verdict::Stable),
@@ -52,8 +52,8 @@ fn write(case: &Case, chart: &CellChart, path: &Path) -> Result<(), Error> {
         "svg" => picture(case, chart)?,
         "html" => {
             let caption = format!(
-                "Size of the dominant multiplier over one tooth period. {}. Line: where it is 1.",
-                in_words(chart)
+                "Modulus of the dominant Floquet multiplier over one tooth period. {}. Line: |multiplier| = 1.",
+                counts_text(chart)
             );
             let body = maud::html! {
                 h1 { (case.name) }
@@ -63,7 +63,7 @@ fn write(case: &Case, chart: &CellChart, path: &Path) -> Result<(), Error> {
         }
         _ => {
             return Err(Error::input(format!(
-                "{}: the ending says what to write; .svg, .html, .csv or .json is needed",
+                "{}: the ending of the file sets its format; .svg, .html, .csv or .json is needed",
                 path.display()
             )));
         }
@@ -74,12 +74,12 @@ fn write(case: &Case, chart: &CellChart, path: &Path) -> Result<(), Error> {
 fn picture(case: &Case, chart: &CellChart) -> Result<String, Error> {
     let mut sorted = chart.clone();
     sorted.speeds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
-    let title = format!("{}: |multiplier|, by {}", case.name, chart.label);
-    // What can be wrong with a picture is what was asked for: a single speed, or depths from deep to shallow.
+    let title = format!("{}: |multiplier|, method: {}", case.name, chart.label);
+    // Drawing fails for a single spindle speed and for descending depths: input errors.
     cell_map(&title, &sorted).map_err(Error::input)
 }
 
-/// One row per cell.
+/// CSV with one row per grid point: speed, depth, |multiplier|, its error and the verdict.
 fn as_csv(chart: &CellChart) -> Result<String, Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer

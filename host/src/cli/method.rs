@@ -1,4 +1,4 @@
-//! The methods that `--method` knows, and their options.
+//! Stability methods of `--method` and their options.
 
 use std::path::{Path, PathBuf};
 
@@ -12,71 +12,71 @@ use crate::stability::{
     needs_orbit,
 };
 
-/// Steps per tooth period where none are asked for.
+/// Default number of steps per tooth period of semi- and full discretization: a choice.
 const STEPS: usize = 100;
 
-/// The most steps per tooth period: a step of a thousandth of a degree is finer than any table of coefficients.
+/// Upper bound of `--steps`, a choice: with 20 000 steps per tooth period a step is at most 0.018 degrees of rotation.
 const STEPS_MAX: usize = 20_000;
 
-/// The most harmonics: beyond them the matrices are too large to be of use.
+/// Upper bound of `--harmonics`, a choice: more harmonics make the truncated Hill matrix too large to be useful.
 const HARMONICS_MAX: usize = 400;
 
-/// Error of a table between its lines, as a share of its peak, from which on the user is told.
+/// Interpolation error of an FRF table, as a fraction of its peak, above which a warning is printed: a choice.
 const COARSE: f64 = 0.01;
 
-/// How to compute.
+/// Stability method with its options.
 #[derive(Debug, clap::Args)]
 pub(super) struct MethodChoice {
-    /// How to compute; where nothing is said collocation, and with --frf multi-frequency.
+    /// Stability method. Default: collocation; with --frf multi-frequency.
     #[arg(long, value_enum)]
     method: Option<MethodName>,
-    /// Frequency response functions in place of the structure of the case: frequency_hz,hxx_re [m/N],hxx_im [m/N],…
+    /// Table of receptances that replaces the structure of the case: frequency_hz,hxx_re [m/N],hxx_im [m/N],…
     #[arg(long, value_name = "FILE")]
     frf: Option<PathBuf>,
-    /// Harmonics of multi-frequency, else as many as limits need; of nyquist, else 0: averaged coefficients.
+    /// Harmonics of the directional coefficients. Default: multi-frequency adds harmonics until the limits converge; nyquist
+    /// uses 0, the averaged coefficients.
     #[arg(long, value_name = "N", value_parser = harmonics)]
     harmonics: Option<usize>,
-    /// Leave out the cubic terms of a structure: the limits for vanishing feed.
+    /// Ignore the cubic terms of the structure: limits of the linear structure, valid for vanishing feed.
     #[arg(long)]
     linear: bool,
-    /// How long the machine has worked, in s: where the case has drift or wear, the limits hold for that moment. Between two
-    /// moments they lie between those of both.
+    /// Operating time in s at which drift and wear of the case are evaluated.
     #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
     after_s: Option<f64>,
-    /// Steps per tooth period of sdm and fdm; 100 where nothing is said.
+    /// Steps per tooth period of sdm and fdm. Default: 100.
     #[arg(long, value_name = "N", value_parser = steps)]
     steps: Option<usize>,
-    /// Order of sdm: what stands for the delayed displacement within a step, a constant (0) or a straight line (1).
+    /// Order of sdm: interpolation of the delayed displacement within a step, constant (0) or linear (1).
     #[arg(long, value_name = "0|1", value_parser = order)]
     order: Option<SdmOrder>,
 }
 
-/// The methods that can be asked for.
+/// Stability methods of the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 enum MethodName {
-    /// Collocation of the one-period map; with variable pitch over the revolution, with cubic terms about the forced
-    /// orbit.
+    /// Collocation of the monodromy operator over the tooth period; over the revolution with variable pitch, about the
+    /// forced periodic orbit with cubic terms.
     #[default]
     Collocation,
-    /// Semi-discretization with a fixed number of steps.
+    /// Semi-discretization (Insperger, Stépán) with a fixed number of steps.
     Sdm,
-    /// Full discretization of first order with a fixed number of steps.
+    /// First-order full discretization (Ding) with a fixed number of steps.
     Fdm,
-    /// Zeroth-order approximation: averaged coefficients in closed form, blind to flips.
+    /// Zeroth-order approximation (Altintas, Budak): averaged coefficients in closed form; does not find flips.
     Zoa,
-    /// Nyquist criterion on the receptances: averaged coefficients, or periodic ones with --harmonics.
+    /// Nyquist criterion on the receptances: averaged coefficients, or periodic coefficients with --harmonics.
     Nyquist,
-    /// Multi-frequency solution: the harmonics of the coefficients, flips included.
+    /// Multi-frequency solution: harmonics of the directional coefficients; finds flips.
     MultiFrequency,
-    /// Mode-coupling criterion, for comparison: no regeneration.
+    /// Mode-coupling criterion without the regenerative effect, for comparison.
     ModeCoupling,
 }
 
 impl MethodChoice {
-    /// The method on a case.
+    /// Builds the chosen stability method for a case.
     ///
     /// # Errors
-    /// The method is not defined for the case, or an option is not one of the method.
+    /// The method is not defined for the case, or an option does not belong to the method.
     pub(super) fn on(&self, case: &Case) -> Result<Box<dyn Method>, Error> {
         self.check_options()?;
         let moved;
@@ -89,11 +89,11 @@ impl MethodChoice {
         };
         if let Some(path) = &self.frf {
             let table = FrfTable::read(path).map_err(Error::input)?;
-            tell_what_is_missing(&table)?;
-            return self.by_receptances(FrequencyProblem::of_table(case, &table)?, path);
+            warn_of_table(&table)?;
+            return self.from_receptances(FrequencyProblem::of_table(case, &table)?, path);
         }
         let about_orbit = needs_orbit(case) && !self.linear;
-        // All but the default know limits for vanishing feed only: they refuse cubic terms unless these are left out.
+        // Only collocation handles cubic terms; the other methods refuse them unless `--linear` removes them.
         let cubic = if self.linear {
             CubicTerms::LeaveOut
         } else {
@@ -120,7 +120,7 @@ impl MethodChoice {
                 discretization: FullDiscretization,
                 steps,
             }),
-            _ => return self.by_receptances(FrequencyProblem::new(case, cubic)?, &case.path),
+            _ => return self.from_receptances(FrequencyProblem::new(case, cubic)?, &case.path),
         })
     }
 
@@ -132,8 +132,8 @@ impl MethodChoice {
         })
     }
 
-    /// The methods that need no more than receptances; `path` is where these came from.
-    fn by_receptances(&self, problem: FrequencyProblem, path: &Path) -> Result<Box<dyn Method>, Error> {
+    /// Builds a method that uses receptances only; `path` is the file of the receptances, for messages.
+    fn from_receptances(&self, problem: FrequencyProblem, path: &Path) -> Result<Box<dyn Method>, Error> {
         Ok(match self.name() {
             MethodName::Zoa => Box::new(Zoa { problem }),
             MethodName::Nyquist => Box::new(Nyquist {
@@ -147,8 +147,8 @@ impl MethodChoice {
             MethodName::ModeCoupling => Box::new(ModeCoupling::new(problem)?),
             MethodName::Collocation | MethodName::Sdm | MethodName::Fdm => {
                 return Err(Error::input(format!(
-                    "{}: this method needs a structure, of which frequency response functions are no more than \
-                     lines; with --frf the methods are zoa, nyquist, multi-frequency and mode-coupling",
+                    "{}: this method needs the equations of motion of the structure, which an FRF table does not contain; \
+                     with --frf the methods are zoa, nyquist, multi-frequency and mode-coupling",
                     path.display()
                 )));
             }
@@ -160,7 +160,7 @@ impl MethodChoice {
         let in_steps = matches!(name, MethodName::Sdm | MethodName::Fdm);
         if self.steps.is_some() && !in_steps {
             return Err(Error::input(
-                "--steps is an option of --method sdm and fdm; others choose steps of their own",
+                "--steps is an option of --method sdm and fdm; the other methods choose their own mesh",
             ));
         }
         if self.order.is_some() && name != MethodName::Sdm {
@@ -173,33 +173,32 @@ impl MethodChoice {
         }
         if self.harmonics == Some(0) && name == MethodName::MultiFrequency {
             return Err(Error::input(
-                "--harmonics 0 leaves averaged coefficients, which --method zoa and nyquist are for; \
-                 multi-frequency needs 1 or more",
+                "--harmonics 0 means averaged coefficients: use --method zoa or nyquist; multi-frequency needs 1 or more",
             ));
         }
         Ok(())
     }
 }
 
-/// Says on stderr which receptances are taken for zero, and where a table is too coarse.
-fn tell_what_is_missing(table: &FrfTable) -> Result<(), Error> {
+/// Warns about receptances that the table lacks, a possible mode below its first line, and a resolution that is too coarse.
+fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
     let file = table.path().display();
     let missing = table.missing();
     if !missing.is_empty() {
         let names: Vec<String> = missing.iter().map(|name| format!("h{name}")).collect();
-        tracing::warn!("{file}: {} not there, taken for zero", names.join(", "));
+        tracing::warn!("{file}: the table has no {}; zero is assumed", names.join(", "));
     }
     for entry in table
         .entries()
         .iter()
         .filter(|entry| entry.response == entry.force)
     {
-        // At rest a structure gives way to a force: with a mode below the first line it seems not to.
+        // At low frequency a receptance is close to a positive static compliance; otherwise a mode lies below the first line.
         if let (Some(first), Some(hz)) = (entry.receptance.first(), table.frequency_hz().first())
             && first.im.abs() > first.re
         {
             tracing::warn!(
-                "{file}: h{} at its first line, {hz} Hz, is {:.2e}{:+.2e}i m/N, not that of a stiffness: a mode may lie \
+                "{file}: h{} at its first line, {hz} Hz, is {:.2e}{:+.2e}i m/N, not close to a static compliance: a mode may lie \
                  below the table",
                 entry.name(),
                 first.re,
@@ -210,7 +209,7 @@ fn tell_what_is_missing(table: &FrfTable) -> Result<(), Error> {
     let error = Interpolation::new(table).map_err(Error::input)?.error();
     if error > COARSE {
         tracing::warn!(
-            "{file}: between its lines the table is known to {:.1} % of its peak only; lines closer together would help",
+            "{file}: the interpolation error between the lines of the table is {:.1} % of its peak; a finer frequency resolution would help",
             100.0 * error
         );
     }

@@ -1,57 +1,57 @@
-//! `quietcut simulate --experiment porous|speed-sweep`: cuts that excite the structure.
+//! `quietcut simulate --experiment porous|speed-sweep`: simulated cuts that identify the structure from cutting forces.
 
 use serde::Serialize;
 use std::path::PathBuf;
 
-use super::experiment::{Common, Kind};
+use super::experiment::{Common, ExperimentKind};
 use super::{Error, Output, non_negative, positive};
 use crate::case::Case;
 use crate::recording::Quantity;
 use crate::simulate::{Effects, Entry, Pores, Recorder, TachometerModel, VirtualCut};
 
-/// The options of cuts that excite the structure.
+/// Options of simulated cuts whose forces excite the structure.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Milling rigs")]
 pub(super) struct MillingRig {
-    /// The speed to which speed-sweep glides by the end, in rev/min; --rpm is where it begins.
+    /// Spindle speed at the end of speed-sweep, in rev/min; --rpm is the speed at its start.
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     to_rpm: Option<f64>,
-    /// Share of the material of porous that is pores, in percent.
+    /// Volume fraction of pores in the material of porous, in percent.
     #[arg(long, value_name = "P", default_value_t = 50.0, value_parser = share, allow_negative_numbers = true)]
     pores_percent: f64,
-    /// Size of these pores in mm.
+    /// Size of the pores in mm.
     #[arg(long, value_name = "D", default_value_t = 0.2, value_parser = positive, allow_negative_numbers = true)]
     pore_mm: f64,
-    /// By how much the pressures along the cut, towards the axis and along it vary each by itself, in percent.
+    /// Independent variation of the tangential, radial and axial cutting coefficients of the porous material, in percent.
     #[arg(long, value_name = "P", default_value_t = 40.0, value_parser = share, allow_negative_numbers = true)]
     strength_percent: f64,
-    /// Immersion angle at which teeth enter, in degrees, instead of that of the case.
+    /// Entry immersion angle in degrees; replaces that of the case.
     #[arg(long, value_name = "A", value_parser = non_negative, allow_negative_numbers = true)]
     start_deg: Option<f64>,
-    /// Immersion angle at which teeth leave, in degrees, instead of that of the case.
+    /// Exit immersion angle in degrees; replaces that of the case.
     #[arg(long, value_name = "A", value_parser = positive, allow_negative_numbers = true)]
     exit_deg: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
-struct Answer {
+struct MillingRigOutput {
     recording: PathBuf,
     sample_rate_hz: f64,
     samples: usize,
     largest_displacement_mm: f64,
-    /// Root mean square of each force about its mean, N.
+    /// Standard deviation of each measured force over time, N.
     force_rms_n: Vec<f64>,
     steps: u64,
     contact_changes: u64,
 }
 
-/// Samples per second where nothing is asked for: the motion of a robot ends far below.
+/// Default sampling rate, Hz: a choice far above the natural frequencies of a milling robot (tens of Hz).
 const SAMPLE_RATE_HZ: f64 = 2048.0;
 
-/// Cuts, and writes what the sensors record.
+/// Simulates the cut and writes the recording of its sensors.
 pub(super) fn run(
     case: &Case,
-    kind: Kind,
+    kind: ExperimentKind,
     (spindle_rpm, depth_mm): (f64, f64),
     rig: &MillingRig,
     common: &Common<'_>,
@@ -66,7 +66,7 @@ pub(super) fn run(
         .map_err(Error::input)?;
     let cut = VirtualCut {
         last_rpm: last_rpm(kind, rig)?,
-        pores: (kind == Kind::Porous).then_some(Pores {
+        pores: (kind == ExperimentKind::Porous).then_some(Pores {
             share: 0.01 * rig.pores_percent,
             size_m: 1e-3 * rig.pore_mm,
             strength: 0.01 * rig.strength_percent,
@@ -102,7 +102,7 @@ pub(super) fn run(
         .channels
         .iter()
         .filter(|channel| channel.quantity == Quantity::Force);
-    let answer = Answer {
+    let answer = MillingRigOutput {
         recording: common.out.into(),
         sample_rate_hz: recording.sample_rate_hz,
         samples: recording.len(),
@@ -117,7 +117,7 @@ pub(super) fn run(
         .map(|force| format!("{force:.2}"))
         .collect();
     let text = format!(
-        "{}: {} samples at {:.1} Hz; forces vary by {} N (root mean square), the tool moves by up to {:.4} mm",
+        "{}: {} samples at {:.1} Hz; standard deviation of the forces {} N, largest displacement of the tool {:.4} mm",
         answer.recording.display(),
         answer.samples,
         answer.sample_rate_hz,
@@ -127,19 +127,20 @@ pub(super) fn run(
     output.answer(&answer, text)
 }
 
-/// Twice what the force has of frequencies: teeth enter and leave suddenly, and pass three pores and more per period.
+/// Internal sampling rate of the simulation, Hz: the larger of 1000 times the tooth-passing frequency (teeth enter and leave
+/// suddenly) and three times the rate at which a tooth passes pores, π·D·n/size.
 fn fastest_hz(cut: &VirtualCut, case: &Case) -> f64 {
-    let turns_hz = cut.spindle_rpm.max(cut.last_rpm.unwrap_or(0.0)) / 60.0;
+    let revolutions_hz = cut.spindle_rpm.max(cut.last_rpm.unwrap_or(0.0)) / 60.0;
     let tool = case.tool.as_ref();
-    let teeth_hz = turns_hz * tool.map_or(1, |tool| tool.teeth) as f64;
+    let teeth_hz = revolutions_hz * tool.map_or(1, |tool| tool.teeth) as f64;
     let diameter_m = 1e-3 * tool.and_then(|tool| tool.diameter_mm).unwrap_or(0.0);
     let pores_hz = cut.pores.map_or(0.0, |pores| {
-        std::f64::consts::PI * diameter_m * turns_hz / pores.size_m
+        std::f64::consts::PI * diameter_m * revolutions_hz / pores.size_m
     });
     (3.0 * pores_hz).max(1000.0 * teeth_hz)
 }
 
-/// The case with the immersion that was asked for.
+/// Copy of the case with the entry and exit angles of the options.
 fn immersed(case: &Case, rig: &MillingRig) -> Result<Case, Error> {
     let mut case = case.clone();
     if let Some(cut) = &mut case.cut {
@@ -155,12 +156,12 @@ fn immersed(case: &Case, rig: &MillingRig) -> Result<Case, Error> {
     Ok(case)
 }
 
-fn last_rpm(kind: Kind, rig: &MillingRig) -> Result<Option<f64>, Error> {
+fn last_rpm(kind: ExperimentKind, rig: &MillingRig) -> Result<Option<f64>, Error> {
     match (kind, rig.to_rpm) {
-        (Kind::SpeedSweep, None) => Err(Error::input(
-            "--to-rpm is needed: a speed sweep glides from --rpm to another speed",
+        (ExperimentKind::SpeedSweep, None) => Err(Error::input(
+            "--to-rpm is needed: a speed sweep changes the spindle speed from --rpm to --to-rpm",
         )),
-        (Kind::SpeedSweep, last_rpm) => Ok(last_rpm),
+        (ExperimentKind::SpeedSweep, last_rpm) => Ok(last_rpm),
         (_, None) => Ok(None),
         (_, Some(_)) => Err(Error::input(
             "--to-rpm belongs to --experiment speed-sweep; leave it out",
@@ -168,7 +169,7 @@ fn last_rpm(kind: Kind, rig: &MillingRig) -> Result<Option<f64>, Error> {
     }
 }
 
-/// Root mean square about the mean.
+/// Standard deviation of the samples: root mean square about their mean.
 fn deviation(samples: &[f64]) -> f64 {
     let count = samples.len().max(1) as f64;
     let mean = samples.iter().sum::<f64>() / count;

@@ -1,6 +1,6 @@
 //! The command line: one file per verb, each with its arguments and a `run`.
 //!
-//! Exit status 0: done. 2: bad usage or bad input, with one message. 1: anything else, never a panic.
+//! Exit status 0: success. Exit status 2: wrong usage or wrong input, with one message on stderr. Exit status 1: any other failure.
 
 mod channels;
 pub mod demo;
@@ -39,11 +39,11 @@ pub use number::{angle, count, finite, non_negative, positive};
 pub use output::Output;
 pub use range::Range;
 
-/// Hears chatter, says what it is, knows the quiet speed.
+/// Detects chatter, names its kind, and finds a stable spindle speed.
 #[derive(Debug, Parser)]
 #[command(name = "quietcut", version, arg_required_else_help = true)]
 struct Cli {
-    /// Say more on stderr; twice for everything.
+    /// Log more on stderr: once for progress, twice for every detail.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     verbose: u8,
     #[command(subcommand)]
@@ -67,12 +67,12 @@ enum Verb {
     Replay(replay::Args),
 }
 
-/// Runs the command that the process was started with; what `main` returns.
+/// Parses the command line of the process, runs its verb, and returns the exit status.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|fault| {
         eprintln!("quietcut: a fault in quietcut itself, please report it: {fault}");
     }));
-    // clap ends the process itself: status 2 for bad usage, 0 for help.
+    // clap ends the process itself: exit status 2 for wrong usage, 0 for help.
     let cli = Cli::parse();
     log_to_stderr(cli.verbose);
     match panic::catch_unwind(|| run(cli.verb)) {
@@ -81,7 +81,7 @@ pub fn main() -> ExitCode {
             eprintln!("quietcut: {error}");
             ExitCode::from(error.exit_status())
         }
-        // The hook has said what happened.
+        // The panic hook has already printed the message.
         Err(_) => ExitCode::from(1),
     }
 }
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_arguments_are_consistent() {
+    fn the_argument_definitions_are_consistent() {
         Cli::command().debug_assert();
     }
 

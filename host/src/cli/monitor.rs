@@ -1,4 +1,4 @@
-//! `quietcut monitor`: what the device hears, live.
+//! `quietcut monitor`: live verdicts and advice of the device.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,24 +12,24 @@ use crate::device::{Client, Event};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
 
-/// What the device hears, live: speed, verdict, chatter frequency, advice.
+/// Shows live reports of the device: spindle speed, verdict, chatter frequency, advice.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  quietcut monitor simulated --seconds 2")]
 pub struct Args {
     #[command(flatten)]
     port: PortArgs,
-    /// Stop after this many seconds; without it Ctrl-C ends.
+    /// Stop after this time in s. Default: run until Ctrl-C.
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
     #[command(flatten)]
     output: Output,
 }
 
-/// A line without news comes this often, so that one sees that the device lives.
-const QUIET_LINES: Duration = Duration::from_secs(2);
+/// Time between printed lines while the verdict does not change: a choice, short enough to show that the device still answers.
+const UNCHANGED_LINE_PERIOD: Duration = Duration::from_secs(2);
 
-/// Ctrl-C is noticed within this time.
-const GLANCE: Duration = Duration::from_millis(100);
+/// Longest wait for an event of the device before Ctrl-C and `--seconds` are checked: a choice.
+const EVENT_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// Runs the verb.
 pub fn run(args: Args) -> Result<(), Error> {
@@ -42,7 +42,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         reports: Reports::All,
         ..Subscription::default()
     })?;
-    // A time too far to count is no end.
+    // A duration beyond the range of the clock means no end.
     let end = args
         .seconds
         .and_then(|seconds| Instant::now().checked_add(Duration::try_from_secs_f64(seconds).ok()?));
@@ -52,29 +52,29 @@ pub fn run(args: Args) -> Result<(), Error> {
     client.subscribe(Subscription::default())?;
     if client.lost_frames() > 0 {
         tracing::warn!(
-            "{} messages of the device were lost on the line",
+            "{} messages of the device were lost on the serial line",
             client.lost_frames()
         );
     }
     args.output.answer(&log, &log.summary)
 }
 
-/// Prints news, and now and then a sign of life, until `is_over`.
+/// Prints changes of verdict or advice, and the unchanged state from time to time, until `is_over` returns true.
 fn listen(client: &mut Client, output: Output, is_over: impl Fn() -> bool) -> Result<VerdictLog, Error> {
     let mut log = VerdictLog::default();
-    let mut said = Instant::now();
+    let mut printed = Instant::now();
     while !is_over() {
-        let Some(Event::Report(report)) = client.next_event(GLANCE)? else {
+        let Some(Event::Report(report)) = client.next_event(EVENT_TIMEOUT)? else {
             continue;
         };
-        let is_news = log.take(&report).is_some();
-        if is_news || said.elapsed() >= QUIET_LINES {
-            output.line(if is_news {
+        let is_change = log.take(&report).is_some();
+        if is_change || printed.elapsed() >= UNCHANGED_LINE_PERIOD {
+            output.line(if is_change {
                 words::line(&report)
             } else {
                 words::state(&report)
             })?;
-            said = Instant::now();
+            printed = Instant::now();
         }
     }
     Ok(log)

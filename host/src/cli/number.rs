@@ -1,8 +1,8 @@
-//! Numbers on the command line: each says what it must be.
+//! Parsers of numbers on the command line; an error states the allowed range.
 
 use std::num::NonZeroU8;
 
-/// A finite number.
+/// Parses a finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
@@ -10,7 +10,7 @@ pub fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number greater than 0: a speed, a depth, a duration.
+/// Parses a number greater than 0, such as a speed, a depth or a duration.
 pub fn positive(text: &str) -> Result<f64, String> {
     let value = finite(text)?;
     if value > 0.0 {
@@ -20,7 +20,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number of 0 or more.
+/// Parses a number of 0 or more.
 pub fn non_negative(text: &str) -> Result<f64, String> {
     let value = finite(text)?;
     if value >= 0.0 {
@@ -30,7 +30,7 @@ pub fn non_negative(text: &str) -> Result<f64, String> {
     }
 }
 
-/// An angle of immersion in degrees.
+/// Parses an immersion angle from 0 to 360 degrees.
 pub fn angle(text: &str) -> Result<f64, String> {
     let value = finite(text)?;
     if (0.0..=360.0).contains(&value) {
@@ -42,7 +42,7 @@ pub fn angle(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number of things of which there is at least one and at most 255: teeth.
+/// Parses a whole number from 1 to 255, such as the number of teeth.
 pub fn count(text: &str) -> Result<NonZeroU8, String> {
     text.parse()
         .map_err(|_| format!("`{text}` is not possible: it must be a whole number from 1 to 255"))
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_is_possible_passes() {
+    fn numbers_outside_the_allowed_range_are_refused() {
         assert_eq!(positive("2.5"), Ok(2.5));
         assert_eq!(non_negative("0"), Ok(0.0));
         for text in ["0", "-1", "nan", "inf", "two", ""] {

@@ -1,4 +1,4 @@
-//! Standard output: lines for people, or exactly one JSON object.
+//! Standard output of a verb: text lines, or exactly one JSON object with `--json`.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::Error;
 
-/// How a verb answers; part of the arguments of every verb.
+/// Output format of a verb, text or JSON; part of the arguments of every verb.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub struct Output {
     /// Print exactly one JSON object instead of text.
@@ -16,12 +16,12 @@ pub struct Output {
 }
 
 impl Output {
-    /// One line for people; nothing with `--json`.
+    /// Prints one text line; prints nothing with `--json`.
     pub fn line(self, text: impl Display) -> Result<(), Error> {
         if self.json { Ok(()) } else { print(&text) }
     }
 
-    /// The answer of the verb, once: the object with `--json`, else the text.
+    /// Prints the result of the verb: `object` as JSON with `--json`, else `text`.
     pub fn answer(self, object: &impl Serialize, text: impl Display) -> Result<(), Error> {
         if self.json {
             print(&serde_json::to_string(object).map_err(Error::other)?)

@@ -1,4 +1,4 @@
-//! `quietcut plan`: the fewest tests that make a chart trustworthy.
+//! `quietcut plan`: the smallest set of tests that reduces the uncertainty of the stability limits to a given width.
 
 use std::fmt::Write;
 use std::io::IsTerminal;
@@ -13,10 +13,10 @@ use crate::plan::{Means, Plan, Prior, Request, Step, Test, plan};
 use crate::report::page::{figure, page};
 use crate::report::plan_chart::plan_chart;
 
-/// The fewest cuts and tests that make the chart trustworthy to a wanted width.
+/// Finds the fewest cuts and tests that reduce the 90 % intervals of all stability limits to a given width.
 ///
-/// How well parameters are known stands in the case, in keys that end in _std; of a case without such keys the options
-/// --assume-… are taken. Every limit of the chart gets a 90 % interval; that of the widest is the width of the chart.
+/// The standard deviations of the parameters stand in the case (keys that end in _std); for a case without such keys the
+/// options --assume-… apply. The widest 90 % interval of a limit is the width of the chart.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut plan tests/cases/kuka-kr90-acetal.toml --rpm 700:2000:40 --depth-mm 0:6:60 --width-percent 15 --out plan.svg\n  quietcut plan tests/cases/insperger-1dof-ad1.toml --rpm 5000:15000:40 --depth-mm 0:4:60 --width-percent 10 --json"
@@ -31,67 +31,67 @@ pub struct Args {
     /// Axial depths in mm, first:last:count. Limits are searched from depth 0 to the last, in steps no wider than these.
     #[arg(long, value_name = "R", value_parser = Range::non_negative)]
     depth_mm: Range,
-    /// Width of the 90 % interval that every limit is to have, in percent of the limit.
+    /// Required width of the 90 % interval of every limit, in percent of the limit.
     #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]
     width_percent: f64,
-    /// Leave out the cubic terms of a structure.
+    /// Ignore the cubic terms of the structure.
     #[arg(long)]
     linear: bool,
     #[command(flatten)]
     assumed: Assumed,
     #[command(flatten)]
     tests: Tests,
-    /// Picture or page to write: svg or html by its ending.
+    /// Chart or page to write; the ending sets the format: svg or html.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
 }
 
-/// Standard deviations of a case that states none.
+/// Standard deviations of the parameters of a case that states none.
 #[derive(Debug, clap::Args)]
-#[command(next_help_heading = "What is not known, where the case has no keys that end in _std")]
+#[command(next_help_heading = "Standard deviations, where the case has no keys that end in _std")]
 struct Assumed {
-    /// Of natural frequencies.
+    /// Standard deviation of natural frequencies, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().frequency, value_parser = positive)]
     assume_frequency_percent: f64,
-    /// Of damping ratios.
+    /// Standard deviation of damping ratios, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().damping, value_parser = positive)]
     assume_damping_percent: f64,
-    /// Of modal stiffnesses.
+    /// Standard deviation of modal stiffnesses, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().stiffness, value_parser = positive)]
     assume_stiffness_percent: f64,
-    /// Of the cutting coefficients.
+    /// Standard deviation of the cutting coefficients, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Prior::default().force, value_parser = positive)]
     assume_force_percent: f64,
 }
 
-/// What tests are like.
+/// Accuracy of the available tests.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Tests")]
 struct Tests {
-    /// To what width cuts bracket a limit, in percent of it.
+    /// Width of the bracket of a limit from trial cuts, in percent of the limit.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().bracket, value_parser = positive)]
     bracket_percent: f64,
-    /// Standard deviation of a measured chatter frequency.
+    /// Standard deviation of a measured chatter frequency, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().chatter_frequency, value_parser = positive)]
     chatter_frequency_percent: f64,
-    /// Blows of a hammer test.
+    /// Number of impacts of a hammer test.
     #[arg(long, value_name = "N", default_value_t = Means::default().blows as u16, value_parser = clap::value_parser!(u16).range(1..))]
     blows: u16,
-    /// Peak force of a blow in N.
+    /// Peak force of an impact in N.
     #[arg(long, value_name = "F", default_value_t = Means::default().peak_n, value_parser = positive)]
     peak_n: f64,
     /// Noise of the accelerometer in µg per √Hz.
     #[arg(long, value_name = "N", default_value_t = 1e6 * Means::default().accelerometer_g_per_root_hertz, value_parser = positive)]
     noise_ug: f64,
-    /// Standard deviation of the gains of hammer with accelerometer, and of the dynamometer.
+    /// Standard deviation of the gain of hammer and accelerometer, and of the gain of the dynamometer, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().calibration, value_parser = positive)]
     calibration_percent: f64,
-    /// Standard deviation of how much frequencies differ between standstill and cutting.
+    /// Standard deviation of the change of natural frequencies from standstill to cutting, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().standstill_frequency, value_parser = positive)]
     standstill_frequency_percent: f64,
-    /// Standard deviation of how much damping ratios differ between standstill and cutting.
+    /// Standard deviation of the change of damping ratios from standstill to cutting, in percent.
     #[arg(long, value_name = "P", default_value_t = 100.0 * Means::default().standstill_damping, value_parser = positive)]
     standstill_damping_percent: f64,
 }
@@ -106,11 +106,11 @@ pub fn run(args: Args) -> Result<(), Error> {
     if let Some(path) = &args.out {
         write(&case, &found, request.depth_mm, path)?;
     }
-    let mut said = text(&found);
+    let mut output_text = text(&found);
     if let Some(path) = &args.out {
-        let _ = write!(said, "\n{}", path.display());
+        let _ = write!(output_text, "\n{}", path.display());
     }
-    args.output.answer(&found, said)
+    args.output.answer(&found, output_text)
 }
 
 fn request(args: &Args) -> Request {
@@ -155,12 +155,12 @@ fn progress_bar(speeds: usize) -> ProgressBar {
     }
 }
 
-/// A test in words.
-fn words(step: &Step) -> String {
+/// Instruction for one planned test.
+fn instruction(step: &Step) -> String {
     match &step.test {
         Test::Hammer { direction, blows } => {
             format!(
-                "{blows} blows of a hammer on the tool tip in {direction}, acceleration there in every direction"
+                "{blows} hammer impacts on the tool tip in {direction}; measure its acceleration in every direction"
             )
         }
         Test::Force {
@@ -181,7 +181,7 @@ fn words(step: &Step) -> String {
 
 fn text(plan: &Plan) -> String {
     let mut text = format!(
-        "widest 90 % interval of a limit: {:.1} % at {:.0} rev/min (median {:.1} %), wanted {:.1} %",
+        "widest 90 % interval of a limit: {:.1} % at {:.0} rev/min (median {:.1} %); required: {:.1} %",
         plan.before.widest_percent, plan.before.at_rpm, plan.before.median_percent, plan.wanted_percent
     );
     // Writing to a String cannot fail.
@@ -197,7 +197,7 @@ fn text(plan: &Plan) -> String {
             text,
             "\n{:>2}. {}\n    then {:.1} % at {:.0} rev/min (median {:.1} %)",
             index + 1,
-            words(step),
+            instruction(step),
             step.after.widest_percent,
             step.after.at_rpm,
             step.after.median_percent
@@ -211,17 +211,21 @@ fn text(plan: &Plan) -> String {
     if let Some(obstacle) = &plan.obstacle {
         let _ = write!(
             text,
-            ": if every test is done a thousand times {:.1} % are left at {:.0} rev/min",
+            ": with a thousand repetitions of every test the width is still {:.1} % at {:.0} rev/min",
             obstacle.at_best.widest_percent, obstacle.at_best.at_rpm
         );
         for one in &obstacle.if_known {
-            let _ = write!(text, "\n    {:.1} % if known: {}", one.widest_percent, one.name);
+            let _ = write!(
+                text,
+                "\n    {:.1} % if this parameter were known exactly: {}",
+                one.widest_percent, one.name
+            );
         }
     }
     if !plan.without_limit_rpm.is_empty() {
         let _ = write!(
             text,
-            "\nnothing is lost up to the last depth at {} of the speeds: they do not count",
+            "\n{} speeds are stable up to the last depth and are not considered",
             plan.without_limit_rpm.len()
         );
     }
@@ -234,10 +238,10 @@ fn write(case: &Case, plan: &Plan, depth_mm: f64, path: &Path) -> Result<(), Err
     let text = match file::ending(path).as_str() {
         "svg" => picture()?,
         "html" => {
-            let caption = "Grey: where the limits lie with 90 %, as the case is known. Blue: after the tests, if they find it as \
-                           it stands. Points: where cuts bracket a limit.";
+            let caption = "Grey: 90 % intervals of the limits from the case. Blue: 90 % intervals after the tests, if they confirm the \
+                           case. Points: trial cuts that bracket a limit.";
             let body = maud::html! {
-                h1 { (case.name) ": what to test" }
+                h1 { (case.name) ": planned tests" }
                 (figure(&picture()?, caption))
                 pre { (self::text(plan)) }
             };
@@ -245,7 +249,7 @@ fn write(case: &Case, plan: &Plan, depth_mm: f64, path: &Path) -> Result<(), Err
         }
         _ => {
             return Err(Error::input(format!(
-                "{}: the ending says what to write; .svg or .html is needed",
+                "{}: the ending of the file sets its format; .svg or .html is needed",
                 path.display()
             )));
         }

@@ -1,4 +1,4 @@
-//! The PORT argument, and what devices say of themselves in answers.
+//! The PORT argument, and the description of a device in outputs: lobe table, memory slots, working point.
 
 use std::path::PathBuf;
 
@@ -10,24 +10,24 @@ use super::Error;
 use crate::device::{self, Client};
 use crate::report::answer::number;
 
-/// Where the device is; part of the arguments of every verb that talks to one.
+/// Port of the device; part of the arguments of every verb that connects to one.
 #[derive(Debug, clap::Args)]
 pub struct PortArgs {
     /// Serial port of the device, or `simulated`.
     #[arg(value_name = "PORT")]
     port: String,
-    /// Keep the memory of the simulated device in this file, so that a table outlives the command.
+    /// File that holds the memory of the simulated device, so that a lobe table persists between commands.
     #[arg(long, value_name = "FILE")]
     state: Option<PathBuf>,
 }
 
 impl PortArgs {
-    /// The name of the port.
+    /// Name of the port, as given on the command line.
     pub fn name(&self) -> &str {
         &self.port
     }
 
-    /// Opens the port and says hello to the device.
+    /// Opens the port and starts the protocol with the device.
     pub fn connect(&self) -> Result<(Client, Info), Error> {
         if let Some(state) = &self.state
             && self.port != device::port::SIMULATED
@@ -43,7 +43,7 @@ impl PortArgs {
     }
 }
 
-/// A table of a device, as JSON and as text.
+/// Summary of the lobe table of a device, as JSON and as text.
 #[derive(Debug, Serialize)]
 pub struct TableAnswer {
     name: String,
@@ -56,7 +56,7 @@ pub struct TableAnswer {
 }
 
 impl TableAnswer {
-    /// The answer for a table.
+    /// Converts the summary that the device sends.
     pub fn new(table: &TableSummary) -> Self {
         Self {
             name: table.name.as_str().into(),
@@ -91,42 +91,42 @@ impl std::fmt::Display for TableAnswer {
     }
 }
 
-/// A slot for a table, as JSON and as text.
+/// State of one memory slot for a lobe table, as JSON and as text.
 #[derive(Debug, Serialize)]
 #[serde(tag = "state", rename_all = "kebab-case")]
 pub enum SlotAnswer {
-    /// Nothing is in it.
+    /// The slot holds no table.
     Empty,
-    /// An upload that has not ended.
+    /// The slot holds an incomplete upload.
     Unfinished {
-        /// Bytes that have come.
+        /// Bytes received so far.
         received: u32,
-        /// Bytes of the table.
+        /// Size of the whole table, bytes.
         length: u32,
     },
-    /// Bytes that are no table.
+    /// The slot holds bytes that are no valid table.
     Damaged {
-        /// Why.
+        /// Reason why the table is invalid.
         error: String,
     },
-    /// A table that is not in use.
+    /// The slot holds a valid table that is not in use.
     Valid {
-        /// Its bytes.
+        /// Size of the table, bytes.
         length: u32,
-        /// Counted up with each table.
+        /// Generation number of the table; each upload increases it by one.
         generation: u32,
     },
-    /// The table in use.
+    /// The slot holds the table in use.
     InUse {
-        /// Its bytes.
+        /// Size of the table, bytes.
         length: u32,
-        /// Counted up with each table.
+        /// Generation number of the table; each upload increases it by one.
         generation: u32,
     },
 }
 
 impl SlotAnswer {
-    /// The answer for a slot.
+    /// Converts the slot state that the device sends.
     pub fn new(slot: &Slot) -> Self {
         match slot {
             Slot::Empty => Self::Empty,
@@ -156,7 +156,7 @@ impl std::fmt::Display for SlotAnswer {
             Self::Unfinished { received, length } => {
                 write!(
                     f,
-                    "{received} of {length} bytes of an upload; `quietcut upload` goes on there"
+                    "{received} of {length} bytes of an upload; `quietcut upload` resumes there"
                 )
             }
             Self::Damaged { error } => write!(f, "damaged: {error}"),
@@ -166,15 +166,15 @@ impl std::fmt::Display for SlotAnswer {
     }
 }
 
-/// A feed direction, degrees, as text.
-pub fn direction_in_words(direction_deg: Option<f64>) -> String {
+/// Feed direction in degrees as text; `None` means that none is set on the device.
+pub fn feed_direction_text(direction_deg: Option<f64>) -> String {
     match direction_deg {
         Some(degrees) => format!("{degrees}°"),
-        None => "not told: that of the table is assumed, where it has only one".into(),
+        None => "not set: the feed direction of the lobe table is assumed if the table has only one".into(),
     }
 }
 
-/// A working point, as JSON and as text.
+/// Working point of the cut (axial depth, immersion, feed, posture), as JSON and as text.
 #[derive(Debug, Serialize)]
 pub struct WorkingPointAnswer {
     depth_mm: f64,
@@ -185,7 +185,7 @@ pub struct WorkingPointAnswer {
 }
 
 impl WorkingPointAnswer {
-    /// The answer for a working point.
+    /// Converts the working point that the device sends.
     pub fn new(point: &WorkingPoint) -> Self {
         Self {
             depth_mm: number(point.axial_depth.0),

@@ -1,4 +1,4 @@
-//! `first:last:count`.
+//! Ranges of evenly spaced values on the command line, written `first:last:count`.
 
 use std::str::FromStr;
 
@@ -13,25 +13,25 @@ pub struct Range {
 }
 
 impl Range {
-    /// More values than any chart can show are a slip of the finger.
+    /// Upper bound of the count, a choice: more values than a chart can show indicate a typing error.
     const MAX_COUNT: usize = 1_000_000;
 
-    /// The first value.
+    /// First value of the range.
     pub fn first(&self) -> f64 {
         self.first
     }
 
-    /// The last value.
+    /// Last value of the range.
     pub fn last(&self) -> f64 {
         self.last
     }
 
-    /// How many values there are, at least 1.
+    /// Number of values, at least 1.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// The values in order; the first and the last are exact.
+    /// All values in order; the first and the last are exact.
     pub fn values(&self) -> Vec<f64> {
         let steps = self.count.saturating_sub(1).max(1) as f64;
         (0..self.count)
@@ -42,7 +42,7 @@ impl Range {
             .collect()
     }
 
-    /// How many equal steps from 0 to the larger end are no wider than those of the range.
+    /// Number of equal steps from 0 to the larger end of the range that are no wider than the steps of the range.
     pub fn steps_from_zero(&self) -> usize {
         let widest = (self.last - self.first).abs() / self.count.max(2) as f64;
         if widest > 0.0 {
@@ -52,7 +52,7 @@ impl Range {
         }
     }
 
-    /// A value parser for ranges of numbers greater than 0.
+    /// Parses a range of numbers greater than 0.
     pub fn positive(text: &str) -> Result<Self, String> {
         let range: Self = text.parse()?;
         if range.first > 0.0 && range.last > 0.0 {
@@ -66,7 +66,7 @@ impl Range {
 }
 
 impl Range {
-    /// A value parser for ranges of numbers of which the first or the last may be 0.
+    /// Parses a range of numbers of 0 or more, not all 0.
     pub fn non_negative(text: &str) -> Result<Self, String> {
         let range: Self = text.parse()?;
         if range.first >= 0.0 && range.last >= 0.0 && range.first.max(range.last) > 0.0 {
@@ -134,7 +134,7 @@ mod tests {
         let range: Range = "0.1:0.7:7".parse().unwrap();
         let values = range.values();
         assert_eq!((values[0], values[6], values.len()), (0.1, 0.7, 7));
-        // Half an ulp of 0.4 for each of two products and a sum.
+        // Rounding error: half an ulp of 0.4 for each of two products and one sum.
         assert!((values[3] - 0.4).abs() < 2e-16);
         assert_eq!("900".parse::<Range>().unwrap().values(), [900.0]);
         assert_eq!(
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_range_is_refused() {
+    fn invalid_ranges_are_refused() {
         for text in [
             "", "1:2", "1:2:0", "1:2:-3", "1:2:1", "1:1:2", "a:2:3", "1:2:3:4", "1:2:2.5",
         ] {

@@ -1,4 +1,4 @@
-//! `quietcut replay`: a recording through the same pipeline, here or on a device.
+//! `quietcut replay`: chatter detection in a recording, computed on this computer or on a device.
 
 use std::num::NonZeroU8;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::recording::{RecordingError, Sensed, Speed};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
 
-/// A recording through the same pipeline as on the spindle, here or on a device.
+/// Runs the signal chain of the device on a recording, on this computer or on a device.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut replay cut.csv"
@@ -28,16 +28,16 @@ pub struct Args {
     /// Lobe table for the advice.
     #[arg(long, value_name = "FILE.qct")]
     table: Option<PathBuf>,
-    /// Run it on the device at this serial port, or `simulated`, instead of here.
+    /// Run the signal chain on the device at this serial port, or `simulated`, instead of on this computer.
     #[arg(long, value_name = "PORT")]
     port: Option<String>,
-    /// Spindle speed in rev/min; goes before what the recording says, and a recorded tachometer is then left out.
+    /// Spindle speed in rev/min; overrides the speed of the recording, and a recorded tachometer is then ignored.
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     rpm: Option<f64>,
-    /// Number of teeth where the recording does not say.
+    /// Number of teeth, if the recording does not state it.
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     teeth: Option<NonZeroU8>,
-    /// Feed direction in degrees from the machine's x towards its y, for tables with layers for several.
+    /// Feed direction in degrees from the machine's x towards its y, for lobe tables with layers of several directions.
     #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     feed_direction_deg: Option<f64>,
     #[command(flatten)]
@@ -67,26 +67,26 @@ pub fn run(args: Args) -> Result<(), Error> {
         && recording.channel("tacho").is_some()
     {
         tracing::warn!(
-            "{}: the recorded tachometer is left out, because --rpm {rpm} states the speed; leave --rpm out to use the tachometer",
+            "{}: the recorded tachometer is ignored, because --rpm {rpm} sets the speed; omit --rpm to use the tachometer",
             args.recording.display()
         );
     }
     if !sensed.is_calibrated {
         tracing::warn!(
-            "{}: the unit of the channel is not known, so amplitudes are relative to the largest sample",
+            "{}: the channel has no unit; amplitudes are relative to the largest sample",
             args.recording.display()
         );
     }
     let table = args.table.as_deref().map(crate::file::read).transpose()?;
     let log = match &args.port {
         Some(port) => on_device(&args, port, &sensed, table.as_deref())?,
-        None => here(&args, &sensed, table.as_deref())?,
+        None => on_host(&args, &sensed, table.as_deref())?,
     };
     args.output.answer(&log, format_args!("{}", log.summary))
 }
 
-/// Through the pipeline in this process.
-fn here(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
+/// Runs the signal chain on this computer.
+fn on_host(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
     let monitor = Monitor::new(sensed.settings)
         .map_err(|error| Error::input(format!("{}: {error}", args.recording.display())))?;
     let table = match (table, &args.table) {
@@ -114,7 +114,7 @@ fn here(args: &Args, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog
     Ok(log)
 }
 
-/// Through the pipeline of a device, which afterwards is set up as it was before and listens to its sensor again.
+/// Runs the signal chain on a device, and afterwards restores its settings and returns it to its own sensor.
 fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> Result<VerdictLog, Error> {
     let (mut client, _) = Client::connect(device::open(port, None)?)?;
     if let (Some(bytes), Some(path)) = (table, &args.table) {
@@ -126,21 +126,21 @@ fn on_device(args: &Args, port: &str, sensed: &Sensed, table: Option<&[u8]>) -> 
         .is_some()
         .then(|| client.feed_direction())
         .transpose()?;
-    let heard = hear(args, &mut client, sensed);
-    // Also where something went wrong on the way; that is told then.
-    let left = client
+    let log = feed_recording(args, &mut client, sensed);
+    // The settings are restored even if feeding failed; the error of feeding is reported first.
+    let restored = client
         .subscribe(Subscription::default())
         .and_then(|()| client.set_working_point(status.working_point))
-        .and_then(|()| direction.map_or(Ok(()), |told| client.set_feed_direction(told)))
+        .and_then(|()| direction.map_or(Ok(()), |direction| client.set_feed_direction(direction)))
         .and_then(|()| client.set_settings(settings))
         .and_then(|()| client.reset());
-    let log = heard?;
-    left?;
+    let log = log?;
+    restored?;
     Ok(log)
 }
 
-/// Sets a device up for a recording and feeds it.
-fn hear(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<VerdictLog, Error> {
+/// Configures the device for the recording, sends it the recorded samples, and collects its reports.
+fn feed_recording(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<VerdictLog, Error> {
     client.set_settings(sensed.settings)?;
     client.set_working_point(sensed.working_point)?;
     if let Some(direction) = args.feed_direction() {
@@ -153,8 +153,8 @@ fn hear(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<VerdictLog,
     let mut log = VerdictLog::default();
     for (block, edges) in sensed.steps() {
         client.feed(block, edges)?;
-        // The report of a block is the last before the answer to it; what came before the first is of the device's own
-        // sensor, which it hears until it is fed.
+        // The last report before the reply belongs to this block. Earlier reports belong to the device's own sensor, which
+        // it evaluates until the first block is fed.
         let mut last = None;
         while let Some(event) = client.next_event(Duration::ZERO)? {
             if let Event::Report(report) = event {
@@ -170,7 +170,7 @@ fn hear(args: &Args, client: &mut Client, sensed: &Sensed) -> Result<VerdictLog,
     Ok(log)
 }
 
-/// The table in the bytes of a file.
+/// Parses the lobe table in the bytes of the file at `path`.
 fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<LobeTable<'a>, Error> {
     LobeTable::parse(bytes).map_err(|error| Error::input(format!("{}: {error}", path.display())))
 }

@@ -1,27 +1,28 @@
-//! The part of the recordings that a verb uses.
+//! Options for the segment of the recordings that a verb uses.
 
 use std::path::PathBuf;
 
 use super::{Error, finite};
 use crate::recording::{Recording, Segment};
 
-/// From when to when recordings are used.
+/// Start and end of the segment of the recordings to use.
 #[derive(Clone, Copy, Debug, clap::Args)]
-#[command(next_help_heading = "Part of the recordings")]
+#[command(next_help_heading = "Segment of the recordings")]
 pub(super) struct RecordedSegment {
-    /// Leave out what comes before this time in s, on the time axis of the file.
+    /// Start of the segment in s on the time axis of the file. Default: the first sample.
     #[arg(long, value_name = "T", value_parser = finite, allow_negative_numbers = true)]
     from_s: Option<f64>,
-    /// Leave out what comes at this time in s or later, on the time axis of the file.
+    /// End of the segment in s on the time axis of the file; samples at this time or later are not used. Default: the last
+    /// sample.
     #[arg(long, value_name = "T", value_parser = finite, allow_negative_numbers = true)]
     until_s: Option<f64>,
 }
 
 impl RecordedSegment {
-    /// The segment of each recording, in order.
+    /// Reads the segment of each recording, in the order of `paths`.
     ///
     /// # Errors
-    /// A recording cannot be read, or does not reach into the segment.
+    /// A recording cannot be read, or has no samples in the segment.
     pub(super) fn read(self, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
         let segment = Segment {
             from_s: self.from_s,

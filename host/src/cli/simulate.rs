@@ -1,4 +1,4 @@
-//! `quietcut simulate`: a virtual cut, or with `--experiment` a virtual test rig.
+//! `quietcut simulate`: a simulated cut, or with `--experiment` a simulated vibration test.
 
 use std::path::PathBuf;
 
@@ -21,8 +21,7 @@ use crate::simulate::{
 
 const EXAMPLE: &str = "Example:\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 2 --seconds 4 --out cut.csv\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 20 --sample-rate-hz 128 --noise-percent 1 --out steps.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment porous --rpm 820 --depth-mm 2 --start-deg 0 --exit-deg 180 --seconds 60 --sample-rate-hz 1024 --noise-percent 1 --out porous.csv";
 
-/// A virtual cut: exact switching of the teeth, loss of contact, runout, and the sensor that hears it; with --experiment
-/// a virtual test rig.
+/// Simulates a cut with tooth entry and exit, loss of contact, runout and sensor; with --experiment a vibration test.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLE, after_long_help = format!("{}\n{EXAMPLE}", help()))]
 pub struct Args {
@@ -42,29 +41,29 @@ pub struct Args {
     experiment: Experiment,
     #[command(flatten)]
     channels: Channels,
-    /// Of a cut, do not record the forces.
+    /// Do not record the cutting forces.
     #[arg(long, conflicts_with = "experiment")]
     no_force: bool,
     #[command(flatten)]
     milling_rig: MillingRig,
-    /// Something that the case does not have, such as runout=20 (µm) or runout.angle_deg=45; may be repeated; listed below.
+    /// Effect to add to the case, such as runout=20 (µm) or runout.angle_deg=45; may be repeated; listed below.
     #[arg(long, value_name = "NAME=VALUE")]
     effect: Vec<String>,
-    /// How the tool comes into the workpiece and out: through its faces, with a depth that grows, or in full cut all
-    /// the time. Without it: feed, or ramp where the tool's diameter is not known or the time too short for feed.
+    /// Entry into and exit from the workpiece. Default: feed, or ramp if the tool diameter is not given or the duration is
+    /// too short for feed.
     #[arg(long, value_name = "KIND")]
     entry: Option<EntryKind>,
-    /// How long the depth grows with --entry ramp, in s; a tenth of the duration where it is not given.
+    /// Duration of the depth ramp with --entry ramp, in s. Default: a tenth of the duration of the cut.
     #[arg(long, value_name = "T", value_parser = positive, allow_negative_numbers = true)]
     ramp_s: Option<f64>,
-    /// Air before and after the cut in s; a twentieth of the duration, at most 0.2 s, where it is not given.
+    /// Time in air before and after the cut, in s. Default: a twentieth of the duration, at most 0.2 s.
     #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
     air_s: Option<f64>,
-    /// Record the motion itself, without a sensor's faults.
+    /// Record the exact motion, without noise, quantization and clock error of the sensor.
     #[arg(long, conflicts_with_all = ["range_g", "noise_ug", "clock_error_percent", "tacho_jitter_us"])]
     ideal: bool,
-    /// Samples per second: nominal, where a sensor samples. Without it 26 667 in a cut, and at a rig enough for the
-    /// harmonics of what it excites.
+    /// Sampling rate in Hz; nominal, if a sensor samples. Default: 26667 in a cut; in a vibration test at least 20 times the
+    /// highest excited frequency.
     #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     sample_rate_hz: Option<f64>,
     /// Range of the accelerometer in g: 2, 4, 8 or 16.
@@ -73,45 +72,45 @@ pub struct Args {
     /// Noise of the accelerometer in µg per √Hz.
     #[arg(long, value_name = "N", default_value_t = 75.0, value_parser = non_negative, allow_negative_numbers = true)]
     noise_ug: f64,
-    /// How much too fast the clock of the accelerometer runs, in percent: −3 to 3.
+    /// Relative error of the accelerometer clock in percent, −3 to 3; positive if it runs fast.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = clock_error, allow_negative_numbers = true)]
     clock_error_percent: f64,
-    /// Positions on the tachometer's wheel.
+    /// Number of tooth positions on the tachometer wheel.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
     tacho_positions: u16,
-    /// Of these, how many in a row are missing.
+    /// Number of consecutive missing teeth on the tachometer wheel.
     #[arg(long, value_name = "N", default_value_t = 0)]
     tacho_missing: u16,
-    /// Jitter of the tachometer's edges in µs.
+    /// Jitter of the tachometer edges in µs.
     #[arg(long, value_name = "N", default_value_t = 2.0, value_parser = non_negative, allow_negative_numbers = true)]
     tacho_jitter_us: f64,
-    /// Seed of the sensor's noise; the same seed gives the same file.
+    /// Seed of the random numbers (sensor noise, scatter of impacts); the same seed gives the same file.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The recording to write: csv, uff or bunv (UFF 58 as text, in binary) by its ending; what it cannot say goes into the .toml
-    /// beside it.
+    /// Recording to write; the ending sets the format: csv, uff (UFF 58, text) or bunv (UFF 58, binary). Metadata go to a
+    /// sidecar file with the ending .toml.
     #[arg(long, value_name = "REC.csv", value_parser = recording_to_write)]
     out: PathBuf,
     #[command(flatten)]
     output: Output,
 }
 
-/// What the IIS3DWB samples at.
+/// Nominal sampling rate of the accelerometer IIS3DWB, Hz (data sheet).
 const SAMPLE_RATE_HZ: f64 = 26_667.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum EntryKind {
-    /// Through the faces of the workpiece: immersion grows and shrinks as the tool feeds.
+    /// Through the side faces of the workpiece: the immersion increases at entry and decreases at exit.
     Feed,
-    /// The axial depth grows and shrinks.
+    /// Ramp of the axial depth at entry and exit.
     Ramp,
-    /// In full cut from the start to the end.
+    /// Full engagement from start to end.
     None,
 }
 
-/// What was cut.
+/// Output of a simulated cut.
 #[derive(Debug, Serialize)]
-struct Answer {
+struct CutOutput {
     recording: PathBuf,
     sample_rate_hz: f64,
     samples: usize,
@@ -122,7 +121,7 @@ struct Answer {
     contact_changes: u64,
 }
 
-/// The name of a recording in a form that can be written.
+/// Parses the path of the recording to write; its ending must be a format that can be written.
 fn recording_to_write(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     let ending = file::ending(&path);
@@ -143,7 +142,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         && sidecar == case
     {
         return Err(Error::input(format!(
-            "--out {}: what belongs to the recording would go to {}, which is the case; choose another name",
+            "--out {}: the sidecar file of the recording would overwrite the case {}; choose another name",
             args.out.display(),
             sidecar.display()
         )));
@@ -199,7 +198,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             seed: args.seed,
         }
     };
-    let named = |error| named(&args, error);
+    let named = |error| with_source(&args, error);
     let full_cut_s = cut.full_cut_s(&case).map_err(named)?;
     let (
         mut recording,
@@ -218,7 +217,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         .iter()
         .filter(|channel| ["x", "y", "z"].contains(&channel.name.as_str()))
         .flat_map(|channel| &channel.samples);
-    let answer = Answer {
+    let answer = CutOutput {
         recording: args.out.clone(),
         sample_rate_hz: recording.sample_rate_hz,
         samples: recording.len(),
@@ -236,15 +235,15 @@ pub fn run(args: Args) -> Result<(), Error> {
     args.output.answer(&answer, text)
 }
 
-fn text(answer: &Answer) -> String {
+fn text(answer: &CutOutput) -> String {
     let [from, to] = answer.full_cut_s;
     let entry = match answer.entry {
-        "feed" => "in and out through the faces of the workpiece, ",
-        "ramp" => "in and out with a depth that grows and shrinks, ",
+        "feed" => "entry and exit through the faces of the workpiece, ",
+        "ramp" => "entry and exit with a ramp of the depth, ",
         _ => "",
     };
     format!(
-        "{}: {} samples at {:.1} Hz\n{entry}in full cut from {from:.2} to {to:.2} s; the tool moves by up to {:.3} mm\n{} steps, contact lost or found {} times",
+        "{}: {} samples at {:.1} Hz\n{entry}full engagement from {from:.2} to {to:.2} s; largest displacement of the tool {:.3} mm\n{} steps, {} changes of contact",
         answer.recording.display(),
         answer.samples,
         answer.sample_rate_hz,
@@ -270,7 +269,7 @@ fn tachometer(args: &Args) -> Result<TachometerModel, Error> {
     })
 }
 
-/// The cut that was asked for, with an entry that the case and the time allow.
+/// Builds the cut from the options; without `--entry` it chooses feed if the case and the duration allow it, else ramp.
 fn cut(args: &Args, case: &Case, effects: Effects) -> Result<VirtualCut, Error> {
     let (Some(rpm), Some(depth_mm), Some(seconds)) = (args.rpm, args.depth_mm, args.seconds) else {
         return Err(Error::input(
@@ -302,15 +301,15 @@ fn cut(args: &Args, case: &Case, effects: Effects) -> Result<VirtualCut, Error> 
                 Err(
                     VirtualCutError::TooShort { .. } | VirtualCutError::Simulate(SimulateError::NoDiameter),
                 ) => ramp,
-                Err(error) => return Err(named(args, error)),
+                Err(error) => return Err(with_source(args, error)),
             }
         }
     };
     Ok(cut)
 }
 
-/// The error with the name of the case, where it does not say it itself.
-fn named(args: &Args, error: VirtualCutError) -> Error {
+/// Adds the case file or the option that caused the error to its message.
+fn with_source(args: &Args, error: VirtualCutError) -> Error {
     let case = args.case.display();
     match error {
         VirtualCutError::Case(error) => error.into(),

@@ -1,4 +1,4 @@
-//! `quietcut table`: builds the lobe table that goes to the device, or shows one.
+//! `quietcut table`: builds the lobe table of the device from cases, or shows an existing table.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -18,41 +18,42 @@ use crate::stability::after;
     after_help = "Example:\n  quietcut table tests/cases/kuka-kr90-acetal.toml --out kuka.qct\n  quietcut table --show kuka.qct"
 )]
 pub struct Args {
-    /// The case files, one layer each.
+    /// The case files; each becomes one layer of the table.
     #[arg(value_name = "CASE", required_unless_present = "show", requires = "out")]
     cases: Vec<PathBuf>,
-    /// The table to write.
+    /// Lobe table to write.
     #[arg(long, value_name = "FILE.qct", requires = "cases")]
     out: Option<PathBuf>,
-    /// Spindle speeds in rev/min, first:last:count; only the ends matter, the speeds between are chosen where limits
-    /// bend. Default: the limits of the machine, else the range of the lobes.
+    /// Spindle speeds in rev/min, first:last:count. Only the ends are used; the speeds between them are chosen adaptively.
+    /// Default: the speed limits of the machine, else the range of the lobes.
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "cases")]
     rpm: Option<Range>,
-    /// The largest axial depth in mm. Default: four times the lowest limit.
+    /// Largest axial depth in mm. Default: four times the lowest stability limit.
     #[arg(long, value_name = "MM", value_parser = super::positive, allow_negative_numbers = true, requires = "cases")]
     depth_mm: Option<f64>,
-    /// Speeds to begin with; more are added where limits bend. Default: 121.
+    /// Initial number of spindle speeds; more are added where the limits curve. Default: 121.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2000), requires = "cases")]
     speeds: Option<u16>,
-    /// Feeds per tooth in mm, one layer each and more between them where limits bend, where limits depend on the feed; separated by
-    /// commas.
+    /// Feeds per tooth in mm, separated by commas, for cases whose limits depend on the feed. Each becomes a layer; more
+    /// layers are added between them where the limits curve.
     #[arg(long, value_name = "MM", value_parser = super::positive, value_delimiter = ',', requires = "cases")]
     feed: Vec<f64>,
-    /// Feed directions in degrees from the machine's x towards its y, one layer each and more between them where limits
-    /// bend; separated by commas. Default: that of each case, which the table then does not state.
+    /// Feed directions in degrees from the machine's x towards its y, separated by commas. Each becomes a layer; more layers
+    /// are added between them where the limits curve. Default: the feed direction of each case, which the table does not store.
     #[arg(long, value_name = "DEG", value_parser = super::finite, value_delimiter = ',', allow_negative_numbers = true, requires = "cases")]
     feed_direction_deg: Vec<f64>,
-    /// Write how each limit moves with frequencies, damping ratios and cutting force, for a device that learns them.
+    /// Store the derivatives of each limit with respect to natural frequencies, damping ratios and cutting force, for a device
+    /// that updates these parameters.
     #[arg(long, requires = "cases")]
     derivatives: bool,
-    /// Write the first limit of all but so many percent of the machines that the deviations of a case (keys that end in _std)
-    /// describe, instead of its own; takes minutes.
+    /// Store this percentile of the first limit, in percent, instead of the nominal limit. It follows from the standard
+    /// deviations of the case (keys that end in _std); the computation takes minutes.
     #[arg(long, value_name = "P", value_parser = percent, requires = "cases")]
     percentile: Option<f64>,
-    /// The limits after so many seconds of work, of cases that drift or wear.
+    /// Operating time in s at which drift and wear of the cases are evaluated.
     #[arg(long, value_name = "T", value_parser = super::non_negative, allow_negative_numbers = true, requires = "cases")]
     after_s: Option<f64>,
-    /// A table to read back.
+    /// Lobe table to show.
     #[arg(long, value_name = "FILE.qct", conflicts_with_all = ["cases", "out"])]
     show: Option<PathBuf>,
     #[command(flatten)]
@@ -60,7 +61,7 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Shown {
+struct TableOutput {
     name: String,
     teeth: u8,
     bytes: usize,
@@ -69,19 +70,19 @@ struct Shown {
     rpm_limits: Option<[f32; 2]>,
     depth_mm: [f32; 2],
     #[serde(skip_serializing_if = "Option::is_none")]
-    interpolation_error: Option<ShownError>,
-    layers: Vec<ShownLayer>,
+    interpolation_error: Option<ErrorOutput>,
+    layers: Vec<LayerOutput>,
 }
 
-/// How far answers between the entries may be off: in depth, or in speed relative to it.
+/// Bound of the interpolation error between the entries of a lobe table: in depth, mm, and in relative spindle speed.
 #[derive(Serialize)]
-struct ShownError {
+struct ErrorOutput {
     depth_mm: f32,
     speed: f32,
 }
 
 #[derive(Serialize)]
-struct ShownLayer {
+struct LayerOutput {
     feed_per_tooth_mm: [f32; 2],
     start_deg: f32,
     exit_deg: f32,
@@ -89,38 +90,38 @@ struct ShownLayer {
     #[serde(skip_serializing_if = "Option::is_none")]
     feed_direction_deg: Option<f32>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    modes: Vec<ShownMode>,
-    speeds: Vec<ShownColumn>,
+    modes: Vec<ModeOutput>,
+    speeds: Vec<SpeedOutput>,
 }
 
 #[derive(Serialize)]
-struct ShownMode {
+struct ModeOutput {
     frequency_hz: f32,
     damping_ratio: f32,
 }
 
-/// Change of both ends of an interval, mm per relative change.
+/// Derivatives of both ends of an unstable depth interval, mm per relative change of the parameter.
 #[derive(Serialize)]
-struct ShownSlopes {
+struct DerivativesOutput {
     by_frequency_mm: [Vec<f32>; 2],
     by_damping_ratio_mm: [Vec<f32>; 2],
     by_cutting_force_mm: [f32; 2],
 }
 
 #[derive(Serialize)]
-struct ShownColumn {
+struct SpeedOutput {
     rpm: f32,
-    unstable: Vec<ShownInterval>,
+    unstable: Vec<UnstableOutput>,
 }
 
 #[derive(Serialize)]
-struct ShownInterval {
+struct UnstableOutput {
     from_mm: f32,
     to_mm: f32,
     kind: &'static str,
     chatter_hz: f32,
     #[serde(skip_serializing_if = "Option::is_none")]
-    derivatives: Option<ShownSlopes>,
+    derivatives: Option<DerivativesOutput>,
 }
 
 /// Runs the verb.
@@ -130,7 +131,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         return show(path, &bytes, args.output);
     }
     let Some(out) = &args.out else {
-        return Err(Error::input("--out FILE.qct says where the table goes"));
+        return Err(Error::input("--out FILE.qct is needed: the lobe table to write"));
     };
     let mut cases = args
         .cases
@@ -174,7 +175,7 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
     let layers = table
         .layers()
         .enumerate()
-        .map(|(index, validity)| ShownLayer {
+        .map(|(index, validity)| LayerOutput {
             feed_per_tooth_mm: [validity.feed_from.0, validity.feed_to.0],
             start_deg: validity.start.0,
             exit_deg: validity.exit.0,
@@ -182,7 +183,7 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
             feed_direction_deg: table.feed_direction(index).map(|direction| direction.0),
             modes: table
                 .modes(index)
-                .map(|mode| ShownMode {
+                .map(|mode| ModeOutput {
                     frequency_hz: mode.frequency.0,
                     damping_ratio: mode.damping_ratio,
                 })
@@ -190,7 +191,7 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
             speeds: columns(&table, index),
         })
         .collect();
-    let shown = Shown {
+    let shown = TableOutput {
         name: table.name().into(),
         teeth: table.teeth(),
         bytes: bytes.len(),
@@ -198,7 +199,7 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
         crc: format!("{:08x}", header.crc),
         rpm_limits: table.limits().map(|limits| [limits.rpm_min.0, limits.rpm_max.0]),
         depth_mm: [from.0, to.0],
-        interpolation_error: table.interpolation_error().map(|error| ShownError {
+        interpolation_error: table.interpolation_error().map(|error| ErrorOutput {
             depth_mm: error.depth.0,
             speed: error.speed,
         }),
@@ -208,16 +209,16 @@ fn show(path: &Path, bytes: &[u8], output: Output) -> Result<(), Error> {
     output.answer(&shown, text)
 }
 
-fn columns(table: &LobeTable<'_>, layer: usize) -> Vec<ShownColumn> {
+fn columns(table: &LobeTable<'_>, layer: usize) -> Vec<SpeedOutput> {
     table
         .speeds()
         .enumerate()
-        .map(|(index, rpm)| ShownColumn {
+        .map(|(index, rpm)| SpeedOutput {
             rpm: rpm.0,
             unstable: table.entry(layer, index).map_or_else(Vec::new, |column| {
                 let intervals = column.intervals().iter().enumerate();
                 intervals
-                    .map(|(position, interval)| ShownInterval {
+                    .map(|(position, interval)| UnstableOutput {
                         from_mm: interval.from.0,
                         to_mm: interval.to.0,
                         kind: kind_name(interval.kind),
@@ -232,16 +233,16 @@ fn columns(table: &LobeTable<'_>, layer: usize) -> Vec<ShownColumn> {
         .collect()
 }
 
-fn shown_slopes(slopes: &IntervalSlopes, modes: usize) -> ShownSlopes {
+fn shown_slopes(slopes: &IntervalSlopes, modes: usize) -> DerivativesOutput {
     let ends = [&slopes.from, &slopes.to];
-    ShownSlopes {
+    DerivativesOutput {
         by_frequency_mm: ends.map(|end| end.by_frequency.iter().take(modes).copied().collect()),
         by_damping_ratio_mm: ends.map(|end| end.by_damping_ratio.iter().take(modes).copied().collect()),
         by_cutting_force_mm: ends.map(|end| end.by_cutting_force),
     }
 }
 
-/// A percentage between 0 and 100, both excluded.
+/// Parses a percentage between 0 and 100, both excluded.
 fn percent(text: &str) -> Result<f64, String> {
     let percent = super::positive(text)?;
     if percent < 100.0 {
@@ -262,7 +263,7 @@ fn kind_name(kind: IntervalKind) -> &'static str {
     }
 }
 
-fn as_text(path: &Path, shown: &Shown) -> String {
+fn as_text(path: &Path, shown: &TableOutput) -> String {
     let mut text = format!(
         "{}: {} ({} teeth), {} bytes, generation {}, CRC {}, depth {} to {} mm",
         path.display(),
@@ -280,7 +281,7 @@ fn as_text(path: &Path, shown: &Shown) -> String {
     if let Some(error) = &shown.interpolation_error {
         let _ = write!(
             text,
-            ", stable depths right to {:.4} mm between the entries, too cautious over at most {:.2} % of the speed",
+            ", interpolation error of stable depths at most {:.4} mm, on the safe side over at most {:.2} % of the speed",
             error.depth_mm,
             100.0 * error.speed
         );
@@ -321,7 +322,7 @@ fn as_text(path: &Path, shown: &Shown) -> String {
                 .collect();
             let _ = write!(
                 text,
-                ", with derivatives by cutting force and modes of {}",
+                ", with derivatives with respect to cutting force and modes of {}",
                 modes.join(", ")
             );
         }

@@ -10,7 +10,7 @@ use super::port::{PortArgs, TableAnswer};
 use super::{Error, Output};
 use crate::file;
 
-/// Sends a lobe table to the device; goes on where an interrupted upload stopped.
+/// Sends a lobe table to the device; resumes an interrupted upload.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut table tests/cases/kuka-kr90-acetal.toml --out kuka.qct\n  quietcut upload simulated kuka.qct --state device.bin"
@@ -26,7 +26,7 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Answer<'a> {
+struct UploadOutput<'a> {
     port: &'a str,
     bytes: usize,
     resumed_at: u32,
@@ -47,7 +47,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let uploaded = client.upload(&table, |received, _| bar.set_position(received.into()));
     bar.finish_and_clear();
     let uploaded = uploaded?;
-    let answer = Answer {
+    let answer = UploadOutput {
         port: args.port.name(),
         bytes: bytes.len(),
         resumed_at: uploaded.resumed_at,
@@ -55,17 +55,17 @@ pub fn run(args: Args) -> Result<(), Error> {
     };
     let resumed = match answer.resumed_at {
         0 => String::new(),
-        at => format!(" (from byte {at} on; an earlier upload had sent the rest)"),
+        at => format!(" (resumed at byte {at} of an interrupted upload)"),
     };
     let in_use = answer.table.as_ref().map_or("none".into(), ToString::to_string);
     let text = format!(
-        "{}: {} bytes sent{resumed}; in use is {in_use}",
+        "{}: {} bytes sent{resumed}; table in use: {in_use}",
         answer.port, answer.bytes
     );
     args.output.answer(&answer, text)
 }
 
-/// A bar on stderr where that is a terminal; else nothing.
+/// Progress bar on stderr if stderr is a terminal, else an invisible bar.
 fn progress_bar(bytes: usize) -> ProgressBar {
     let bar = ProgressBar::new(bytes as u64);
     if let Ok(style) = ProgressStyle::with_template("upload {bar:40} {bytes}/{total_bytes} {eta}") {

@@ -1,4 +1,4 @@
-//! `quietcut lobes` over the feed per tooth or the feed direction: the lines of a chart for each of them.
+//! `quietcut lobes` over the feed per tooth or the feed direction: one chart of limits for each value.
 
 use std::fmt::Write;
 
@@ -9,18 +9,19 @@ use super::{Error, Output, Range};
 use crate::case::Case;
 use crate::stability::{Label, SpeedLine, chart};
 
-/// What is varied beside speed and depth; at most one.
+/// Option for a third parameter of the chart besides spindle speed and axial depth.
 #[derive(Debug, clap::Args)]
 pub(super) struct Varied {
-    /// Limits over the feed direction too: degrees from the machine's x towards its y, first:last:count.
+    /// Compute the limits for each of these feed directions: degrees from the machine's x towards its y, first:last:count.
     #[arg(long, value_name = "R", allow_negative_numbers = true, requires = "rpm", conflicts_with_all = ["out", "cells", "feed_mm"])]
     feed_direction_deg: Option<Range>,
-    /// Limits over the feed per tooth too, in mm, first:last:count: it matters with axial-depth-modulation and with cubic terms.
+    /// Compute the limits for each of these feeds per tooth, in mm, first:last:count. Limits depend on the feed with
+    /// axial-depth-modulation and with cubic terms.
     #[arg(long, value_name = "R", value_parser = Range::positive, requires = "rpm", conflicts_with_all = ["out", "cells"])]
     feed_mm: Option<Range>,
 }
 
-/// The quantity, and its values.
+/// Varied parameter of the cut, with its values and the function that sets it in a case.
 pub(super) struct Variation {
     name: &'static str,
     values: Vec<f64>,
@@ -28,21 +29,21 @@ pub(super) struct Variation {
 }
 
 #[derive(Serialize)]
-struct Answer {
+struct VariedOutput {
     #[serde(flatten)]
     label: Label,
     varied: &'static str,
-    charts: Vec<Of>,
+    charts: Vec<ChartOutput>,
 }
 
 #[derive(Serialize)]
-struct Of {
+struct ChartOutput {
     value: f64,
     speeds: Vec<SpeedLine>,
 }
 
 impl Varied {
-    /// What was asked for.
+    /// The parameter to vary, if an option names one.
     pub(super) fn variation(&self) -> Option<Variation> {
         let direction = self.feed_direction_deg.map(|range| Variation {
             name: "feed_direction_deg",
@@ -66,7 +67,7 @@ impl Varied {
     }
 }
 
-/// Answers with a chart for each value.
+/// Computes and prints the chart of limits for each value of the varied parameter.
 pub(super) fn run(
     case: &Case,
     method: &MethodChoice,
@@ -83,28 +84,32 @@ pub(super) fn run(
         (variation.set)(&mut case, value);
         let chart = chart(method.on(&case)?.as_ref(), &rpm.values(), deepest_mm, 0)?;
         label = Some(chart.label);
-        charts.push(Of {
+        charts.push(ChartOutput {
             value,
             speeds: chart.speeds,
         });
     }
-    // A range has one value at least.
+    // A range has at least one value.
     let Some(label) = label else { return Ok(()) };
     let mut text = format!(
-        "by {label}\n{:>18}    rev/min  first limit [mm]  kind",
+        "method: {label}\n{:>18}    rev/min  first limit [mm]  kind",
         variation.name
     );
-    for of in &charts {
-        for line in &of.speeds {
+    for chart in &charts {
+        for line in &chart.speeds {
             let (depth, kind) = line.first_limit.map_or_else(
                 || ("none".into(), ""),
                 |limit| (format!("{:.4}", limit.depth_mm), limit.kind.name()),
             );
             // Writing to a String cannot fail.
-            let _ = write!(text, "\n{:>18}  {:>9.1}  {depth:>16}  {kind}", of.value, line.rpm);
+            let _ = write!(
+                text,
+                "\n{:>18}  {:>9.1}  {depth:>16}  {kind}",
+                chart.value, line.rpm
+            );
         }
     }
-    let answer = Answer {
+    let answer = VariedOutput {
         label,
         varied: variation.name,
         charts,

@@ -1,14 +1,14 @@
-//! `quietcut work`: tells the device its working point.
+//! `quietcut work`: sets the working point of the cut on the device.
 
 use quietcut_core::units::{Degrees, Millimeters};
 use quietcut_core::working_point::WorkingPoint;
 use serde::Serialize;
 
-use super::port::{PortArgs, WorkingPointAnswer, direction_in_words};
+use super::port::{PortArgs, WorkingPointAnswer, feed_direction_text};
 use super::{Error, Output, angle, positive};
 use crate::report::answer::number;
 
-/// Tells the device its working point; without it, advice says what it assumes.
+/// Sets the working point of the cut on the device; without it, advice states the working point that it assumes.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  quietcut work simulated --depth-mm 2 --start 90 --exit 180 --feed 0.15")]
 pub struct Args {
@@ -26,10 +26,10 @@ pub struct Args {
     /// Feed per tooth in mm.
     #[arg(long, value_name = "F", value_parser = positive, allow_negative_numbers = true)]
     feed: f64,
-    /// Feed direction in degrees from the machine's x towards its y, for tables with layers for several.
+    /// Feed direction in degrees from the machine's x towards its y, for lobe tables with layers of several directions.
     #[arg(long, value_name = "D", value_parser = angle, allow_negative_numbers = true)]
     feed_direction_deg: Option<f64>,
-    /// Posture of the robot: an index that means the same on host and device.
+    /// Posture of the robot: index of the posture in the lobe table.
     #[arg(long, value_name = "N", default_value_t = 0)]
     posture: u8,
     #[command(flatten)]
@@ -37,10 +37,10 @@ pub struct Args {
 }
 
 #[derive(Serialize)]
-struct Answer<'a> {
+struct WorkingPointOutput<'a> {
     port: &'a str,
     working_point: WorkingPointAnswer,
-    /// `null` where it was not told.
+    /// Feed direction in degrees; `null` if none is set.
     feed_direction_deg: Option<f64>,
 }
 
@@ -61,29 +61,29 @@ pub fn run(args: Args) -> Result<(), Error> {
     };
     let (mut client, _) = args.port.connect()?;
     client.set_working_point(Some(point))?;
-    // What the device says it was told, not what this command meant to tell.
-    let told = client.status()?.working_point;
-    let told = told.ok_or_else(|| {
+    // Read back from the device, to report the working point that it uses.
+    let point = client.status()?.working_point;
+    let point = point.ok_or_else(|| {
         Error::other(format!(
-            "{}: the device forgot the working point",
+            "{}: the device did not keep the working point",
             args.port.name()
         ))
     })?;
-    // Last, since older firmware does not know of directions; what was told before is not left behind.
+    // The last request, since older firmware rejects requests of the feed direction. An earlier direction is replaced or removed.
     let direction = args.feed_direction_deg.map(|degrees| Degrees(degrees as f32));
     if direction.is_some() || client.feed_direction()?.is_some() {
         client.set_feed_direction(direction)?;
     }
-    let answer = Answer {
+    let answer = WorkingPointOutput {
         port: args.port.name(),
-        working_point: WorkingPointAnswer::new(&told),
+        working_point: WorkingPointAnswer::new(&point),
         feed_direction_deg: client.feed_direction()?.map(|direction| number(direction.0)),
     };
     let text = format!(
         "{}: {}, feed direction {}",
         answer.port,
         answer.working_point,
-        direction_in_words(answer.feed_direction_deg)
+        feed_direction_text(answer.feed_direction_deg)
     );
     args.output.answer(&answer, text)
 }
