@@ -291,7 +291,7 @@ fn deviations_of_a_case_give_percentiles_a_band_and_probabilities() {
     }
     assert_eq!(json["cells_mm"], serde_json::json!([1.0, 2.0, 3.0]));
     let svg = std::fs::read_to_string(folder.path().join("k.svg")).expect("the picture");
-    assert!(svg.contains("95 % of the machines"));
+    assert!(svg.contains("95 % percentiles of the limit"));
     // The same draws again; without the deviations the answer that a case without them has.
     let again = run(&["--probability"]);
     assert_eq!(again.stdout, answer.stdout);

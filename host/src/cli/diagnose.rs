@@ -13,7 +13,7 @@ use crate::diagnose::lobes::{believed, lobes};
 use crate::diagnose::{DiagnoseError, Diagnosis, Options, Stage, diagnose_watched, recorded_cuts};
 use crate::recording::Recording;
 use crate::report::diagnosis::diagnosis_page;
-use crate::report::lobes_change::{called, sentences};
+use crate::report::lobes_change::{sentences, trial_cut_counts};
 use crate::trial_cuts::{self, TestCut};
 
 /// Finds why the simulation of a case differs from recordings, extends the case, and states the gain in prediction error.
@@ -181,7 +181,7 @@ fn text(diagnosis: &Diagnosis) -> String {
     }
     lines.extend(diagnosis.unexplained.guess.clone());
     lines.extend(diagnosis.lobes.iter().flat_map(sentences));
-    lines.extend(diagnosis.believed.iter().map(called));
+    lines.extend(diagnosis.believed.iter().map(trial_cut_counts));
     if let Some(test) = &diagnosis.next_test {
         lines.push(format!("next test: {}; it {}", test.what(), test.why));
     }

@@ -15,7 +15,7 @@ use std::path::Path;
 
 use super::Error;
 use crate::case::Case;
-use answer::Answer;
+use answer::IdentifyOutput;
 pub use args::Args;
 use args::Method;
 
@@ -61,19 +61,19 @@ fn sections(path: &Path) -> Result<toml::Table, Error> {
         .map_err(|error| Error::input(format!("{}: {error}", path.display())))
 }
 
-fn text(answer: &Answer) -> String {
+fn text(answer: &IdentifyOutput) -> String {
     let mut lines = Vec::new();
     for model in &answer.models {
         for (key, figure) in &model.parameters {
             let [low, high] = figure.ci90;
             lines.push(format!(
                 "{}{key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
-                model.place(),
+                model.label(),
                 figure.value
             ));
         }
     }
-    lines.extend(answer.said.iter().cloned());
+    lines.extend(answer.messages.iter().cloned());
     if let Some(error) = answer.fit_error {
         lines.push(format!(
             "fit error {:.3} % (root mean square, relative to the data)",

@@ -1,4 +1,4 @@
-//! The virtual cell with a simulated device at its spindle, and a host at the other end of the serial line.
+//! Test bench of the demonstration: virtual cell, simulated device at its spindle, and client at the other end of the serial line.
 
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
@@ -13,43 +13,43 @@ use super::trial::Trial;
 use crate::device::{Client, DeviceError, Event, Pace, Setup, SimulatedDevice, SimulatedPort, VirtualCell};
 use crate::simulate::{Heard, VirtualCutError};
 
-/// Why a cut could not be tried.
+/// Failure of a cut on the test bench.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
-    /// The device.
+    /// The device failed or does not answer.
     #[error(transparent)]
     Device(#[from] DeviceError),
-    /// The simulation of the cut.
+    /// The cut cannot be simulated.
     #[error(transparent)]
     Cut(#[from] VirtualCutError),
-    /// The device stopped talking in the middle of a cut.
-    #[error("the simulated device said nothing for {} s in the middle of a cut", SILENCE.as_secs())]
+    /// The device sent no report during a cut.
+    #[error("the simulated device sent nothing for {} s during a cut", REPORT_TIMEOUT.as_secs())]
     Silent,
 }
 
-/// A device that hears a block says something of it long before this.
-const SILENCE: Duration = Duration::from_secs(20);
+/// Longest wait for a report during a cut: a choice far above the computing time of a block.
+const REPORT_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// How long each cut is.
+/// Duration of each cut, s: a choice, long enough for detection and for the stationary vibration after it.
 const CUT_SECONDS: f64 = 16.0;
 
-/// A cell, a device, a serial line, a host.
+/// Test bench with a virtual cell, a simulated device and its client.
 pub struct Bench {
     cell: VirtualCell,
     cuts: Sender<Heard>,
     client: Client,
     serial_port: String,
-    /// Number of the next block and its time, if the spindle goes on at once.
+    /// Sequence number and time of the next block, if the next cut follows without a pause.
     next_sequence: u32,
-    /// Seed of the next cut's noise.
+    /// Seed of the sensor noise of the next cut.
     seed: u64,
 }
 
 impl Bench {
-    /// Switches the device on and says hello to it over its serial port.
+    /// Starts the device and connects to it over its serial port.
     ///
     /// # Errors
-    /// Where the system has no pseudo-terminal.
+    /// The operating system has no free pseudo-terminal.
     pub fn new(cell: VirtualCell) -> Result<(Self, Info), DeviceError> {
         let (cuts, queue) = channel();
         let setup = Setup {
@@ -73,43 +73,43 @@ impl Bench {
         ))
     }
 
-    /// The path of the device's serial port.
+    /// Path of the serial port of the device.
     pub fn serial_port(&self) -> &str {
         &self.serial_port
     }
 
-    /// The host's end of the line.
+    /// Client at the host end of the serial line.
     pub fn client(&mut self) -> &mut Client {
         &mut self.client
     }
 
-    /// Cuts, and listens to what the device says of it.
+    /// Simulates one cut and collects the reports of the device.
     ///
     /// # Errors
-    /// Where the cut cannot be simulated, or the device stops talking.
+    /// The cut cannot be simulated, or the device sends no report for a long time.
     pub fn cut(&mut self, rpm: f64, depth_mm: f64) -> Result<Trial, BenchError> {
-        let heard = self.cell.cut(rpm, depth_mm, CUT_SECONDS, self.seed)?;
+        let recorded = self.cell.cut(rpm, depth_mm, CUT_SECONDS, self.seed)?;
         let mut trial = Trial {
             rpm,
             depth_mm,
             teeth: self.cell.teeth().map_err(DeviceError::from)?,
             full_cut_s: self.cell.full_cut_s(rpm, depth_mm, CUT_SECONDS)?,
-            trace: Trace::of(&heard.blocks, &Sensor::IIS3DWB_16G),
-            reports: Vec::with_capacity(heard.blocks.len()),
+            trace: Trace::of(&recorded.blocks, &Sensor::IIS3DWB_16G),
+            reports: Vec::with_capacity(recorded.blocks.len()),
             spectra: Vec::new(),
             strobes: Vec::new(),
         };
-        let blocks = heard.blocks.len() as u32;
+        let blocks = recorded.blocks.len() as u32;
         let all = Subscription {
             reports: Reports::All,
             spectra: true,
             strobes: true,
         };
         self.client.subscribe(all)?;
-        // The bench keeps the device, and the device takes cuts as long as it lives.
-        let _ = self.cuts.send(heard);
+        // Sending cannot fail: the bench owns the device, which receives cuts until it is dropped.
+        let _ = self.cuts.send(recorded);
         let last = self.next_sequence.wrapping_add(blocks).wrapping_sub(1);
-        self.listen(&mut trial, last)?;
+        self.collect(&mut trial, last)?;
         if trial.reports.last().is_none_or(|report| report.sequence != last) {
             return Err(BenchError::Silent);
         }
@@ -118,18 +118,18 @@ impl Bench {
         Ok(trial)
     }
 
-    /// Takes what the device says up to block `last`.
-    fn listen(&mut self, trial: &mut Trial, last: u32) -> Result<(), DeviceError> {
+    /// Collects the events of the device up to block `last`.
+    fn collect(&mut self, trial: &mut Trial, last: u32) -> Result<(), DeviceError> {
         let mut is_over = false;
         let mut start = None;
         while !is_over {
-            let Some(event) = self.client.next_event(SILENCE)? else {
+            let Some(event) = self.client.next_event(REPORT_TIMEOUT)? else {
                 return Ok(());
             };
             is_over = matches!(&event, Event::Report(report) if report.sequence == last);
             take(trial, event, &mut start);
         }
-        // What the last block made beside its report comes before the answer to the next request.
+        // Spectra and map points of the last block arrive before the reply to the next request.
         self.client.subscribe(Subscription::default())?;
         while let Some(event) = self.client.next_event(Duration::ZERO)? {
             take(trial, event, &mut start);
@@ -138,7 +138,7 @@ impl Bench {
     }
 }
 
-/// Times of a trial begin with its first report.
+/// Adds one event to the trial; times are counted from the first report of the cut.
 fn take(trial: &mut Trial, event: Event, start: &mut Option<Nanoseconds>) {
     match event {
         Event::Spectrum(chunk) => trial.take_spectrum(&chunk),

@@ -1,5 +1,4 @@
-//! The demonstration: a virtual robot cell with a simulated device, the cuts that are tried on it, and the report of
-//! them.
+//! Demonstration: test bench with a virtual robot cell and a simulated device, its cuts, and their HTML report.
 
 mod bench;
 mod page;

@@ -1,4 +1,4 @@
-//! The report of the demonstration.
+//! HTML report of the demonstration.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -11,43 +11,43 @@ use crate::report::marks::{Mark, MarkKind};
 use crate::report::page::{figure, page as whole_page};
 use crate::report::spectrum::{SpectrumMarks, spectrum};
 use crate::report::stroboscope::samples_per_tooth;
-use crate::report::time_signal::{Moment, time_signal};
+use crate::report::time_signal::{TimeMark, time_signal};
 use crate::report::{PictureError, words};
 
-/// A cut that was tried, and the cut that the device advised.
+/// One chapter of the demonstration: a first cut, and the cut with the advised speed and depth.
 #[derive(Clone, Debug)]
 pub struct Story {
-    /// The first cut.
+    /// First cut, before any advice.
     pub first: Trial,
-    /// The cut with the advised speed and depth; `None` where there was nothing to follow.
+    /// Cut with the advised speed and depth; `None` without advice.
     pub advised: Option<Trial>,
 }
 
-/// Spindle speeds that the chart shows, rev/min.
+/// Spindle speeds of the lobe chart, rev/min: a choice that contains all cuts of the demonstration.
 const CHART_RPM: RangeInclusive<f64> = 850.0..=1200.0;
-/// Depths that the chart shows, mm.
+/// Largest axial depth of the lobe chart, mm: a choice, twice the depth of the cuts.
 const CHART_DEPTH_MM: f64 = 4.0;
-/// Frequencies that the spectra show: the modes of the robot and a few harmonics of the teeth.
+/// Highest frequency of the spectra, Hz: a choice that shows the modes of the robot and the first tooth-passing harmonics.
 const SPECTRUM_HZ: f64 = 120.0;
 
-/// The page: the lobe chart of the table with all cuts on it, then each story with its pictures.
+/// Renders the page: the lobe chart of the table with all cuts, then the texts and pictures of each story.
 ///
 /// # Errors
-/// Where a picture cannot be drawn.
+/// A picture cannot be drawn.
 pub fn page(title: &str, table: &LobeTable<'_>, stories: &[Story]) -> Result<String, PictureError> {
     let chart = chart(table, stories)?;
     let chapters = stories.iter().map(chapter).collect::<Result<Vec<_>, _>>()?;
     let body = html! {
         h1 { (title) }
         p {
-            "A milling robot cuts acetal. The device on its spindle hears chatter, says which kind it is, looks up in the \
-             stability lobes of this robot which speed is quiet, and the next cut shows that it is. Robot, cut, sensor \
-             and device are computed; the device is the same program as on the board, at the other end of a serial line."
+            "A milling robot cuts acetal. The device on its spindle detects chatter, names its kind and finds a quiet speed in the \
+             stability lobes of this robot. The next cut confirms that speed. Robot, cut and sensor are simulated; the \
+             device runs the same program as the board, at the other end of a serial line."
         }
-        (figure(&chart, "Lobes as the device has them. Green: stable. Crosses: cuts that chattered; arrows: what the device said; \
-                         dots: the cuts after that."))
+        (figure(&chart, "Lobe table of the device. Green: stable. Crosses: cuts with chatter; arrows: advice of the device; \
+                         dots: the advised cuts."))
         @for chapter in &chapters { (chapter) }
-        footer { "Made by quietcut demo. Sensor: ±16 g, 16 bit, 26.7 kHz, its clock 1 % fast, with noise; one tachometer mark per turn." }
+        footer { "Made by quietcut demo. Sensor: ±16 g, 16 bit, 26.7 kHz, its clock 1 % fast, with noise; one tachometer mark per revolution." }
     };
     Ok(whole_page(title, &body))
 }
@@ -92,9 +92,9 @@ fn kind(trial: &Trial) -> String {
 
 fn chapter(story: &Story) -> Result<Markup, PictureError> {
     let trials: Vec<&Trial> = std::iter::once(&story.first).chain(&story.advised).collect();
-    let axis = loudest(&story.first);
-    // Both cuts on one scale: the quiet one shall look as quiet as it is.
-    let scale = Scale {
+    let axis = dominant_axis(&story.first);
+    // Both cuts share one scale, so that their vibrations can be compared.
+    let scale = CommonScale {
         axis,
         signal: around_zero(
             trials
@@ -108,24 +108,24 @@ fn chapter(story: &Story) -> Result<Markup, PictureError> {
                 .map(|(_, value)| value),
         ),
     };
-    let parts = trials
+    let sections = trials
         .iter()
         .map(|trial| pictures(trial, &scale))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
-        @for (index, (trial, part)) in trials.iter().zip(&parts).enumerate() {
+        @for (index, (trial, section)) in trials.iter().zip(&sections).enumerate() {
             h2 {
-                @if index > 0 { "As the device says: " }
+                @if index > 0 { "Advised cut: " }
                 (headline(trial))
             }
             (account(trial))
-            (part)
+            (section)
         }
     })
 }
 
-/// What the pictures of one story have in common.
-struct Scale {
+/// Axis and value ranges that the pictures of both cuts of a story share.
+struct CommonScale {
     axis: usize,
     signal: Range<f64>,
     strobes: Range<f64>,
@@ -140,43 +140,43 @@ fn headline(trial: &Trial) -> String {
     format!("{:.0} rev/min, {:.2} mm deep", trial.rpm, trial.depth_mm)
 }
 
-/// What happened, in a few sentences.
+/// Sentences about chatter, advice and vibration of one cut.
 fn account(trial: &Trial) -> Markup {
-    let vibration = trial.vibration()[loudest(trial)];
+    let vibration = trial.vibration()[dominant_axis(trial)];
     html! {
         @match trial.alarm() {
             Some(report) => {
                 p {
                     span.chatter { (words::verdict(&report.judgement)) }
-                    " " (format!("heard {:.2} s after the start, {:.0} tooth passes after the tool was in full cut ({}).",
+                    " " (format!("detected {:.2} s after the start, {:.0} tooth passings after full engagement ({}).",
                                  seconds(report), trial.teeth_since_entry(seconds(report)).max(0.0), words::reason(report.judgement.reason)))
                 }
                 @if let Some(advice) = &report.advice {
-                    p { "The device says: " b { (words::action(advice)) } " – " (words::why(advice, &report.judgement, report.speed)) "." }
+                    p { "Advice: " b { (words::action(advice)) } " – " (words::why(advice, &report.judgement, report.speed)) "." }
                 }
             }
-            None => p { span.quiet { "Quiet: " } "the device called no chatter from the first touch to the last." }
+            None => p { span.quiet { "Quiet: " } "the device reported no chatter during the whole cut." }
         }
         p { (format!("Vibration at the end of the cut, below 400 Hz: {vibration:.2} m/s² rms.")) }
     }
 }
 
-fn pictures(trial: &Trial, scale: &Scale) -> Result<Markup, PictureError> {
+fn pictures(trial: &Trial, scale: &CommonScale) -> Result<Markup, PictureError> {
     let axis = scale.axis;
     let quantity = format!("acceleration {} [m/s²]", ["x", "y", "z"][axis]);
     let [from_s, to_s] = trial.full_cut_s;
-    let moment = |t_s, label: &str| Moment {
+    let mark = |t_s, label: &str| TimeMark {
         t_s,
         label: label.into(),
     };
-    let mut moments = vec![moment(from_s, "full cut"), moment(to_s, "tool leaves")];
-    moments.extend(
+    let mut marks = vec![mark(from_s, "full engagement"), mark(to_s, "tool leaves")];
+    marks.extend(
         trial
             .alarm()
-            .map(|report| moment(seconds(report), "chatter heard")),
+            .map(|report| mark(seconds(report), "chatter detected")),
     );
     let (t_s, values) = (&trial.trace.t_s, &trial.trace.axes[axis]);
-    let signal = time_signal("", &quantity, t_s, values, &moments, Some(scale.signal.clone()))?;
+    let signal = time_signal("", &quantity, t_s, values, &marks, Some(scale.signal.clone()))?;
     let mut pair = Vec::new();
     if let Some(last) = trial.spectrum_in_cut() {
         let frequency_hz: Vec<f64> = (0..last.power.len())
@@ -197,7 +197,7 @@ fn pictures(trial: &Trial, scale: &Scale) -> Result<Markup, PictureError> {
         )?;
         pair.push(figure(
             &picture,
-            "As the device computed it; all axes together, rms per bin.",
+            "Spectrum of the device: sum over all axes, rms per bin.",
         ));
     }
     let strobes = trial.strobes_in_cut(axis);
@@ -206,17 +206,17 @@ fn pictures(trial: &Trial, scale: &Scale) -> Result<Markup, PictureError> {
         let picture = samples_per_tooth("One sample per tooth", &quantity, &strobes, range)?;
         pair.push(figure(
             &picture,
-            "One line: every tooth feels the same. Two lines: period doubling. Waves: a Hopf.",
+            "One line: the same vibration at every tooth. Two lines: period doubling. Waves: Hopf bifurcation.",
         ));
     }
     Ok(html! {
-        (figure(&signal, "What the sensor felt below 400 Hz."))
+        (figure(&signal, "Acceleration below 400 Hz."))
         div.pair { @for picture in &pair { (picture) } }
     })
 }
 
-/// The axis that vibrates most.
-fn loudest(trial: &Trial) -> usize {
+/// Axis with the largest root mean square of the acceleration.
+fn dominant_axis(trial: &Trial) -> usize {
     let [x, y, z] = trial.vibration();
     if x >= y && x >= z {
         0

@@ -1,20 +1,20 @@
-//! What the sensor felt at low frequencies, to be drawn.
+//! Low-pass filtered acceleration of a cut, for the pictures of the report.
 
 use quietcut_core::acceleration::{Block, Sensor};
 use quietcut_core::decimation::{Decimation, FRACTION_BITS, State};
 
-/// Acceleration in the structure band over time.
+/// Acceleration over time in the structure band, the low frequencies with the structural modes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
-    /// Seconds since the first sample of the cut.
+    /// Time since the first sample of the cut, s.
     pub t_s: Vec<f64>,
-    /// Acceleration along x, y, z in m/s², as many.
+    /// Acceleration along x, y and z in m/s², one value for each time.
     pub axes: [Vec<f64>; 3],
 }
 
 impl Trace {
-    /// The structure band of these blocks, filtered as in the device and with the delay of the filter taken off; the
-    /// true sample rate is taken from the stamps of the first and the last block.
+    /// Filters the blocks into the structure band as the device does, and removes the delay of the filter. The sampling rate
+    /// follows from the time stamps of the first and the last block.
     pub fn of(blocks: &[Block], sensor: &Sensor) -> Self {
         let mut trace = Self::default();
         let (Ok(decimation), Some(first), Some(last)) = (
@@ -37,7 +37,7 @@ impl Trace {
                 continue;
             };
             let t_s = (index as f64 - delay) * period_s;
-            // Before the filter is full it shows the jump from nothing to the first sample.
+            // Negative times are the transient of the filter at the first sample.
             if t_s < 0.0 {
                 continue;
             }
@@ -49,7 +49,7 @@ impl Trace {
         trace
     }
 
-    /// Root mean square of each axis without its mean between two times.
+    /// Standard deviation of the acceleration along each axis between two times, m/s².
     pub fn rms(&self, [from_s, to_s]: [f64; 2]) -> [f64; 3] {
         let (from, to) = (
             self.t_s.partition_point(|&t| t < from_s),
@@ -99,14 +99,14 @@ mod tests {
         let amplitude = counts * f64::from(sensor.meters_per_second2_per_count);
         for (&t_s, &value) in trace.t_s.iter().zip(&trace.axes[0]).skip(20) {
             let expected = amplitude * (TAU * tone_hz * t_s).sin();
-            // Half a count of rounding, a count more of truncation; the filter is flat to 0.001 dB.
+            // Tolerance: half a count of rounding, one count of truncation, and 0.001 dB of filter ripple.
             assert!(
                 (value - expected).abs() < 2e-3 * amplitude,
                 "{t_s}: {value} {expected}"
             );
         }
         let [x, y, _] = trace.rms([0.5, 1.5]);
-        // Not a whole number of periods in the second: 1 / (4 π · 17.4) of the square at most.
+        // The interval of 1 s contains no whole number of periods: the relative error of the mean square is at most 1/(4π·17.4).
         assert!(
             (x / (amplitude / 2f64.sqrt()) - 1.0).abs() < 0.01 && y == 0.0,
             "{x} {y}"

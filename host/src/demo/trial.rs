@@ -1,51 +1,51 @@
-//! One cut on the virtual cell, and what the device said of it.
+//! One cut on the virtual cell with the reports of the device.
 
 use quietcut_core::monitor::{Band, Report, Strobe};
 use quietcut_core::protocol::SpectrumChunk;
 
 use super::trace::Trace;
 
-/// A spectrum that the device has sent.
+/// Power spectrum from the device.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spectrum {
-    /// Sequence number of the block that completed it.
+    /// Sequence number of the block that completed the spectrum.
     pub sequence: u32,
-    /// Width of a bin.
+    /// Width of a frequency bin, Hz.
     pub bin_hz: f64,
-    /// Power per bin, in (m/s²)².
+    /// Mean square of the acceleration in each bin, (m/s²)².
     pub power: Vec<f64>,
 }
 
-/// One cut.
+/// One cut with its acceleration and all data from the device.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// Spindle speed.
+    /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Axial depth of cut.
+    /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Number of teeth.
+    /// Number of teeth of the tool.
     pub teeth: u8,
-    /// From the end of the entry to the beginning of the exit, in seconds since the first sample.
+    /// Start and end of full engagement, s since the first sample.
     pub full_cut_s: [f64; 2],
-    /// What the sensor felt.
+    /// Low-pass filtered acceleration at the sensor.
     pub trace: Trace,
-    /// What the device said, block by block, its times beginning with the cut.
+    /// Reports of the device, one for each block; times are counted from the start of the cut.
     pub reports: Vec<Report>,
-    /// Spectra of the structure band.
+    /// Power spectra of the structure band.
     pub spectra: Vec<Spectrum>,
-    /// Samples once per tooth in the structure band, with the number of the block that made them.
+    /// Stroboscopic samples of the structure band, one per tooth passing, each with the number of its block.
     pub strobes: Vec<(u32, Strobe)>,
 }
 
 impl Trial {
-    /// The first time that the device called chatter.
+    /// First report with chatter; `None` for a quiet cut.
     pub fn alarm(&self) -> Option<&Report> {
         self.reports
             .iter()
             .find(|report| report.judgement.verdict.is_chatter())
     }
 
-    /// What the device said last before the tool began to leave the workpiece.
+    /// Last report before the tool begins to leave the workpiece.
     pub fn last_in_cut(&self) -> Option<&Report> {
         let end = self
             .reports
@@ -53,28 +53,28 @@ impl Trial {
         end.checked_sub(1).and_then(|index| self.reports.get(index))
     }
 
-    /// True where the device never called chatter.
+    /// Whether the device reported no chatter during the whole cut.
     pub fn is_quiet(&self) -> bool {
         self.alarm().is_none()
     }
 
-    /// The tooth-passing frequency.
+    /// Tooth-passing frequency, Hz.
     pub fn tooth_passing_hz(&self) -> f64 {
         self.rpm / 60.0 * f64::from(self.teeth)
     }
 
-    /// Tooth passes from the beginning of the full cut to a time.
+    /// Number of tooth passings between the start of full engagement and the time `t_s`.
     pub fn teeth_since_entry(&self, t_s: f64) -> f64 {
         (t_s - self.full_cut_s[0]) * self.tooth_passing_hz()
     }
 
-    /// Vibration in the structure band over the last quarter of the full cut, rms of each axis.
+    /// Standard deviation of the acceleration along each axis over the last quarter of full engagement, m/s².
     pub fn vibration(&self) -> [f64; 3] {
         let [from_s, to_s] = self.full_cut_s;
         self.trace.rms([to_s - 0.25 * (to_s - from_s), to_s])
     }
 
-    /// Samples once per tooth of the full cut along one axis: number of the tooth pass, and acceleration in m/s².
+    /// Stroboscopic samples of full engagement along one axis: number of the tooth passing and acceleration in m/s².
     pub fn strobes_in_cut(&self, axis: usize) -> Vec<(u32, f64)> {
         let in_cut = |sequence: u32| {
             let report = self.reports.partition_point(|report| report.sequence < sequence);
@@ -87,7 +87,7 @@ impl Trial {
             .collect()
     }
 
-    /// The newest spectrum of the full cut.
+    /// Latest power spectrum of full engagement.
     pub fn spectrum_in_cut(&self) -> Option<&Spectrum> {
         let last = self.last_in_cut()?.sequence;
         self.spectra
@@ -96,7 +96,7 @@ impl Trial {
             .find(|spectrum| spectrum.sequence <= last)
     }
 
-    /// Takes a piece of a spectrum; pieces come in order.
+    /// Appends a chunk of a spectrum; chunks arrive in order.
     pub(super) fn take_spectrum(&mut self, chunk: &SpectrumChunk) {
         if chunk.band != Band::Structure {
             return;
@@ -118,7 +118,7 @@ impl Trial {
     }
 }
 
-/// The time of a report in seconds.
+/// Time of a report, s.
 pub(super) fn seconds(report: &Report) -> f64 {
     crate::report::time::seconds(report)
 }

@@ -1,5 +1,5 @@
-//! The host's side of the protocol: one request at a time, repeated until it is answered, and what the device sends by
-//! itself in between.
+//! Client of the protocol: it sends one request at a time, repeats it until the reply arrives, and queues the events that the device
+//! sends without a request.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -15,36 +15,36 @@ use quietcut_core::working_point::WorkingPoint;
 use super::DeviceError;
 use super::port::Port;
 
-/// How often a request is sent before the device counts as silent.
+/// Number of transmissions of a request before the device counts as not answering: a choice.
 const ATTEMPTS: u32 = 4;
 
-/// The longest that a device takes to answer: the emulated one needs about a second for the first reply behind a
-/// pseudo-terminal.
+/// Longest wait for a reply: the emulated board needs about 1 s for its first reply over a pseudo-terminal.
 const REPLY: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 1200 });
 
-/// The same where flash memory may be erased first: a page in 22 ms, and before it the blocks that wait; and many times as much.
+/// Longest wait for a reply that follows an erasure of flash memory: a choice far above the 22 ms of a page and the processing of
+/// waiting blocks.
 pub(super) const REPLY_AFTER_ERASE: Duration = Duration::from_secs(3);
 
-/// How long an answer is still waited for behind a frame that cannot be read.
+/// Longest wait for a reply after an unreadable frame: a choice.
 const AFTER_NOISE: Duration = Duration::from_millis(if cfg!(test) { 10 } else { 150 });
 
-/// The longest that the line takes to swallow one frame: at 9600 bit/s the largest takes 0.6 s.
+/// Longest time to send one frame: a choice above the 0.6 s of the largest frame at 9600 bit/s.
 const SEND: Duration = Duration::from_secs(2);
 
-/// What a device sends without being asked.
+/// Message that the device sends without a request.
 #[derive(Clone, Debug, PartialEq)]
-// Most events are reports, and no more than a few wait at a time.
+// Most events are reports, and the queue holds only a few.
 #[allow(clippy::large_enum_variant)]
 pub enum Event {
-    /// What the pipeline says of a block.
+    /// Report of the signal chain after a block.
     Report(Report),
-    /// A piece of a spectrum.
+    /// Chunk of a power spectrum.
     Spectrum(SpectrumChunk),
-    /// Points of the stroboscopic map.
+    /// Points of the stroboscopic map, one per tooth passing.
     Strobes(StrobeChunk),
 }
 
-/// A device that has answered.
+/// Connection to a device.
 pub struct Client {
     port: Box<dyn Port>,
     decoder: Decoder,
@@ -55,12 +55,12 @@ pub struct Client {
 }
 
 impl Client {
-    /// Says hello to the device at `port`.
+    /// Connects to the device at `port` with the request hello.
     ///
     /// # Errors
-    /// Where no quietcut device of this protocol version answers.
+    /// No quietcut device of this protocol version answers.
     pub fn connect(port: Box<dyn Port>) -> Result<(Self, Info), DeviceError> {
-        // Numbers that no earlier run has used: a device repeats its reply to a number that it has just answered.
+        // Request numbers start at a new value: a device repeats its last reply for a number that it has just answered.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let mut client = Self {
             port,
@@ -70,26 +70,26 @@ impl Client {
             events: VecDeque::new(),
             lost_frames: 0,
         };
-        // A zero ends what noise may have begun.
+        // A zero byte ends a frame that noise may have started.
         client.port.send(&[0], SEND)?;
         let info = client.hello()?;
-        // What was on the line before belongs to another session.
+        // Earlier events belong to another session.
         client.events.clear();
         client.lost_frames = 0;
         Ok((client, info))
     }
 
-    /// The name of the port.
+    /// Name of the port.
     pub fn port(&self) -> &str {
         self.port.name()
     }
 
-    /// Frames that the device has sent and that did not arrive.
+    /// Number of frames from the device that were lost.
     pub fn lost_frames(&self) -> u32 {
         self.lost_frames
     }
 
-    /// Begins anew, as after a restart of the device.
+    /// Repeats the hello, as after a restart of the device.
     pub(super) fn hello(&mut self) -> Result<Info, DeviceError> {
         match self.exchange(&Request::Hello, "hello", REPLY)? {
             Reply::Info(info) if info.protocol == VERSION => Ok(info),
@@ -98,7 +98,7 @@ impl Client {
         }
     }
 
-    /// Who the device is, and what it has.
+    /// Requests the identity, memory slots and lobe table of the device.
     pub fn info(&mut self) -> Result<Info, DeviceError> {
         match self.exchange(&Request::Info, "info", REPLY)? {
             Reply::Info(info) => Ok(info),
@@ -106,7 +106,7 @@ impl Client {
         }
     }
 
-    /// How the device is.
+    /// Requests the status of the device: uptime, counters, working point.
     pub fn status(&mut self) -> Result<Status, DeviceError> {
         match self.exchange(&Request::Status, "status", REPLY)? {
             Reply::Status(status) => Ok(status),
@@ -114,7 +114,7 @@ impl Client {
         }
     }
 
-    /// The settings of the device's pipeline.
+    /// Requests the settings of the signal chain.
     pub fn settings(&mut self) -> Result<Settings, DeviceError> {
         match self.exchange(&Request::Settings, "settings", REPLY)? {
             Reply::Settings(settings) => Ok(settings),
@@ -122,19 +122,19 @@ impl Client {
         }
     }
 
-    /// Sets the pipeline up anew.
+    /// Replaces the settings of the signal chain.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), DeviceError> {
-        self.tell(&Request::SetSettings(settings), "settings")
+        self.command(&Request::SetSettings(settings), "settings")
     }
 
-    /// Tells the working point, or that it is not known.
+    /// Sets the working point, or removes it with `None`.
     pub fn set_working_point(&mut self, point: Option<WorkingPoint>) -> Result<(), DeviceError> {
-        self.tell(&Request::SetWorkingPoint(point), "working point")
+        self.command(&Request::SetWorkingPoint(point), "working point")
     }
 
-    /// The feed direction, as told.
+    /// Requests the feed direction; `None` if none is set.
     ///
-    /// A device with older firmware does not know the question; it was told none. It must be the last that is asked of such a device.
+    /// Older firmware does not support this request and is treated as having none. It must be the last request to such a device.
     pub fn feed_direction(&mut self) -> Result<Option<Degrees>, DeviceError> {
         match self.exchange(&Request::FeedDirection, "feed direction", REPLY) {
             Ok(Reply::FeedDirection(direction)) => Ok(direction),
@@ -147,28 +147,28 @@ impl Client {
         }
     }
 
-    /// Tells the feed direction, or that it is not known.
+    /// Sets the feed direction, or removes it with `None`.
     pub fn set_feed_direction(&mut self, direction: Option<Degrees>) -> Result<(), DeviceError> {
-        self.tell(&Request::SetFeedDirection(direction), "feed direction")
+        self.command(&Request::SetFeedDirection(direction), "feed direction")
     }
 
-    /// Says what the device shall send by itself.
+    /// Selects the events that the device sends without a request.
     pub fn subscribe(&mut self, subscription: Subscription) -> Result<(), DeviceError> {
-        self.tell(&Request::Subscribe(subscription), "subscription")
+        self.command(&Request::Subscribe(subscription), "subscription")
     }
 
-    /// Forgets what the pipeline has learned and lets it listen to the sensor again.
+    /// Resets the signal chain to its initial state and returns it to the sensor.
     pub fn reset(&mut self) -> Result<(), DeviceError> {
-        self.tell(&Request::Reset, "reset")
+        self.command(&Request::Reset, "reset")
     }
 
-    /// A request that is answered by "done".
-    pub(super) fn tell(&mut self, request: &Request, name: &'static str) -> Result<(), DeviceError> {
-        self.tell_within(request, name, REPLY)
+    /// Sends a request whose reply is `Done`.
+    pub(super) fn command(&mut self, request: &Request, name: &'static str) -> Result<(), DeviceError> {
+        self.command_within(request, name, REPLY)
     }
 
-    /// The same, for a request that takes longer.
-    pub(super) fn tell_within(
+    /// Sends a request whose reply is `Done` within `timeout`.
+    pub(super) fn command_within(
         &mut self,
         request: &Request,
         name: &'static str,
@@ -180,12 +180,12 @@ impl Client {
         }
     }
 
-    /// What the device sent by itself, in order; `None` where nothing came within `timeout`.
+    /// Next event of the device, in order; `None` if none arrives within `timeout`.
     pub fn next_event(&mut self, timeout: Duration) -> Result<Option<Event>, DeviceError> {
         let deadline = Instant::now() + timeout;
         while self.events.is_empty() {
             let left = deadline.saturating_duration_since(Instant::now());
-            if let Some(Answer::Version(theirs)) = self.receive(left, None)? {
+            if let Some(ReplyFrame::Version(theirs)) = self.receive(left, None)? {
                 return Err(self.version(theirs));
             }
             if left.is_zero() {
@@ -195,7 +195,7 @@ impl Client {
         Ok(self.events.pop_front())
     }
 
-    /// Sends a request until it is answered; refusals are errors.
+    /// Sends a request until its reply arrives; a refusal is an error.
     pub(super) fn exchange(
         &mut self,
         request: &Request,
@@ -239,7 +239,7 @@ impl Client {
         })
     }
 
-    /// Waits for the reply to a request that was sent; `None` where it must be sent again.
+    /// Waits for the reply to a sent request; `None` if it must be sent again.
     fn await_reply(
         &mut self,
         number: u16,
@@ -250,15 +250,15 @@ impl Client {
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
             match self.receive(left, Some(number))? {
-                Some(Answer::Reply(reply)) => return Ok(Some(reply)),
-                Some(Answer::Version(theirs)) => return Err(self.version(theirs)),
-                Some(Answer::Unreadable(error)) => {
+                Some(ReplyFrame::Reply(reply)) => return Ok(Some(reply)),
+                Some(ReplyFrame::Version(theirs)) => return Err(self.version(theirs)),
+                Some(ReplyFrame::Unreadable(error)) => {
                     tracing::debug!("{}: request {number}: {error}", self.port.name());
                     *fault = Some(error);
-                    // It may have been a report, with the answer just behind it.
+                    // The frame may have been a report with the reply behind it.
                     deadline = deadline.min(Instant::now() + AFTER_NOISE);
                 }
-                Some(Answer::Again(error)) => {
+                Some(ReplyFrame::Again(error)) => {
                     tracing::debug!("{}: request {number} came as {error}", self.port.name());
                     *fault = Some(error);
                     return Ok(None);
@@ -271,10 +271,9 @@ impl Client {
         }
     }
 
-    /// Takes what comes within `timeout`, up to the first thing that matters to a request with this number.
-    fn receive(&mut self, timeout: Duration, number: Option<u16>) -> Result<Option<Answer>, DeviceError> {
-        // One byte at a time out of a small buffer would cost a system call each; what is behind an answer is decoded
-        // before the answer is given.
+    /// Reads the line for at most `timeout`, up to the first frame that concerns the request with this number.
+    fn receive(&mut self, timeout: Duration, number: Option<u16>) -> Result<Option<ReplyFrame>, DeviceError> {
+        // A buffer avoids one system call per byte; all bytes in it are decoded before the reply is returned.
         let mut bytes = [0; 256];
         let count = self.port.receive(&mut bytes, timeout)?;
         let mut answer = None;
@@ -285,19 +284,19 @@ impl Client {
             let decoded = frame.and_then(|frame| Ok((frame.sequence, frame.message::<Response>()?)));
             let next = match decoded {
                 Ok((sequence, response)) => self.sort(sequence, response, number),
-                Err(FrameError::Version { theirs, .. }) => Some(Answer::Version(theirs)),
-                Err(error) => Some(Answer::Unreadable(error)),
+                Err(FrameError::Version { theirs, .. }) => Some(ReplyFrame::Version(theirs)),
+                Err(error) => Some(ReplyFrame::Unreadable(error)),
             };
-            // A reply counts more than the noise around it.
-            if !matches!(answer, Some(Answer::Reply(_) | Answer::Version(_))) {
+            // A reply has priority over unreadable frames around it.
+            if !matches!(answer, Some(ReplyFrame::Reply(_) | ReplyFrame::Version(_))) {
                 answer = next.or(answer);
             }
         }
         Ok(answer)
     }
 
-    /// Puts events into the queue; gives back what answers the request with this number.
-    fn sort(&mut self, sequence: u16, response: Response, number: Option<u16>) -> Option<Answer> {
+    /// Queues an event; returns a response that concerns the request with this number.
+    fn sort(&mut self, sequence: u16, response: Response, number: Option<u16>) -> Option<ReplyFrame> {
         let order = self.responses.check(sequence);
         if let Err(FrameError::OutOfOrder { expected, found }) = order {
             self.lost_frames = self
@@ -310,16 +309,16 @@ impl Client {
             Response::Spectrum(chunk) => self.events.push_back(Event::Spectrum(chunk)),
             Response::Strobes(chunk) => self.events.push_back(Event::Strobes(chunk)),
             Response::FrameRefused(FrameError::Version { ours: theirs, .. }) => {
-                return Some(Answer::Version(theirs));
+                return Some(ReplyFrame::Version(theirs));
             }
-            Response::FrameRefused(error) => return Some(Answer::Again(error)),
-            // An answer to a request that was repeated meanwhile.
+            Response::FrameRefused(error) => return Some(ReplyFrame::Again(error)),
+            // A second reply to a request that was repeated.
             Response::Reply { request, .. } if Some(request) != number => {}
             Response::Reply { reply, .. } => {
                 return Some(match order {
-                    Ok(()) => Answer::Reply(reply),
-                    // The device repeats its reply when it is asked again: a whole exchange leaves no doubt.
-                    Err(error) => Answer::Again(error),
+                    Ok(()) => ReplyFrame::Reply(reply),
+                    // The device repeats its reply to a repeated request; the second transmission decides.
+                    Err(error) => ReplyFrame::Again(error),
                 });
             }
         }
@@ -352,13 +351,13 @@ impl Client {
     }
 }
 
-/// What bears on a request that waits.
-enum Answer {
+/// Received frame that concerns a waiting request.
+enum ReplyFrame {
     Reply(Reply),
-    /// A frame that cannot be read came.
+    /// A frame that cannot be decoded.
     Unreadable(FrameError),
-    /// The frame must be sent again.
+    /// The device asks for the request again.
     Again(FrameError),
-    /// The other side speaks another version.
+    /// Protocol version of a device with another version.
     Version(u8),
 }

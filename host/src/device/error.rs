@@ -1,4 +1,4 @@
-//! What can go wrong between host and device.
+//! Errors between host and device: port, line, protocol, lobe table.
 
 use std::io;
 use std::time::Duration;
@@ -10,131 +10,131 @@ use quietcut_core::protocol::{FrameError, Refusal};
 use super::FlashFileError;
 use crate::case::CaseError;
 
-/// A device that could not be reached, or did not do what it was asked to.
+/// Failure of a connection or of a request to a device.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
-    /// There is no such port.
+    /// The serial port does not exist.
     #[error("{port}: there is no such serial port; {present}, or use `simulated`")]
     NoPort {
-        /// The port that was asked for.
+        /// Requested port.
         port: String,
-        /// The ports that are there, as a phrase.
+        /// Existing ports, as a phrase.
         present: String,
     },
-    /// The port is there and cannot be used.
+    /// The port exists but cannot be opened.
     #[error("{port}: cannot open it as a serial port: {cause}")]
     Open {
-        /// The port.
+        /// Name of the port.
         port: String,
-        /// What the system says.
+        /// Error of the operating system.
         cause: String,
     },
-    /// The line went away while it was in use.
+    /// The port disappeared while it was in use.
     #[error("{port}: the device is gone: unplugged, or switched off; plug it in and run the command again")]
     Unplugged {
-        /// The port.
+        /// Name of the port.
         port: String,
     },
-    /// The device does not take bytes.
-    #[error("{port}: the line does not take bytes: {cause}")]
+    /// The line accepts no bytes.
+    #[error("{port}: cannot send to the device: {cause}")]
     Line {
-        /// The port.
+        /// Name of the port.
         port: String,
-        /// What the system says.
+        /// Error of the operating system.
         cause: io::Error,
     },
-    /// The pseudo-terminal of the simulated device could not be made.
+    /// The pseudo-terminal of the simulated device cannot be created.
     #[error("cannot make a pseudo-terminal for the simulated device: {cause}")]
     PseudoTerminal {
-        /// What the system says.
+        /// Error of the operating system.
         cause: serialport::Error,
     },
-    /// The memory of the simulated device cannot be had.
+    /// The state file of the simulated device cannot be used.
     #[error(transparent)]
     FlashFile(#[from] FlashFileError),
-    /// The simulated device cannot be set up like this.
+    /// The settings of the simulated device are invalid.
     #[error("the simulated device cannot have {error}")]
     Settings {
-        /// Why not.
+        /// Reason.
         error: SettingsError,
     },
-    /// The case of the virtual cell is wrong: a fault in quietcut itself.
+    /// The case of the virtual cell is invalid, which is a defect of quietcut.
     #[error(transparent)]
     Cell(#[from] CaseError),
-    /// Nothing came in time.
+    /// No reply arrived in time.
     #[error("{port}: no answer to {request} within {:.1} s, asked {attempts} times; is it a quietcut device?", waited.as_secs_f64())]
     NoAnswer {
-        /// The port.
+        /// Name of the port.
         port: String,
-        /// What was asked.
+        /// Name of the request.
         request: &'static str,
-        /// How long was waited in all.
+        /// Total waiting time.
         waited: Duration,
-        /// How often it was asked.
+        /// Number of transmissions of the request.
         attempts: u32,
     },
-    /// What came are not whole frames in their order, and asking again did not help.
+    /// The received frames are damaged or out of order, also after repeated requests.
     #[error(
         "{port}: no usable answer to {request}, asked {attempts} times: {error}; check the cable and that nothing else uses the port"
     )]
     Frames {
-        /// The port.
+        /// Name of the port.
         port: String,
-        /// What was asked.
+        /// Name of the request.
         request: &'static str,
-        /// How often it was asked.
+        /// Number of transmissions of the request.
         attempts: u32,
-        /// What was wrong the last time.
+        /// Fault of the last frame.
         error: FrameError,
     },
-    /// The device speaks another version of the protocol.
+    /// The device uses another version of the protocol.
     #[error(
-        "{port}: the device speaks protocol version {theirs}, this command version {ours}; bring both to the same release"
+        "{port}: the device uses protocol version {theirs}, this command version {ours}; bring both to the same release"
     )]
     Version {
-        /// The port.
+        /// Name of the port.
         port: String,
-        /// Version of this side.
+        /// Protocol version of the host.
         ours: u8,
-        /// Version of the device.
+        /// Protocol version of the device.
         theirs: u8,
     },
-    /// The device understood and does not do it.
+    /// The device refuses the request.
     #[error("{port}: the device refuses the {request}: {refusal}")]
     Refused {
-        /// The port.
+        /// Name of the port.
         port: String,
-        /// What was asked.
+        /// Name of the request.
         request: &'static str,
-        /// Why not.
+        /// Reason of the refusal.
         refusal: Refusal,
     },
-    /// The device answers something else than it was asked.
+    /// The reply does not belong to the request.
     #[error("{port}: the device answers `{reply}` to {request}: it does not keep to the protocol")]
     Unexpected {
-        /// The port.
+        /// Name of the port.
         port: String,
-        /// What was asked.
+        /// Name of the request.
         request: &'static str,
-        /// The kind of the reply.
+        /// Name of the reply.
         reply: &'static str,
     },
-    /// The table is none.
+    /// The lobe table is invalid.
     #[error("{error}")]
     Table {
-        /// Why.
+        /// Reason.
         error: TableError,
     },
-    /// A request that fits no frame.
+    /// The request is larger than a frame.
     #[error("the {request} does not fit a frame: a fault in quietcut itself")]
     TooLarge {
-        /// The request.
+        /// Name of the request.
         request: &'static str,
     },
 }
 
 impl DeviceError {
-    /// The error for a port that could not be opened.
+    /// Converts a failure to open a port.
     pub(super) fn open(port: &str, error: &serialport::Error) -> Self {
         if error.kind() == serialport::ErrorKind::Io(io::ErrorKind::NotFound) {
             let present = match serialport::available_ports() {
@@ -155,10 +155,10 @@ impl DeviceError {
         }
     }
 
-    /// The error for a line that failed while it was in use.
+    /// Converts a failure of a line in use.
     pub(super) fn line(port: &str, error: io::Error) -> Self {
         match error.kind() {
-            // What a USB serial port that was pulled out, and a pseudo-terminal whose other end is closed, say.
+            // Errors of an unplugged USB serial port and of a closed pseudo-terminal.
             io::ErrorKind::BrokenPipe | io::ErrorKind::NotConnected | io::ErrorKind::Other => {
                 Self::Unplugged { port: port.into() }
             }

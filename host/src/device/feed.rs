@@ -1,4 +1,4 @@
-//! Recorded or simulated samples through the pipeline of a device, in place of its sensor's.
+//! Feeding of recorded or simulated samples to the signal chain of a device in place of its sensor.
 
 use heapless::Vec;
 use quietcut_core::acceleration::Block;
@@ -10,18 +10,18 @@ use super::DeviceError;
 use super::client::Client;
 
 impl Client {
-    /// Feeds one block and the tachometer edges up to its end; returns when it has gone through the pipeline. What the
-    /// pipeline said of it waits in [`next_event`](Self::next_event), where it was subscribed to.
+    /// Feeds one block and the tachometer edges up to its end; returns after the signal chain has processed it. Subscribed events of
+    /// the block are then available from [`next_event`](Self::next_event).
     ///
     /// # Errors
-    /// Where the device does not answer or does not take the block.
+    /// The device does not answer or refuses the block.
     pub fn feed(&mut self, block: &Block, edges: &[Edge]) -> Result<(), DeviceError> {
         let (before, with) = edges.split_at(edges.len().saturating_sub(MAX_FEED_EDGES));
         for some in before.chunks(MAX_EDGES) {
             let some = Vec::try_from(some).map_err(|_| DeviceError::TooLarge { request: "edges" })?;
-            self.tell(&Request::FeedEdges(some), "edges")?;
+            self.command(&Request::FeedEdges(some), "edges")?;
         }
         let with = Vec::try_from(with).map_err(|_| DeviceError::TooLarge { request: "edges" })?;
-        self.tell(&Request::Feed(Feed::new(block, with)), "block")
+        self.command(&Request::Feed(Feed::new(block, with)), "block")
     }
 }

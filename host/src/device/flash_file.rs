@@ -1,4 +1,4 @@
-//! The flash of the simulated device: in memory, and in a file where its tables shall outlive it.
+//! Flash memory of the simulated device, in memory or in a file that keeps its lobe tables.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
@@ -8,45 +8,45 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNo
 use quietcut_firmware::flash_model::FlashModel;
 use quietcut_firmware::storage::TableMemory;
 
-/// Bytes of the flash for tables: the second bank of the NUCLEO-G474RE.
+/// Size of the flash memory for lobe tables, bytes: the second bank of the NUCLEO-G474RE.
 const FLASH_BYTES: usize = 256 * 1024;
-/// Bytes that are written at once, on that board.
+/// Smallest writable unit of flash, bytes, as on the NUCLEO-G474RE.
 const WORD: usize = 8;
-/// Bytes that are erased at once, on that board.
+/// Smallest erasable unit of flash, bytes, as on the NUCLEO-G474RE.
 const PAGE: usize = 2048;
-/// What erased flash reads as.
+/// Value of an erased byte.
 const ERASED: u8 = 0xff;
 
-/// A state file that cannot be used.
+/// Failure of the state file of the simulated device.
 #[derive(Debug, thiserror::Error)]
 pub enum FlashFileError {
-    /// It cannot be opened, read or made.
+    /// The file cannot be opened, read or created.
     #[error("{}: cannot use it as the memory of the simulated device: {cause}", path.display())]
     Access {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         cause: std::io::Error,
     },
-    /// It is something else.
+    /// The file has another length than the flash memory.
     #[error("{}: {found} bytes; a memory of the simulated device has {FLASH_BYTES}; name a new file to begin with an empty one", path.display())]
     Length {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its bytes.
+        /// Length of the file, bytes.
         found: u64,
     },
 }
 
-/// Flash that obeys the rules of the real one; every change goes to the file at once, so that whatever ends the
-/// command leaves what a power cut leaves.
+/// Flash memory with the write and erase rules of the board. Every change is written to the file at once, so that an aborted
+/// command leaves the same state as a power failure.
 pub(super) struct FlashFile {
     flash: FlashModel<Vec<u8>, WORD, PAGE>,
     file: Option<File>,
 }
 
 impl FlashFile {
-    /// Empty flash that is gone with the device.
+    /// Creates empty flash memory without a file.
     pub(super) fn in_memory() -> Self {
         Self {
             flash: FlashModel::new(vec![ERASED; FLASH_BYTES]),
@@ -54,10 +54,10 @@ impl FlashFile {
         }
     }
 
-    /// The flash in the file at `path`; a file that is not there yet is made, with empty flash.
+    /// Opens the flash memory in the file at `path`; a missing file is created with erased flash.
     ///
     /// # Errors
-    /// Where the file cannot be used, or has another length than the flash.
+    /// The file cannot be used, or has another length than the flash memory.
     pub(super) fn open(path: &Path) -> Result<Self, FlashFileError> {
         let access = |cause| FlashFileError::Access {
             path: path.into(),
@@ -91,7 +91,7 @@ impl FlashFile {
         })
     }
 
-    /// Brings the file up to date between two offsets.
+    /// Writes the bytes between two offsets to the file.
     fn store(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
         let Some(file) = &mut self.file else { return Ok(()) };
         let changed = self.flash.mapped().get(from as usize..to as usize);
@@ -151,7 +151,7 @@ mod tests {
         flash.write(4096, &[1, 2, 3, 4, 5, 6, 7, 8]).unwrap();
         flash.write(8192, &[0; 8]).unwrap();
         flash.erase(8192, 8192 + PAGE as u32).unwrap();
-        // A word may be written once after an erase.
+        // A word can be written only once after an erasure.
         assert!(flash.write(4096, &[0; 8]).is_err());
         let mut again = FlashFile::open(&path).unwrap();
         let mut bytes = [0; 10];

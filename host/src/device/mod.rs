@@ -1,4 +1,4 @@
-//! The device: the line to it, the client that talks over the line, and a simulated device that needs no hardware.
+//! Access to a device: serial line, client of the protocol, and a simulated device without hardware.
 
 mod client;
 mod error;
@@ -25,11 +25,11 @@ use std::path::Path;
 
 use port::{Port, SIMULATED, SerialLine};
 
-/// Opens a port by its name: a serial port, or the simulated device, whose memory is kept in the file `state` where one
-/// is given and whose virtual spindle cuts without end.
+/// Opens the port `name`: a serial port, or `simulated` for a simulated device whose virtual spindle repeats cuts. The file `state`,
+/// if given, keeps the memory of the simulated device.
 ///
 /// # Errors
-/// Where there is no such port, or it may not be used.
+/// The port does not exist or cannot be opened.
 pub fn open(name: &str, state: Option<&Path>) -> Result<Box<dyn Port>, DeviceError> {
     if name != SIMULATED {
         return Ok(Box::new(SerialLine::open(name)?));
@@ -40,6 +40,6 @@ pub fn open(name: &str, state: Option<&Path>) -> Result<Box<dyn Port>, DeviceErr
         teeth: cell.teeth()?,
         pace: Pace::RealTime,
     };
-    let device = SimulatedDevice::start(setup, cell.cuts_for_ever())?;
+    let device = SimulatedDevice::start(setup, cell.endless_cuts())?;
     Ok(Box::new(SimulatedPort::open(device)?))
 }

@@ -1,44 +1,45 @@
-//! The bytes to and from a device.
+//! Byte stream to and from a device.
 
 use std::io::{self, Read, Write};
 use std::time::Duration;
 
 use super::DeviceError;
 
-/// The name of the port that needs no hardware.
+/// Port name of the simulated device.
 pub const SIMULATED: &str = "simulated";
 
-/// Bits per second on a real serial line, as the board has it; a pseudo-terminal does not care.
+/// Bit rate of the serial line, bit/s, as configured on the board; a pseudo-terminal ignores it.
 const BAUD_RATE: u32 = 921_600;
 
-/// The bytes to and from one device.
+/// Byte stream to and from one device.
 pub trait Port: Send {
-    /// The name people know it by.
+    /// Name of the port for messages.
     fn name(&self) -> &str;
 
-    /// Sends all bytes, within `timeout`.
+    /// Sends all bytes within `timeout`.
     fn send(&mut self, bytes: &[u8], timeout: Duration) -> Result<(), DeviceError>;
 
-    /// Takes what has come, waiting at most `timeout` for the first byte; 0 where nothing came.
+    /// Reads available bytes, waiting at most `timeout` for the first one; returns their number, 0 if none arrived.
     fn receive(&mut self, into: &mut [u8], timeout: Duration) -> Result<usize, DeviceError>;
 }
 
-/// How often a port that is in use is tried, and after how long again: a process that is being started holds a copy of the lock of
-/// its parent until its own program runs.
+/// Number of attempts to open a port that is in use: a choice. A starting child process holds a copy of the lock of its parent for a
+/// short time.
 const TRIES: usize = 6;
+/// Pause between two attempts to open a port that is in use: a choice.
 const BETWEEN_TRIES: Duration = Duration::from_millis(50);
 
-/// A serial port of this computer.
+/// Serial port of this computer.
 pub struct SerialLine {
     name: String,
     line: Box<dyn serialport::SerialPort>,
 }
 
 impl SerialLine {
-    /// Opens the port called `name`, such as `/dev/ttyACM0`.
+    /// Opens the port `name`, such as `/dev/ttyACM0`.
     ///
     /// # Errors
-    /// Where there is no such port, it is in use, or may not be used; the message says which.
+    /// The port does not exist, is in use, or is not accessible.
     pub fn open(name: &str) -> Result<Self, DeviceError> {
         let mut tries_left = TRIES;
         loop {
@@ -78,7 +79,7 @@ impl Port for SerialLine {
             .set_timeout(timeout)
             .map_err(|error| DeviceError::line(&self.name, error.into()))?;
         match self.line.read(into) {
-            // A line that is ready and has nothing has been pulled out.
+            // A readable port without bytes has been unplugged.
             Ok(0) => Err(DeviceError::Unplugged {
                 port: self.name.clone(),
             }),

@@ -1,4 +1,4 @@
-//! A serial port without hardware: one end is opened by its path like any other, the other end is the device's.
+//! Pseudo-terminal: a serial port without hardware. The host opens one end by its path; the simulated device uses the other end.
 
 use std::io::{self, Read, Write};
 use std::time::Duration;
@@ -7,23 +7,23 @@ use serialport::{SerialPort, TTYPort};
 
 use super::DeviceError;
 
-/// The device's end of a pseudo-terminal.
+/// Device end of a pseudo-terminal.
 pub struct PseudoTerminal {
     path: String,
     device_end: TTYPort,
-    /// While this is open, and it is open without a lock, a host may open the other end, close it and open it again.
+    /// Host end, kept open without a lock, so that a host can open, close and reopen it.
     _host_end: TTYPort,
 }
 
 impl PseudoTerminal {
-    /// Makes a pseudo-terminal.
+    /// Creates a pseudo-terminal.
     ///
     /// # Errors
-    /// Where the system has none left.
+    /// The operating system has no free pseudo-terminal.
     pub fn new() -> Result<Self, DeviceError> {
         let failed = |cause| DeviceError::PseudoTerminal { cause };
         let (device_end, host_end) = TTYPort::pair().map_err(failed)?;
-        // The copies, other than the originals, are closed in child processes: there they would keep the line up.
+        // The cloned handles close in child processes; inherited originals would keep the line open there.
         let device_end = device_end.try_clone_native().map_err(failed)?;
         let host_end = host_end.try_clone_native().map_err(failed)?;
         let path = host_end.name().unwrap_or_default();
@@ -34,10 +34,10 @@ impl PseudoTerminal {
         })
     }
 
-    /// A second handle of the same pseudo-terminal, so that one thread can receive while another sends.
+    /// Creates a second handle of the pseudo-terminal, so that one thread can receive while another sends.
     ///
     /// # Errors
-    /// Where the system has no handles left.
+    /// The operating system has no free handles.
     pub fn try_clone(&self) -> Result<Self, DeviceError> {
         let failed = |cause| DeviceError::PseudoTerminal { cause };
         Ok(Self {
@@ -47,12 +47,12 @@ impl PseudoTerminal {
         })
     }
 
-    /// The path that a host opens.
+    /// Path of the host end.
     pub fn path(&self) -> &str {
         &self.path
     }
 
-    /// Takes what has come, waiting at most `timeout` for the first byte; 0 where nothing came.
+    /// Reads available bytes, waiting at most `timeout` for the first one; returns their number, 0 if none arrived.
     pub fn receive(&mut self, into: &mut [u8], timeout: Duration) -> io::Result<usize> {
         self.device_end.set_timeout(timeout)?;
         match self.device_end.read(into) {
@@ -63,7 +63,7 @@ impl PseudoTerminal {
         }
     }
 
-    /// Sends as many of the bytes as the line takes within `timeout` and returns their number.
+    /// Sends as many bytes as the line accepts within `timeout` and returns their number.
     pub fn send(&mut self, bytes: &[u8], timeout: Duration) -> io::Result<usize> {
         self.device_end.set_timeout(timeout)?;
         match self.device_end.write(bytes) {

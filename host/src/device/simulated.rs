@@ -1,5 +1,5 @@
-//! The simulated device: the firmware's device logic in a thread of this process, behind a pseudo-terminal, with a
-//! virtual spindle for a sensor.
+//! Simulated device: the device logic of the firmware in a thread of this process, with a pseudo-terminal as serial line and a
+//! virtual spindle as sensor.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,27 +22,27 @@ use super::pseudo_terminal::PseudoTerminal;
 use super::virtual_spindle::VirtualSpindle;
 use crate::simulate::Heard;
 
-/// How fast the virtual spindle turns.
+/// Time scale of the virtual spindle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// A second takes a second.
+    /// Samples are produced in real time.
     RealTime,
-    /// As fast as the host takes what the device says.
+    /// Samples are produced as fast as the host reads the events of the device.
     AsFastAsPossible,
 }
 
-/// How the simulated device is set up.
+/// Settings of the simulated device.
 #[derive(Clone, Copy, Debug)]
 pub struct Setup<'a> {
-    /// The file that keeps its flash; without one it is gone with the device.
+    /// File that keeps the flash memory; `None` keeps it only in memory.
     pub state: Option<&'a Path>,
     /// Number of teeth of the tool.
     pub teeth: u8,
-    /// How fast the virtual spindle turns.
+    /// Time scale of the virtual spindle.
     pub pace: Pace,
 }
 
-/// A device without hardware. It runs until this is dropped.
+/// Device without hardware; it runs until this value is dropped.
 pub struct SimulatedDevice {
     path: String,
     stop: Arc<AtomicBool>,
@@ -50,10 +50,10 @@ pub struct SimulatedDevice {
 }
 
 impl SimulatedDevice {
-    /// Switches a device on, in front of a virtual spindle that makes these cuts as they come.
+    /// Starts a device whose virtual spindle plays the received cuts.
     ///
     /// # Errors
-    /// Where there is no pseudo-terminal left, the state file cannot be used, or the teeth are too many.
+    /// No pseudo-terminal is free, the state file cannot be used, or the number of teeth is too large.
     pub fn start(setup: Setup<'_>, cuts: Receiver<Heard>) -> Result<Self, DeviceError> {
         let terminal = PseudoTerminal::new()?;
         let flash = match setup.state {
@@ -78,7 +78,7 @@ impl SimulatedDevice {
         })
     }
 
-    /// The path of its serial port.
+    /// Path of the serial port of the device.
     pub fn path(&self) -> &str {
         &self.path
     }
@@ -88,23 +88,23 @@ impl Drop for SimulatedDevice {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic in there has been reported where it happened.
+            // The panic hook has already reported a panic of the thread.
             let _ = thread.join();
         }
     }
 }
 
-/// The port of a simulated device that belongs to this port alone.
+/// Port that owns its simulated device.
 pub struct SimulatedPort {
     line: SerialLine,
     _device: SimulatedDevice,
 }
 
 impl SimulatedPort {
-    /// Opens the serial port of a device by its path, as that of any other.
+    /// Opens the serial port of the simulated device.
     ///
     /// # Errors
-    /// Where it cannot be opened.
+    /// The port cannot be opened.
     pub fn open(device: SimulatedDevice) -> Result<Self, DeviceError> {
         Ok(Self {
             line: SerialLine::open(device.path())?,
@@ -127,7 +127,7 @@ impl Port for SimulatedPort {
     }
 }
 
-/// What the pipeline of the simulated device is set up for: the board's sensor, one tachometer mark per turn.
+/// Settings of the signal chain: sensor of the board, one tachometer mark per revolution.
 fn settings(teeth: u8) -> Settings {
     Settings {
         sensor: Sensor::IIS3DWB_16G,
@@ -141,7 +141,7 @@ fn settings(teeth: u8) -> Settings {
     }
 }
 
-/// What the thread of the device works with.
+/// State of the device thread.
 struct Machine {
     terminal: PseudoTerminal,
     spindle: VirtualSpindle,
@@ -149,7 +149,7 @@ struct Machine {
     stop: Arc<AtomicBool>,
 }
 
-/// The device's clock: that of its samples where they come faster than real time, else that of this computer.
+/// Clock of the device: the time of its samples if they are faster than real time, else the clock of this computer.
 #[derive(Clone)]
 struct SharedClock(Arc<AtomicU64>);
 
@@ -159,7 +159,7 @@ impl Clock for SharedClock {
     }
 }
 
-/// The longest that the loop waits for bytes while the spindle stands.
+/// Longest wait for bytes while the spindle stands still: a choice.
 const IDLE: Duration = Duration::from_millis(5);
 
 impl Machine {
@@ -171,7 +171,7 @@ impl Machine {
         let clock = SharedClock(Arc::default());
         let mut state = Box::<State>::default();
         let Ok(mut device) = Device::new(identity, settings, &mut state, flash, clock.clone()) else {
-            // The settings were checked before the thread began.
+            // Unreachable: the settings were checked before the thread started.
             return;
         };
         let began = Instant::now();
@@ -190,7 +190,7 @@ impl Machine {
             pending.extend_from_slice(bytes.get(..count).unwrap_or_default());
             let taken = device.receive(&pending);
             pending.drain(..taken);
-            // Where the line is full the spindle waits: nothing is dropped.
+            // The spindle waits while the line is full, so that no message is dropped.
             while !device.outgoing().is_empty() && !self.stop.load(Ordering::Relaxed) {
                 match self.terminal.send(device.outgoing(), IDLE) {
                     Ok(count) => device.sent(count),
@@ -204,7 +204,7 @@ impl Machine {
         }
     }
 
-    /// True where the next block is there and its time has come.
+    /// Whether the next block exists and its time has come.
     fn step_due(&mut self, clock: &SharedClock, began: Instant) -> bool {
         let now = clock.now();
         let Some((block, _)) = self.spindle.peek(now) else {

@@ -1,4 +1,4 @@
-//! The client against a device that keeps to a script, and to its faults.
+//! Tests of the client with a scripted device that also sends faulty frames.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -19,10 +19,10 @@ use quietcut_core::units::{Degrees, Hertz, Millimeters, Nanoseconds, Rpm};
 use super::port::Port;
 use super::{Client, DeviceError, Event};
 
-/// What the script makes of a request: the bytes that go back.
+/// Script of a device: writes the response bytes of each request.
 type Script = dyn FnMut(&mut Wire, u16, Request) + Send;
 
-/// The device's side of the line.
+/// Device end of the line.
 #[derive(Default)]
 struct Wire {
     sequence: Sequence,
@@ -122,7 +122,7 @@ fn report(sequence: u32) -> Report {
 }
 
 #[test]
-fn a_lost_reply_is_asked_for_again_under_the_same_number() {
+fn a_request_is_repeated_with_the_same_number_after_a_lost_reply() {
     let asked = Arc::new(Mutex::new(Vec::new()));
     let seen = asked.clone();
     let (_, answer) = connect(move |wire, number, _| {
@@ -169,7 +169,7 @@ fn every_fault_of_a_frame_has_its_own_error() {
         "{truncated}"
     );
     let corrupted = fault(|frame| {
-        // Behind the board's name, where no byte is a COBS length; never to zero.
+        // Damages a byte of the board name, which is no COBS length byte, and never sets it to zero.
         frame[12] ^= if frame[12] == 1 { 2 } else { 1 };
     });
     assert!(
@@ -198,8 +198,8 @@ fn every_fault_of_a_frame_has_its_own_error() {
 }
 
 #[test]
-fn frames_out_of_order_are_refused_and_a_lost_one_is_not_missed() {
-    // Every reply has a number that is not due.
+fn frames_out_of_order_are_refused_and_a_lost_frame_is_counted() {
+    // Every reply has a wrong sequence number.
     let jumping = connect(|wire, number, request| {
         if request != Request::Hello {
             wire.sequence = Sequence::from(number.wrapping_mul(7));
@@ -209,7 +209,7 @@ fn frames_out_of_order_are_refused_and_a_lost_one_is_not_missed() {
         }
         wire.reply(number, Reply::Info(info()));
     });
-    // The first frame may have any number, so that hello passes.
+    // The first frame may have any sequence number, so that hello succeeds.
     let error = jumping.unwrap().0.info().unwrap_err();
     assert!(
         matches!(
@@ -222,7 +222,7 @@ fn frames_out_of_order_are_refused_and_a_lost_one_is_not_missed() {
         "{error}"
     );
 
-    // One report is lost before the reply: asked again, the reply is taken.
+    // One report is lost before the reply; the repeated request succeeds.
     let mut first = true;
     let (mut client, _) = connect(move |wire, number, request| {
         if request == Request::Info && std::mem::take(&mut first) {
@@ -236,7 +236,7 @@ fn frames_out_of_order_are_refused_and_a_lost_one_is_not_missed() {
 }
 
 #[test]
-fn another_version_is_named_at_once() {
+fn another_protocol_version_is_an_error_at_once() {
     let error = connect(|wire, request, _| {
         wire.reply(
             request,
@@ -262,7 +262,7 @@ fn another_version_is_named_at_once() {
 }
 
 #[test]
-fn refusals_and_wrong_replies_are_told_apart() {
+fn refusals_and_wrong_replies_are_different_errors() {
     let (mut client, _) = connect(|wire, number, request| match request {
         Request::Hello => wire.reply(number, Reply::Info(info())),
         Request::SetWorkingPoint(_) => wire.reply(number, Reply::Refused(Refusal::HelloFirst)),
@@ -288,7 +288,7 @@ fn refusals_and_wrong_replies_are_told_apart() {
 }
 
 #[test]
-fn what_the_device_sends_by_itself_waits_in_order() {
+fn events_are_queued_in_order() {
     let (mut client, _) = connect(|wire, number, request| {
         if let Request::Feed(feed) = &request {
             wire.send(&Response::Report(report(feed.block().sequence)));
@@ -378,7 +378,7 @@ fn table_bytes() -> Vec<u8> {
     lobes::encode(&content, &mut buffer).unwrap().to_vec()
 }
 
-/// A device that keeps a table in memory, and forgets `Hello` once after this many chunks.
+/// Script of a device that stores an upload and restarts once after `restart_after` chunks.
 fn receiver(held: Arc<Mutex<Vec<u8>>>, restart_after: usize) -> impl FnMut(&mut Wire, u16, Request) + Send {
     let mut header: Option<Header> = None;
     let mut chunks = 0;
@@ -422,7 +422,7 @@ fn receiver(held: Arc<Mutex<Vec<u8>>>, restart_after: usize) -> impl FnMut(&mut 
 }
 
 #[test]
-fn an_upload_goes_on_where_an_earlier_one_stopped() {
+fn an_interrupted_upload_is_resumed() {
     let bytes = table_bytes();
     let held = Arc::new(Mutex::new(bytes[..512].to_vec()));
     let (mut client, _) = connect(receiver(held.clone(), 0)).unwrap();
@@ -453,7 +453,7 @@ fn an_upload_survives_a_restart_of_the_device() {
 #[test]
 fn a_table_that_the_device_refuses_is_an_error() {
     let bytes = table_bytes();
-    // What the device holds from before is not what the file has.
+    // The device holds other bytes of an earlier upload.
     let held = Arc::new(Mutex::new(vec![0; 512]));
     let (mut client, _) = connect(receiver(held, 0)).unwrap();
     let refused = client

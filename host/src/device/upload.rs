@@ -1,4 +1,4 @@
-//! A lobe table to the device, in chunks; goes on where an earlier upload of the same table stopped.
+//! Upload of a lobe table in chunks; it resumes an interrupted upload of the same table.
 
 use quietcut_core::lobes::LobeTable;
 use quietcut_core::lobes::format::HEADER_LENGTH;
@@ -8,26 +8,25 @@ use quietcut_core::protocol::{Info, Refusal, Reply, Request, Upload};
 use super::DeviceError;
 use super::client::{Client, REPLY_AFTER_ERASE};
 
-/// How often an upload is begun again after the device was restarted in the middle.
+/// Number of new attempts after a restart of the device during an upload: a choice.
 const RESTARTS: u32 = 3;
 
-/// What an upload came to.
+/// Result of an upload.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Uploaded {
-    /// The device afterwards.
+    /// Identity and memory of the device after the upload.
     pub info: Info,
-    /// Where the upload began: more than 0 where an earlier one had stopped.
+    /// First byte that was sent; greater than 0 if an interrupted upload was resumed.
     pub resumed_at: u32,
 }
 
 impl Client {
-    /// Sends the table and lets the device take it into use. Whatever happens, the device keeps a whole table: the
-    /// old one until the new one is checked.
+    /// Sends the table and activates it on the device. The device keeps its old table until the new one is complete and checked.
     ///
-    /// `progress` is told the bytes that the device has and the bytes in all, after each chunk.
+    /// After each chunk `progress` gets the number of received bytes and the total number of bytes.
     ///
     /// # Errors
-    /// Where the device does not answer, refuses the table, or is restarted again and again.
+    /// The device does not answer, refuses the table, or restarts repeatedly.
     pub fn upload(
         &mut self,
         table: &LobeTable<'_>,
@@ -71,7 +70,7 @@ impl Client {
             Reply::Upload(Upload { received, .. }) => received,
             other => return Err(self.unexpected(BEGIN, &other)),
         };
-        // The device has the header from the request itself.
+        // The request that starts the upload already contains the header.
         resumed_at.get_or_insert(if received > HEADER_LENGTH as u32 {
             received
         } else {
@@ -82,10 +81,10 @@ impl Client {
             received = self.send_chunk(bytes, received)?;
             progress(received, header.length);
         }
-        self.tell_within(&Request::UploadCommit, "table", REPLY_AFTER_ERASE)
+        self.command_within(&Request::UploadCommit, "table", REPLY_AFTER_ERASE)
     }
 
-    /// Sends the chunk at `offset`; the offset that is due next.
+    /// Sends the chunk at `offset`; returns the offset of the next one.
     fn send_chunk(&mut self, bytes: &[u8], offset: u32) -> Result<u32, DeviceError> {
         const CHUNK: &str = "piece of the table";
         let rest = bytes.get(offset as usize..).unwrap_or_default();
@@ -96,7 +95,7 @@ impl Client {
         match self.exchange(&Request::UploadChunk { offset, data }, CHUNK, REPLY_AFTER_ERASE) {
             Ok(Reply::Upload(Upload { received, .. })) if received > offset => Ok(received),
             Ok(other) => Err(self.unexpected(CHUNK, &other)),
-            // The device knows better what it has: a reply was lost, or it was restarted.
+            // The offset of the device is valid: a reply was lost, or the device was restarted.
             Err(DeviceError::Refused {
                 refusal: Refusal::ChunkOffset { expected, .. },
                 ..

@@ -1,4 +1,4 @@
-//! The virtual robot cell: what the simulated device hears where nothing else is asked for.
+//! Virtual robot cell: default source of the samples of the simulated device.
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -6,53 +6,51 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use crate::case::{Case, CaseError};
 use crate::simulate::{Accelerometer, Heard, TachometerModel, VirtualCut, VirtualCutError};
 
-/// The case file of the cell, part of the program so that it needs no other file.
+/// Path of the case file of the cell; the program contains its text.
 const CASE_NAME: &str = "tests/cases/kuka-kr90-acetal.toml";
 const CASE_TEXT: &str = include_str!("../../../tests/cases/kuka-kr90-acetal.toml");
 
-/// The sample clock of the virtual sensor runs this much too fast: a real one is off by up to 3 %.
+/// Relative error of the sample clock of the virtual sensor: a choice within the 3 % of the real sensor.
 const CLOCK_ERROR: f64 = 0.01;
 
-/// The spindle turns this long before and after the tool is in the workpiece: what one cut made has died out before the
-/// next begins.
+/// Time in air before and after each cut, s: a choice that lets the vibration of one cut decay before the next.
 const AIR_SECONDS: f64 = 1.0;
 
-/// A milling robot with its tool over a block of acetal.
+/// Milling robot with a tool and a block of acetal.
 #[derive(Clone, Debug)]
 pub struct VirtualCell {
     case: Case,
 }
 
 impl VirtualCell {
-    /// The KUKA KR90 of the case files.
+    /// Loads the case of the milling robot KUKA KR90.
     ///
     /// # Errors
-    /// None that a test does not find: the case is part of the program.
+    /// The case is invalid; a test excludes this, because the case is part of the program.
     pub fn new() -> Result<Self, CaseError> {
         Ok(Self {
             case: Case::parse(Path::new(CASE_NAME), CASE_TEXT)?,
         })
     }
 
-    /// Structure, tool, material and cut.
+    /// Case of the cell: structure, tool, material and cut.
     pub fn case(&self) -> &Case {
         &self.case
     }
 
-    /// Number of teeth of its tool.
+    /// Number of teeth of the tool.
     ///
     /// # Errors
-    /// None that a test does not find.
+    /// The case has no tool; a test excludes this.
     pub fn teeth(&self) -> Result<u8, CaseError> {
-        // More teeth than a device can count are for the device to refuse.
+        // The device refuses a number of teeth that it does not support.
         Ok(u8::try_from(self.case.tool()?.teeth).unwrap_or(u8::MAX))
     }
 
-    /// What the sensor hears of a cut, entry and exit and the air before and behind included; `seed` makes its noise
-    /// repeat.
+    /// Simulates the sensor samples of a cut with entry, exit and time in air; `seed` sets the sensor noise.
     ///
     /// # Errors
-    /// Where the cut is shorter than entry and exit, or cannot be simulated.
+    /// The cut is shorter than entry and exit, or cannot be simulated.
     pub fn cut(
         &self,
         spindle_rpm: f64,
@@ -72,7 +70,7 @@ impl VirtualCell {
         )
     }
 
-    /// From when to when the tool of such a cut is in the workpiece in full, in seconds since the first sample.
+    /// Start and end of full engagement of such a cut, s since the first sample.
     ///
     /// # Errors
     /// As [`cut`](Self::cut).
@@ -85,8 +83,8 @@ impl VirtualCell {
         virtual_cut(spindle_rpm, depth_mm, seconds).full_cut_s(&self.case)
     }
 
-    /// Cut after cut without end, computed while the one before is heard: period doubling, a quiet cut, a Hopf.
-    pub fn cuts_for_ever(self) -> Receiver<Heard> {
+    /// Repeats three cuts without end: period doubling, stable, Hopf. Each is computed while the previous one is played.
+    pub fn endless_cuts(self) -> Receiver<Heard> {
         const CUTS: [(f64, f64); 3] = [(1045.0, 2.0), (1045.0, 1.0), (900.0, 2.0)];
         const SECONDS: f64 = 12.0;
         let (send, receive) = sync_channel(1);
@@ -95,7 +93,7 @@ impl VirtualCell {
                 let Ok(heard) = self.cut(spindle_rpm, depth_mm, SECONDS, seed) else {
                     return;
                 };
-                // Nobody listens any more.
+                // The receiver is gone.
                 if send.send(heard).is_err() {
                     return;
                 }
@@ -118,7 +116,7 @@ mod tests {
 
     #[test]
     fn its_cuts_can_be_made() {
-        let cuts = VirtualCell::new().unwrap().cuts_for_ever();
+        let cuts = VirtualCell::new().unwrap().endless_cuts();
         for _ in 0..3 {
             assert!(cuts.recv().unwrap().blocks.len() > 1000);
         }

@@ -1,4 +1,4 @@
-//! The virtual spindle in front of the simulated device: cut after cut, on one clock.
+//! Virtual spindle of the simulated device: joins consecutive cuts on one clock.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::Receiver;
@@ -9,10 +9,10 @@ use quietcut_core::units::Nanoseconds;
 
 use crate::simulate::Heard;
 
-/// A block with the tachometer edges before the next block begins.
+/// Block of samples with the tachometer edges before the next block.
 pub(super) type Step = (Block, Vec<Edge>);
 
-/// Puts cuts behind one another: each begins at time 0 and block 0 of its own.
+/// Joins cuts, each of which starts at its own time 0 and block 0, to one sequence of blocks.
 pub(super) struct VirtualSpindle {
     cuts: Receiver<Heard>,
     steps: VecDeque<Step>,
@@ -30,18 +30,18 @@ impl VirtualSpindle {
         }
     }
 
-    /// The next block; `None` while the spindle stands. A cut that comes after a pause begins at `now`.
+    /// Next block without removing it; `None` while the spindle stands still. A cut after a pause starts at `now`.
     pub(super) fn peek(&mut self, now: Nanoseconds) -> Option<&Step> {
         if self.steps.is_empty() {
             let heard = self.cuts.try_recv().ok()?;
-            // A spindle that stood is no gap in the samples; the sensor was off.
+            // A pause of the spindle is no gap in the samples: the sensor was off.
             self.next_time = self.next_time.max(now.0);
             self.append(heard);
         }
         self.steps.front()
     }
 
-    /// Takes the block that [`peek`](Self::peek) has shown.
+    /// Removes and returns the block of [`peek`](Self::peek).
     pub(super) fn take(&mut self) -> Option<Step> {
         self.steps.pop_front()
     }
@@ -75,7 +75,7 @@ impl VirtualSpindle {
     }
 }
 
-/// The time from one block to the next: the mean over all of them, since stamps jitter.
+/// Period of the blocks, ns: the mean over all blocks, since time stamps jitter.
 fn block_period(blocks: &[Block]) -> u64 {
     match (blocks.first(), blocks.last()) {
         (Some(first), Some(last)) if blocks.len() > 1 => {
@@ -131,7 +131,7 @@ mod tests {
             (4, 4, vec![4]),
         ];
         assert_eq!(steps, expected);
-        // After a pause the next cut begins when it begins.
+        // After a pause the next cut starts at the current time.
         send.send(heard(1, &[])).unwrap();
         let (block, _) = spindle.peek(Nanoseconds(9_000_000)).unwrap();
         assert_eq!((block.sequence, block.time), (5, Nanoseconds(9_000_000)));

@@ -1,4 +1,4 @@
-//! Verdicts and advice as JSON objects: what `replay` and `monitor` answer with.
+//! Verdicts and advice as JSON objects: the output of `quietcut replay` and `quietcut monitor`.
 
 use std::fmt;
 
@@ -9,42 +9,42 @@ use serde::Serialize;
 use super::time::seconds;
 use super::words;
 
-/// One verdict.
+/// Verdict of the chatter detector after one block of samples.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerdictAnswer {
-    /// End of the block it was given for, in seconds on the clock of the samples.
+    /// Time of the end of the block, s, on the clock of the samples.
     pub t_s: f64,
-    /// The word for it, see [`words::verdict_key`].
+    /// Key of the verdict, see [`words::verdict_key`].
     pub verdict: &'static str,
-    /// Chatter frequency, where there is chatter.
+    /// Chatter frequency, Hz; `None` without chatter.
     pub chatter_hz: Option<f64>,
-    /// Probability that it is right, 0 to 1.
+    /// Probability that the verdict is correct, 0 to 1.
     pub confidence: f64,
-    /// Spindle speed, where it is known.
+    /// Spindle speed, rev/min; `None` if it is not measured and not set.
     pub spindle_rpm: Option<f64>,
-    /// What to do, where there is something to do.
+    /// Advice of the device; `None` if there is none.
     pub advice: Option<AdviceAnswer>,
 }
 
-/// One piece of advice.
+/// Advice on spindle speed and axial depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AdviceAnswer {
-    /// The word for it, see [`words::action_key`].
+    /// Key of the advised action, see [`words::action_key`].
     pub action: &'static str,
-    /// The speed to cut with.
+    /// Advised spindle speed, rev/min.
     pub rpm: f64,
-    /// The depth to cut with, where the working point was told.
+    /// Advised axial depth, mm; `None` if no working point is set.
     pub depth_mm: Option<f64>,
-    /// The word for what it rests on, see [`words::source_key`].
+    /// Key of the source of the advice, see [`words::source_key`].
     pub source: &'static str,
-    /// True where the working point was not told.
+    /// Whether the advice assumes a working point because none is set.
     pub assumed_working_point: bool,
-    /// A sentence for people.
+    /// Reason for the advice, as a sentence.
     pub why: String,
 }
 
 impl VerdictAnswer {
-    /// The answer for what the pipeline said after a block.
+    /// Converts the report of the signal chain after one block.
     pub fn new(report: &Report) -> Self {
         let judgement = &report.judgement;
         Self {
@@ -62,7 +62,7 @@ impl VerdictAnswer {
 }
 
 impl AdviceAnswer {
-    /// The answer for advice that came with `report`.
+    /// Converts the advice of `report`.
     pub fn new(advice: &Advice, report: &Report) -> Self {
         Self {
             action: words::action_key(advice.action),
@@ -75,32 +75,32 @@ impl AdviceAnswer {
     }
 }
 
-/// What a stream of reports comes to: the answer of `replay` and `monitor`.
+/// Log of the changes in a sequence of reports: the output of `replay` and `monitor`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct VerdictLog {
-    /// The first verdict, and each that differs from the one before in verdict or advice.
+    /// First verdict, and every later one whose verdict or advice differs from the previous one.
     pub verdicts: Vec<VerdictAnswer>,
-    /// All of them together.
+    /// Summary over all reports.
     pub summary: Summary,
 }
 
-/// A stream of reports in a few words.
+/// Summary of a sequence of reports: main verdict and counts of blocks, clipped samples and gaps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// The first kind of chatter that was heard; without chatter the last verdict. `None` where there was no report.
+    /// First kind of chatter that was detected; without chatter the last verdict. `None` without any report.
     pub verdict: Option<&'static str>,
-    /// Since when it was heard.
+    /// Time from which this verdict was given, s.
     pub since_s: Option<f64>,
-    /// Blocks that were judged.
+    /// Number of evaluated blocks.
     pub blocks: u64,
-    /// Samples clipped.
+    /// Number of clipped samples.
     pub clipped: u32,
-    /// Places where samples are missing.
+    /// Number of gaps where samples are missing.
     pub gaps: u32,
     #[serde(skip)]
     lost: u32,
     #[serde(skip)]
-    heard_chatter: bool,
+    has_chatter: bool,
 }
 
 impl fmt::Display for Summary {
@@ -117,12 +117,12 @@ impl fmt::Display for Summary {
     }
 }
 
-/// Advice to another speed counts as other advice where it differs by more than this share: the tooth-passing rule
-/// follows every hertz that the estimate of the chatter frequency moves.
+/// Largest relative change of the advised speed that counts as the same advice. It is a choice: the tooth-passing rule follows
+/// every small change of the estimated chatter frequency.
 const SAME_SPEED: f64 = 0.01;
 
 impl VerdictLog {
-    /// Takes the next report; the new verdict, where it differs from the one before.
+    /// Adds the next report; returns its verdict if verdict or advice differs from the previous one.
     pub fn take(&mut self, report: &Report) -> Option<&VerdictAnswer> {
         let next = VerdictAnswer::new(report);
         let summary = &mut self.summary;
@@ -130,8 +130,8 @@ impl VerdictLog {
         summary.clipped = report.clipped;
         summary.gaps += u32::from(report.lost > summary.lost);
         summary.lost = report.lost;
-        if !summary.heard_chatter && summary.verdict != Some(next.verdict) {
-            summary.heard_chatter = report.judgement.verdict.is_chatter();
+        if !summary.has_chatter && summary.verdict != Some(next.verdict) {
+            summary.has_chatter = report.judgement.verdict.is_chatter();
             summary.verdict = Some(next.verdict);
             summary.since_s = Some(next.t_s);
         }
@@ -151,7 +151,7 @@ fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
         (None, None) => true,
         (Some(a), Some(b)) => {
             let near = (a.rpm - b.rpm).abs() <= SAME_SPEED * a.rpm;
-            // To keep cutting at whatever speed the spindle has is always the same advice.
+            // The advice to keep cutting does not depend on the measured speed.
             let same_target = a.action == "keep" || (near && a.depth_mm == b.depth_mm);
             a.action == b.action && a.source == b.source && same_target
         }
@@ -159,7 +159,7 @@ fn is_same_advice(a: Option<&AdviceAnswer>, b: Option<&AdviceAnswer>) -> bool {
     }
 }
 
-/// The shortest decimal number that is this `f32`: 900.1, not 900.0999755859375.
+/// Converts an `f32` to the `f64` with the same shortest decimal form: 900.1, not 900.0999755859375.
 pub fn number(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }

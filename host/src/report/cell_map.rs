@@ -1,4 +1,4 @@
-//! The map of cells: how large the dominant multiplier is over spindle speed and depth, and the contour where it is 1.
+//! Map of the modulus |μ| of the dominant Floquet multiplier over spindle speed and axial depth, with the stability limit |μ| = 1.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{LineSeries, Rectangle, WHITE};
@@ -7,7 +7,7 @@ use plotters::style::{Color, RGBColor};
 use super::picture::{Axes, INK, Labels, PictureError, axes, draw, text};
 use crate::stability::{CellChart, Verdict};
 
-/// Upper end of each band of |μ|, its colour and its name; green within the unit circle, red outside.
+/// Upper end, colour and name of each band of |μ|: green for stable points (|μ| < 1), red for unstable ones.
 const BANDS: [(f64, RGBColor, &str); 9] = [
     (0.7, RGBColor(0x6f, 0xb8, 0x92), "below 0.7"),
     (0.8, RGBColor(0x93, 0xcb, 0xad), "0.7 to 0.8"),
@@ -20,16 +20,16 @@ const BANDS: [(f64, RGBColor, &str); 9] = [
     (f64::INFINITY, RGBColor(0xc8, 0x60, 0x53), "above 2"),
 ];
 
-/// Cells whose error bar straddles 1.
+/// Colour and name of cells whose interval |μ| ± error contains 1.
 const UNDECIDED: (RGBColor, &str) = (RGBColor(0x9a, 0xa0, 0xa8), "undecided");
 
 /// Size of the picture in pixels.
 const SIZE: (u32, u32) = (1100, 520);
 
-/// Draws the map as SVG. Speeds and depths ascending, at least two of each.
+/// Draws the map as SVG. Speeds and depths must be ascending, at least two of each.
 ///
 /// # Errors
-/// Where there is nothing to draw, or the drawing library refuses.
+/// Speeds or depths are fewer than two or not ascending, or the drawing library fails.
 pub fn cell_map(title: &str, chart: &CellChart) -> Result<String, PictureError> {
     let ascending = |values: &[f64]| values.len() > 1 && values.windows(2).all(|pair| pair[0] < pair[1]);
     let speeds: Vec<f64> = chart.speeds.iter().map(|line| line.rpm).collect();
@@ -64,7 +64,7 @@ pub fn cell_map(title: &str, chart: &CellChart) -> Result<String, PictureError> 
     })
 }
 
-/// Borders half way between values, the outer ones as far outside.
+/// Cell borders: midpoints between values; the outer borders lie half a step outside the first and the last value.
 fn edges(values: &[f64]) -> Vec<f64> {
     let count = values.len();
     let mut edges: Vec<f64> = values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
@@ -73,7 +73,7 @@ fn edges(values: &[f64]) -> Vec<f64> {
     edges
 }
 
-/// Which band a cell lies in; the one after the last is for undecided cells.
+/// Index of the band of |μ| of a cell; `BANDS.len()` for undecided cells.
 fn band_of(multiplier_abs: f64, verdict: Verdict) -> usize {
     if verdict == Verdict::Undecided {
         return BANDS.len();
@@ -82,7 +82,7 @@ fn band_of(multiplier_abs: f64, verdict: Verdict) -> usize {
     BANDS.iter().position(below).unwrap_or(BANDS.len() - 1)
 }
 
-/// The cells of one band; neighbours along the depth as one rectangle.
+/// Draws the cells of one band; neighbouring cells along the depth become one rectangle.
 fn draw_band(
     axes: &mut Axes<'_, '_>,
     chart: &CellChart,
@@ -119,11 +119,11 @@ fn draw_band(
     Ok(())
 }
 
-/// A place in the map.
-type Place = (f64, f64);
+/// Point of the map: spindle speed in rev/min and axial depth in mm.
+type MapPoint = (f64, f64);
 
-/// Where |μ| = 1 by linear interpolation of ln |μ| between the centres of four neighbouring cells (marching squares).
-fn contour(chart: &CellChart, speeds: &[f64]) -> Vec<(Place, Place)> {
+/// Contour |μ| = 1 by marching squares: ln |μ| is interpolated linearly between the centres of neighbouring cells.
+fn contour(chart: &CellChart, speeds: &[f64]) -> Vec<(MapPoint, MapPoint)> {
     let mut segments = Vec::new();
     let level = |line: usize, depth: usize| {
         let size = chart.speeds.get(line)?.multiplier_abs.get(depth)?;
@@ -137,8 +137,8 @@ fn contour(chart: &CellChart, speeds: &[f64]) -> Vec<(Place, Place)> {
                 (line + 1, depth + 1),
                 (line, depth + 1),
             ];
-            let around: Vec<(Place, f64)> = corners.iter().filter_map(|&(i, j)| level(i, j)).collect();
-            let crossings: Vec<Place> = (0..around.len())
+            let around: Vec<(MapPoint, f64)> = corners.iter().filter_map(|&(i, j)| level(i, j)).collect();
+            let crossings: Vec<MapPoint> = (0..around.len())
                 .filter_map(|i| crossing(around[i], around[(i + 1) % around.len()]))
                 .collect();
             segments.extend(crossings.chunks_exact(2).map(|pair| (pair[0], pair[1])));
@@ -147,8 +147,8 @@ fn contour(chart: &CellChart, speeds: &[f64]) -> Vec<(Place, Place)> {
     segments
 }
 
-/// Where a level passes through 0 between two places.
-fn crossing((from, a): (Place, f64), (to, b): (Place, f64)) -> Option<Place> {
+/// Zero of ln |μ| between two points by linear interpolation; `None` if its sign does not change.
+fn crossing((from, a): (MapPoint, f64), (to, b): (MapPoint, f64)) -> Option<MapPoint> {
     let share = ((a > 0.0) != (b > 0.0)).then(|| (a / (a - b)).clamp(0.0, 1.0))?;
     Some((from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share))
 }
@@ -185,7 +185,7 @@ mod tests {
     fn the_contour_lies_where_the_multiplier_is_1() {
         let chart = chart();
         let segments = contour(&chart, &[1000.0, 1100.0, 1200.0]);
-        // 2 mm, between two columns each.
+        // The contour lies at a depth of 2 mm, with one segment between each pair of speeds.
         assert_eq!(segments.len(), 2);
         for (from, to) in segments {
             assert!((from.1 - 2.0).abs() < 1e-12 && (to.1 - 2.0).abs() < 1e-12);
@@ -200,7 +200,7 @@ mod tests {
         for said in ["robot", "below 0.7", "above 2", "undecided", "rev/min"] {
             assert!(svg.contains(said), "{said}");
         }
-        // 1.5 to 2 is left open: cells are 0.25 apart, 1.5 and 1.75 lie in it.
+        // Cells are 0.25 apart in |μ|; the values 1.5 and 1.75 lie in the band from 1.5 to 2.
         assert!(svg.contains("1.5 to 2"));
         chart.speeds.truncate(1);
         assert!(cell_map("robot", &chart).is_err());

@@ -1,4 +1,4 @@
-//! Several lines over one axis: what was measured beside what was predicted.
+//! Chart of several lines over one axis: measured signal, residuals, noise level.
 
 use std::ops::Range;
 
@@ -9,51 +9,52 @@ use super::picture::{
     BLUE, CHATTER, INK, Labels, ORANGE, PictureError, QUIET, VIOLET, axes, draw, legend, span,
 };
 
-/// One line, or one cloud of points.
+/// One line or one set of points of a comparison chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// What it is.
+    /// Name in the legend.
     pub name: String,
-    /// Its points.
+    /// Points (x, y).
     pub points: Vec<(f64, f64)>,
-    /// How it is drawn.
-    pub look: Look,
+    /// Meaning of the line, which sets its colour and shape.
+    pub role: LineRole,
 }
 
-/// The looks of lines.
+/// Meaning of a line, which sets its colour and shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
-    /// What was measured.
+pub enum LineRole {
+    /// Measured signal.
     Measured,
-    /// What the model misses.
-    Missed,
-    /// What is left with the cause.
-    Left,
-    /// A level.
+    /// Residual of the baseline model.
+    BaselineResidual,
+    /// Residual of the extended model.
+    ExtendedResidual,
+    /// Horizontal level, such as the noise level.
     Level,
-    /// Points of what the model misses.
-    Cloud,
-    /// Points of something else of the same kind.
-    OtherCloud,
+    /// Points instead of a line.
+    Points,
+    /// Points of a second quantity, in another colour.
+    OtherPoints,
 }
 
-impl Look {
+impl LineRole {
     fn color(self) -> RGBColor {
         match self {
             Self::Measured => INK,
-            Self::Missed => CHATTER,
-            Self::Left => QUIET,
+            Self::BaselineResidual => CHATTER,
+            Self::ExtendedResidual => QUIET,
             Self::Level => ORANGE,
-            Self::Cloud => BLUE,
-            Self::OtherCloud => VIOLET,
+            Self::Points => BLUE,
+            Self::OtherPoints => VIOLET,
         }
     }
 }
 
-/// Draws lines over a common axis as SVG of `size` pixels.
+/// Draws lines over a common axis as SVG of `size` pixels; `y_range` is the range of the vertical axis, by default that of all
+/// points.
 ///
 /// # Errors
-/// Where there is nothing to draw, or the drawing library refuses.
+/// There are fewer than two points, or the drawing library fails.
 pub fn comparison(
     size: (u32, u32),
     [title, x, y]: [&str; 3],
@@ -73,15 +74,15 @@ pub fn comparison(
     draw(size, |canvas| {
         let mut chart = axes(canvas, &Labels { title, x, y }, low..high, y_range.clone())?;
         for line in lines.iter().filter(|line| !line.points.is_empty()) {
-            let color = line.look.color();
-            let drawn = if matches!(line.look, Look::Cloud | Look::OtherCloud) {
+            let color = line.role.color();
+            let drawn = if matches!(line.role, LineRole::Points | LineRole::OtherPoints) {
                 let dots = line
                     .points
                     .iter()
                     .map(|point| Circle::new(*point, 1, color.mix(0.5).filled()));
                 chart.draw_series(dots)?
             } else {
-                let style = color.stroke_width(if line.look == Look::Level { 2 } else { 1 });
+                let style = color.stroke_width(if line.role == LineRole::Level { 2 } else { 1 });
                 chart.draw_series(LineSeries::new(line.points.iter().copied(), style))?
             };
             drawn
@@ -98,12 +99,15 @@ mod tests {
 
     #[test]
     fn every_line_is_named_and_nothing_is_refused() {
-        let line = |name: &str, look| Line {
+        let line = |name: &str, role| Line {
             name: name.into(),
             points: vec![(0.0, 1.0), (1.0, 2.0)],
-            look,
+            role,
         };
-        let lines = [line("measured", Look::Measured), line("missed", Look::Cloud)];
+        let lines = [
+            line("measured", LineRole::Measured),
+            line("missed", LineRole::Points),
+        ];
         let svg = comparison((400, 300), ["t", "x", "y"], &lines, None).unwrap();
         assert!(svg.contains("measured") && svg.contains("missed"));
         assert!(comparison((400, 300), ["t", "x", "y"], &[], None).is_err());

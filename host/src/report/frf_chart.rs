@@ -1,4 +1,4 @@
-//! Frequency response functions: magnitude, phase and coherence, one above the other.
+//! Chart of receptances: magnitude, phase and coherence over frequency.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{LineSeries, PathElement, RGBColor, WHITE};
@@ -9,15 +9,16 @@ use super::picture::{
 };
 use crate::frf::{Frf, FrfTable};
 
+/// Size of the picture in pixels.
 const SIZE: (u32, u32) = (900, 860);
 
-/// Colours of the lines, over and over.
+/// Colours of the receptances, used cyclically.
 const COLORS: [RGBColor; 6] = [BLUE, ORANGE, QUIET, CHATTER, VIOLET, INK];
 
-/// Draws all receptances of a table over its frequencies as SVG.
+/// Draws magnitude in µm/N, phase in degrees and coherence of all receptances of a table as SVG.
 ///
 /// # Errors
-/// Where there are fewer than two frequencies, or the drawing library refuses.
+/// The table has fewer than two frequencies, or the drawing library fails.
 pub fn frf_chart(title: &str, table: &FrfTable) -> Result<String, PictureError> {
     let frequency_hz = table.frequency_hz();
     let (Some(&first), Some(&last)) = (frequency_hz.first(), frequency_hz.last()) else {
@@ -50,7 +51,7 @@ pub fn frf_chart(title: &str, table: &FrfTable) -> Result<String, PictureError> 
     })
 }
 
-/// One value of every receptance over frequency.
+/// Draws one panel: one value (magnitude, phase or coherence) of every receptance over frequency.
 fn lines(
     canvas: &Canvas<'_>,
     table: &FrfTable,

@@ -1,4 +1,4 @@
-//! The stability chart: stable depths over spindle speed, the kind of each limit, and points of interest.
+//! Stability lobe diagram: stable axial depths over spindle speed, kind of each limit, trial cuts.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{Circle, LineSeries, PathElement, Polygon, Rectangle, WHITE};
@@ -12,33 +12,33 @@ use super::marks::{Mark, draw_marks};
 use super::picture::{Axes, BLUE, INK, Labels, ORANGE, PictureError, VIOLET, axes, draw, text};
 use crate::stability::SpeedLine;
 
-/// Where stability is first lost over depth at one speed.
+/// Smallest axial depth at which stability is lost at one spindle speed, with the kind of loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstLimit {
-    /// Axial depth of cut.
+    /// Axial depth, mm.
     pub depth_mm: f64,
-    /// How.
+    /// Kind of the loss of stability: Hopf, flip or fold.
     pub kind: LimitKind,
 }
 
-/// What is known at one spindle speed.
+/// Stability at one spindle speed: stable and undecided depths, first limit, percentiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Spindle speed.
+    /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Depths that are stable, as intervals in order.
+    /// Stable depths, mm, as ascending intervals.
     pub stable_mm: Vec<(f64, f64)>,
-    /// Depths for which the computation could not decide, as intervals in order.
+    /// Undecided depths, mm, as ascending intervals: the multiplier is 1 within the error of the method.
     pub undecided_mm: Vec<(f64, f64)>,
-    /// Where stability is first lost; `None` where nothing is lost up to the last depth.
+    /// First limit; `None` if all depths up to the last one are stable.
     pub first_limit: Option<FirstLimit>,
-    /// Depths below which the first limit lies with 5, 50 and 95 %; `None` beyond the last depth. Nothing where the
-    /// parameters have no deviations.
+    /// 5, 50 and 95 % percentiles of the first limit, mm; an entry is `None` beyond the last depth. `None` if the case has no
+    /// standard deviations.
     pub percentiles_mm: Option<[Option<f64>; 3]>,
 }
 
 impl Column {
-    /// The columns of one layer of a lobe table, as the device has them.
+    /// Columns of one layer of a lobe table, with the rounding of the device.
     pub fn of_table(table: &LobeTable<'_>, layer: usize) -> Vec<Self> {
         let speeds = table.speeds().enumerate();
         speeds
@@ -94,7 +94,7 @@ impl From<&SpeedLine> for Column {
     }
 }
 
-// Paper colours that do not mix where areas lie on one another.
+// Opaque fill colours, so that overlapping areas do not mix.
 const STABLE: RGBColor = RGBColor(0xd2, 0xea, 0xdc);
 const UNDECIDED: RGBColor = RGBColor(0xd6, 0xd8, 0xdc);
 const UNSTABLE: RGBColor = RGBColor(0xfa, 0xec, 0xec);
@@ -102,10 +102,11 @@ const UNSTABLE: RGBColor = RGBColor(0xfa, 0xec, 0xec);
 /// Size of the picture in pixels.
 const SIZE: (u32, u32) = (960, 480);
 
-/// Draws the chart as SVG. `columns` in order of speed, at least two of different speed; depths from 0 to `depth_max_mm`.
+/// Draws the diagram as SVG. `columns` must be sorted by speed, with at least two different speeds; depths range from 0 to
+/// `depth_max_mm`.
 ///
 /// # Errors
-/// Where there is nothing to draw, or the drawing library refuses.
+/// There are fewer than two speeds or no depth, or the drawing library fails.
 pub fn lobe_chart(
     title: &str,
     columns: &[Column],
@@ -150,7 +151,7 @@ pub fn lobe_chart(
     })
 }
 
-/// Where the error leaves the side open, if that is anywhere wide enough to be seen.
+/// Draws the undecided depths, if any interval is at least one pixel high.
 fn draw_undecided(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -169,7 +170,7 @@ fn draw_undecided(
     Ok(())
 }
 
-/// The band from the 5 to the 95 % limit, and the median in it.
+/// Draws the band between the 5 and 95 % percentiles of the first limit, and its median.
 fn draw_percentiles(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -192,7 +193,7 @@ fn draw_percentiles(
     let band: Vec<(f64, f64)> = along(0).chain(along(2).rev()).collect();
     chart
         .draw_series([Polygon::new(band, INK.mix(0.12))])?
-        .label("limit of 5 to 95 % of the machines")
+        .label("5 to 95 % percentiles of the limit")
         .legend(|(x, y)| Rectangle::new([(x, y - 4), (x + 18, y + 4)], INK.mix(0.12).filled()));
     for (index, width) in [(0, 1), (1, 2), (2, 1)] {
         chart.draw_series(LineSeries::new(along(index), INK.mix(0.5).stroke_width(width)))?;
@@ -208,7 +209,8 @@ fn limit_look(kind: LimitKind) -> (RGBColor, &'static str) {
     }
 }
 
-/// Between two columns with as many intervals, trapezoids; else each column's intervals reach half way.
+/// Polygons of intervals over speed: trapezoids between two columns with equally many intervals, else rectangles to the midpoint
+/// between the columns.
 fn areas(columns: &[Column], intervals: impl Fn(&Column) -> &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let mut areas = Vec::new();
     for (left, right) in columns.iter().zip(columns.iter().skip(1)) {
@@ -228,7 +230,7 @@ fn areas(columns: &[Column], intervals: impl Fn(&Column) -> &[(f64, f64)]) -> Ve
     areas
 }
 
-/// The first limits of one kind as lines.
+/// Draws the first limits of one kind of stability loss as lines.
 fn draw_limits(
     chart: &mut Axes<'_, '_>,
     columns: &[Column],
@@ -237,7 +239,7 @@ fn draw_limits(
 ) -> Result<(), PictureError> {
     let (color, name) = limit_look(kind);
     for (index, run) in limit_runs(columns, depth_max_mm, kind).into_iter().enumerate() {
-        // A kind that leads at a lone speed is still seen.
+        // A circle shows a kind that occurs at a single speed only.
         chart.draw_series(run.iter().map(|&at| Circle::new(at, 1, color.filled())))?;
         let line = chart.draw_series(LineSeries::new(run, color.stroke_width(3)))?;
         if index == 0 {
@@ -248,7 +250,7 @@ fn draw_limits(
     Ok(())
 }
 
-/// Runs of neighbouring speeds whose first limit has this kind; each goes half way to a neighbour of another kind.
+/// Runs of neighbouring speeds whose first limit has this kind; a run extends to the midpoint towards a neighbour of another kind.
 fn limit_runs(columns: &[Column], depth_max_mm: f64, kind: LimitKind) -> Vec<Vec<(f64, f64)>> {
     let visible = |column: &Column| column.first_limit.filter(|limit| limit.depth_mm <= depth_max_mm);
     let mut runs: Vec<Vec<(f64, f64)>> = Vec::new();
@@ -310,7 +312,7 @@ mod tests {
             areas[0],
             [(1000.0, 0.0), (1010.0, 0.0), (1010.0, 1.6), (1000.0, 2.0)]
         );
-        // Half way between 1010 and 1020 the island begins: one area on the left, two on the right.
+        // The stable island begins midway between 1010 and 1020 rev/min: one area on the left, two on the right.
         assert_eq!(areas.len(), 4);
         assert_eq!(
             areas[3],
@@ -363,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_draw_is_said() {
+    fn an_empty_chart_is_refused() {
         let one = [column(600.0, &[(0.0, 3.0)], LimitKind::Hopf)];
         assert!(lobe_chart("", &one, 4.0, &[]).is_err());
         assert!(lobe_chart("", &[], 4.0, &[]).is_err());
@@ -409,7 +411,7 @@ mod tests {
         let mut buffer = [0; 1024];
         let bytes = encode(&content, &mut buffer).unwrap();
         let columns = Column::of_table(&LobeTable::parse(bytes).unwrap(), 0);
-        // Entries are rounded to the unstable side by at most a step of the 16-bit grid, 4 mm / 65 535.
+        // Table entries are rounded to the safe side by at most one step of the 16-bit grid, 4 mm / 65535.
         let step = 4.0 / 65_535.0;
         let near = |a: f64, b: f64| (a - b).abs() <= step;
         assert_eq!((columns.len(), columns[0].stable_mm.len()), (2, 2));

@@ -1,4 +1,4 @@
-//! What an extension changes of the limits, in words and charts.
+//! Change of the stability limits by the extension of a case, as sentences and charts.
 
 use maud::{Markup, html};
 
@@ -8,7 +8,7 @@ use super::marks::Mark;
 use super::page::figure;
 use crate::diagnose::lobes::{Change, Chart, Lobes};
 
-/// The change in sentences.
+/// Sentences about the change of the limits and of the predicted trial cuts.
 pub fn sentences(lobes: &Lobes) -> Vec<String> {
     let changes = lobes
         .speeds
@@ -16,14 +16,14 @@ pub fn sentences(lobes: &Lobes) -> Vec<String> {
         .map(|change| change.relative(lobes.searched_mm).abs());
     let most = changes.fold(0.0, f64::max);
     let mut all = Vec::new();
-    if most < SAME {
-        all.push("the extension changes no limit: the machine and its cut are as believed".into());
+    if most < UNCHANGED {
+        all.push("the extension changes no stability limit".into());
     } else {
         all.extend(limits(lobes));
     }
     if let Some(calls) = lobes.calls {
         all.push(format!(
-            "of {} cuts that are known the case calls {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
+            "of {} trial cuts the case predicts {} wrong ({} missed chatter, {} false alarms), the extended case {} ({} and {})",
             calls.before.cuts,
             calls.before.wrong,
             calls.before.missed_chatter,
@@ -35,18 +35,18 @@ pub fn sentences(lobes: &Lobes) -> Vec<String> {
     }
     if let Some(after_s) = lobes.after_s {
         all.push(format!(
-            "drift and wear as they are after {after_s:.0} s, the end of the longest recording"
+            "drift and wear are evaluated at {after_s:.0} s, the end of the longest recording"
         ));
     }
     all
 }
 
-/// Relative changes of limits below this are none.
-const SAME: f64 = 1e-6;
+/// Relative change of a limit below which it counts as unchanged: a choice.
+const UNCHANGED: f64 = 1e-6;
 
 fn limits(lobes: &Lobes) -> Vec<String> {
     let mut all = vec![format!(
-        "at {:.1} rev/min the limit was {} and is {} with the extension",
+        "at {:.1} rev/min the limit of the case is {}, that of the extended case {}",
         lobes.at.at_rpm,
         limit(
             lobes.at.limit_before_mm,
@@ -67,7 +67,7 @@ fn limits(lobes: &Lobes) -> Vec<String> {
             None => format!("beyond {:.3} mm", lobes.searched_mm),
         };
         all[0].push_str(&format!(
-            "; 90 % interval by that of the parameters {} to {}",
+            "; 90 % interval from the intervals of the parameters: {} to {}",
             end(low_mm),
             end(high_mm)
         ));
@@ -104,19 +104,19 @@ fn limit(
     }
 }
 
-/// How a chart calls the cuts, in a sentence without its end.
-pub fn called(chart: &Chart) -> String {
+/// Sentence, without a full stop, that counts the trial cuts that a chart predicts wrong.
+pub fn trial_cut_counts(chart: &Chart) -> String {
     let calls = chart.calls();
     format!(
-        "of {} cuts that are known the case calls {} wrong ({} missed chatter, {} false alarms), and of {} it cannot be told",
+        "of {} trial cuts the case predicts {} wrong ({} missed chatter, {} false alarms); {} are undecided",
         calls.cuts, calls.wrong, calls.missed_chatter, calls.false_alarms, calls.undecided
     )
 }
 
-/// Both charts, with the cuts that are known; those that a chart calls wrong are ringed.
+/// Lobe diagrams of the case and of the extended case with the trial cuts; a ring marks a wrong prediction.
 ///
 /// # Errors
-/// A picture that cannot be drawn.
+/// A picture cannot be drawn.
 pub(super) fn section(lobes: &Lobes) -> Result<Markup, PictureError> {
     let [before, after] = &lobes.charts;
     let mut columns: Vec<Column> = after.lines.iter().map(Column::from).collect();
@@ -126,13 +126,13 @@ pub(super) fn section(lobes: &Lobes) -> Result<Markup, PictureError> {
     }
     Ok(html! {
         ul { @for sentence in sentences(lobes) { li { (sentence) "." } } }
-        (picture("Lobes of the case", before, "What was believed.")?)
+        (picture("Lobes of the case", before, "The baseline model.")?)
         (figure(
             &drawn("Lobes of the extended case", after, &columns)?,
-            &format!("By {}. Grey: 90 % interval of the limits. {}", after.method, words_of_cuts(after))
+            &format!("Method: {}. Grey: 90 % interval of the limits. {}", after.method, trial_cut_caption(after))
         ))
         details {
-            summary { "Limits, speed by speed" }
+            summary { "Limits at each spindle speed" }
             table {
                 tr { th { "rev/min" } th { "limit before [mm]" } th { "chatter [Hz]" } th { "limit after [mm]" } th { "90 % interval [mm]" } th { "chatter [Hz]" } }
                 @for change in &lobes.speeds { (row(change)) }
@@ -141,13 +141,13 @@ pub(super) fn section(lobes: &Lobes) -> Result<Markup, PictureError> {
     })
 }
 
-/// One chart with the cuts that are known; those that it calls wrong are ringed.
+/// One lobe diagram with the trial cuts; a ring marks a wrong prediction.
 ///
 /// # Errors
-/// A picture that cannot be drawn.
-pub(super) fn picture(title: &str, chart: &Chart, said: &str) -> Result<Markup, PictureError> {
+/// The picture cannot be drawn.
+pub(super) fn picture(title: &str, chart: &Chart, sentence: &str) -> Result<Markup, PictureError> {
     let columns: Vec<Column> = chart.lines.iter().map(Column::from).collect();
-    let caption = format!("{said} {}", words_of_cuts(chart));
+    let caption = format!("{sentence} {}", trial_cut_caption(chart));
     Ok(figure(&drawn(title, chart, &columns)?, &caption))
 }
 
@@ -163,11 +163,11 @@ fn drawn(title: &str, chart: &Chart, columns: &[Column]) -> Result<String, Pictu
     lobe_chart(title, columns, chart.searched_mm, &marks)
 }
 
-fn words_of_cuts(chart: &Chart) -> &'static str {
+fn trial_cut_caption(chart: &Chart) -> &'static str {
     if chart.cuts.is_empty() {
         ""
     } else {
-        "Circles: cuts that were stable; crosses: that chattered; squares: of which it cannot be told; an orange ring: the chart calls it wrong. What came of a recorded cut is what the signal chain of the device hears in it."
+        "Circles: stable trial cuts; crosses: cuts with chatter; squares: marginal cuts; orange ring: wrong prediction of the chart. The outcome of a recorded cut is the verdict of the device's signal chain."
     }
 }
 

@@ -1,4 +1,4 @@
-//! Points of interest on a chart: what was cut there, and an arrow to what was advised.
+//! Marks of cuts on a stability chart, with arrows to the advised speed and depth.
 
 use plotters::prelude::{Circle, Cross, PathElement, Polygon, Rectangle, Text, WHITE};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -7,31 +7,31 @@ use plotters::style::{Color, RGBColor};
 use super::picture::{Axes, CHATTER, Canvas, INK, ORANGE, PictureError, QUIET, text};
 use crate::trial_cuts::{Outcome, TestCut};
 
-/// What a marked point is.
+/// Outcome of a marked cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarkKind {
-    /// A cut that chattered.
+    /// Cut with chatter.
     Chatter,
-    /// A cut that was quiet.
+    /// Stable cut.
     Quiet,
-    /// A cut of which it cannot be told.
+    /// Marginal cut, neither clearly stable nor chatter.
     Marginal,
 }
 
-/// A point on the chart.
+/// Mark of one cut on the chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
-    /// Spindle speed.
+    /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// Axial depth of cut.
+    /// Axial depth, mm.
     pub depth_mm: f64,
-    /// What it is.
+    /// Outcome of the cut, which sets the symbol.
     pub kind: MarkKind,
-    /// A word beside it; empty for none.
+    /// Label beside the symbol; empty for none.
     pub label: String,
-    /// Spindle speed and depth that were advised here: an arrow goes there.
+    /// Advised spindle speed in rev/min and depth in mm, shown by an arrow.
     pub advice: Option<(f64, f64)>,
-    /// True where the chart says the opposite: it gets a ring.
+    /// Whether the chart predicts the opposite outcome, shown by a ring.
     pub wrong: bool,
 }
 
@@ -52,27 +52,27 @@ impl From<&TestCut> for Mark {
     }
 }
 
-/// A box on the paper: left, top, right, bottom.
+/// Rectangle in pixels: left, top, right, bottom.
 type Area = (i32, i32, i32, i32);
 
 fn overlap(a: Area, b: Area) -> bool {
     a.0 < b.2 && b.0 < a.2 && a.1 < b.3 && b.1 < a.3
 }
 
-/// Draws the points with their labels and arrows.
+/// Draws the marks with their labels and arrows.
 pub(super) fn draw_marks(
     canvas: &Canvas<'_>,
     chart: &mut Axes<'_, '_>,
     marks: &[Mark],
 ) -> Result<(), PictureError> {
     const RADIUS: i32 = 7;
-    let mut taken: Vec<Area> = Vec::new();
+    let mut occupied: Vec<Area> = Vec::new();
     for mark in marks {
         let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
         if let Some(advice) = mark.advice {
             draw_arrow(canvas, at, chart.backend_coord(&advice))?;
         }
-        taken.push((at.0 - RADIUS, at.1 - RADIUS, at.0 + RADIUS, at.1 + RADIUS));
+        occupied.push((at.0 - RADIUS, at.1 - RADIUS, at.0 + RADIUS, at.1 + RADIUS));
     }
     for mark in marks {
         let at = chart.backend_coord(&(mark.rpm, mark.depth_mm));
@@ -98,25 +98,25 @@ pub(super) fn draw_marks(
             canvas.draw(&Circle::new(at, RADIUS + 5, ORANGE.stroke_width(3)))?;
         }
         if !mark.label.is_empty() {
-            draw_label(canvas, at, &mark.label, color, &mut taken)?;
+            draw_label(canvas, at, &mark.label, color, &mut occupied)?;
         }
     }
     Ok(())
 }
 
-/// A label near `at` that covers no other: above, below, then farther away.
+/// Draws a label near `at` that does not cover another one: above, below, then farther away.
 fn draw_label(
     canvas: &Canvas<'_>,
     at: (i32, i32),
     label: &str,
     color: RGBColor,
-    taken: &mut Vec<Area>,
+    occupied: &mut Vec<Area>,
 ) -> Result<(), PictureError> {
     let style = text(13, color);
     let (w, h) = canvas.estimate_text_size(label, &style)?;
     let (w, h) = (w as i32 + 12, h as i32 + 6);
     let width = canvas.dim_in_pixel().0 as i32;
-    // Moved sideways where it would leave the paper.
+    // Shifted sideways to stay within the picture.
     let left = (at.0 - w / 2).clamp(0, (width - w).max(0));
     let tops = [
         at.1 - h - 11,
@@ -129,9 +129,9 @@ fn draw_label(
     let areas = tops.map(|top| (left, top, left + w, top + h));
     let area = areas
         .into_iter()
-        .find(|&area| !taken.iter().any(|&other| overlap(area, other)));
+        .find(|&area| !occupied.iter().any(|&other| overlap(area, other)));
     let area = area.unwrap_or(areas[0]);
-    taken.push(area);
+    occupied.push(area);
     canvas.draw(&Rectangle::new(
         [(area.0, area.1), (area.2, area.3)],
         WHITE.mix(0.85).filled(),
@@ -145,7 +145,7 @@ fn draw_label(
     Ok(())
 }
 
-/// An arrow that stops a little before the point it shows.
+/// Draws an arrow that ends 12 pixels before its target.
 fn draw_arrow(canvas: &Canvas<'_>, from: (i32, i32), to: (i32, i32)) -> Result<(), PictureError> {
     const GAP: f64 = 12.0;
     const HEAD: f64 = 11.0;
@@ -177,16 +177,19 @@ mod tests {
 
     #[test]
     fn labels_of_near_points_do_not_cover_one_another() {
-        let mut taken = Vec::new();
+        let mut occupied = Vec::new();
         draw((400, 300), |canvas| {
             for at in [(100, 100), (110, 100), (120, 102), (130, 98)] {
-                draw_label(canvas, at, "a cut", CHATTER, &mut taken)?;
+                draw_label(canvas, at, "a cut", CHATTER, &mut occupied)?;
             }
             Ok(())
         })
         .unwrap();
-        for (index, &a) in taken.iter().enumerate() {
-            assert!(taken.iter().skip(index + 1).all(|&b| !overlap(a, b)), "{taken:?}");
+        for (index, &a) in occupied.iter().enumerate() {
+            assert!(
+                occupied.iter().skip(index + 1).all(|&b| !overlap(a, b)),
+                "{occupied:?}"
+            );
         }
     }
 }

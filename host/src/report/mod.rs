@@ -1,4 +1,4 @@
-//! What people read: words, pictures, the HTML report.
+//! Reports: texts of verdicts and advice, charts as SVG, HTML pages.
 
 pub mod answer;
 pub mod cell_map;

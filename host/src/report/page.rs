@@ -1,7 +1,8 @@
-//! The HTML report: one file with everything in it, pictures included.
+//! HTML page of a report: one file that contains style and pictures.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+/// Style sheet of every page.
 const STYLE: &str = "
 body { font: 16px/1.5 system-ui, sans-serif; color: #262b33; background: #f4f5f7; margin: 0; }
 main { max-width: 1000px; margin: 0 auto; padding: 24px 28px 60px; background: #fff; }
@@ -19,7 +20,7 @@ th, td { text-align: left; padding: 0.3em 1.1em 0.3em 0; border-bottom: 1px soli
 footer { color: #5a626e; font-size: 0.9em; margin-top: 3em; }
 ";
 
-/// A whole page around `body`; needs no other file and no network.
+/// Renders a complete HTML page around `body`; it needs no other file and no network.
 pub fn page(title: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
@@ -36,7 +37,7 @@ pub fn page(title: &str, body: &Markup) -> String {
     .into_string()
 }
 
-/// An SVG picture with a sentence below.
+/// HTML figure: SVG picture with its caption.
 pub fn figure(svg: &str, caption: &str) -> Markup {
     html! {
         figure {

@@ -1,4 +1,4 @@
-//! A picture: an SVG drawing with the house's paper, fonts and colours.
+//! SVG pictures with common fonts, colours, axes and legends.
 
 use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
 use plotters::coord::Shift;
@@ -7,7 +7,7 @@ use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
 use plotters::prelude::{Cartesian2d, RGBColor, Rectangle, SVGBackend, Text, WHITE};
 use plotters::style::{Color, IntoFont, TextStyle};
 
-/// A picture that could not be drawn.
+/// Failure to draw a picture.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot draw the picture: {0}")]
 pub struct PictureError(String);
@@ -19,15 +19,15 @@ impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for Pictu
 }
 
 impl PictureError {
-    /// There is nothing to draw; `what` says what a picture needs.
+    /// Error for missing data; `what` states the data that the picture needs.
     pub(super) fn nothing(what: &str) -> Self {
         Self(what.into())
     }
 }
 
-/// Where a picture is drawn.
+/// Drawing area of an SVG picture.
 pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// A pair of axes on a canvas.
+/// Pair of Cartesian axes on a canvas.
 pub(super) type Axes<'a, 'c> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 pub(super) const INK: RGBColor = RGBColor(0x26, 0x2b, 0x33);
@@ -38,14 +38,14 @@ pub(super) const BLUE: RGBColor = RGBColor(0x1f, 0x5f, 0xa8);
 pub(super) const ORANGE: RGBColor = RGBColor(0xd9, 0x7a, 0x12);
 pub(super) const VIOLET: RGBColor = RGBColor(0x7a, 0x3f, 0xa0);
 
-/// The text style of labels.
+/// Text style of labels with a font size in pixels.
 pub(super) fn text(size: u32, color: RGBColor) -> TextStyle<'static> {
     let mut style = TextStyle::from(("sans-serif", size).into_font());
     style.color = color.to_backend_color();
     style
 }
 
-/// Draws the legend of an axis' series into its upper right corner.
+/// Draws the legend in the upper right corner of the axes.
 pub(super) fn legend<'a: 'c, 'c>(chart: &mut Axes<'a, 'c>) -> Result<(), PictureError> {
     chart
         .configure_series_labels()
@@ -57,7 +57,7 @@ pub(super) fn legend<'a: 'c, 'c>(chart: &mut Axes<'a, 'c>) -> Result<(), Picture
     Ok(())
 }
 
-/// Draws on white paper of `size` pixels and returns the SVG text.
+/// Draws on a white canvas of `size` pixels and returns the SVG text.
 pub(super) fn draw(
     size: (u32, u32),
     paint: impl FnOnce(&Canvas<'_>) -> Result<(), PictureError>,
@@ -72,17 +72,17 @@ pub(super) fn draw(
     Ok(svg)
 }
 
-/// What stands at the axes of one chart.
+/// Title and axis labels of a chart.
 pub(super) struct Labels<'a> {
-    /// Above the chart; empty for none.
+    /// Title above the chart; empty for none.
     pub(super) title: &'a str,
-    /// Quantity and unit along x.
+    /// Quantity and unit of the horizontal axis.
     pub(super) x: &'a str,
-    /// Quantity and unit along y.
+    /// Quantity and unit of the vertical axis.
     pub(super) y: &'a str,
 }
 
-/// Axes over the two ranges, with grid and labels.
+/// Draws axes over the ranges `x` and `y` with grid and labels.
 pub(super) fn axes<'a, 'c>(
     canvas: &'c Canvas<'a>,
     labels: &Labels<'_>,
@@ -114,7 +114,7 @@ pub(super) fn axes<'a, 'c>(
     Ok(chart)
 }
 
-/// A word on paper of its own, so that lines below do not cross it; `at` is its left upper corner.
+/// Draws a word on a white background that covers the lines below it; `at` is its upper left corner in pixels.
 pub(super) fn label(
     canvas: &Canvas<'_>,
     at: (i32, i32),
@@ -123,16 +123,16 @@ pub(super) fn label(
 ) -> Result<(), PictureError> {
     let style = text(13, color);
     let (width, height) = canvas.estimate_text_size(word, &style)?;
-    let paper = [
+    let background = [
         (at.0 - 2, at.1 - 1),
         (at.0 + width as i32 + 3, at.1 + height as i32 + 2),
     ];
-    canvas.draw(&Rectangle::new(paper, WHITE.mix(0.8).filled()))?;
+    canvas.draw(&Rectangle::new(background, WHITE.mix(0.8).filled()))?;
     canvas.draw(&Text::new(word, at, style))?;
     Ok(())
 }
 
-/// A number at an axis: no noise digits of binary fractions.
+/// Formats a number of an axis without the rounding digits of binary fractions.
 fn tick(value: &f64) -> String {
     let size = value.abs();
     if size < 1e-12 {
@@ -144,7 +144,7 @@ fn tick(value: &f64) -> String {
     }
 }
 
-/// The smallest interval that holds all finite values, a little wider at both ends; around 0 where there is none.
+/// Range of an axis: all finite values plus a margin of 6 % at both ends; −1 to 1 if there are none.
 pub(super) fn span(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let (low, high) = values
         .filter(|value| value.is_finite())
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_and_spans_are_plain() {
+    fn ticks_have_no_rounding_digits_and_ranges_have_a_margin() {
         assert_eq!(tick(&0.30000000000000004), "0.3");
         assert_eq!(tick(&-0.0), "0");
         assert_eq!(tick(&-1.1e-16), "0");

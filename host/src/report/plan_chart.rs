@@ -1,4 +1,4 @@
-//! What tests would make of a chart: the 90 % intervals of its limits before and after them, and where to cut.
+//! Chart of a test plan: 90 % intervals of the limits before and after the tests, and the planned trial cuts.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::prelude::{LineSeries, PathElement, Polygon, Rectangle, WHITE};
@@ -11,10 +11,10 @@ use crate::plan::{Plan, Speed, Test};
 /// Size of the picture in pixels.
 const SIZE: (u32, u32) = (960, 480);
 
-/// Draws the chart as SVG, depths from 0 to `depth_max_mm`; speeds are put into order.
+/// Draws the chart as SVG with depths from 0 to `depth_max_mm`; it sorts the speeds.
 ///
 /// # Errors
-/// With fewer than two speeds, or where the drawing library refuses.
+/// There are fewer than two speeds, or the drawing library fails.
 pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String, PictureError> {
     let mut speeds = plan.chart.clone();
     speeds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
@@ -50,13 +50,13 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
         let before = Band {
             interval: |speed| speed.before_mm,
             color: INK,
-            strength: 0.14,
-            name: "90 % interval as it is known",
+            opacity: 0.14,
+            name: "90 % interval before the tests",
         };
         let after = Band {
             interval: |speed| speed.after_mm,
             color: BLUE,
-            strength: 0.45,
+            opacity: 0.45,
             name: "90 % interval after the tests",
         };
         for band in [before, after] {
@@ -81,11 +81,11 @@ pub fn plan_chart(title: &str, plan: &Plan, depth_max_mm: f64) -> Result<String,
     })
 }
 
-/// An interval over the speeds, and how it looks.
+/// Band of intervals over the spindle speed with its colour, opacity and name.
 struct Band {
     interval: fn(&Speed) -> [f64; 2],
     color: RGBColor,
-    strength: f64,
+    opacity: f64,
     name: &'static str,
 }
 
@@ -101,7 +101,7 @@ fn draw_band(
             .map(move |speed| (speed.rpm, (band.interval)(speed)[index].clamp(0.0, depth_max_mm)))
     };
     let outline: Vec<(f64, f64)> = end(0).chain(end(1).rev()).collect();
-    let fill = band.color.mix(band.strength);
+    let fill = band.color.mix(band.opacity);
     chart
         .draw_series([Polygon::new(outline, fill)])?
         .label(band.name)

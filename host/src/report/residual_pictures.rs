@@ -1,72 +1,75 @@
-//! Pictures of what a case misses: over time, frequency, spindle orders, amplitude and displacement, and tooth by tooth.
+//! Pictures of the residual of a case over time, frequency, spindle order, amplitude, displacement and tooth passing.
 
 use maud::{Markup, html};
 
 use super::PictureError;
-use super::comparison::{Line, Look, comparison};
+use super::comparison::{Line, LineRole, comparison};
 use super::page::figure;
 use super::stroboscope::samples_per_tooth;
 use super::time_signal::thinned;
 use crate::diagnose::{MissingForce, ResidualView, SpindleMotionView};
 
-/// Points of a cloud, at most.
+/// Largest number of points of a scatter plot: a choice that limits the file size.
 const POINTS: usize = 3000;
 
-/// Size of the pictures that stand side by side.
-const HALF: (u32, u32) = (470, 330);
+/// Size in pixels of pictures that stand side by side.
+const HALF_WIDTH_SIZE: (u32, u32) = (470, 330);
 
-/// Spindle orders that are shown, as multiples of the teeth.
+/// Highest spindle order in the picture divided by the number of teeth: a choice that shows four harmonics of the tooth passing.
 const ORDERS_PER_TOOTH: f64 = 4.5;
 
-/// Tooth passes that are shown.
-const PASSES: usize = 400;
+/// Number of tooth passings in the stroboscopic picture, the last ones of the record: a choice.
+const PASSINGS: usize = 400;
 
-/// All pictures of one channel of one record; `fellows` are the views of all records of that channel.
+/// All pictures of one channel of one record; `channel_views` are the residuals of this channel in all records.
 ///
 /// # Errors
-/// A picture that cannot be drawn.
+/// A picture cannot be drawn.
 pub(super) fn pictures(
     view: &ResidualView,
-    fellows: &[&ResidualView],
+    channel_views: &[&ResidualView],
     with_extension: bool,
 ) -> Result<Markup, PictureError> {
     let what = format!("{} of {}", view.channel, file_name(&view.record));
     let time = if with_extension {
-        "over time: what was measured, what the case misses, and what the extended case misses."
+        "over time: measured signal, residual of the case, and residual of the extended case."
     } else {
-        "over time: what was measured, and what the case misses."
+        "over time: measured signal and residual of the case."
     };
     let mut halves = vec![figure(
         &over_frequency(view)?,
-        "Over frequency, as powers of ten of the amplitude per line. What stays at the level of the noise is explained.",
+        "Amplitude spectrum, logarithm to base 10. A residual at the noise level is explained.",
     )];
-    if let Some(turning) = &view.spindle_motion {
+    if let Some(spindle) = &view.spindle_motion {
         halves.push(figure(
-            &over_orders(view, turning)?,
+            &over_orders(view, spindle)?,
             &format!(
-                "Over spindle orders ({:.1} rev/min, {} teeth): what repeats once per turn is runout or the spindle; at multiples of the teeth the force is wrong.",
-                turning.rpm, turning.teeth
+                "Spectrum over spindle orders ({:.1} rev/min, {} teeth). Order 1: runout or spindle error; multiples of the number of teeth: error of the cutting force.",
+                spindle.rpm, spindle.teeth
             ),
         ));
-        if turning.residual.len() > 1 {
+        if spindle.residual.len() > 1 {
             halves.push(figure(
-                &strobed(&turning.residual, "missed by the case", view)?,
-                "Stroboscopic map: what the case misses each time a tooth enters. Lines that part by tooth are runout; clouds that drift are wear, drift or chatter.",
+                &stroboscopic_map(&spindle.residual, "residual of the case", view)?,
+                "Stroboscopic map: residual at each tooth entry. Separate lines for each tooth: runout; drifting points: wear, drift or chatter.",
             ));
         }
     }
     if let Some(missing) = &view.missing {
-        let all: Vec<&MissingForce> = fellows.iter().filter_map(|view| view.missing.as_ref()).collect();
+        let all: Vec<&MissingForce> = channel_views
+            .iter()
+            .filter_map(|view| view.missing.as_ref())
+            .collect();
         if let Some(picture) = over_amplitude(&all)? {
             halves.push(figure(
                 &picture,
-                "Does the receptance move with force? The stiffness and damping that are missing, as shares of the static stiffness, stretch by stretch over its amplitude, of this channel in all records. Level: a linear parameter; sloped: a term that is not linear.",
+                "Missing stiffness and damping relative to the static stiffness, over the amplitude of each segment, for this channel in all records. Constant: error of a linear parameter; dependent on amplitude: nonlinear term.",
             ));
         }
         if let Some(picture) = over_displacement(missing)? {
             halves.push(figure(
                 &picture,
-                "The restoring force that is missing, over the displacement: a spring that is not linear bends it, friction and play open it.",
+                "Missing restoring force over displacement. Curved: nonlinear spring; loop: friction or backlash.",
             ));
         }
     }
@@ -76,18 +79,26 @@ pub(super) fn pictures(
     })
 }
 
-/// The name of a file without its folders.
+/// File name without its folders.
 pub(super) fn file_name(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or(path)
 }
 
-fn signals(view: &ResidualView) -> Vec<(&'static str, Look, &[f64])> {
+fn signals(view: &ResidualView) -> Vec<(&'static str, LineRole, &[f64])> {
     let mut signals = vec![
-        ("measured", Look::Measured, view.measured.as_slice()),
-        ("missed by the case", Look::Missed, view.residual.as_slice()),
+        ("measured", LineRole::Measured, view.measured.as_slice()),
+        (
+            "residual of the case",
+            LineRole::BaselineResidual,
+            view.residual.as_slice(),
+        ),
     ];
     if !view.left.is_empty() {
-        signals.push(("missed with the extension", Look::Left, view.left.as_slice()));
+        signals.push((
+            "residual of the extended case",
+            LineRole::ExtendedResidual,
+            view.left.as_slice(),
+        ));
     }
     signals
 }
@@ -98,21 +109,21 @@ fn over_time(view: &ResidualView, what: &str) -> Result<String, PictureError> {
         .collect();
     let lines: Vec<Line> = signals(view)
         .into_iter()
-        .map(|(name, look, samples)| Line {
+        .map(|(name, role, samples)| Line {
             name: name.into(),
             points: thinned(&t_s, samples),
-            look,
+            role,
         })
         .collect();
     let unit = format!("{} [{}]", view.channel, view.unit);
     comparison((960, 300), [what, "time [s]", &unit], &lines, None)
 }
 
-/// Spectra with `scale` frequency units to a hertz, up to `last_hz`.
+/// Amplitude spectra of measured signal and residuals up to `last_hz`; `scale` converts Hz to the unit of the axis.
 fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<Line> {
     let mut lines: Vec<Line> = signals(view)
         .into_iter()
-        .map(|(name, look, samples)| Line {
+        .map(|(name, role, samples)| Line {
             name: name.into(),
             points: view
                 .spectrum(samples, points)
@@ -120,10 +131,10 @@ fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<
                 .filter(|(hertz, amplitude)| *amplitude > 0.0 && *hertz <= last_hz)
                 .map(|(hertz, amplitude)| (scale * hertz, amplitude.log10()))
                 .collect(),
-            look,
+            role,
         })
         .collect();
-    // White noise of deviation σ: 2σ/√n per line.
+    // Expected amplitude of white noise with standard deviation σ in n samples: 2σ/√n per frequency line.
     let noise = 2.0 * view.deviation / (view.measured.len().max(1) as f64).sqrt();
     if let (Some(&(first, _)), Some(&(last, _))) = (lines[0].points.first(), lines[0].points.last())
         && noise > 0.0
@@ -131,7 +142,7 @@ fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<
         lines.push(Line {
             name: "noise".into(),
             points: vec![(first, noise.log10()), (last, noise.log10())],
-            look: Look::Level,
+            role: LineRole::Level,
         });
     }
     lines
@@ -140,30 +151,29 @@ fn spectra(view: &ResidualView, points: usize, last_hz: f64, scale: f64) -> Vec<
 fn over_frequency(view: &ResidualView) -> Result<String, PictureError> {
     let unit = format!("log10 of {} [{}]", view.channel, view.unit);
     let lines = spectra(view, 500, view.highest_hz, 1.0);
-    comparison(HALF, ["", "frequency [Hz]", &unit], &lines, None)
+    comparison(HALF_WIDTH_SIZE, ["", "frequency [Hz]", &unit], &lines, None)
 }
 
-fn over_orders(view: &ResidualView, turning: &SpindleMotionView) -> Result<String, PictureError> {
+fn over_orders(view: &ResidualView, spindle: &SpindleMotionView) -> Result<String, PictureError> {
     let unit = format!("log10 of {} [{}]", view.channel, view.unit);
-    let turns_hz = turning.rpm / 60.0;
-    let last_hz = (ORDERS_PER_TOOTH * turning.teeth as f64 * turns_hz).min(0.5 * view.rate_hz);
-    // So fine that an order has ten points.
-    let points = (5.0 * view.rate_hz / turns_hz) as usize;
-    let lines = spectra(view, points, last_hz, turns_hz.recip());
-    comparison(HALF, ["", "spindle order", &unit], &lines, None)
+    let revolutions_hz = spindle.rpm / 60.0;
+    let last_hz = (ORDERS_PER_TOOTH * spindle.teeth as f64 * revolutions_hz).min(0.5 * view.rate_hz);
+    // The number of points gives ten frequency lines per spindle order.
+    let points = (5.0 * view.rate_hz / revolutions_hz) as usize;
+    let lines = spectra(view, points, last_hz, revolutions_hz.recip());
+    comparison(HALF_WIDTH_SIZE, ["", "spindle order", &unit], &lines, None)
 }
 
-fn strobed(samples: &[(u32, f64)], what: &str, view: &ResidualView) -> Result<String, PictureError> {
-    let shown = &samples[samples.len().saturating_sub(PASSES)..];
+fn stroboscopic_map(samples: &[(u32, f64)], what: &str, view: &ResidualView) -> Result<String, PictureError> {
+    let shown = &samples[samples.len().saturating_sub(PASSINGS)..];
     let quantity = format!("{what}: {} [{}]", view.channel, view.unit);
     samples_per_tooth("", &quantity, shown, None)
 }
 
-/// `None` where the amplitude does not change enough to tell, within a record and from one to the other.
+/// Missing stiffness and damping over amplitude; `None` if the largest amplitude is less than 1.2 times the smallest one.
 fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureError> {
     let rms = |a: &[f64]| (a.iter().map(|x| x * x).sum::<f64>() / a.len().max(1) as f64).sqrt();
-    // Amplitude in µm, and stiffness and damping as shares of the static stiffness; damping times the frequency at which velocity and
-    // displacement have their sizes.
+    // Amplitude in µm, k/k_static and ω·c/k_static, where ω is the ratio of the root mean squares of velocity and displacement.
     let mut all: Vec<[f64; 3]> = Vec::new();
     for missing in records.iter().filter(|missing| missing.stiffness > 0.0) {
         let omega = rms(&missing.v) / rms(&missing.x).max(f64::MIN_POSITIVE);
@@ -180,17 +190,17 @@ fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureEr
         return Ok(None);
     }
     let every = all.len().div_ceil(POINTS / 2).max(1);
-    let cloud = |name: &str, look, of: usize| Line {
+    let scatter = |name: &str, role, of: usize| Line {
         name: name.into(),
         points: all.iter().step_by(every).map(|at| (at[0], at[of])).collect(),
-        look,
+        role,
     };
     let lines = [
-        cloud("missing stiffness", Look::Cloud, 1),
-        cloud("missing damping · ω", Look::OtherCloud, 2),
+        scatter("missing stiffness", LineRole::Points, 1),
+        scatter("missing damping · ω", LineRole::OtherPoints, 2),
     ];
-    let labels = ["", "amplitude [µm]", "share of the static stiffness"];
-    comparison(HALF, labels, &lines, None).map(Some)
+    let labels = ["", "amplitude [µm]", "relative to the static stiffness"];
+    comparison(HALF_WIDTH_SIZE, labels, &lines, None).map(Some)
 }
 
 fn over_displacement(missing: &MissingForce) -> Result<Option<String>, PictureError> {
@@ -208,10 +218,10 @@ fn over_displacement(missing: &MissingForce) -> Result<Option<String>, PictureEr
     let lines = [Line {
         name: "missing force".into(),
         points,
-        look: Look::Cloud,
+        role: LineRole::Points,
     }];
     comparison(
-        HALF,
+        HALF_WIDTH_SIZE,
         ["", "displacement [µm]", "missing restoring force [N]"],
         &lines,
         None,

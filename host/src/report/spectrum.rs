@@ -1,25 +1,26 @@
-//! A spectrum, with the harmonics of the tooth passing and the chatter frequency marked.
+//! Amplitude spectrum with marks at the harmonics of the tooth-passing frequency and at the chatter frequency.
 
 use plotters::prelude::{LineSeries, PathElement, Polygon};
 use plotters::style::Color;
 
 use super::picture::{BLUE, CHATTER, Labels, ORANGE, PictureError, axes, draw, label, legend, span};
 
+/// Size of the picture in pixels.
 const SIZE: (u32, u32) = (470, 330);
 
-/// What a spectrum shows beside its line.
+/// Frequencies marked in a spectrum, Hz.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SpectrumMarks {
-    /// The tooth-passing frequency: its harmonics get thin lines.
+    /// Tooth-passing frequency, Hz; thin lines mark its harmonics.
     pub tooth_passing_hz: Option<f64>,
-    /// The chatter frequency.
+    /// Chatter frequency, Hz.
     pub chatter_hz: Option<f64>,
 }
 
-/// Draws amplitudes in m/s² at `frequency_hz` (as many, in order) up to `last_hz` as SVG.
+/// Draws amplitudes in m/s² over the ascending frequencies `frequency_hz` (equally many) up to `last_hz` as SVG.
 ///
 /// # Errors
-/// Where there is nothing to draw, or the drawing library refuses.
+/// There are fewer than two frequencies, or the drawing library fails.
 pub fn spectrum(
     title: &str,
     frequency_hz: &[f64],

@@ -1,4 +1,4 @@
-//! The stabilization diagram: poles over the order of the model, and below it the receptances with their fit.
+//! Stabilization diagram: poles over the model order; below it the measured receptances and their modal fit.
 
 use plotters::prelude::{Circle, LineSeries, PathElement, RGBColor};
 use plotters::style::Color;
@@ -9,16 +9,19 @@ use super::picture::{
 };
 use crate::identify::modes::{ModalModel, Receptances};
 
+/// Size of the picture in pixels.
 const SIZE: (u32, u32) = (900, 820);
 
-/// Colours of the receptances, over and over.
+/// Colours of the receptances, used cyclically.
 const COLORS: [RGBColor; 6] = [BLUE, ORANGE, QUIET, CHATTER, VIOLET, INK];
 
-/// Draws poles that are stable from one order to the next, those that are not, and the modes that were taken; below it
-/// the size of the receptances as they were measured (dots) and as the modes give them (lines).
+/// Draws stable poles, unstable poles and the selected modes over frequency and model order; below them the magnitude of the
+/// measured receptances (dots) and of the modal model (lines).
+///
+/// A pole is stable if its frequency, damping and mode shape stay constant from one model order to the next.
 ///
 /// # Errors
-/// The drawing library refuses.
+/// The drawing library fails.
 pub fn stabilization_chart(
     title: &str,
     data: &Receptances,
@@ -74,7 +77,7 @@ fn diagram(
             mode.mode.frequency_hz,
             100.0 * mode.mode.damping_ratio
         );
-        // Words of neighbouring modes one below the other.
+        // Labels of neighbouring modes are staggered vertically.
         let at = chart.backend_coord(&(mode.mode.frequency_hz, top + 2.6 - (index % 3) as f64));
         let origin = canvas.get_base_pixel();
         label(canvas, (at.0 - origin.0 + 4, at.1 - origin.1), &words, QUIET)?;

@@ -1,4 +1,5 @@
-//! Samples once per tooth: one line is a quiet cut, two are period doubling, waves are a Hopf.
+//! Stroboscopic picture, one sample per tooth passing: one line is a stable cut, two lines are a period doubling, waves are a Hopf
+//! bifurcation.
 
 use std::ops::Range;
 
@@ -7,13 +8,14 @@ use plotters::style::{Color, RGBColor};
 
 use super::picture::{BLUE, Labels, ORANGE, PictureError, axes, draw, legend, span};
 
+/// Size of the picture in pixels.
 const SIZE: (u32, u32) = (470, 330);
 
-/// Draws samples over the number of their tooth passes as SVG; even and odd passes have their own colour. `range` is that of
-/// the axis of samples, by default what holds them.
+/// Draws samples over the number of the tooth passing as SVG, in two colours for even and odd numbers; `range` is that of the
+/// vertical axis, by default that of the samples.
 ///
 /// # Errors
-/// Where there is nothing to draw, or the drawing library refuses.
+/// There are no samples, or the drawing library fails.
 pub fn samples_per_tooth(
     title: &str,
     quantity: &str,
@@ -25,21 +27,24 @@ pub fn samples_per_tooth(
     };
     let labels = Labels {
         title,
-        x: "tooth passes",
+        x: "tooth passing number",
         y: quantity,
     };
-    let passes = |tooth: u32| f64::from(tooth.wrapping_sub(first));
+    let passings = |tooth: u32| f64::from(tooth.wrapping_sub(first));
     let mut y = range.unwrap_or_else(|| span(samples.iter().map(|&(_, value)| value)));
-    // Room for the legend above the samples.
+    // Space for the legend above the samples.
     y.end += 0.25 * (y.end - y.start);
     draw(SIZE, |canvas| {
-        let mut chart = axes(canvas, &labels, 0.0..passes(last) + 1.0, y)?;
-        let kinds: [(u32, RGBColor, &str); 2] = [(0, BLUE, "even passes"), (1, ORANGE, "odd passes")];
+        let mut chart = axes(canvas, &labels, 0.0..passings(last) + 1.0, y)?;
+        let kinds: [(u32, RGBColor, &str); 2] = [
+            (0, BLUE, "even tooth passings"),
+            (1, ORANGE, "odd tooth passings"),
+        ];
         for (parity, color, name) in kinds {
             let own = samples.iter().filter(|(tooth, _)| tooth % 2 == parity);
             chart
                 .draw_series(
-                    own.map(|&(tooth, value)| Circle::new((passes(tooth), value), 2, color.filled())),
+                    own.map(|&(tooth, value)| Circle::new((passings(tooth), value), 2, color.filled())),
                 )?
                 .label(name)
                 .legend(move |(x, y)| PathElement::new([(x + 4, y), (x + 14, y)], color.stroke_width(4)));
@@ -54,7 +59,7 @@ mod tests {
 
     #[test]
     fn the_colour_follows_the_tooth() {
-        // A pass is missing: by their place in the list the later ones would change colour.
+        // One tooth passing is missing: the colour must follow the passing number, not the index in the list.
         let samples: Vec<(u32, f64)> = (0..41)
             .filter(|tooth| *tooth != 20)
             .map(|tooth| (tooth, if tooth % 2 == 0 { 1.0 } else { -1.0 }))

@@ -1,8 +1,8 @@
-//! The time of a report.
+//! Time of a report in seconds.
 
 use quietcut_core::monitor::Report;
 
-/// The time of a report in seconds: whole nanoseconds of the first 104 days are exact in an `f64`.
+/// Converts the time stamp of a report from ns to s; an `f64` holds whole nanoseconds exactly for 104 days.
 pub fn seconds(report: &Report) -> f64 {
     report.time.0 as f64 / 1e9
 }

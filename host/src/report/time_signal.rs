@@ -1,4 +1,4 @@
-//! A signal over time, with the moments that matter marked.
+//! Chart of a signal over time with marked events.
 
 use std::ops::Range;
 
@@ -7,31 +7,31 @@ use plotters::style::Color;
 
 use super::picture::{BLUE, CHATTER, INK, Labels, PictureError, axes, draw, label, span};
 
-/// A moment on the time axis.
+/// Marked event on the time axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moment {
-    /// When.
+pub struct TimeMark {
+    /// Time of the event, s.
     pub t_s: f64,
-    /// What happens then.
+    /// Label of the event.
     pub label: String,
 }
 
+/// Size of the picture in pixels.
 const SIZE: (u32, u32) = (960, 280);
-/// The line is drawn through the least and the greatest value of this many stretches of time: more than there are
-/// pixels would only make the file bigger.
-const STRETCHES: usize = 1200;
+/// Number of subintervals of time whose minimum and maximum are drawn: a choice slightly above the width of the picture in pixels.
+const SUBINTERVALS: usize = 1200;
 
-/// Draws `values` at the times `t_s` (as many, in order) as SVG; `range` is that of the axis of values, by default what holds
-/// them.
+/// Draws `values` at the ascending times `t_s` (equally many, s) as SVG; `range` is that of the vertical axis, by default that of
+/// the values.
 ///
 /// # Errors
-/// Where there is nothing to draw, or the drawing library refuses.
+/// There are no samples, or the drawing library fails.
 pub fn time_signal(
     title: &str,
     quantity: &str,
     t_s: &[f64],
     values: &[f64],
-    moments: &[Moment],
+    moments: &[TimeMark],
     range: Option<Range<f64>>,
 ) -> Result<String, PictureError> {
     let (Some(&from), Some(&to)) = (t_s.first(), t_s.last()) else {
@@ -50,7 +50,7 @@ pub fn time_signal(
             let line = [(moment.t_s, y.start), (moment.t_s, y.end)];
             chart.draw_series([PathElement::new(line, CHATTER.stroke_width(2))])?;
             let (x, top) = chart.backend_coord(&(moment.t_s, y.end));
-            // Labels of near moments must not lie on one another.
+            // Labels of near events are staggered so that they do not overlap.
             let row = 16 * (index as i32 % 3);
             label(canvas, (x + 6, top + 4 + row), &moment.label, INK)?;
         }
@@ -58,17 +58,20 @@ pub fn time_signal(
     })
 }
 
-/// The least and the greatest value of every stretch, in the order in which they come.
+/// Reduces a signal to the minimum and maximum of each subinterval of time, in their order.
 pub(super) fn thinned(t_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = t_s.iter().copied().zip(values.iter().copied()).collect();
-    let stretch = points.len().div_ceil(STRETCHES).max(1);
-    if stretch <= 2 {
+    let length = points.len().div_ceil(SUBINTERVALS).max(1);
+    if length <= 2 {
         return points;
     }
-    let mut kept = Vec::with_capacity(2 * STRETCHES);
-    for part in points.chunks(stretch) {
+    let mut kept = Vec::with_capacity(2 * SUBINTERVALS);
+    for subinterval in points.chunks(length) {
         let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
-        if let (Some(&low), Some(&high)) = (part.iter().min_by(by_value), part.iter().max_by(by_value)) {
+        if let (Some(&low), Some(&high)) = (
+            subinterval.iter().min_by(by_value),
+            subinterval.iter().max_by(by_value),
+        ) {
             if low.0 <= high.0 {
                 kept.extend([low, high]);
             } else {
@@ -90,7 +93,7 @@ mod tests {
         values[50_001] = 7.0;
         values[50_002] = -3.0;
         let kept = thinned(&t_s, &values);
-        assert!(kept.len() <= 2 * STRETCHES);
+        assert!(kept.len() <= 2 * SUBINTERVALS);
         assert!(kept.windows(2).all(|pair| pair[0].0 <= pair[1].0));
         for extreme in [7.0, -3.0] {
             assert!(kept.iter().any(|&(_, value)| value == extreme), "{extreme}");

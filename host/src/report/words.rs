@@ -1,4 +1,4 @@
-//! The words of verdicts and advice, for machinists and for scripts; the only place that has them.
+//! Texts of verdicts and advice for machinists, and their keys for JSON and CSV.
 
 use quietcut_core::advice::{Action, Advice, Obstacle, Source};
 use quietcut_core::detector::{Judgement, Reason, Verdict};
@@ -9,7 +9,7 @@ use quietcut_core::working_point::WorkingPoint;
 
 use super::time::seconds;
 
-/// The word for a verdict in JSON and CSV.
+/// Key of a verdict in JSON and CSV.
 pub fn verdict_key(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::AirCut => "air-cut",
@@ -22,7 +22,7 @@ pub fn verdict_key(verdict: Verdict) -> &'static str {
     }
 }
 
-/// The word for an action in JSON and CSV.
+/// Key of an advised action in JSON and CSV.
 pub fn action_key(action: Action) -> &'static str {
     match action {
         Action::Keep => "keep",
@@ -32,7 +32,7 @@ pub fn action_key(action: Action) -> &'static str {
     }
 }
 
-/// The word for the source of advice in JSON and CSV.
+/// Key of the source of advice in JSON and CSV.
 pub fn source_key(source: Source) -> &'static str {
     match source {
         Source::Table => "table",
@@ -40,7 +40,7 @@ pub fn source_key(source: Source) -> &'static str {
     }
 }
 
-/// A verdict as a machinist would say it: `chatter at 17.4 Hz`.
+/// Verdict as a text for machinists, such as `CHATTER at 17.4 Hz, not synchronous with the teeth (Hopf)`.
 pub fn verdict(judgement: &Judgement) -> String {
     let at = judgement
         .chatter
@@ -49,32 +49,34 @@ pub fn verdict(judgement: &Judgement) -> String {
     match judgement.verdict {
         Verdict::AirCut => "not cutting".into(),
         Verdict::Stable => "cutting, quiet".into(),
-        Verdict::Hopf => format!("CHATTER{at}, not in step with the teeth (Hopf)"),
+        Verdict::Hopf => format!("CHATTER{at}, not synchronous with the teeth (Hopf)"),
         Verdict::PeriodDoubling => format!("CHATTER{at}, every second tooth (period doubling)"),
-        Verdict::Forced => "strong vibration in step with the teeth: forced, not chatter".into(),
-        Verdict::Runout => "strong vibration once per turn: the tool runs out, not chatter".into(),
-        Verdict::Indeterminate => format!("cannot tell: {}", reason(judgement.reason)),
+        Verdict::Forced => {
+            "strong vibration synchronous with the teeth: forced vibration, not chatter".into()
+        }
+        Verdict::Runout => "strong vibration once per revolution: runout of the tool, not chatter".into(),
+        Verdict::Indeterminate => format!("no decision: {}", reason(judgement.reason)),
     }
 }
 
-/// Why a verdict is what it is.
+/// Reason of a verdict.
 pub fn reason(reason: Reason) -> &'static str {
     match reason {
         Reason::TooShort => "not enough signal yet",
-        Reason::NoSignal => "nothing above the noise but what the spindle makes",
-        Reason::Decaying => "what is not in step with the teeth dies out",
-        Reason::Growing => "what is not in step with the teeth grows",
-        Reason::Persistent => "what is not in step with the teeth stays",
-        Reason::FlipOrRunout => "with this signal runout and period doubling look the same",
+        Reason::NoSignal => "no vibration above the noise except that of the spindle",
+        Reason::Decaying => "the vibration not synchronous with the teeth decays",
+        Reason::Growing => "the vibration not synchronous with the teeth grows",
+        Reason::Persistent => "the vibration not synchronous with the teeth persists",
+        Reason::FlipOrRunout => "runout and period doubling cannot be separated in this signal",
         Reason::SpeedUnknown => {
-            "no tachometer and no speed told, so chatter cannot be told from forced vibration"
+            "no tachometer and no spindle speed set: chatter cannot be separated from forced vibration"
         }
         Reason::SpeedChanging => "the spindle speed is changing",
         Reason::DamagedSignal => "too many samples are clipped or lost",
     }
 }
 
-/// A report on one line: time, speed, verdict, advice.
+/// One line of text for a report: time, spindle speed, verdict, advice.
 pub fn line(report: &Report) -> String {
     match &report.advice {
         Some(advice) if advice.action != Action::Keep => format!(
@@ -87,7 +89,7 @@ pub fn line(report: &Report) -> String {
     }
 }
 
-/// A report on one line without its advice.
+/// One line of text for a report without its advice: time, spindle speed, verdict.
 pub fn state(report: &Report) -> String {
     let speed = report.speed.map_or_else(
         || "      speed ?".into(),
@@ -97,7 +99,7 @@ pub fn state(report: &Report) -> String {
     format!("{seconds:9.2} s  {speed}  {}", verdict(&report.judgement))
 }
 
-/// What to do: `go to 1480 rev/min`.
+/// Advised action as a text, such as `go to 1480 rev/min`.
 pub fn action(advice: &Advice) -> String {
     match advice.action {
         Action::Keep => "keep cutting".into(),
@@ -113,10 +115,10 @@ pub fn action(advice: &Advice) -> String {
     }
 }
 
-/// Why the advice is what it is: what it rests on, what it assumes, and why it rests on nothing better. `speed` is the
-/// speed the cut had.
+/// Reason for the advice: its source, the obstacle to a better source, and the assumed working point. `speed` is the measured
+/// spindle speed.
 pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
-    let mut parts = vec![ground(advice, judgement, speed)];
+    let mut parts = vec![source_reason(advice, judgement, speed)];
     if advice.action != Action::Keep {
         parts.extend(advice.obstacle.as_ref().map(obstacle));
         parts.extend(advice.assumed.as_ref().map(assumed));
@@ -124,9 +126,9 @@ pub fn why(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String
     parts.join("; ")
 }
 
-fn ground(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
+fn source_reason(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String {
     match (advice.action, advice.source) {
-        (Action::Keep, _) => "no chatter is heard".into(),
+        (Action::Keep, _) => "no chatter is detected".into(),
         (Action::Speed, Source::Table) => {
             let deep = advice
                 .depth
@@ -135,11 +137,11 @@ fn ground(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String 
             let from = speed
                 .map(|speed| format!(" to {:.0} rev/min", speed.0))
                 .unwrap_or_default();
-            format!("the nearest speed{from} where the lobe table calls a cut{deep} stable with margin")
+            format!("the nearest speed{from} where a cut{deep} is stable with margin in the lobe table")
         }
         (Action::Depth, Source::Table) => {
             "the lobe table has no speed within the limits of the machine where the present depth is stable; \
-             this depth is the largest that is, with margin"
+             the advised depth is the largest stable depth with margin"
                 .into()
         }
         (Action::Speed, Source::ToothPassingRule) => {
@@ -152,54 +154,54 @@ fn ground(advice: &Advice, judgement: &Judgement, speed: Option<Rpm>) -> String 
             )
         }
         (Action::Depth, Source::ToothPassingRule) => {
-            "the tooth-passing rule knows no depths, only that less is quieter".into()
+            "the tooth-passing rule gives no stable depth; a smaller depth is more stable".into()
         }
-        (Action::NotKnown, Source::Table) => "the lobe table does not help".into(),
-        (Action::NotKnown, Source::ToothPassingRule) => "the tooth-passing rule does not help".into(),
+        (Action::NotKnown, Source::Table) => "the lobe table gives no stable cut".into(),
+        (Action::NotKnown, Source::ToothPassingRule) => "the tooth-passing rule gives no speed".into(),
     }
 }
 
-/// What kept a better source of advice from being used.
+/// Reason why a better source of advice was not used.
 pub fn obstacle(obstacle: &Obstacle) -> String {
     match obstacle {
         Obstacle::NoTable => "the device has no lobe table".into(),
-        Obstacle::Table(why) => format!("the lobe table does not know this cut: {}", not_known(why)),
+        Obstacle::Table(why) => format!("the lobe table does not cover this cut: {}", not_known(why)),
         Obstacle::Speed => "the spindle speed is not a positive number".into(),
         Obstacle::Contradicted => {
-            "the lobe table calls this cut stable, and yet it chatters: the table is not true here".into()
+            "this cut is stable in the lobe table and yet it chatters: the table is wrong here".into()
         }
         Obstacle::NothingStable => {
             "the lobe table has no stable depth at any speed within the limits of the machine".into()
         }
-        Obstacle::ChatterFrequency => "the chatter frequency is not known".into(),
+        Obstacle::ChatterFrequency => "the chatter frequency is unknown".into(),
         Obstacle::NoSpeedWithinLimits => {
             "the tooth-passing rule has no speed within the limits of the machine".into()
         }
     }
 }
 
-/// How stability is lost.
+/// Kind of the loss of stability as a text.
 pub fn limit(kind: lobes::IntervalKind) -> &'static str {
     match kind {
-        lobes::IntervalKind::Hopf => "chatter at a frequency of its own (Hopf)",
-        lobes::IntervalKind::Flip => "chatter at every second tooth (period doubling)",
+        lobes::IntervalKind::Hopf => "chatter at a frequency not synchronous with the teeth (Hopf)",
+        lobes::IntervalKind::Flip => "chatter with the period of two teeth (period doubling)",
         lobes::IntervalKind::Fold => "the forced vibration jumps (fold)",
         lobes::IntervalKind::Undecided => "the computation could not decide",
     }
 }
 
-/// Why a lobe table has no answer.
+/// Reason why a lobe table does not cover a cut.
 pub fn not_known(why: &NotKnown) -> String {
     match why {
         NotKnown::Speed { asked, from, to } => {
             format!(
-                "{:.0} rev/min is not within its {:.0} to {:.0} rev/min",
+                "{:.0} rev/min is outside its range of {:.0} to {:.0} rev/min",
                 asked.0, from.0, to.0
             )
         }
         NotKnown::Depth { asked, from, to } => {
             format!(
-                "{:.2} mm is not within its {:.2} to {:.2} mm",
+                "{:.2} mm is outside its range of {:.2} to {:.2} mm",
                 asked.0, from.0, to.0
             )
         }
@@ -207,30 +209,30 @@ pub fn not_known(why: &NotKnown) -> String {
             format!("it is for a feed of {from} per tooth, not {asked}")
         }
         NotKnown::Feed { asked, from, to } => {
-            format!("a feed of {asked} per tooth is not within its {from} to {to}")
+            format!("a feed of {asked} per tooth is outside its range of {from} to {to}")
         }
         NotKnown::Immersion { start, exit } => {
-            format!("it has nothing for an immersion from {start} to {exit}")
+            format!("it has no layer for an immersion from {start} to {exit}")
         }
-        NotKnown::Posture { asked } => format!("it has nothing for posture {asked}"),
+        NotKnown::Posture { asked } => format!("it has no layer for posture {asked}"),
         NotKnown::Teeth { asked, table } => format!("it is for {table} teeth, the tool has {asked}"),
-        NotKnown::Undecided => "its computation could not decide here".into(),
-        NotKnown::Damaged => "its bytes are damaged".into(),
+        NotKnown::Undecided => "its stability computation is undecided here".into(),
+        NotKnown::Damaged => "its data are damaged".into(),
         NotKnown::FeedDirection { .. } => {
-            "it depends on the direction of the feed, and has no layers around that of the cut".into()
+            "it depends on the feed direction, and has no layers near that of the cut".into()
         }
         NotKnown::FeedDirectionNotTold => {
-            "it depends on the direction of the feed, which was not told (tell it with `quietcut work`, \
+            "it depends on the feed direction, which is not set (set it with `quietcut work`, \
              --feed-direction-deg)"
                 .into()
         }
     }
 }
 
-/// The cut that advice assumed, where the host told none.
+/// Working point that the advice assumes because none is set.
 fn assumed(point: &WorkingPoint) -> String {
     format!(
-        "the working point was not told: assumed is a cut {:.2} mm deep, immersion from {} to {}, {} per tooth (tell it with \
+        "no working point is set; assuming an axial depth of {:.2} mm, immersion from {} to {}, {} per tooth (set it with \
          `quietcut work`)",
         point.axial_depth.0, point.start, point.exit, point.feed_per_tooth
     )
@@ -243,7 +245,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_machinist_can_read_it() {
+    fn verdict_action_and_reason_are_whole_sentences() {
         let judgement = Judgement {
             verdict: Verdict::Hopf,
             reason: Reason::Growing,
@@ -267,14 +269,14 @@ mod tests {
         };
         assert_eq!(
             verdict(&judgement),
-            "CHATTER at 17.4 Hz, not in step with the teeth (Hopf)"
+            "CHATTER at 17.4 Hz, not synchronous with the teeth (Hopf)"
         );
         assert_eq!(action(&advice), "go to 1480 rev/min");
         assert_eq!(
             why(&advice, &judgement, Some(Rpm(900.2))),
-            "the nearest speed to 900 rev/min where the lobe table calls a cut 2.00 mm deep stable with margin; \
-             the working point was not told: assumed is a cut 2.00 mm deep, immersion from 90 ° to 180 °, 0.15 mm per \
-             tooth (tell it with `quietcut work`)"
+            "the nearest speed to 900 rev/min where a cut 2.00 mm deep is stable with margin in the lobe table; \
+             no working point is set; assuming an axial depth of 2.00 mm, immersion from 90 ° to 180 °, 0.15 mm per \
+             tooth (set it with `quietcut work`)"
         );
         let by_rule = Advice {
             source: Source::ToothPassingRule,
@@ -285,7 +287,7 @@ mod tests {
         assert_eq!(
             why(&by_rule, &judgement, Some(Rpm(900.2))),
             "tooth-passing rule: at this speed the chatter frequency of 17.4 Hz is a multiple of the tooth passing; \
-             the lobe table does not know this cut: it is for 4 teeth, the tool has 2"
+             the lobe table does not cover this cut: it is for 4 teeth, the tool has 2"
         );
     }
 }

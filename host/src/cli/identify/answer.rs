@@ -1,4 +1,4 @@
-//! What `identify` answers.
+//! Output of `quietcut identify`: parameters with 90 % intervals, as JSON, as text and as a case file.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,31 +16,31 @@ use crate::identify::student::NINETY_PERCENT;
 use crate::identify::sweep::Comparison;
 use crate::structure::Direction;
 
-/// The answer of the verb.
+/// Output of every method; fields that a method does not compute stay empty.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct Answer {
+pub(super) struct IdentifyOutput {
     pub(super) method: &'static str,
-    /// Complex modes by rising frequency.
+    /// Complex modes in order of frequency.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) complex_modes: Vec<ComplexMode>,
-    /// Poles that are no modes, and why.
+    /// Poles that were rejected as modes, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) rejected: Vec<Rejected>,
     /// Median coherence of each response.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) coherence: BTreeMap<&'static str, f64>,
-    /// Noise of the channels, where modes were fitted to the records themselves.
+    /// Noise of each channel, if the modes were fitted to the time records.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) noise: Vec<ChannelNoise>,
-    /// Parameters by the directions that they belong to.
+    /// Identified parameters, grouped by direction or pair of directions.
     pub(super) models: Vec<Model>,
-    /// Root mean square of what is left over that of the data.
+    /// Root mean square of the residual divided by that of the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) fit_error: Option<f64>,
-    /// Sum of squares over degrees of freedom in units of the noise.
+    /// Reduced χ²: weighted sum of squared residuals divided by the number of residuals minus parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) misfit: Option<f64>,
-    /// Steady motions that were used.
+    /// Number of steady responses (dwells) used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) dwells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -52,29 +52,29 @@ pub(super) struct Answer {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) cutting: Option<Cutting>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) modes: Option<Vec<OfMode>>,
+    pub(super) modes: Option<Vec<EstimatedMode>>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) joints: Option<Vec<OfJoint>>,
+    pub(super) joints: Option<Vec<EstimatedJoint>>,
     pub(super) warnings: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) case: Option<PathBuf>,
-    /// A case that is no equation of motion.
+    /// Case file of a method whose parameters are not those of an equation of motion.
     #[serde(skip)]
     pub(super) table: Option<toml::Table>,
-    /// Of complex modes: what becomes a case.
+    /// Modal model that is written into the case file.
     #[serde(skip)]
     pub(super) modal: Option<ModalModel>,
-    /// What becomes a case.
+    /// Estimated parameters that are written into the case file.
     #[serde(skip)]
     pub(super) estimates: Vec<Estimate>,
     #[serde(skip)]
     pub(super) directions: Vec<Direction>,
-    /// Lines for people.
+    /// Sentences of the text output.
     #[serde(skip)]
-    pub(super) said: Vec<String>,
+    pub(super) messages: Vec<String>,
 }
 
-/// Parameters of one direction, or of a pair.
+/// Parameters of one direction, or of a pair of directions.
 #[derive(Debug, Serialize)]
 pub(super) struct Model {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,62 +84,62 @@ pub(super) struct Model {
     pub(super) parameters: BTreeMap<&'static str, Figure>,
 }
 
-/// A value and its 90 % interval.
+/// Estimated value with its 90 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Figure {
     pub(super) value: f64,
     pub(super) ci90: [f64; 2],
 }
 
-/// A complex mode.
+/// Complex mode with left and right mode shapes (eq. 7.15 of the thesis).
 #[derive(Debug, Serialize)]
 pub(super) struct ComplexMode {
     pub(super) frequency_hz: Figure,
     pub(super) damping_ratio: Figure,
-    pub(super) left: BTreeMap<&'static str, Parts>,
-    pub(super) right: BTreeMap<&'static str, Parts>,
+    pub(super) left: BTreeMap<&'static str, ComplexFigure>,
+    pub(super) right: BTreeMap<&'static str, ComplexFigure>,
 }
 
-/// Real and imaginary part of an entry of a shape.
+/// Real and imaginary part of one component of a mode shape.
 #[derive(Debug, Serialize)]
-pub(super) struct Parts {
+pub(super) struct ComplexFigure {
     pub(super) re: Figure,
     pub(super) im: Figure,
 }
 
-/// What `--method linearity` finds.
+/// Results of `--method linearity`.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Linearity {
-    /// True where no check speaks against a linear structure.
+    /// Whether all checks agree with a linear structure.
     pub(super) linear: bool,
-    /// Steady tones, by the direction of the force.
-    pub(super) tones: Vec<OfTones>,
-    /// Pairs of sweeps.
-    pub(super) sweeps: Vec<OfSweeps>,
+    /// Checks of steady sine responses, one entry for each direction of the force.
+    pub(super) tones: Vec<TonesLinearity>,
+    /// Comparisons of two sine sweeps.
+    pub(super) sweeps: Vec<SweepPair>,
     pub(super) reciprocity: Vec<Reciprocity>,
 }
 
 #[derive(Debug, Serialize)]
-pub(super) struct OfTones {
+pub(super) struct TonesLinearity {
     pub(super) direction: &'static str,
     #[serde(flatten)]
     pub(super) verdict: Verdict,
-    /// Of a tone with rising force: regions of X(F), and where it jumps, N.
+    /// Regions of the amplitude X(F) of a sine with increasing force, and the forces of its jumps in N.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) regions: Vec<Region>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) jumps_n: Vec<f64>,
 }
 
-/// Two sweeps that were compared.
+/// Comparison of two sine sweeps of the same direction and quantity.
 #[derive(Debug, Serialize)]
-pub(super) struct OfSweeps {
+pub(super) struct SweepPair {
     pub(super) recordings: [PathBuf; 2],
     #[serde(flatten)]
     pub(super) comparison: Comparison,
 }
 
-/// Empirical maps: coefficients of a(F), b(F), c(F) in a·(X/F)² + b·(X/F) + c, each from the highest power of F down.
+/// Empirical maps of the nonlinear complex mode: coefficients of a(F), b(F), c(F) in a·(X/F)² + b·(X/F) + c, each in descending powers of F.
 #[derive(Debug, Serialize)]
 pub(super) struct Maps {
     pub(super) frequency_hz: Coefficients,
@@ -155,37 +155,37 @@ pub(super) struct Coefficients {
     pub(super) receptance_m_per_n: [f64; 2],
 }
 
-/// A mode that was found without a measured force.
+/// Mode that was identified without a measured force.
 #[derive(Debug, Serialize)]
-pub(super) struct OfMode {
+pub(super) struct EstimatedMode {
     pub(super) frequency_hz: Figure,
     pub(super) damping_ratio: Figure,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) stiffness_n_per_m: Option<Figure>,
-    /// Quantities that the data leave as good as open.
+    /// Parameters that are not identifiable from the data.
     pub(super) cannot_tell: Vec<&'static str>,
 }
 
-/// What was identified of a joint and its link.
+/// Identified parameters of a robot joint and its link.
 #[derive(Debug, Serialize)]
-pub(super) struct OfJoint {
-    /// From 1, from the base on.
+pub(super) struct EstimatedJoint {
+    /// Number of the joint, counted from 1 at the base.
     pub(super) joint: usize,
     pub(super) parameters: BTreeMap<&'static str, Figure>,
 }
 
-/// What cutting tests say besides the force coefficients.
+/// Results of cutting tests besides the fitted force coefficients.
 #[derive(Debug, Serialize)]
 pub(super) struct Cutting {
-    /// Force coefficients by mean forces over the feed; `null` where all feeds are the same.
+    /// Force coefficients from the regression of mean forces on the feed (Altintas); `null` if all feeds are equal.
     pub(super) averaged: Option<BTreeMap<&'static str, Figure>>,
-    /// How far each tooth stands out from the mean of all.
+    /// Radial runout of each tooth relative to the mean of all teeth, µm.
     pub(super) runout_um: Vec<Figure>,
     pub(super) revolutions: usize,
     pub(super) feeds: usize,
 }
 
-/// What the slices of the restoring-force surface give.
+/// Stiffness and damping parameters from slices of the restoring-force surface.
 #[derive(Debug, Serialize)]
 pub(super) struct Slices {
     pub(super) stiffness: BTreeMap<&'static str, Figure>,
@@ -220,8 +220,8 @@ impl Coefficients {
 }
 
 impl Model {
-    /// What the line of a parameter begins with.
-    pub(super) fn place(&self) -> String {
+    /// Direction or pair of directions that precedes each parameter in the text output.
+    pub(super) fn label(&self) -> String {
         match (&self.direction, &self.directions) {
             (Some(direction), _) => format!("{direction} "),
             (None, Some(pair)) => format!("{} ", pair.join("-")),
@@ -230,8 +230,8 @@ impl Model {
     }
 }
 
-impl Answer {
-    /// An answer whose parameters are `estimates`.
+impl IdentifyOutput {
+    /// Output of `method` with the parameters `estimates`.
     pub(super) fn of(method: &'static str, directions: Vec<Direction>, estimates: Vec<Estimate>) -> Self {
         let mut models: Vec<Model> = Vec::new();
         for estimate in &estimates {
@@ -269,7 +269,7 @@ impl Answer {
         }
     }
 
-    /// The case file of the model; `other` has the sections that are not the structure.
+    /// TOML text of the case file with the identified model; `other` contains the sections besides the structure.
     pub(super) fn case(&self, path: &Path, other: Option<&toml::Table>) -> Result<String, Error> {
         let text = self.structure(path)?;
         Ok(match other {
@@ -284,7 +284,7 @@ impl Answer {
             .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let refused = |error| Error::input(format!("--out {}: {error}", path.display()));
         if let Some(table) = &self.table {
-            // A table of numbers and words is always TOML.
+            // A table of numbers and strings always serializes to TOML.
             return Ok(toml::to_string(table).unwrap_or_default());
         }
         if let Some(model) = &self.modal {

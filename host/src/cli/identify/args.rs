@@ -1,4 +1,4 @@
-//! The arguments of `quietcut identify`.
+//! Arguments of `quietcut identify`.
 
 use std::path::PathBuf;
 
@@ -9,23 +9,23 @@ use crate::cli::segment::RecordedSegment;
 use crate::cli::{Error, Output, finite, non_negative, positive};
 use crate::identify::law::Extra;
 
-/// A model of the structure from recordings: parameters with 90 % intervals, and what does not fit.
+/// Identifies structural or cutting parameters with 90 % intervals from recordings, and reports the misfit.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  quietcut simulate tests/cases/kuka-kr90-y17-low.toml --experiment step-sine --frequency-hz 16.6:17.9:14 --force-n 1.8,5.8,9.5 --dwell-s 30 --sample-rate-hz 128 --noise-percent 1 --out measured.csv\n  quietcut identify measured.csv --method harmonic-balance --out found.toml\n  quietcut identify measured.csv --method hfrf\n  quietcut identify measured.csv --method linearity\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --rpm 900 --depth-mm 1 --seconds 3 --out cut.csv\n  quietcut identify cut.csv --method force-coefficients --out material.toml\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction x --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-x.csv\n  quietcut simulate tests/cases/six-joint-robot.toml --experiment hammer --direction y --force-n 800 --impacts 3 --spacing-s 6 --noise-percent 1 --out blows-y.csv\n  quietcut identify blows-x.csv blows-y.csv --method joints --start tests/cases/six-joint-robot.toml --band-hz 2,60 --out robot.toml\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction x --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-x.csv\n  quietcut simulate tests/cases/kuka-kr90-acetal.toml --experiment hammer --direction y --force-n 300 --sample-rate-hz 512 --noise-percent 0.1 --out tap-y.csv\n  quietcut frf tap-x.csv tap-y.csv --band-hz 10:30 --out frf.csv\n  quietcut identify frf.csv --method modes --stabilization poles.svg --case tests/cases/kuka-kr90-acetal.toml --out modes.toml"
 )]
 pub struct Args {
-    /// The recordings; for modes also a table of receptances; for inverse-stability a table of cuts, rpm,depth_mm,chatter_hz,verdict with verdict stable, chatter, hopf
-    /// or period-doubling, and chatter_hz empty where nothing was heard.
+    /// Recordings; for modes also a table of receptances; for inverse-stability a table of cuts with the columns
+    /// rpm,depth_mm,chatter_hz,verdict: the verdict is stable, chatter, hopf or period-doubling, and chatter_hz is empty for a stable cut.
     #[arg(value_name = "REC", required = true)]
     pub(super) recordings: Vec<PathBuf>,
-    /// How.
+    /// Identification method.
     #[arg(long, value_name = "NAME")]
     pub(super) method: Method,
-    /// The case to write.
+    /// Case file to write.
     #[arg(long, value_name = "CASE.toml")]
     pub(super) out: Option<PathBuf>,
-    /// Nonlinear terms of harmonic-balance, and of joints.
+    /// Nonlinear terms of harmonic-balance and joints.
     #[arg(
         long,
         value_name = "TERM,…",
@@ -33,16 +33,17 @@ pub struct Args {
         default_value = "cubic-stiffness,cubic-damping"
     )]
     pub(super) terms: Vec<Extra>,
-    /// Harmonics of the response that are balanced and fitted.
+    /// Number of harmonics of the response in the harmonic balance and in the fit.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=40))]
     pub(super) harmonics: u8,
-    /// How much of each dwell is transient, in s; without it what the decay of the structure and the noise say.
+    /// Duration of the transient at the start of each dwell, in s. Default: estimated from the decay of the structure and
+    /// the noise.
     #[arg(long, value_name = "T", value_parser = non_negative, allow_negative_numbers = true)]
     pub(super) settle_s: Option<f64>,
-    /// The recordings are multisines: harmonic-balance takes the last N samples of each as one whole period.
+    /// Period of a multisine in samples: harmonic-balance uses the last N samples of each recording as one period.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..))]
     pub(super) period_samples: Option<u32>,
-    /// Terms of restoring-force.
+    /// Terms of the restoring force that restoring-force fits.
     #[arg(
         long,
         value_name = "TERM,…",
@@ -50,45 +51,45 @@ pub struct Args {
         default_value = "mass,damping,stiffness,cubic-stiffness,cubic-damping"
     )]
     pub(super) surface: Vec<SurfaceTerm>,
-    /// The mass, where restoring-force is to take it as known: needed where no force acts.
+    /// Mass that restoring-force uses instead of estimating it; required for a free decay, where no force acts.
     #[arg(long, value_name = "M", value_parser = positive, allow_negative_numbers = true)]
     pub(super) mass_kg: Option<f64>,
-    /// The band in Hz, from and to: of restoring-force, without it where the motion stands out of its noise; of joints and modes; and of
-    /// output-only, which needs it.
+    /// Frequency band in Hz of restoring-force, joints, modes and output-only. output-only requires it; the default of
+    /// restoring-force is the band where the motion exceeds its noise.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, value_parser = non_negative)]
     pub(super) band_hz: Vec<f64>,
-    /// Width of the slices of restoring-force, as a share of the largest velocity or displacement.
+    /// Width of the slices of the restoring-force surface, as a fraction of the largest velocity or displacement.
     #[arg(long, value_name = "SHARE", default_value_t = 0.01, value_parser = positive, allow_negative_numbers = true)]
     pub(super) slice: f64,
-    /// Degree in the force of the maps of ncma: 1 has the form of eqs 4.8 and 4.9, 2 holds a cubic mode.
+    /// Degree of the maps of ncma in the force: 1 as in eqs 4.8 and 4.9, 2 for a mode with cubic stiffness.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=2))]
     pub(super) degree: u8,
-    /// For joints: a case of the robot, with its geometry and the inertia of its links; its stiffness and damping are a guess.
-    /// For inverse-stability: a case with tool, material and cut, and a first guess of the structure.
+    /// Case with the initial values. For joints: geometry and inertia of the links, and initial stiffness and damping. For
+    /// inverse-stability: tool, material and cut, and an initial structure.
     #[arg(long, value_name = "CASE.toml")]
     pub(super) start: Option<PathBuf>,
-    /// For joints: the mass of the last link, tool and payload, is not known either.
+    /// For joints: also estimate the mass of the last link, which includes tool and payload.
     #[arg(long)]
     pub(super) payload: bool,
-    /// For inverse-stability: standard deviation of depths, in percent.
+    /// For inverse-stability: standard deviation of the axial depths, in percent.
     #[arg(long, value_name = "P", default_value_t = 2.0, value_parser = positive, allow_negative_numbers = true)]
     pub(super) depth_error_percent: f64,
     /// For inverse-stability: standard deviation of chatter frequencies, in percent.
     #[arg(long, value_name = "P", default_value_t = 0.3, value_parser = positive, allow_negative_numbers = true)]
     pub(super) chatter_error_percent: f64,
-    /// Seed of inverse-stability, which draws structures; the same seed gives the same answer.
+    /// Seed of the structures that inverse-stability draws; the same seed gives the same result.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Edge angle of the tool in degrees, for force-coefficients; 90 is a square end mill.
+    /// For force-coefficients: edge angle κ of the tool in degrees; 90 is a square end mill.
     #[arg(long, value_name = "D", default_value_t = 90.0, value_parser = positive, allow_negative_numbers = true)]
     pub(super) edge_angle_deg: f64,
-    /// Angle from x to the feed in degrees, for force-coefficients.
+    /// For force-coefficients: angle from x to the feed in degrees.
     #[arg(long, value_name = "D", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true)]
     pub(super) feed_direction_deg: f64,
-    /// From when to when the tool is in full cut, in s, for force-coefficients; without it where the force says so.
+    /// For force-coefficients: start and end of full engagement, in s. Default: detected in the measured force.
     #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, value_parser = finite)]
     pub(super) cut_s: Vec<f64>,
-    /// The case whose tool, material, cut and limits go into the case that is written; without it those of --start.
+    /// Case whose tool, material, cut and limits are copied into the written case. Default: the case of --start.
     #[arg(long, value_name = "CASE", requires = "out")]
     pub(super) case: Option<PathBuf>,
     #[command(flatten)]
@@ -99,29 +100,29 @@ pub struct Args {
     pub(super) output: Output,
 }
 
-/// The methods.
+/// Identification methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Method {
-    /// Complex modes with left and right shapes (eq. 7.15) from receptances, or from recordings that give them.
+    /// Complex modes with left and right mode shapes (eq. 7.15), from receptances or from recordings of force and response.
     Modes,
-    /// Mass, damping, stiffness and nonlinear terms from step-sine tests, without the bias of hfrf.
+    /// Mass, damping, stiffness and nonlinear terms from step-sine tests by harmonic balance, without the bias of hfrf.
     HarmonicBalance,
-    /// Higher-order FRF as in the thesis (eqs 5.15 to 5.17).
+    /// Higher-order frequency response functions (eqs 5.15 to 5.17 of the thesis).
     Hfrf,
-    /// The restoring-force surface (eq. 5.4) of any record, and the law that it follows.
+    /// Restoring-force surface (eq. 5.4) of any record, and the force law fitted to it.
     RestoringForce,
-    /// Natural frequency and loss factor over force and receptance (eqs 4.5 to 4.9).
+    /// Nonlinear complex mode: natural frequency and loss factor over force and receptance (eqs 4.5 to 4.9).
     Ncma,
-    /// Whether the structure is linear, and if not of what kind it is.
+    /// Tests of linearity, and the kind of nonlinearity.
     Linearity,
-    /// Stiffness and damping of a robot's joints, from blows or a shaker at several postures; with --terms from step-sine tests at
-    /// several forces.
+    /// Stiffness and damping of robot joints from hammer or shaker tests at several postures; with --terms from step-sine
+    /// tests at several forces.
     Joints,
-    /// Natural frequencies and damping ratios from motion alone: idle running, or whatever shakes the machine.
+    /// Operational modal analysis: natural frequencies and damping ratios from motion under unmeasured excitation.
     OutputOnly,
-    /// Natural frequencies, damping ratios and stiffnesses from a table of cuts that chattered or not.
+    /// Natural frequencies, damping ratios and stiffnesses from a table of stable cuts and cuts with chatter.
     InverseStability,
-    /// Cutting and edge coefficients, and runout, from cuts with measured forces.
+    /// Cutting coefficients, edge coefficients and runout from cuts with measured forces.
     ForceCoefficients,
 }
 
@@ -138,7 +139,7 @@ pub(super) enum SurfaceTerm {
     Offset,
 }
 
-/// From and to of `--band-hz`, Hz.
+/// Lower and upper frequency of `--band-hz`, Hz.
 pub(super) fn band(args: &Args) -> Result<Option<[f64; 2]>, Error> {
     match args.band_hz[..] {
         [] => Ok(None),

@@ -1,9 +1,9 @@
-//! `--method linearity`: everything that speaks against a linear structure.
+//! `--method linearity`: tests of the linearity of a structure.
 
 use std::path::PathBuf;
 
 use super::Error;
-use super::answer::{Answer, Linearity, OfSweeps, OfTones};
+use super::answer::{IdentifyOutput, Linearity, SweepPair, TonesLinearity};
 use super::args::Args;
 use super::methods::settling;
 use super::records::along;
@@ -16,8 +16,8 @@ use crate::identify::sweep::{Spectra, compare};
 use crate::recording::{Kind, Quantity, Recording};
 use crate::structure::Direction;
 
-/// Checks tones (by level, harmonics, homogeneity, reciprocity) and sweeps (against each other).
-pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+/// Tests steady sine responses (levels, harmonics, homogeneity, reciprocity) and compares pairs of sweeps.
+pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let harmonics = usize::from(args.harmonics).max(3);
     let of_kind = |kind| {
         recordings
@@ -59,7 +59,7 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Answer,
                 } else {
                     regions(&points)
                 };
-                found.tones.push(OfTones {
+                found.tones.push(TonesLinearity {
                     direction: direction.name(),
                     verdict,
                     regions,
@@ -86,16 +86,16 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Answer,
     found.linear = found.tones.iter().all(|tones| tones.verdict.linear)
         && found.sweeps.iter().all(|sweeps| sweeps.comparison.same)
         && found.reciprocity.iter().all(|pair| pair.reciprocal);
-    Ok(Answer {
+    Ok(IdentifyOutput {
         dwells: Some(taken.dwells.len() + rising.len()),
         warnings: taken.warnings,
-        said: said(&found),
+        messages: said(&found),
         linearity: Some(found),
-        ..Answer::of("linearity", Vec::new(), Vec::new())
+        ..IdentifyOutput::of("linearity", Vec::new(), Vec::new())
     })
 }
 
-/// Periods of a window of a tone whose force rises.
+/// Length of the analysis window of a sine with increasing force, in periods: a choice.
 const PERIODS: f64 = 10.0;
 
 fn response(dwell: &Dwell) -> Option<(f64, f64)> {
@@ -107,8 +107,8 @@ fn response(dwell: &Dwell) -> Option<(f64, f64)> {
     Some((force.amplitude(1), motion.amplitude(1)))
 }
 
-/// Every sweep against the first of its direction and quantity.
-fn compare_sweeps(sweeps: &[&Recording]) -> Result<Vec<OfSweeps>, Error> {
+/// Compares every sweep with the first sweep of its direction and quantity.
+fn compare_sweeps(sweeps: &[&Recording]) -> Result<Vec<SweepPair>, Error> {
     let mut known: Vec<((Direction, Quantity), PathBuf, Spectra)> = Vec::new();
     let mut found = Vec::new();
     for sweep in sweeps {
@@ -118,7 +118,7 @@ fn compare_sweeps(sweeps: &[&Recording]) -> Result<Vec<OfSweeps>, Error> {
         match known.iter().find(|(other, ..)| *other == place) {
             Some((_, path, first)) => {
                 if let Some(comparison) = compare(first, &spectra) {
-                    found.push(OfSweeps {
+                    found.push(SweepPair {
                         recordings: [path.clone(), sweep.path.clone()],
                         comparison,
                     });
@@ -131,20 +131,20 @@ fn compare_sweeps(sweeps: &[&Recording]) -> Result<Vec<OfSweeps>, Error> {
 }
 
 fn said(found: &Linearity) -> Vec<String> {
-    let mut said = Vec::new();
-    for OfTones {
+    let mut messages = Vec::new();
+    for TonesLinearity {
         direction,
         verdict,
         regions,
         jumps_n,
     } in &found.tones
     {
-        said.push(if verdict.linear {
-            format!("{direction}: linear, the response follows the force at every level")
+        messages.push(if verdict.linear {
+            format!("{direction}: linear, the response is proportional to the force at every level")
         } else {
             let kinds: Vec<&str> = verdict.kinds.iter().map(|kind| kind.name()).collect();
             let kinds = if kinds.is_empty() {
-                "of no kind that is known".into()
+                "of unknown kind".into()
             } else {
                 kinds.join(" and ")
             };
@@ -152,14 +152,14 @@ fn said(found: &Linearity) -> Vec<String> {
             format!("{direction}: not linear: {kinds}; F/X changes by up to {change:.1} % with the level")
         });
         if regions.len() > 1 {
-            said.push(format!(
+            messages.push(format!(
                 "{direction}: the response rises in {} regions, with {} jumps",
                 regions.len(),
                 jumps_n.len()
             ));
         }
     }
-    for OfSweeps {
+    for SweepPair {
         recordings,
         comparison,
     } in &found.sweeps
@@ -169,7 +169,7 @@ fn said(found: &Linearity) -> Vec<String> {
         } else {
             "differ: not linear"
         };
-        said.push(format!(
+        messages.push(format!(
             "sweeps {} and {} {verdict}, by up to {:.2} % of the peak",
             recordings[0].display(),
             recordings[1].display(),
@@ -178,11 +178,11 @@ fn said(found: &Linearity) -> Vec<String> {
     }
     for pair in &found.reciprocity {
         let [i, j] = pair.directions;
-        let verdict = if pair.reciprocal { "are one" } else { "differ" };
-        said.push(format!(
+        let verdict = if pair.reciprocal { "agree" } else { "differ" };
+        messages.push(format!(
             "H_{i}{j} and H_{j}{i} {verdict}, by up to {:.2} % of the larger",
             100.0 * pair.largest_change
         ));
     }
-    said
+    messages
 }

@@ -1,16 +1,16 @@
-//! `--method force-coefficients`: what cutting tests say of material and tool.
+//! `--method force-coefficients`: cutting and edge coefficients and runout from cuts with measured forces.
 
 use std::collections::BTreeMap;
 
 use super::Error;
-use super::answer::{Answer, Cutting, Figure};
+use super::answer::{Cutting, Figure, IdentifyOutput};
 use super::args::Args;
 use crate::identify::case_file::{self, Estimate};
 use crate::identify::force_coefficients::{Fit, KEYS, Value, fit, runout};
 use crate::identify::force_test::{CuttingTest, Setup};
 use crate::recording::Recording;
 
-pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let full_cut_s = match args.cut_s[..] {
         [] => None,
         [from, to] if from < to => Some([from, to]),
@@ -66,10 +66,10 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
             )));
         }
     };
-    Ok(Answer {
+    Ok(IdentifyOutput {
         fit_error: Some(fit.relative_error),
         warnings: warnings(&fit, &tests),
-        said: said(&fit),
+        messages: said(&fit),
         cutting: Some(Cutting {
             averaged: fit.averaged.map(figures),
             runout_um: fit
@@ -81,7 +81,7 @@ pub(super) fn force_coefficients(args: &Args, recordings: &[Recording]) -> Resul
             feeds: fit.feeds,
         }),
         table,
-        ..Answer::of("force-coefficients", Vec::new(), estimates)
+        ..IdentifyOutput::of("force-coefficients", Vec::new(), estimates)
     })
 }
 
@@ -96,20 +96,20 @@ fn warnings(fit: &Fit, tests: &[CuttingTest]) -> Vec<String> {
     let mut warnings = Vec::new();
     if fit.feeds < 2 {
         warnings.push(
-            "all tests have one feed: edge and cutting forces are told apart by the chip thickness along the arc alone, and mean forces cannot tell them apart at all; tests at two or more feeds are needed for that"
+            "all tests have one feed: only the chip thickness along the arc separates edge and cutting coefficients, and mean forces do not identify them; tests at two or more feeds are needed"
                 .into(),
         );
     }
     if tests.iter().any(|test| test.displacement.is_none()) {
         warnings.push(
-            "not every recording has the displacement of the tool: there chips are those of feed and runout alone"
+            "some recordings have no displacement of the tool: their chip thickness is computed from feed and runout alone"
                 .into(),
         );
     }
     let apart = fit.apart();
     if !apart.is_empty() {
         warnings.push(format!(
-            "mean forces give other values of {} than the fit over the arc, by more than both intervals: teeth that lose their chip to runout where it is thin, the phase of the tachometer, the immersion, or a motion that was not measured",
+            "{}: the values from mean forces and from the fit over the arc differ by more than both intervals. Possible causes: loss of contact through runout where the chip is thin, the phase of the tachometer, the immersion, or an unmeasured motion",
             apart.join(", ")
         ));
     }
@@ -117,12 +117,12 @@ fn warnings(fit: &Fit, tests: &[CuttingTest]) -> Vec<String> {
 }
 
 fn said(fit: &Fit) -> Vec<String> {
-    let mut said = vec![format!("{} revolutions at {} feeds", fit.revolutions, fit.feeds)];
+    let mut messages = vec![format!("{} revolutions at {} feeds", fit.revolutions, fit.feeds)];
     if let Some(averaged) = fit.averaged {
-        said.extend(figures(averaged).into_iter().map(|(key, figure)| {
+        messages.extend(figures(averaged).into_iter().map(|(key, figure)| {
             let [low, high] = figure.ci90;
             format!(
-                "by mean forces {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
+                "from mean forces {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}",
                 figure.value
             )
         }));
@@ -139,10 +139,10 @@ fn said(fit: &Fit) -> Vec<String> {
                 )
             })
             .collect();
-        said.push(format!(
-            "teeth stand out by {} um, 90 % intervals",
+        messages.push(format!(
+            "runout of the teeth: {} um, 90 % intervals",
             teeth.join(", ")
         ));
     }
-    said
+    messages
 }

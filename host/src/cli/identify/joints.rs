@@ -1,11 +1,11 @@
-//! `--method joints`: the joints of a robot from tests at several postures.
+//! `--method joints`: stiffness and damping of robot joints from tests at several postures.
 
 use std::collections::BTreeMap;
 
 use clap::ValueEnum;
 
 use super::Error;
-use super::answer::{Answer, Figure, OfJoint};
+use super::answer::{EstimatedJoint, Figure, IdentifyOutput};
 use super::args::{Args, band};
 use super::methods::settling;
 use crate::case::Case;
@@ -20,13 +20,14 @@ use crate::identify::student::NINETY_PERCENT;
 use crate::recording::{Kind, Recording};
 use crate::structure::{Direction, Form, Robot, Structure};
 
-/// Postures whose angles are closer than this, degrees, are one.
+/// Largest difference of joint angles, in degrees, between recordings of the same posture: a choice.
 const SAME_DEG: f64 = 1e-3;
 
-/// Forces further apart than this factor are levels; a shaker keeps its own within a few percent.
+/// Smallest ratio of two force amplitudes that count as different levels: a choice above the few percent of force control of a
+/// shaker.
 const LEVELS: f64 = 1.2;
 
-/// Recordings at one posture.
+/// Recordings at one posture of the robot.
 struct AtPosture {
     joints_deg: Vec<f64>,
     recordings: Vec<Recording>,
@@ -38,17 +39,17 @@ impl AtPosture {
     }
 }
 
-/// What was identified of a robot.
-struct Found {
+/// Identified joint parameters of a robot.
+struct JointFit {
     robot: Robot,
     estimates: Vec<(JointParameter, Figure, f64)>,
     misfit: f64,
     relative_error: f64,
-    said: Vec<String>,
+    messages: Vec<String>,
     warnings: Vec<String>,
 }
 
-pub(super) fn joints(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+pub(super) fn joints(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let start = start(args)?;
     let postures = postures(recordings)?;
     let all_steps = recordings
@@ -62,7 +63,7 @@ pub(super) fn joints(args: &Args, recordings: &[Recording]) -> Result<Answer, Er
     let found = if tones.iter().any(|(posture, _)| has_levels(&posture.dwells)) {
         by_tones(args, &start, &postures, tones)?
     } else {
-        by_receptances(args, &start, &postures)?
+        from_receptances(args, &start, &postures)?
     };
     Ok(answer(args, &found, postures.len()))
 }
@@ -72,7 +73,7 @@ fn postures(recordings: &[Recording]) -> Result<Vec<AtPosture>, Error> {
     for recording in recordings {
         let Some(posture) = &recording.sidecar.posture else {
             return Err(Error::input(format!(
-                "{}: [posture] joints_deg is needed and not there: joint angles in degrees, from the base on",
+                "{}: [posture] joints_deg is missing: joint angles in degrees, starting at the base",
                 crate::recording::Sidecar::path_of(&recording.path).display()
             )));
         };
@@ -91,7 +92,7 @@ fn postures(recordings: &[Recording]) -> Result<Vec<AtPosture>, Error> {
     Ok(postures)
 }
 
-/// Steady tones of every posture, and what was wrong with the rest.
+/// Steady sine responses of every posture, with warnings about recordings that have none.
 fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(PostureDwells, Vec<String>)> {
     postures
         .iter()
@@ -106,7 +107,7 @@ fn dwells(args: &Args, postures: &[AtPosture], settling: Settling) -> Vec<(Postu
         .collect()
 }
 
-/// True where the force of one direction has more than one level.
+/// Whether the force of any direction has more than one level.
 fn has_levels(dwells: &[Dwell]) -> bool {
     let forces: Vec<(Direction, f64)> = dwells
         .iter()
@@ -119,13 +120,13 @@ fn has_levels(dwells: &[Dwell]) -> bool {
     })
 }
 
-/// Stiffness, damping and cubic terms from tones at several levels.
+/// Identifies stiffness, damping and cubic terms from steady sine responses at several force levels.
 fn by_tones(
     args: &Args,
     start: &Robot,
     postures: &[AtPosture],
     tones: Vec<(PostureDwells, Vec<String>)>,
-) -> Result<Found, Error> {
+) -> Result<JointFit, Error> {
     if let Some(other) = args
         .terms
         .iter()
@@ -133,7 +134,7 @@ fn by_tones(
     {
         let name = other.to_possible_value();
         return Err(Error::input(format!(
-            "--terms {}: joints have cubic-stiffness and cubic-damping",
+            "--terms {}: the terms of joints are cubic-stiffness and cubic-damping",
             name.as_ref().map_or("", |name| name.get_name())
         )));
     }
@@ -151,7 +152,7 @@ fn by_tones(
     }
     if fit.robust {
         warnings.push(format!(
-            "what is left is {:.1} times the noise: geometry or inertia of the links may be wrong, links bend, or joints have other terms; the intervals are those of the scatter between tones",
+            "the residual exceeds the noise by a factor of {:.1}: geometry or inertia of the links may be wrong, links may bend, or joints may have other terms; the intervals are estimated from the scatter between steady responses",
             fit.misfit.sqrt()
         ));
     }
@@ -160,17 +161,17 @@ fn by_tones(
         let figure = Figure::new(parameter.value(&fit.robot), deviation);
         (*parameter, figure, deviation)
     });
-    Ok(Found {
+    Ok(JointFit {
         estimates: estimates.collect(),
         misfit: fit.misfit,
         relative_error: fit.relative_error,
-        said: vec!["steady tones at several forces, by harmonic balance".into()],
+        messages: vec!["steady tones at several forces, by harmonic balance".into()],
         warnings,
         robot: fit.robot,
     })
 }
 
-/// The slowest decay of the robot at the postures, 1/s.
+/// Smallest decay rate ζω of the modes of the robot over all postures, 1/s.
 fn slowest_decay(robot: &Robot, postures: &[AtPosture]) -> Result<f64, Error> {
     let mut slowest = f64::INFINITY;
     for posture in postures {
@@ -190,8 +191,8 @@ fn slowest_decay(robot: &Robot, postures: &[AtPosture]) -> Result<f64, Error> {
     Ok(slowest.max(1e-3))
 }
 
-/// Stiffness and damping from receptances.
-fn by_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<Found, Error> {
+/// Identifies stiffness and damping from receptances.
+fn from_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<JointFit, Error> {
     let settings = MeasurementSettings {
         band_hz: band(args)?.map(|[low, high]| (low, high)),
         ..MeasurementSettings::default()
@@ -210,14 +211,14 @@ fn by_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<
     let fit = joints::fit(start, &measured, args.payload).map_err(|error| Error::input(error.to_string()))?;
     if fit.misfit > 4.0 {
         warnings.push(format!(
-            "what is left is {:.1} times the error of the receptances: geometry or inertia of the links may be wrong, or links bend; the intervals are those of the scatter between receptances",
+            "the residual exceeds the error of the receptances by a factor of {:.1}: geometry or inertia of the links may be wrong, or links may bend; the intervals are estimated from the scatter between receptances",
             fit.misfit.sqrt()
         ));
     }
     let estimates = fit.parameters.iter().enumerate().map(|(index, parameter)| {
         let value = parameter.value(&fit.robot);
         let share = fit.covariance[(index, index)].max(0.0).sqrt();
-        // Of the logarithm: the interval is not that of a difference.
+        // The standard deviation of the logarithm, so that the interval is multiplicative.
         let factor = (NINETY_PERCENT * share).exp();
         let figure = Figure {
             value,
@@ -225,11 +226,13 @@ fn by_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<
         };
         (*parameter, figure, share * value)
     });
-    Ok(Found {
+    Ok(JointFit {
         estimates: estimates.collect(),
         misfit: fit.misfit,
         relative_error: fit.relative_error,
-        said: vec!["receptances, without cubic terms: those need step-sine tests at several forces".into()],
+        messages: vec![
+            "receptances, without cubic terms: those need step-sine tests at several forces".into(),
+        ],
         warnings,
         robot: fit.robot,
     })
@@ -238,7 +241,7 @@ fn by_receptances(args: &Args, start: &Robot, postures: &[AtPosture]) -> Result<
 fn start(args: &Args) -> Result<Robot, Error> {
     let Some(path) = &args.start else {
         return Err(Error::input(
-            "--method joints needs --start CASE.toml: geometry and inertia of the robot's links, and a guess of its joints",
+            "--method joints needs --start CASE.toml: geometry and inertia of the robot links, and initial values of its joints",
         ));
     };
     let case = Case::read(path)?;
@@ -251,23 +254,23 @@ fn start(args: &Args) -> Result<Robot, Error> {
     }
 }
 
-fn answer(args: &Args, found: &Found, postures: usize) -> Answer {
+fn answer(args: &Args, found: &JointFit, postures: usize) -> IdentifyOutput {
     let count = found.robot.joints.len();
-    let mut of_joints: Vec<OfJoint> = (1..=count)
-        .map(|joint| OfJoint {
+    let mut of_joints: Vec<EstimatedJoint> = (1..=count)
+        .map(|joint| EstimatedJoint {
             joint,
             parameters: BTreeMap::new(),
         })
         .collect();
-    let mut said = vec![format!(
-        "{postures} postures; what is left is {:.2} times the error",
+    let mut messages = vec![format!(
+        "{postures} postures; residual divided by the measurement error: {:.2}",
         found.misfit.sqrt()
     )];
-    said.extend(found.said.iter().cloned());
+    messages.extend(found.messages.iter().cloned());
     for (parameter, figure, _) in &found.estimates {
         let joint = parameter.joint(count);
         of_joints[joint].parameters.insert(parameter.key(), *figure);
-        said.push(format!(
+        messages.push(format!(
             "joint {} {} = {:.5e}, 90 % interval {:.5e} to {:.5e}",
             joint + 1,
             parameter.key(),
@@ -287,13 +290,13 @@ fn answer(args: &Args, found: &Found, postures: usize) -> Answer {
         .and_then(std::path::Path::file_stem)
         .unwrap_or_default()
         .to_string_lossy();
-    Answer {
+    IdentifyOutput {
         fit_error: Some(found.relative_error),
         misfit: Some(found.misfit),
         warnings: found.warnings.clone(),
-        said,
+        messages,
         joints: Some(of_joints),
         table: Some(case_file::robot(&name, &found.robot, &deviations)),
-        ..Answer::of("joints", Vec::new(), Vec::new())
+        ..IdentifyOutput::of("joints", Vec::new(), Vec::new())
     }
 }

@@ -1,10 +1,10 @@
-//! Answers from steady tones, method by method.
+//! Identification from steady sine responses: harmonic balance, higher-order FRFs, nonlinear complex modes.
 
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 
-use super::answer::{Answer, Coefficients, Maps};
+use super::answer::{Coefficients, IdentifyOutput, Maps};
 use super::args::Args;
 use super::{Error, records};
 use crate::identify::case_file::Estimate;
@@ -18,15 +18,15 @@ use crate::identify::steady_fit::{Data, Fit, FitError};
 use crate::recording::Recording;
 use crate::structure::Direction;
 
-/// Steps of one frequency differ by noise only; steps of a test by more than this.
+/// Largest relative difference of frequencies that count as the same step of a step-sine test: a choice.
 const SAME_FREQUENCY: f64 = 1e-3;
 
-pub(super) fn harmonic_balance(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+pub(super) fn harmonic_balance(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     if let Some(samples) = args.period_samples {
         return records::multisine(args, recordings, samples as usize);
     }
     let found = fit_steady(args, recordings, &args.terms)?;
-    let Found {
+    let SteadyFit {
         law,
         directions,
         fit,
@@ -35,7 +35,7 @@ pub(super) fn harmonic_balance(args: &Args, recordings: &[Recording]) -> Result<
     } = found;
     if fit.robust {
         warnings.push(format!(
-            "the law leaves {:.1} times the noise: it is not the whole truth, and the intervals are those of the scatter between dwells; other --terms may fit better",
+            "the residual exceeds the noise by a factor of {:.1}: the force law is incomplete, and the intervals are estimated from the scatter between dwells; other --terms may fit better",
             fit.misfit.sqrt()
         ));
     }
@@ -43,16 +43,16 @@ pub(super) fn harmonic_balance(args: &Args, recordings: &[Recording]) -> Result<
         .map(|p| fit.covariance[(p, p)].max(0.0).sqrt())
         .collect();
     let estimates = estimates(&law, &directions, &fit.theta, &deviations);
-    Ok(Answer {
+    Ok(IdentifyOutput {
         fit_error: Some(fit.relative_error),
         misfit: Some(fit.misfit),
         dwells: Some(dwells.len()),
         warnings,
-        ..Answer::of("harmonic-balance", directions, estimates)
+        ..IdentifyOutput::of("harmonic-balance", directions, estimates)
     })
 }
 
-struct Found {
+struct SteadyFit {
     law: Law,
     directions: Vec<Direction>,
     fit: Fit,
@@ -60,7 +60,7 @@ struct Found {
     warnings: Vec<String>,
 }
 
-/// Directions in which both a force and a motion was measured, or a motion where others are driven too.
+/// Directions with a measured force and a measured motion, or with a measured motion while other directions are excited.
 fn directions(dwells: &[Dwell]) -> Vec<Direction> {
     Direction::ALL
         .into_iter()
@@ -81,14 +81,14 @@ pub(super) fn settling(args: &Args) -> Settling {
     args.settle_s.map_or(Settling::Half, Settling::Seconds)
 }
 
-fn fit_steady(args: &Args, recordings: &[Recording], extras: &[Extra]) -> Result<Found, Error> {
+fn fit_steady(args: &Args, recordings: &[Recording], extras: &[Extra]) -> Result<SteadyFit, Error> {
     let harmonics = usize::from(args.harmonics);
     let first = steady(recordings, harmonics, settling(args));
     let directions = directions(&first.dwells);
     if directions.is_empty() {
         let why = first.warnings.join("; ");
         return Err(Error::input(format!(
-            "no direction has both a measured force and a measured motion that is held at some frequency{}{why}",
+            "no direction has a measured force and a steady measured motion{}{why}",
             if why.is_empty() { "" } else { ": " }
         )));
     }
@@ -120,7 +120,7 @@ fn fit_steady(args: &Args, recordings: &[Recording], extras: &[Extra]) -> Result
         fit = data(&settled.dwells).map_err(refused)?;
         taken = settled;
     }
-    Ok(Found {
+    Ok(SteadyFit {
         law,
         directions,
         fit,
@@ -147,11 +147,11 @@ fn estimates(law: &Law, directions: &[Direction], theta: &DVector<f64>, deviatio
         .collect()
 }
 
-pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let found = fit_steady(args, recordings, &[Extra::CubicStiffness, Extra::CubicDamping])?;
     let [direction] = found.directions[..] else {
         return Err(Error::input(
-            "higher-order FRF are for one direction at a time (eq. 5.5); give recordings of one",
+            "higher-order FRFs hold for one direction at a time (eq. 5.5); give recordings of one direction",
         ));
     };
     let responses = higher_order::responses(&found.dwells, SAME_FREQUENCY);
@@ -165,7 +165,7 @@ pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<Answer, Erro
     };
     let predicted = data.relative_error(&fit.theta);
     let mut warnings = found.warnings;
-    // A model that is right within the noise predicts the data about as well as the best fit does.
+    // A model that is correct within the noise has about the same prediction error as the best fit.
     if predicted > 2.0 * found.fit.relative_error + 1e-3 {
         let mut shifts = Vec::new();
         for role in [Role::CubicDamping(0), Role::CubicStiffness(0)] {
@@ -179,7 +179,7 @@ pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<Answer, Erro
             }
         }
         warnings.push(format!(
-            "these parameters mispredict the very data they come from by {:.1} % (harmonic balance: {:.2} %): eqs 5.15 to 5.17 are exact only as the force goes to zero and biased at these levels (against harmonic balance: {}); use --method harmonic-balance",
+            "the prediction error of these parameters on the same data is {:.1} % (harmonic balance: {:.2} %): eqs 5.15 to 5.17 are exact only in the limit of zero force and biased at these levels (against harmonic balance: {}); use --method harmonic-balance",
             100.0 * predicted,
             100.0 * found.fit.relative_error,
             shifts.join(", ")
@@ -187,30 +187,30 @@ pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<Answer, Erro
     }
     let deviations: Vec<f64> = fit.deviations.iter().copied().collect();
     let estimates = estimates(&fit.law, &[direction], &fit.theta, &deviations);
-    Ok(Answer {
+    Ok(IdentifyOutput {
         fit_error: Some(predicted),
         dwells: Some(found.dwells.len()),
         warnings,
-        ..Answer::of("hfrf", vec![direction], estimates)
+        ..IdentifyOutput::of("hfrf", vec![direction], estimates)
     })
 }
 
-pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let taken = steady(recordings, usize::from(args.harmonics), settling(args));
     let curves = curves(&taken.dwells);
     let points: Vec<_> = curves.iter().flat_map(|curve| curve.linearized(0.4)).collect();
-    // A parabola over force needs three of them; two give a line, the form of eqs 4.8 and 4.9.
+    // A map quadratic in the force needs three force levels; two levels give a linear map, the form of eqs 4.8 and 4.9.
     let degree = if curves.len() >= 3 { args.degree.into() } else { 1 };
     let maps = Map::fit(&points, degree, |point| point.omega / TAU)
         .zip(Map::fit(&points, degree, |point| point.loss_factor));
     let Some((frequency, loss)) = maps else {
         return Err(Error::input(format!(
-            "{} pairs of points on both sides of a peak were found at {} force levels; at least 6 at 2 levels are needed: step finely through the resonance at several forces",
+            "{} pairs of points on both sides of a peak were found at {} force levels; at least 6 at 2 levels are needed: use fine frequency steps through the resonance at several forces",
             points.len(),
             curves.len()
         )));
     };
-    let said = [("frequency_hz", &frequency), ("loss_factor", &loss)]
+    let messages = [("frequency_hz", &frequency), ("loss_factor", &loss)]
         .map(|(name, map)| {
             let polynomials: Vec<String> = map
                 .coefficients
@@ -230,25 +230,25 @@ pub(super) fn ncma(args: &Args, recordings: &[Recording]) -> Result<Answer, Erro
             )
         })
         .to_vec();
-    Ok(Answer {
+    Ok(IdentifyOutput {
         dwells: Some(taken.dwells.len()),
         maps: Some(Maps {
             frequency_hz: Coefficients::new(&frequency),
             loss_factor: Coefficients::new(&loss),
         }),
         warnings: taken.warnings,
-        said,
-        ..Answer::of("ncma", Vec::new(), Vec::new())
+        messages,
+        ..IdentifyOutput::of("ncma", Vec::new(), Vec::new())
     })
 }
 
-/// Receptances at constant force: dwells grouped by force.
+/// Receptances at constant force amplitude: dwells grouped by force level.
 fn curves(dwells: &[Dwell]) -> Vec<Curve> {
     let mut curves: Vec<Curve> = Vec::new();
     for response in higher_order::responses(dwells, 0.0) {
         for (force, q) in response.levels {
             let point = (response.omega, q / force);
-            // Levels of a test differ by more than a twentieth; a controlled shaker keeps its own within that.
+            // Force levels of a test differ by more than 5 %; force control of a shaker keeps a level within 5 %.
             match curves
                 .iter_mut()
                 .find(|curve| (curve.force_n / force - 1.0).abs() < 0.05)

@@ -1,4 +1,4 @@
-//! `--method modes`: complex modes of receptances.
+//! `--method modes`: complex modes from receptances.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use maud::html;
 
 use super::Error;
-use super::answer::{Answer, ComplexMode, Figure, Parts};
+use super::answer::{ComplexFigure, ComplexMode, Figure, IdentifyOutput};
 use super::args::{Args, band};
 use crate::frf::{Estimator, FrfTable, MeasurementSettings, RecordSpectra, measure, record_spectra};
 use crate::identify::modes::{self, ChannelNoise, IdentifiedMode, ModalModel, Receptances};
@@ -14,8 +14,8 @@ use crate::report::page::{figure, page};
 use crate::report::stabilization_chart::stabilization_chart;
 use crate::structure::Direction;
 
-/// Identifies modes.
-pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
+/// Identifies complex modes from the receptances or recordings of the command line.
+pub(super) fn modes(args: &Args) -> Result<IdentifyOutput, Error> {
     let options = &args.modes;
     if let Some(path) = &options.stabilization {
         ending(path)?;
@@ -40,7 +40,7 @@ pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
     let mut warnings = source.warnings;
     warnings.extend(model.warnings.iter().cloned());
     warnings.extend(not_in_case(args, &model));
-    Ok(Answer {
+    Ok(IdentifyOutput {
         method: "modes",
         complex_modes: model.modes.iter().map(|mode| of_mode(&model, mode)).collect(),
         rejected: model.rejected.clone(),
@@ -48,19 +48,19 @@ pub(super) fn modes(args: &Args) -> Result<Answer, Error> {
         fit_error: Some(model.fit_error),
         misfit: model.misfit,
         warnings,
-        said: said(&model, &noise),
+        messages: said(&model, &noise),
         noise,
         modal: Some(model),
-        ..Answer::default()
+        ..IdentifyOutput::default()
     })
 }
 
-/// Receptances and what is known of them.
+/// Receptances with their standard deviations and coherence.
 struct Source {
     table: FrfTable,
     deviation: Option<Vec<Vec<f64>>>,
     warnings: Vec<String>,
-    /// The records themselves, where they go on from start to end.
+    /// Spectra of the time records, if each record is one continuous test.
     records: Option<Vec<RecordSpectra>>,
 }
 
@@ -95,7 +95,7 @@ fn source(args: &Args) -> Result<Source, Error> {
     })
 }
 
-/// True where a file holds receptances, not a recording.
+/// Whether a file contains receptances instead of a recording.
 fn is_table(path: &Path) -> Result<bool, Error> {
     match crate::file::ending(path).as_str() {
         "uff" | "unv" | "bunv" => Ok(FrfTable::read(path).is_ok()),
@@ -111,7 +111,7 @@ fn is_table(path: &Path) -> Result<bool, Error> {
     }
 }
 
-/// Median coherence of each response within the band.
+/// Median coherence of each response within the frequency band.
 fn coherence(table: &FrfTable, [from_hz, to_hz]: [f64; 2]) -> BTreeMap<&'static str, f64> {
     let mut medians = BTreeMap::new();
     for entry in table.entries() {
@@ -137,7 +137,7 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
         let entries = directions.iter().zip(values).zip(deviations);
         entries
             .map(|((direction, value), deviation)| {
-                let parts = Parts {
+                let parts = ComplexFigure {
                     re: Figure::new(value.re, deviation[0]),
                     im: Figure::new(value.im, deviation[1]),
                 };
@@ -153,7 +153,7 @@ fn of_mode(model: &ModalModel, found: &IdentifiedMode) -> ComplexMode {
     }
 }
 
-/// Directions that the case leaves out.
+/// Warning about directions that the case file does not contain.
 fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
     args.out.as_ref()?;
     let directions = model.directions();
@@ -166,7 +166,7 @@ fn not_in_case(args: &Args, model: &ModalModel) -> Option<String> {
         .collect();
     (!left_out.is_empty() && !directions.is_empty()).then(|| {
         format!(
-            "{} is left out of the case: shapes are known only where a direction is both driven and measured",
+            "the case does not contain {}: a mode shape requires that the direction is both excited and measured",
             left_out.join(", ")
         )
     })
@@ -218,7 +218,7 @@ fn said(model: &ModalModel, noise: &[ChannelNoise]) -> Vec<String> {
     }
     for pole in &model.rejected {
         lines.push(format!(
-            "no mode: {:.3} Hz, damping ratio {:.4}: {}",
+            "rejected pole: {:.3} Hz, damping ratio {:.4}: {}",
             pole.frequency_hz, pole.damping_ratio, pole.why
         ));
     }
@@ -226,15 +226,15 @@ fn said(model: &ModalModel, noise: &[ChannelNoise]) -> Vec<String> {
 }
 
 #[derive(Clone, Copy)]
-enum Form {
+enum ChartFormat {
     Svg,
     Html,
 }
 
-fn ending(path: &Path) -> Result<Form, Error> {
+fn ending(path: &Path) -> Result<ChartFormat, Error> {
     match crate::file::ending(path).as_str() {
-        "svg" => Ok(Form::Svg),
-        "html" => Ok(Form::Html),
+        "svg" => Ok(ChartFormat::Svg),
+        "html" => Ok(ChartFormat::Html),
         other => Err(Error::input(format!(
             "--stabilization {}: it ends in \"{other}\"; svg or html is needed",
             path.display()
@@ -246,13 +246,13 @@ fn draw(path: &Path, data: &Receptances, model: &ModalModel) -> Result<(), Error
     let title = "Stabilization diagram";
     let svg = stabilization_chart(title, data, model).map_err(Error::input)?;
     let text = match ending(path)? {
-        Form::Svg => svg,
-        Form::Html => {
+        ChartFormat::Svg => svg,
+        ChartFormat::Html => {
             let body = html! {
                 h1 { (title) }
-                (figure(&svg, "Poles that come again with the same frequency, damping and shape as the order of the model grows are modes; below, the receptances and their fit."))
+                (figure(&svg, "Poles whose frequency, damping and mode shape stay constant as the model order increases are modes. Below: measured receptances and their fit."))
                 table {
-                    tr { th { "frequency" } th { "damping ratio" } th { "why it is no mode" } }
+                    tr { th { "frequency" } th { "damping ratio" } th { "reason for rejection" } }
                     @for pole in &model.rejected {
                         tr {
                             td { (format!("{:.3} Hz", pole.frequency_hz)) }

@@ -1,7 +1,7 @@
-//! Answers from any record of force and motion, without steady tones.
+//! Identification from records of force and motion: multisine harmonic balance and restoring-force surface.
 
 use super::Error;
-use super::answer::{Answer, Figure, Slices};
+use super::answer::{Figure, IdentifyOutput, Slices};
 use super::args::{Args, SurfaceTerm, band};
 use crate::identify::case_file::Estimate;
 use crate::identify::law::Extra;
@@ -10,8 +10,12 @@ use crate::identify::restoring_force::{Options, Record, Slice, Surface, Term};
 use crate::recording::{Quantity, Recording};
 use crate::structure::Direction;
 
-/// Harmonic balance of whole periods.
-pub(super) fn multisine(args: &Args, recordings: &[Recording], samples: usize) -> Result<Answer, Error> {
+/// Identifies parameters by harmonic balance of one whole period of each multisine recording.
+pub(super) fn multisine(
+    args: &Args,
+    recordings: &[Recording],
+    samples: usize,
+) -> Result<IdentifyOutput, Error> {
     let mut taken = Vec::new();
     for recording in recordings {
         let Along {
@@ -27,7 +31,7 @@ pub(super) fn multisine(args: &Args, recordings: &[Recording], samples: usize) -
         }
         let from = recording.len().checked_sub(samples).ok_or_else(|| {
             Error::input(format!(
-                "{}: {} samples are fewer than the {samples} of a period",
+                "{}: {} samples; a period has {samples}",
                 recording.path.display(),
                 recording.len()
             ))
@@ -56,7 +60,7 @@ pub(super) fn multisine(args: &Args, recordings: &[Recording], samples: usize) -
             Extra::CubicDamping => terms.push(Term::CubicDamping),
             Extra::ModeCoupling => {
                 return Err(Error::input(
-                    "--terms mode-coupling: a multisine is taken in one direction",
+                    "--terms mode-coupling: a multisine test has one direction",
                 ));
             }
         }
@@ -80,16 +84,16 @@ pub(super) fn multisine(args: &Args, recordings: &[Recording], samples: usize) -
             deviation: *deviation,
         })
         .collect();
-    Ok(Answer {
+    Ok(IdentifyOutput {
         fit_error: Some(fit.relative_error),
-        ..Answer::of("harmonic-balance", vec![*direction], estimates)
+        ..IdentifyOutput::of("harmonic-balance", vec![*direction], estimates)
     })
 }
 
-pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let [recording] = recordings else {
         return Err(Error::input(format!(
-            "{} recordings: the restoring-force surface is that of one recording; give one",
+            "{} recordings are given; restoring-force uses one",
             recordings.len()
         )));
     };
@@ -104,7 +108,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<A
         terms: args.surface.iter().map(|term| term.term()).collect(),
         mass_kg: args.mass_kg,
         band_hz,
-        // Two seconds, or a tenth of a short record: several periods of the slowest that is kept.
+        // Trim at both ends: two seconds, or a tenth of a short record. It contains several periods of the lowest frequency in the band.
         trim_s: (0.1 * recording.len() as f64 / recording.sample_rate_hz).min(2.0),
     };
     let record = Record {
@@ -120,7 +124,7 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<A
     let mut warnings = Vec::new();
     if slices.is_none() {
         warnings.push(format!(
-            "fewer than 12 samples lie within {} of the largest velocity or displacement; a larger --slice shows the slices",
+            "fewer than 12 samples lie within {} of the largest velocity or displacement; use a larger --slice",
             args.slice
         ));
     }
@@ -144,12 +148,12 @@ pub(super) fn restoring_force(args: &Args, recordings: &[Recording]) -> Result<A
         });
     }
     let [low, high] = surface.band_hz;
-    Ok(Answer {
+    Ok(IdentifyOutput {
         fit_error: Some(surface.force_error),
         slices,
         warnings,
-        said: vec![format!("band {low:.2} to {high:.2} Hz")],
-        ..Answer::of("restoring-force", vec![direction], estimates)
+        messages: vec![format!("band {low:.2} to {high:.2} Hz")],
+        ..IdentifyOutput::of("restoring-force", vec![direction], estimates)
     })
 }
 
@@ -175,7 +179,7 @@ fn slices(surface: &Surface, share: f64) -> Option<Slices> {
     })
 }
 
-/// Force and motion along one direction.
+/// Recorded force and motion along one direction.
 pub(super) struct Along<'a> {
     pub(super) direction: Direction,
     pub(super) force: Vec<f64>,
@@ -183,9 +187,9 @@ pub(super) struct Along<'a> {
     pub(super) quantity: Quantity,
 }
 
-/// The first motion that has a force beside it; where no force was recorded, none acted.
+/// First direction with a recorded motion and force; without any recorded force, a motion with zero force (free decay).
 pub(super) fn along(recording: &Recording) -> Result<Along<'_>, Error> {
-    // Displacement first: its derivatives keep what is slow, integrals lose it.
+    // Displacement has priority: integrating velocity or acceleration loses the low frequencies.
     let order = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
     for quantity in order {
         for direction in Direction::ALL {

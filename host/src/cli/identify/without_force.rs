@@ -1,7 +1,7 @@
-//! `--method output-only` and `--method inverse-stability`: modes where no force was measured.
+//! `--method output-only` and `--method inverse-stability`: modes without a measured force.
 
 use super::Error;
-use super::answer::{Answer, Figure, OfMode};
+use super::answer::{EstimatedMode, Figure, IdentifyOutput};
 use super::args::Args;
 use crate::case::Case;
 use crate::identify::ambient::Ambient;
@@ -10,11 +10,11 @@ use crate::identify::{case_file, observed_cut, subspace};
 use crate::recording::{Kind, Recording};
 use crate::stability::{CubicTerms, Problem};
 
-/// Modes of a record of motion alone.
-pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Answer, Error> {
+/// Identifies modes from a recording of motion under unmeasured excitation.
+pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     let [recording] = recordings else {
         return Err(Error::input(format!(
-            "{} recordings: output-only takes one; give the longest",
+            "{} recordings are given; output-only uses one: give the longest",
             recordings.len()
         )));
     };
@@ -37,7 +37,7 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Answe
     let mut warnings = Vec::new();
     if recording.sidecar.kind == Some(Kind::Cutting) {
         warnings.push(
-            "it was recorded in a cut: these are modes of the structure together with the cut, whose chip adds stiffness and damping"
+            "this recording was made in a cut: the modes include the stiffness and damping of the cutting process"
                 .into(),
         );
     }
@@ -46,12 +46,12 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Answe
         let harmonic = (mode.frequency_hz / turn_hz).round() * turn_hz;
         if (harmonic - mode.frequency_hz).abs() < mode.damping_ratio * mode.frequency_hz {
             warnings.push(format!(
-                "the mode of {:.3} Hz lies within its own width of the harmonic of the spindle at {harmonic:.3} Hz, which was taken out; another speed would tell more",
+                "the mode at {:.3} Hz lies within its half-power bandwidth of the spindle harmonic at {harmonic:.3} Hz, which was removed; a recording at another speed is better",
                 mode.frequency_hz
             ));
         }
     }
-    let of_modes = found.modes.iter().map(|mode| OfMode {
+    let of_modes = found.modes.iter().map(|mode| EstimatedMode {
         frequency_hz: Figure::new(mode.frequency_hz, mode.frequency_deviation_hz),
         damping_ratio: Figure::new(mode.damping_ratio, mode.damping_deviation),
         stiffness_n_per_m: None,
@@ -61,7 +61,7 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Answe
             Vec::new()
         },
     });
-    let of_modes: Vec<OfMode> = of_modes.collect();
+    let of_modes: Vec<EstimatedMode> = of_modes.collect();
     let mut lines = vec![format!(
         "{} of {}, {:.1} s in {} blocks, {} states",
         ambient.names.join(", "),
@@ -71,26 +71,26 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Answe
         found.order
     )];
     lines.extend(said(&of_modes));
-    Ok(Answer {
+    Ok(IdentifyOutput {
         modes: Some(of_modes),
         warnings,
-        said: lines,
-        ..Answer::of("output-only", Vec::new(), Vec::new())
+        messages: lines,
+        ..IdentifyOutput::of("output-only", Vec::new(), Vec::new())
     })
 }
 
-/// Modes from cuts that chattered and cuts that did not.
-pub(super) fn inverse_stability(args: &Args) -> Result<Answer, Error> {
+/// Identifies modes from a table of stable cuts and cuts with chatter.
+pub(super) fn inverse_stability(args: &Args) -> Result<IdentifyOutput, Error> {
     let [path] = &args.recordings[..] else {
         return Err(Error::input(format!(
-            "{} files: --method inverse-stability takes one table of cuts",
+            "{} files are given; inverse-stability uses one table of cuts",
             args.recordings.len()
         )));
     };
     let cuts = observed_cut::read(path).map_err(|error| Error::input(error.to_string()))?;
     let Some(start) = &args.start else {
         return Err(Error::input(
-            "--method inverse-stability needs --start CASE.toml: tool, material and cut, and a first guess of the structure",
+            "--method inverse-stability needs --start CASE.toml: tool, material and cut, and an initial structure",
         ));
     };
     let case = Case::read(start)?;
@@ -102,9 +102,9 @@ pub(super) fn inverse_stability(args: &Args) -> Result<Answer, Error> {
     let before = Before::default();
     let found = modes(&problem, &cuts, errors, before, args.seed)
         .map_err(|error| Error::input(format!("{}: {error}", path.display())))?;
-    let of_modes: Vec<OfMode> = found.iter().map(of_mode).collect();
+    let of_modes: Vec<EstimatedMode> = found.iter().map(of_mode).collect();
     let mut lines = vec![format!(
-        "{} cuts; thought possible before: frequencies within a factor {}, damping ratios and stiffnesses within {} of the first guess",
+        "{} cuts; prior range: frequencies within a factor of {}, damping ratios and stiffnesses within a factor of {} of the initial structure",
         cuts.len(),
         before.frequency,
         before.damping
@@ -121,15 +121,15 @@ pub(super) fn inverse_stability(args: &Args) -> Result<Answer, Error> {
         .and_then(std::path::Path::file_stem)
         .unwrap_or_default()
         .to_string_lossy();
-    Ok(Answer {
+    Ok(IdentifyOutput {
         modes: Some(of_modes),
-        said: lines,
+        messages: lines,
         table: Some(case_file::modal(&name, &directions, &identified)),
-        ..Answer::of("inverse-stability", Vec::new(), Vec::new())
+        ..IdentifyOutput::of("inverse-stability", Vec::new(), Vec::new())
     })
 }
 
-fn of_mode(mode: &InverseMode) -> OfMode {
+fn of_mode(mode: &InverseMode) -> EstimatedMode {
     let figure = |spread: &Spread| Figure {
         value: spread.value,
         ci90: spread.ci90,
@@ -139,7 +139,7 @@ fn of_mode(mode: &InverseMode) -> OfMode {
         ("damping_ratio", mode.damping_ratio),
         ("stiffness_n_per_m", mode.stiffness_n_per_m),
     ];
-    OfMode {
+    EstimatedMode {
         frequency_hz: figure(&mode.frequency_hz),
         damping_ratio: figure(&mode.damping_ratio),
         stiffness_n_per_m: Some(figure(&mode.stiffness_n_per_m)),
@@ -151,14 +151,18 @@ fn of_mode(mode: &InverseMode) -> OfMode {
     }
 }
 
-fn said(modes: &[OfMode]) -> Vec<String> {
+fn said(modes: &[EstimatedMode]) -> Vec<String> {
     let line = |index: usize, key: &str, figure: &Figure, vague: bool| {
         let [low, high] = figure.ci90;
         format!(
             "mode {} {key} = {:.5e}, 90 % interval {low:.5e} to {high:.5e}{}",
             index + 1,
             figure.value,
-            if vague { ": the data cannot tell" } else { "" }
+            if vague {
+                ": not identifiable from the data"
+            } else {
+                ""
+            }
         )
     };
     let mut lines = Vec::new();
