@@ -90,7 +90,7 @@ impl MethodChoice {
         if let Some(path) = &self.frf {
             let table = FrfTable::read(path).map_err(Error::input)?;
             warn_of_table(&table)?;
-            return self.from_receptances(FrequencyProblem::of_table(case, &table)?, path);
+            return self.on_receptances(FrequencyProblem::of_table(case, &table)?, path);
         }
         let about_orbit = needs_orbit(case) && !self.linear;
         // Only collocation handles cubic terms; the other methods refuse them unless `--linear` removes them.
@@ -120,7 +120,7 @@ impl MethodChoice {
                 discretization: FullDiscretization,
                 steps,
             }),
-            _ => return self.from_receptances(FrequencyProblem::new(case, cubic)?, &case.path),
+            _ => return self.on_receptances(FrequencyProblem::new(case, cubic)?, &case.path),
         })
     }
 
@@ -133,7 +133,7 @@ impl MethodChoice {
     }
 
     /// Builds a method that uses receptances only; `path` is the file of the receptances, for messages.
-    fn from_receptances(&self, problem: FrequencyProblem, path: &Path) -> Result<Box<dyn Method>, Error> {
+    fn on_receptances(&self, problem: FrequencyProblem, path: &Path) -> Result<Box<dyn Method>, Error> {
         Ok(match self.name() {
             MethodName::Zoa => Box::new(Zoa { problem }),
             MethodName::Nyquist => Box::new(Nyquist {
