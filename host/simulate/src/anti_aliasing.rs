@@ -1,15 +1,16 @@
-//! The filter before a sampler: what is above half the sample rate would fold back into the band.
+//! Anti-aliasing filter and decimation: removes components above half the sampling rate, which would alias into the band.
 
 use std::f64::consts::{PI, TAU};
 
-/// Half the length of the filter, in samples of the result.
+/// Half the length of the filter, in samples of the output: the shortest Hann-windowed sinc with 40 dB from half the sampling rate on
+/// (checked by the test below).
 const HALF: usize = 12;
 
-/// Where the filter lets half through, as a part of the sample rate of the result: flat to 0.35, closed from 0.5.
+/// The −6 dB frequency of the filter as a fraction of the output sampling rate: the middle of the transition band from 0.35 to 0.5.
 const CORNER: f64 = 0.425;
 
-/// Every `factor`-th sample of `samples` through a low pass of linear phase and gain 1, without delay: a sinc under a
-/// Hann window. Beyond its ends the signal stays as it is there.
+/// Every `factor`-th sample of `samples` after a linear-phase low pass without delay and with unit gain at 0 Hz (Hann-windowed sinc). The
+/// signal is extended by its first and last values.
 pub(super) fn decimated(samples: Vec<f64>, factor: usize) -> Vec<f64> {
     let Some(last) = samples.len().checked_sub(1).filter(|_| factor > 1) else {
         return samples;
@@ -29,7 +30,7 @@ pub(super) fn decimated(samples: Vec<f64>, factor: usize) -> Vec<f64> {
         .collect()
 }
 
-/// `u` samples of the result from the middle.
+/// Weight of the filter at a distance of `u` output samples from its centre.
 fn weight(u: f64) -> f64 {
     let angle = TAU * CORNER * u;
     let sinc = if u == 0.0 { 1.0 } else { angle.sin() / angle };
@@ -41,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_band_passes_and_what_would_fold_back_does_not() {
+    fn the_pass_band_is_flat_and_aliasing_components_are_removed() {
         let factor = 8;
         let tone = |part: f64| -> Vec<f64> {
             let of = |k: usize| (TAU * part * k as f64 / factor as f64).cos();
@@ -53,13 +54,13 @@ mod tests {
             assert_eq!(found.len(), 400);
             for k in middle.clone() {
                 let expected = (TAU * part * k as f64).cos();
-                // Ripple of a Hann window.
+                // Pass-band ripple of the Hann-windowed sinc.
                 assert!((found[k] - expected).abs() < 8e-3);
             }
         }
         for part in [0.52, 0.7, 0.98, 1.5, 2.03] {
             let found = decimated(tone(part), factor);
-            // 40 dB at the edge of the band, and far more beyond.
+            // 40 dB at the edge of the stop band, and more beyond.
             assert!(middle.clone().all(|k| found[k].abs() < 1e-2), "{part}");
         }
     }

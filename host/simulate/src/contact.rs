@@ -1,62 +1,65 @@
-//! Teeth in contact: who is in the arc of the cut, who has material, who touches it, and the force of it all.
+//! Contact of the teeth with the workpiece, chip thickness, and the cutting force of all teeth.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use super::cutting::{Cutting, Regeneration};
-use super::passage::Spans;
-use super::surface::{Surface, TAKEN_AT};
+use super::passage::MaterialWindows;
+use super::surface::{SURFACE_NODES, Surface};
 use quietcut_model::cutter::{Immersion, Tooth};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// A kink of the surface in a derivative above this leaves the order of the integrator as it is.
+/// Order of the derivative from which on a kink of the surface needs no end of a step: the integrator has order 5.
 const SMOOTH_FROM: u8 = 5;
 
-/// Times closer than this share of the time per pitch are the same time: rounding, not physics.
+/// Relative tolerance, in tooth-passing periods, within which two times count as equal. A choice: far above rounding and far below any
+/// duration in milling.
 const SAME_TIME: f64 = 1e-9;
 
-/// Contact is lost and found this far beyond the surface, as a share of the feed per tooth and at least in m: a chip
-/// that ends in nothing, as in a slot, does not lose contact by errors of integration.
-const NOTHING: f64 = 1e-7;
-const NOTHING_M: f64 = 1e-15;
+/// Hysteresis of loss of contact, as a fraction of the feed per tooth: a chip whose thickness tends to zero, as in a slot, must not lose
+/// contact by integration errors. The value is a factor of 10 above the relative tolerance of the integration.
+const CONTACT_TOLERANCE: f64 = 1e-7;
+/// Smallest hysteresis of loss of contact, m, for a cut without feed: above rounding of displacements.
+const CONTACT_TOLERANCE_MIN_M: f64 = 1e-15;
 
-/// The state of all teeth.
+/// State of contact of all teeth, and the surfaces that they leave.
 #[derive(Clone, Debug)]
 pub(super) struct Contact<'a> {
     cutting: &'a Cutting,
-    teeth: Vec<State>,
-    /// The stretch of time that is being looked at, shortened by rounding: see [`Surface::height_m`].
+    teeth: Vec<ToothState>,
+    /// Start and end of the evaluated step, s, moved inwards by a rounding margin: see [`Surface::height_m`].
     within: [f64; 2],
     same_time_s: f64,
     longest_delay_s: f64,
-    /// Derivatives by which a kink of the force is smoother in the displacement.
+    /// Difference in order between a discontinuous derivative of the force and that of the displacement: 2, or 1 without modal mass.
     gain_of_order: u8,
 }
 
 #[derive(Clone, Debug)]
-struct State {
-    /// Between the start and the exit angle.
+/// State of contact of one tooth.
+struct ToothState {
+    /// True between the start angle and the exit angle of the cut.
     in_arc: bool,
-    /// When it next enters or leaves the arc.
+    /// Time of the next entry into, or exit from, the engagement arc, s.
     next_switch_s: f64,
-    /// Passes begun, counted from the spindle angle.
+    /// Number of the tooth passing, from the spindle angle.
     pass: f64,
-    spans: Spans,
+    spans: MaterialWindows,
     in_material: bool,
-    /// The edge is at the surface; else it is off it, and the surface stays as it was left.
+    /// True while the edge cuts or touches the surface; otherwise the surface of the earlier passing persists.
     at_surface: bool,
-    /// When contact changed last: it can change only once at a time.
+    /// Time of the last change of contact, s; two changes at the same time are an error.
     changed_s: f64,
     surface: Surface,
-    /// Kinks of the surface in front: when they come, and in which derivative.
+    /// Kinks of the surface in front: time at which the tooth meets each, s, and order of the discontinuous derivative.
     kinks: VecDeque<(f64, u8)>,
 }
 
-/// A chip as a tooth sees it.
+/// Chip thickness of one tooth at its immersion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chip {
-    /// Distance from the surface in front to the edge, m; negative off the surface.
+    /// Chip thickness, m: distance from the surface in front to the edge; negative out of contact.
     pub(super) thickness_m: f64,
     place: Immersion,
 }
@@ -64,14 +67,14 @@ pub(super) struct Chip {
 /// The first change of contact in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Change {
-    /// The tooth.
+    /// Index of the tooth.
     pub(super) tooth: usize,
-    /// When, as a fraction of the step.
+    /// Time of the change as a fraction of the step.
     pub(super) u: f64,
 }
 
 impl<'a> Contact<'a> {
-    /// The teeth at t = 0; `velocity_jumps` as [`super::Dynamics::velocity_jumps`].
+    /// Contact of the teeth at t = 0 with a tool at rest; `velocity_jumps` as in [`super::Dynamics::velocity_jumps`].
     pub(super) fn new(cutting: &'a Cutting, velocity_jumps: bool) -> Self {
         let cutter = &cutting.cutter;
         let shortest = cutter
@@ -93,9 +96,9 @@ impl<'a> Contact<'a> {
             gain_of_order: if velocity_jumps { 1 } else { 2 },
         };
         for tooth in &cutter.teeth {
-            contact.teeth.push(State::new());
+            contact.teeth.push(ToothState::new());
             let angle = (cutting.spindle.angle_rad(0.0) + tooth.angle_rad - cutter.start_rad) / TAU;
-            // A tooth that stands at the start angle enters now.
+            // A tooth at the start angle enters the arc now.
             let pass = (angle + SAME_TIME).floor();
             let index = contact.teeth.len() - 1;
             contact.teeth[index].pass = pass;
@@ -110,23 +113,23 @@ impl<'a> Contact<'a> {
         for index in 0..contact.teeth.len() {
             contact.teeth[index].in_material = contact.teeth[index].spans.contain(contact.same_time_s);
         }
-        // What was before t = 0 was another motion: the surface has a step there.
+        // The surface has a step at t = 0, where the rest ends and the motion begins.
         contact.kink_of_motion(0.0, 0);
         contact
     }
 
-    /// The smallest time from tooth to tooth: no step may be longer, the surface must be there.
+    /// Shortest tooth-passing period, s: a longer step would need a surface that is not yet computed.
     pub(super) fn shortest_delay_s(&self) -> f64 {
         self.same_time_s / SAME_TIME
     }
 
-    /// Says which stretch of time is looked at next.
-    pub(super) fn look_at(&mut self, from_s: f64, to_s: f64) {
+    /// Sets the step, from `from_s` to `to_s`, that is evaluated next.
+    pub(super) fn set_step(&mut self, from_s: f64, to_s: f64) {
         let inset = self.same_time_s.min(0.25 * (to_s - from_s));
         self.within = [from_s + inset, to_s - inset];
     }
 
-    /// Force on the tool, N, at `t` with the tool displaced by `x`; without that of its velocity.
+    /// Cutting force on the tool, N, at the time `t` and displacement `x`; without process damping.
     pub(super) fn force_n(&self, t: f64, x: [f64; 3]) -> [f64; 3] {
         let cutter = &self.cutting.cutter;
         let depth_m = self.depth_m(t, x);
@@ -142,8 +145,7 @@ impl<'a> Contact<'a> {
         sum.map(|force| force * cutter.force.wear(t))
     }
 
-    /// The matrix D, N s/m, of the force −D v of process damping at `t` with the tool displaced by `x`; `None` where there
-    /// is none.
+    /// Matrix D, N s/m, of the process damping force −D v at the time `t` and displacement `x`; `None` without process damping.
     pub(super) fn damping_ns_per_m(&self, t: f64, x: [f64; 3]) -> Option<[[f64; 3]; 3]> {
         let cutter = &self.cutting.cutter;
         cutter.force.process_damping?;
@@ -151,7 +153,7 @@ impl<'a> Contact<'a> {
         let depth_m = self.depth_m(t, x);
         let mut sum = [[0.0; 3]; 3];
         for tooth in self.cutting_teeth() {
-            // The flank presses towards the axis.
+            // The flank force acts radially: its depth fraction is the radial one.
             let depth_m = depth_m * self.shares(tooth, t)[1];
             let damping = cutter
                 .force
@@ -163,15 +165,15 @@ impl<'a> Contact<'a> {
         Some(sum)
     }
 
-    /// What of the depth counts where a tooth stands: see [`super::Pores`].
+    /// Fractions of the axial depth that act in tangential, radial and axial force at the location of a tooth: see [`super::Pores`].
     fn shares(&self, tooth: &Tooth, t: f64) -> [f64; 3] {
         match &self.cutting.pores {
-            Some(pores) => pores.met(&self.cutting.cutter, &self.cutting.spindle, tooth, t),
+            Some(pores) => pores.at_tooth(&self.cutting.cutter, &self.cutting.spindle, tooth, t),
             None => [1.0; 3],
         }
     }
 
-    /// The teeth that touch material.
+    /// The teeth in contact with material.
     fn cutting_teeth(&self) -> impl Iterator<Item = &Tooth> {
         let teeth = self.cutting.cutter.teeth.iter().zip(&self.teeth);
         teeth
@@ -179,14 +181,13 @@ impl<'a> Contact<'a> {
             .map(|(tooth, _)| tooth)
     }
 
-    /// Axial depth at `t`, m.
+    /// Axial depth of cut at the time `t`, m.
     fn depth_m(&self, t: f64, x: [f64; 3]) -> f64 {
         let cutter = &self.cutting.cutter;
         cutter.depth_at_m(cutter.depth_m * self.cutting.passage.depth_share(t), x[2])
     }
 
-    /// How far the tool feeds until a tooth passes where the one ahead of it did, m: the feed axis moves steadily, also
-    /// where the spindle does not.
+    /// Feed, m, during the regenerative delay of `tooth` at the time `t`. The feed axis moves at constant speed even if the spindle speed varies.
     fn feed_m(&self, tooth: &Tooth, t: f64) -> f64 {
         tooth.feed_m * self.cutting.spindle.delay_share(t, tooth.pitch_rad)
     }
@@ -210,7 +211,7 @@ impl<'a> Contact<'a> {
             .immersion(self.cutting.spindle.angle_rad(t) + tooth.angle_rad)
     }
 
-    /// Height of the surface in front of a tooth, receded by the feed since it was left, m.
+    /// Height of the surface in front of a tooth, m: the surface of the tooth ahead minus the feed during the regenerative delay.
     fn in_front_m(&self, tooth: &Tooth, place: Immersion, t: f64) -> f64 {
         let cutter = &self.cutting.cutter;
         let spindle = &self.cutting.spindle;
@@ -223,7 +224,7 @@ impl<'a> Contact<'a> {
         left - cutter.recession_m(place, self.feed_m(tooth, t))
     }
 
-    /// The first time after `t` at which a tooth enters or leaves, meets or loses material, or meets a kink.
+    /// The first time after `t`, s, at which a tooth enters or leaves the arc, meets or leaves material, or meets a kink of the surface.
     pub(super) fn next_switch_s(&self, t: f64) -> f64 {
         let after = t + self.same_time_s;
         let of_teeth = self.teeth.iter().map(|state| {
@@ -235,7 +236,7 @@ impl<'a> Contact<'a> {
             .min(self.cutting.passage.next_knot(after))
     }
 
-    /// Enters and leaves, at `t` where [`Self::next_switch_s`] has said; `x` and `v` are the motion of the tool.
+    /// Applies the entries, exits and kinks at the time `t` of [`Self::next_switch_s`]; `x`, m, and `v`, m/s, are the motion of the tool.
     pub(super) fn switch(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
         let now = t + self.same_time_s;
         let mut force_jumps = false;
@@ -258,7 +259,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// True where the tooth entered the arc.
+    /// Moves a tooth into or out of the arc; true if it entered.
     fn switch_arc(&mut self, index: usize, now: f64) -> bool {
         let mut entered = false;
         while self.teeth[index].next_switch_s <= now {
@@ -296,25 +297,25 @@ impl<'a> Contact<'a> {
             .spans(&cutting.cutter, &cutting.spindle, open_s, close_s);
     }
 
-    /// Out of the arc until the pass that `pass` counts.
+    /// Moves a tooth out of the arc until its passing number `pass`.
     fn leave(&mut self, index: usize) {
         let open_s = self.open_s(index);
         let state = &mut self.teeth[index];
         state.in_arc = false;
         state.in_material = false;
         state.next_switch_s = open_s;
-        state.spans = Spans::default();
+        state.spans = MaterialWindows::default();
     }
 
-    /// Teeth that have just entered: at the surface, or off it already?
+    /// Decides for each tooth that has just entered the arc whether it is in contact, from the chip thickness shortly afterwards.
     fn touch(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
         if self.cutting.regeneration != Regeneration::AllPasses {
             return;
         }
-        // Far enough for the slow growth of a chip from nothing to be seen, close enough for it to be linear.
+        // Long enough to resolve the growth of the chip from zero, short enough for linear extrapolation of the motion.
         let soon_s = 1e-4 * self.shortest_delay_s();
         let then = std::array::from_fn(|axis| x[axis] + soon_s * v[axis]);
-        self.look_at(t, t + soon_s);
+        self.set_step(t, t + soon_s);
         for (index, tooth) in self.cutting.cutter.teeth.iter().enumerate() {
             let open_s = self.open_s(index);
             if self.teeth[index].in_arc && (t - open_s).abs() <= self.same_time_s {
@@ -323,7 +324,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// The first change of contact in the step from `t` to `t + h` with the tool moving along `displacement`.
+    /// The first loss or regain of contact in the step from `t` to `t + h`, s, while the tool moves along `displacement`.
     pub(super) fn first_change(&self, t: f64, h: f64, displacement: &[Quartic; 3]) -> Option<Change> {
         if self.cutting.regeneration != Regeneration::AllPasses
             || self
@@ -346,17 +347,18 @@ impl<'a> Contact<'a> {
     fn change_of(&self, index: usize, t: f64, h: f64, displacement: &[Quartic; 3]) -> Option<Change> {
         let tooth = &self.cutting.cutter.teeth[index];
         let sign = if self.teeth[index].at_surface { 1.0 } else { -1.0 };
-        let nothing_m = (NOTHING * self.cutting.cutter.feed_per_tooth_m).max(NOTHING_M);
-        // Positive while contact stays as it is.
+        let tolerance_m =
+            (CONTACT_TOLERANCE * self.cutting.cutter.feed_per_tooth_m).max(CONTACT_TOLERANCE_MIN_M);
+        // Positive while the state of contact persists.
         let margin = |u: f64| {
             let x = std::array::from_fn(|axis| at(&displacement[axis], u));
-            sign * self.chip(tooth, t + u * h, x).thickness_m + nothing_m
+            sign * self.chip(tooth, t + u * h, x).thickness_m + tolerance_m
         };
         first_below_zero(margin).map(|u| Change { tooth: index, u })
     }
 
-    /// Contact of a tooth changes at `t`. `false` where it has changed at this very time before: then neither
-    /// contact nor air is a motion that goes on.
+    /// Changes the contact of a tooth at the time `t`. False if it has already changed at this time: then the motion can continue neither
+    /// in contact nor out of contact.
     pub(super) fn change(&mut self, index: usize, t: f64) -> bool {
         let jumps = self.cutting.cutter.force.jumps_at_contact();
         let again = (t - self.teeth[index].changed_s).abs() <= self.same_time_s * 1e-3;
@@ -370,7 +372,7 @@ impl<'a> Contact<'a> {
         !again
     }
 
-    /// Records the step from `t` to `t + h` in the surfaces.
+    /// Appends the accepted step from `t` to `t + h`, s, to the surfaces of all teeth in the arc.
     pub(super) fn record(&mut self, t: f64, h: f64, displacement: &[Quartic; 3]) {
         let forget_before = t - 1.5 * self.longest_delay_s;
         for index in 0..self.teeth.len() {
@@ -381,17 +383,17 @@ impl<'a> Contact<'a> {
                 self.teeth[index].surface.push_cut(t, t + h, *displacement);
             } else {
                 let tooth = &self.cutting.cutter.teeth[index];
-                let heights = TAKEN_AT.map(|u| {
+                let heights = SURFACE_NODES.map(|u| {
                     let t = t + u * h;
                     self.in_front_m(tooth, self.place(tooth, t), t)
                 });
-                self.teeth[index].surface.push_left(t, t + h, heights);
+                self.teeth[index].surface.push_uncut(t, t + h, heights);
             }
             self.teeth[index].surface.forget_before(forget_before);
         }
     }
 
-    /// The force has a jump in its derivative `order`: so has, some orders higher, the surface that is being cut.
+    /// Derivative `order` of the force is discontinuous at `t`; so is a higher derivative of the surface that is being cut.
     fn kink_of_force(&mut self, t: f64, order: u8) {
         self.kink_of_motion(t, order + self.gain_of_order);
     }
@@ -404,7 +406,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// The surface that tooth `index` leaves has a kink: the tooth behind will meet it.
+    /// The surface of tooth `index` has a kink at the time `t`: the next tooth meets it one regenerative delay later.
     fn kink_behind(&mut self, index: usize, t: f64, order: u8) {
         if order >= SMOOTH_FROM {
             return;
@@ -421,7 +423,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// A tooth meets the kinks that are due.
+    /// Applies the kinks that a tooth meets up to the time `now`.
     fn pass_kinks(&mut self, index: usize, now: f64) {
         while let Some((when, order)) = self.teeth[index]
             .kinks
@@ -443,13 +445,13 @@ impl<'a> Contact<'a> {
     }
 }
 
-impl State {
+impl ToothState {
     fn new() -> Self {
         Self {
             in_arc: false,
             next_switch_s: f64::INFINITY,
             pass: 0.0,
-            spans: Spans::default(),
+            spans: MaterialWindows::default(),
             in_material: false,
             at_surface: true,
             changed_s: f64::NEG_INFINITY,

@@ -1,32 +1,32 @@
-//! A turning tool on its way through a workpiece.
+//! The cutting process of one simulated cut.
 
 use super::passage::Passage;
 use super::pores::Pores;
 use quietcut_model::{Cutter, Spindle};
 
-/// A turning tool on its way through a workpiece.
+/// The cutting process of one simulated cut: cutter, spindle, traverse of the workpiece and regeneration.
 #[derive(Clone, Debug)]
 pub struct Cutting {
-    /// The tool.
+    /// Geometry and cutting force of the tool.
     pub cutter: Cutter,
-    /// How it turns.
+    /// Spindle angle over time.
     pub spindle: Spindle,
-    /// How it comes into the workpiece and out.
+    /// Entry into the workpiece, full engagement and exit.
     pub passage: Passage,
-    /// What a tooth finds in front of it.
+    /// Earlier tooth passings that determine the chip thickness.
     pub regeneration: Regeneration,
-    /// Pores of the material; `None` where it is solid.
+    /// Pores of the workpiece material; `None` for solid material.
     pub pores: Option<Pores>,
 }
 
-/// Which earlier vibration a chip feels.
+/// The earlier vibration that the chip thickness includes (regenerative effect).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regeneration {
-    /// That of all earlier passes: the surface is what they left, and a tooth that does not reach it feels no force.
+    /// All earlier tooth passings (multiple regeneration): a tooth that does not reach the surface they left has no force (eqs 6.20 to 6.27).
     AllPasses,
-    /// That of the last pass alone, and a chip of negative thickness pulls: the linear model of stability charts.
+    /// The last tooth passing only; a negative chip thickness gives a negative force. This is the linear delay model of stability charts.
     LastPass,
-    /// None, nor that of the tooth itself: the chip is that of the feed (and of runout), and the motion is the forced one
-    /// that every stable cut comes to.
+    /// No vibration at all: the chip thickness is that of feed and runout. The motion is the forced vibration, to which a stable cut
+    /// converges.
     None,
 }

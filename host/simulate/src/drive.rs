@@ -1,22 +1,22 @@
-//! A force from outside on the tool.
+//! External excitation force on the tool.
 
-/// A force from outside on the tool: a shaker.
+/// An external excitation force on the tool, such as that of a shaker or a hammer.
 pub trait Drive: Send + Sync {
-    /// The force at `t`, N, in the machine's x, y, z. It is never asked for within a billionth of a step of a knot.
+    /// The commanded force at the time `t`, N, in the machine's x, y, z. The integrator does not evaluate it within 1e-9 of a step of a
+    /// knot, see [`Self::next_knot_s`].
     fn force_n(&self, t: f64) -> [f64; 3];
 
-    /// How much less the force is per velocity of the tool, N s/m: a shaker's armature generates a voltage against its
-    /// drive as it moves, so that the force drops where the structure resonates.
+    /// Force drop per velocity of the tool, N s/m: the back-EMF of a shaker without force control reduces the force at resonance.
     fn drop_ns_per_m(&self) -> [f64; 3] {
         [0.0; 3]
     }
 
-    /// The first time after `t` at which the force or one of its lower derivatives jumps.
+    /// The first time after `t`, s, at which the force or one of its lower derivatives is discontinuous (a knot).
     fn next_knot_s(&self, _t: f64) -> f64 {
         f64::INFINITY
     }
 
-    /// The longest step in which the force is not missed: nothing else shortens steps while friction holds the tool.
+    /// The longest integration step that resolves the force, s. It limits the steps while friction sticks, when no error of the motion does.
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
     }

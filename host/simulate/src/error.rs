@@ -1,60 +1,60 @@
-//! Why a simulation cannot be made or cannot go on.
+//! Errors of the simulation.
 
 use quietcut_model::ModelError;
 
-/// What is wrong with a simulation.
+/// A simulation that cannot be set up or cannot continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimulateError {
-    /// Equations that cannot be set up.
+    /// The equation of motion cannot be assembled.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The tool feeds into the workpiece and its size is not known.
+    /// The tool diameter is missing, which entry through a face of the workpiece and porous material require.
     #[error(
         "the tool's diameter is not known, so its way into the workpiece is not: give diameter_mm in [tool], or let the depth grow instead"
     )]
     NoDiameter,
-    /// The motion left every bound.
+    /// The displacement exceeded the bound of [`super::Settings::largest_m`].
     #[error(
         "at {time_s:.6} s the tool is displaced by {displacement_mm:.3} mm and growing: beyond that the model means nothing (a softening spring has given way, or the cut is so unstable that loss of contact does not bound it)"
     )]
     Diverged {
-        /// When.
+        /// Time of the simulation, s.
         time_s: f64,
-        /// How far the tool was.
+        /// Displacement of the tool, mm.
         displacement_mm: f64,
     },
-    /// More steps than were allowed.
+    /// More steps than [`super::Settings::steps_max`].
     #[error(
         "at {time_s:.6} s {steps} steps were taken, and no more are allowed: the equations are too stiff"
     )]
     TooManySteps {
-        /// When.
+        /// Time of the simulation, s.
         time_s: f64,
-        /// How many.
+        /// Number of accepted and rejected steps.
         steps: u64,
     },
-    /// A tooth that neither cuts nor leaves the surface.
+    /// A tooth that can neither keep nor lose contact (chattering events).
     #[error(
         "at {time_s:.6} s tooth {tooth} leaves the surface the moment it touches it and touches it the moment it leaves: the edge force is too large for this structure"
     )]
     ContactUndecided {
-        /// When.
+        /// Time of the simulation, s.
         time_s: f64,
-        /// Which, from 1.
+        /// Number of the tooth, from 1.
         tooth: usize,
     },
-    /// A term of the equation of motion that finds no branch that goes on.
+    /// A restoring force without a consistent regime, such as two friction forces that act against each other.
     #[error(
-        "at {time_s:.6} s no branch of the added terms (friction, play) goes on: two of them act against each other"
+        "at {time_s:.6} s no regime of the restoring forces (friction, backlash) is consistent with the motion: two of them act against each other"
     )]
     BranchUndecided {
-        /// When.
+        /// Time of the simulation, s.
         time_s: f64,
     },
     /// A rig drives a direction that the structure does not have.
     #[error("the structure cannot be driven in {direction}: it has no such direction, or it is a rotation")]
     NoDirection {
-        /// The direction.
+        /// Direction of the excitation force.
         direction: quietcut_model::structure::Direction,
     },
 }

@@ -1,24 +1,24 @@
-//! Steps of controlled error that end exactly where the right-hand side is not smooth.
+//! Error-controlled integration with event location: steps end where the right-hand side is not smooth.
 
 use super::contact::{Change, Contact};
 use super::error::SimulateError;
-use super::model::{Model, Stretch};
+use super::model::{Model, StepContext};
 use super::segment::{Segment, Workspace};
 use super::settings::Settings;
 use quietcut_model::term::{self, At, Branch, Branches};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{DormandPrince, Quartic, at};
 
-/// What a run took.
+/// Numbers of steps and events of one run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// Steps taken.
+    /// Accepted steps.
     pub steps: u64,
-    /// Steps tried again because their error was too large.
+    /// Steps rejected because their error exceeded the tolerance.
     pub rejected: u64,
-    /// Times at which a tooth lost or found contact.
+    /// Number of times that a tooth lost or regained contact.
     pub contact_changes: u64,
-    /// Times at which a term of the equation of motion changed its branch.
+    /// Number of times that a restoring force changed its regime, such as from stick to slip.
     pub branch_changes: u64,
 }
 
@@ -32,27 +32,27 @@ pub(super) struct Integrator<'a> {
     y: Vec<f64>,
     quartics: Vec<Quartic>,
     displacement: [Quartic; 3],
-    /// Length of the next step if nothing comes between.
+    /// Length of the next step, s, unless an event shortens it.
     next_h: f64,
     statistics: Statistics,
     workspace: Workspace,
-    /// The branch of each term of the model.
+    /// The regime of each restoring force of the model.
     branches: Vec<Branch>,
-    /// The stretch looked at, a little shortened at both ends.
+    /// Start and end of the evaluated step, s, moved inwards by a rounding margin.
     within: [f64; 2],
 }
 
-/// What ends a step before its time.
+/// An event that shortens a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Event {
-    /// A tooth loses or finds contact.
+    /// A tooth loses or regains contact.
     Contact(Change),
-    /// A term leaves its branch.
+    /// Restoring force `index` leaves its regime at the fraction `u` of the step.
     Term { index: usize, u: f64 },
 }
 
 impl Event {
-    /// When, as a fraction of the step.
+    /// Time of the event as a fraction of the step.
     fn u(self) -> f64 {
         match self {
             Self::Contact(change) => change.u,
@@ -61,10 +61,11 @@ impl Event {
     }
 }
 
-/// Error of a step, as a share of what is allowed, below which nothing moves.
+/// Error of a step over its tolerance below which the tool counts as at rest. A choice: the error estimate of any vibration above rounding is
+/// larger.
 const AT_REST: f64 = 1e-6;
 
-/// Changes of contact in a row without a step between them before a run is given up.
+/// Number of successive changes of contact without a step between them at which the run ends with an error. A choice: a tooth needs one.
 const STUCK: u32 = 3;
 
 impl<'a> Integrator<'a> {
@@ -90,13 +91,13 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Runs to `end_s`; `observe` sees every stretch in its order.
+    /// Integrates to `end_s`, s; `observe` receives every step in the order of time.
     pub(super) fn run(
         mut self,
         end_s: f64,
         mut observe: impl FnMut(&Segment<'_>),
     ) -> Result<Statistics, SimulateError> {
-        // Small enough for anything; the first steps find out.
+        // A safely small first step; error control enlarges it within a few steps.
         self.next_h = 1e-3 * self.longest_step(end_s);
         for index in 0..self.branches.len() {
             self.branches[index] = self.next_branch(index, None);
@@ -149,8 +150,8 @@ impl<'a> Integrator<'a> {
             Event::Term { index, .. } => {
                 self.statistics.branch_changes += 1;
                 self.branches[index] = self.next_branch(index, Some(self.branches[index]));
-                // A term that has just changed counts as within its branch (see `first_below_zero`): many changes
-                // without a step between them are a term whose branches exclude each other.
+                // A restoring force that has just changed counts as within its regime (see `first_below_zero`): many
+                // changes without a step between them mean that no regime is consistent with the motion.
                 *stuck += 1;
                 if *stuck > 10 * STUCK {
                     return Err(SimulateError::BranchUndecided { time_s: self.t });
@@ -160,7 +161,7 @@ impl<'a> Integrator<'a> {
         Ok(())
     }
 
-    /// The branch of a term here and now; an axis that begins to be held stands still from now on.
+    /// The regime of a restoring force at the current time; an axis that begins to stick gets zero velocity.
     fn next_branch(&mut self, index: usize, before: Option<Branch>) -> Branch {
         let term = &self.model.terms[index];
         let (at, place) = (self.at(self.t, &self.y), self.place(index));
@@ -183,14 +184,14 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Where the states of a term stand in y.
+    /// Range of the internal states of a restoring force in y.
     fn place(&self, index: usize) -> std::ops::Range<usize> {
         let terms = &self.model.terms;
         let from = self.model.dynamics.order() + term::states(&terms[..index]);
         from..from + terms[index].states()
     }
 
-    /// f_r that would hold the axis of a term at `t`; 0 where it holds none.
+    /// The force f_r, N, that keeps the axis of a restoring force at rest at the time `t`; 0 if it cannot stick.
     fn holding_n(&mut self, index: usize, t: f64, y: &[f64]) -> f64 {
         let Some(axis) = self.model.terms[index].holds() else {
             return 0.0;
@@ -204,12 +205,12 @@ impl<'a> Integrator<'a> {
     fn held_n(&self, index: usize, axis: usize, (t, y): (f64, &[f64]), rate: &mut [f64]) -> f64 {
         let model = self.model;
         let x = model.dynamics.displacement(&y[..model.dynamics.order()]);
-        let stretch = self.stretch();
-        let force = model.force_n(stretch, t, x, y);
+        let context = self.context();
+        let force = model.force_n(context, t, x, y);
         let held = term::rate(
             &model.dynamics,
             &model.terms,
-            stretch.branches,
+            context.branches,
             (t, x),
             force,
             y,
@@ -218,47 +219,46 @@ impl<'a> Integrator<'a> {
         if model.terms[index].locked(self.branches[index]) {
             return held[axis];
         }
-        // What slides now has its own force in the rate: what holds it is that force and what is left.
+        // The rate already contains the slip force: the holding force is that force plus the remaining unbalanced force.
         let at = self.at(t, y);
         let sliding = model.terms[index].restoring_n(self.branches[index], &at, &y[self.place(index)]);
         let locked = std::array::from_fn(|other| other == axis);
         sliding[axis] + term::holding_n(&model.dynamics, locked, &rate[..model.dynamics.order()])[axis]
     }
 
-    fn stretch(&self) -> Stretch<'_> {
-        Stretch {
+    fn context(&self) -> StepContext<'_> {
+        StepContext {
             contact: self.contact.as_ref(),
             within: self.within,
             branches: Branches(&self.branches),
         }
     }
 
-    /// ẏ at the start of a smooth stretch.
+    /// Evaluates ẏ at the start of a step after a discontinuity.
     fn start(&mut self) {
-        self.look_ahead(self.next_h);
+        self.set_step(self.next_h);
         let model = self.model;
-        let stretch = Stretch {
+        let context = StepContext {
             contact: self.contact.as_ref(),
             within: self.within,
             branches: Branches(&self.branches),
         };
         self.step.start(self.t, &self.y, |t, y, rate| {
-            model.rate(stretch, (t, model.dynamics.displacement(y)), y, rate);
+            model.rate(context, (t, model.dynamics.displacement(y)), y, rate);
         });
     }
 
-    /// Looks at the smooth stretch that begins here.
-    fn look_ahead(&mut self, h: f64) {
+    /// Sets the step of length `h`, s, from the current time as the one to evaluate.
+    fn set_step(&mut self, h: f64) {
         let inset = 1e-9 * h;
         self.within = [self.t + inset, self.t + h - inset];
         if let Some(contact) = &mut self.contact {
-            contact.look_at(self.t, self.t + h);
+            contact.set_step(self.t, self.t + h);
         }
     }
 
-    /// Tries steps until one is good; its length, and the event at its end. It is not taken yet.
-    ///
-    /// Length 0: the event is here and now.
+    /// Attempts steps until the error is within tolerance. Returns the length, s, and the event at the end of the step, which is not yet
+    /// accepted. Length 0 means that the event is at the current time.
     fn step_towards(&mut self, stop_s: f64) -> Result<(f64, Option<Event>), SimulateError> {
         let mut h = self.next_h;
         let is_held = self.is_held();
@@ -270,7 +270,7 @@ impl<'a> Integrator<'a> {
             let error = self.attempt(h);
             if error <= 1.0 {
                 let grown = h * (0.9 * error.max(1e-8).powf(-0.2)).clamp(0.2, 5.0);
-                // A step cut short by a switch says little about the next: it does not shrink it.
+                // A step shortened by a stop does not shorten the next one.
                 self.next_h = if h < self.next_h {
                     grown.max(self.next_h)
                 } else {
@@ -283,7 +283,7 @@ impl<'a> Integrator<'a> {
                 break;
             }
             self.statistics.rejected += 1;
-            // NaN shrinks as well.
+            // An error that is not finite also shortens the step.
             let shrunk = if error.is_finite() {
                 (0.9 * error.powf(-0.2)).max(0.1)
             } else {
@@ -302,12 +302,12 @@ impl<'a> Integrator<'a> {
         if shorter <= self.rounding_s() {
             return Ok((0.0, Some(event)));
         }
-        // A shorter step of an accepted one is at least as exact.
+        // A step shorter than an acceptable one has at most the same error.
         self.attempt(shorter);
         Ok((shorter, Some(event)))
     }
 
-    /// The first thing that ends the step tried last before its time.
+    /// The first event within the last attempted step of length `h`, s.
     fn first_event(&mut self, h: f64) -> Option<Event> {
         let contact = self
             .contact
@@ -346,17 +346,17 @@ impl<'a> Integrator<'a> {
         first_below_zero(margin).map(|u| Event::Term { index, u })
     }
 
-    /// Tries one step and makes its interpolant; the error in units of what is allowed.
+    /// Attempts one step of length `h`, s, and its dense output; returns the error divided by the tolerance.
     fn attempt(&mut self, h: f64) -> f64 {
-        self.look_ahead(h);
+        self.set_step(h);
         let model = self.model;
-        let stretch = Stretch {
+        let context = StepContext {
             contact: self.contact.as_ref(),
             within: self.within,
             branches: Branches(&self.branches),
         };
         self.step.attempt(self.t, h, &self.y, |t, y, rate| {
-            model.rate(stretch, (t, model.dynamics.displacement(y)), y, rate);
+            model.rate(context, (t, model.dynamics.displacement(y)), y, rate);
         });
         self.step.interpolant(h, &self.y, &mut self.quartics);
         self.displacement = model.dynamics.displacement_quartics(&self.quartics);
@@ -367,7 +367,7 @@ impl<'a> Integrator<'a> {
         })
     }
 
-    /// The largest element of y at the ends of the step tried last, as a displacement.
+    /// Largest state at the two ends of the last attempted step, as a displacement of the tool, m.
     fn amplitude_m(&self) -> f64 {
         let ends = self.y.iter().zip(self.step.end());
         ends.zip(self.model.dynamics.sizes())
@@ -381,7 +381,7 @@ impl<'a> Integrator<'a> {
         }
         observe(&Segment {
             model: self.model,
-            stretch: self.stretch(),
+            context: self.context(),
             quartics: &self.quartics,
             displacement: &self.displacement,
             from_s: self.t,
@@ -401,13 +401,13 @@ impl<'a> Integrator<'a> {
         let Some(contact) = &mut self.contact else { return };
         let x = self.model.dynamics.displacement(&self.y);
         self.workspace.state.copy_from_slice(&self.y);
-        let stretch = Stretch {
+        let context = StepContext {
             contact: Some(contact),
             within: self.within,
             branches: Branches(&self.branches),
         };
         self.model.rate(
-            stretch,
+            context,
             (self.t, x),
             &self.workspace.state,
             &mut self.workspace.rate,
@@ -416,7 +416,7 @@ impl<'a> Integrator<'a> {
         contact.switch(self.t, x, v);
     }
 
-    /// The next time at which the right-hand side is not smooth, or the end.
+    /// The next time, s, at which the right-hand side is not smooth, or the end of the run.
     fn next_stop(&self, end_s: f64) -> f64 {
         let contact = self
             .contact
@@ -428,15 +428,15 @@ impl<'a> Integrator<'a> {
         contact.min(drive).min(end_s)
     }
 
-    /// Half the time from tooth to tooth: the surface in front must be there, and changes of contact be seen.
+    /// The longest step, s: half the shortest tooth-passing period, so that the surface in front exists and no change of contact is missed.
     fn longest_step(&self, end_s: f64) -> f64 {
         self.contact
             .as_ref()
             .map_or(end_s, |contact| 0.5 * contact.shortest_delay_s())
     }
 
-    /// The longest step while nothing moves, or friction holds an axis: the force alone then says when that ends, and no error of the
-    /// motion shortens steps.
+    /// The longest step while the tool is at rest or friction sticks, s. The motion has then no error that would shorten the step, so the
+    /// excitation force limits it.
     fn longest_step_at_rest(&self) -> f64 {
         let drive = self.model.drive.as_ref();
         drive.map_or(f64::INFINITY, |drive| drive.longest_step_s())
@@ -447,7 +447,7 @@ impl<'a> Integrator<'a> {
         branches.any(|(term, branch)| term.locked(*branch))
     }
 
-    /// The step that leaves no stub before `stop_s`.
+    /// A step of about `h`, s, chosen so that no very short step is left before `stop_s`.
     fn fitted(&self, h: f64, stop_s: f64) -> f64 {
         let left = stop_s - self.t;
         if h >= 0.99 * left {
@@ -459,7 +459,7 @@ impl<'a> Integrator<'a> {
         }
     }
 
-    /// Times closer than this cannot be told apart.
+    /// Rounding of the time, s: two times closer than this count as equal.
     fn rounding_s(&self) -> f64 {
         8.0 * f64::EPSILON * self.t
     }

@@ -1,4 +1,4 @@
-//! The equation of motion of a machine with its cut.
+//! Equation of motion of a structure with its cut, external excitation and restoring forces.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,38 +8,38 @@ use super::drive::Drive;
 use quietcut_model::term::{self, Branches};
 use quietcut_model::{Dynamics, Term};
 
-/// A machine, and what happens to it.
+/// Equation of motion M ẍ + C ẋ + K x + f_r = F: structure, cutting force, external excitation and added restoring forces f_r.
 pub struct Model {
-    /// The structure.
+    /// Linear structure with its cubic terms, in first-order form.
     pub dynamics: Dynamics,
-    /// The cut; `None` where no tool turns.
+    /// Cutter, spindle and workpiece; `None` for a test without cutting.
     pub cutting: Option<Cutting>,
-    /// A force from outside, besides that of the cut.
+    /// External excitation force besides the cutting force; `None` if there is none.
     pub drive: Option<Box<dyn Drive>>,
-    /// What the equation of motion has besides the structure.
+    /// Restoring forces f_r besides those of the structure: friction, backlash, nonlinear springs and others.
     pub terms: Vec<Box<dyn Term>>,
 }
 
-/// What holds on a smooth stretch of the motion.
+/// Quantities that are fixed during one integration step: contact of the teeth and regimes of the restoring forces.
 #[derive(Clone, Copy)]
-pub(super) struct Stretch<'a> {
+pub(super) struct StepContext<'a> {
     pub(super) contact: Option<&'a Contact<'a>>,
-    /// The ends of the stretch, shortened by rounding: a drive may jump at either.
+    /// Start and end of the step, s, moved inwards by a rounding margin: the excitation force may jump at either.
     pub(super) within: [f64; 2],
     pub(super) branches: Branches<'a>,
 }
 
 impl Model {
-    /// Number of states: those of [`Dynamics`], and behind them those of the terms in their order.
+    /// Number of states: those of [`Dynamics`], followed by the internal states of the restoring forces in their order.
     pub fn order(&self) -> usize {
         self.dynamics.order() + term::states(&self.terms)
     }
 
-    /// Force on the tool from cut and drive, N.
-    pub(super) fn force_n(&self, stretch: Stretch<'_>, t: f64, x: [f64; 3], y: &[f64]) -> [f64; 3] {
-        let mut force = stretch.contact.map_or([0.0; 3], |contact| contact.force_n(t, x));
+    /// Force on the tool from cut and excitation, N.
+    pub(super) fn force_n(&self, context: StepContext<'_>, t: f64, x: [f64; 3], y: &[f64]) -> [f64; 3] {
+        let mut force = context.contact.map_or([0.0; 3], |contact| contact.force_n(t, x));
         if let Some(drive) = &self.drive {
-            let driven = drive.force_n(t.clamp(stretch.within[0], stretch.within[1]));
+            let driven = drive.force_n(t.clamp(context.within[0], context.within[1]));
             for (force, driven) in force.iter_mut().zip(driven) {
                 *force += driven;
             }
@@ -53,13 +53,13 @@ impl Model {
                 }
             }
         }
-        match stretch.contact.and_then(|contact| contact.damping_ns_per_m(t, x)) {
+        match context.contact.and_then(|contact| contact.damping_ns_per_m(t, x)) {
             Some(damping) => self.damped_n(force, damping, y),
             None => force,
         }
     }
 
-    /// F with F = `force` − D v, v = C A x + C B F: where the velocity feels the force itself, both are solved for.
+    /// Force F on the tool with process damping, N: solves F = `force` − D v and v = C A x + C B F for both F and v.
     fn damped_n(&self, force: [f64; 3], damping: [[f64; 3]; 3], y: &[f64]) -> [f64; 3] {
         let v = Vector3::from(
             self.dynamics
@@ -69,7 +69,7 @@ impl Model {
         let jump = self.dynamics.velocity_per_force();
         let jump = Matrix3::from_fn(|i, j| jump[i][j]);
         let free = Vector3::from(force) - damping * v;
-        // Damping over a tool without inertia is small beside 1: the matrix is regular.
+        // D·C B is small against 1, so that the matrix is regular.
         (Matrix3::identity() + damping * jump)
             .lu()
             .solve(&free)
@@ -77,22 +77,22 @@ impl Model {
             .into()
     }
 
-    /// ẏ at `t` with the tool at `x`; the force on the tool from cut and drive, N.
+    /// Writes ẏ at the time `t` and displacement `x`; returns the force on the tool from cut and excitation, N.
     pub(super) fn rate(
         &self,
-        stretch: Stretch<'_>,
+        context: StepContext<'_>,
         (t, x): (f64, [f64; 3]),
         y: &[f64],
         rate: &mut [f64],
     ) -> [f64; 3] {
-        let force = self.force_n(stretch, t, x, y);
+        let force = self.force_n(context, t, x, y);
         if self.terms.is_empty() {
             self.dynamics.rate(y, force, rate);
         } else {
             term::rate(
                 &self.dynamics,
                 &self.terms,
-                stretch.branches,
+                context.branches,
                 (t, x),
                 force,
                 y,

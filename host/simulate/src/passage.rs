@@ -1,44 +1,43 @@
-//! When the tool is in the workpiece: air, entry, full cut, exit, air.
+//! Traverse of the workpiece: air, entry, full engagement, exit, air.
 
 use super::SimulateError;
 use quietcut_model::cutter::Cutter;
 use quietcut_model::spindle::Spindle;
 
-/// How the tool comes into the workpiece and leaves it again. Times in s.
+/// Traverse of the workpiece: entry, full engagement and exit of the tool. Times in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Passage {
-    /// It never meets the workpiece.
+    /// The tool never meets the workpiece.
     Air,
-    /// It has always been in full cut; the surface in front of it at t = 0 was left by a tool at rest.
+    /// Full engagement at all times; the surface at t = 0 is that of a tool at rest.
     Steady,
     /// The axial depth grows linearly from `start_s` on for `ramp_s`, and shrinks as long until `end_s`.
     Ramp {
-        /// First touch.
+        /// First contact with the workpiece, s.
         start_s: f64,
-        /// How long the depth grows, and shrinks.
+        /// Duration of the growth of the depth, and of its decrease, s.
         ramp_s: f64,
-        /// Last touch.
+        /// Last contact with the workpiece, s.
         end_s: f64,
     },
-    /// It feeds in through the front face of the workpiece and out through the end face: immersion grows and
-    /// shrinks. A tooth at φ cuts while its place R sin φ along the feed is behind the front face and before the
-    /// end face.
+    /// The tool feeds in through the front face of the workpiece and out through its end face, so that the immersion grows and decreases.
+    /// A tooth at the immersion angle φ cuts while its position R sin φ along the feed is between the two faces.
     Feed {
-        /// The circle of the teeth touches the front face.
+        /// Time at which the circle of the teeth touches the front face, s.
         start_s: f64,
-        /// The circle of the teeth touches the end face.
+        /// Time at which the circle of the teeth touches the end face, s.
         end_s: f64,
     },
 }
 
-/// Stretches of time in which a tooth has material in front of it.
+/// The times at which a tooth has material in front of it during one passing: at most two windows, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spans {
+pub struct MaterialWindows {
     spans: [Option<[f64; 2]>; 2],
 }
 
-impl Spans {
-    /// True where `t` is in one of the stretches, ends excluded.
+impl MaterialWindows {
+    /// True if the time `t`, s, lies in one of the windows.
     pub fn contain(&self, t: f64) -> bool {
         self.spans
             .iter()
@@ -46,7 +45,7 @@ impl Spans {
             .any(|[from, to]| (*from..*to).contains(&t))
     }
 
-    /// The first beginning or end after `t`.
+    /// The first start or end of a window after `t`, s; infinite if there is none.
     pub fn next_edge(&self, t: f64) -> f64 {
         let edges = self.spans.iter().flatten().flatten();
         edges
@@ -57,18 +56,18 @@ impl Spans {
 }
 
 impl Passage {
-    /// How long the tool takes from touching a face to full immersion, and from touching the end face to leaving, s.
+    /// Time from first contact with a face to full engagement, s; the exit takes as long.
     ///
     /// # Errors
-    /// The size of the tool is not known.
+    /// The tool has no diameter.
     pub fn way_in_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
         let radius_m = cutter.radius_m.ok_or(SimulateError::NoDiameter)?;
-        // The last place of the arc to reach a face is at one of its ends.
+        // The last point of the arc to reach a face is one of its two ends.
         let last = cutter.start_rad.sin().min(cutter.exit_rad.sin());
         Ok(radius_m * (1.0 - last) / feed_speed(cutter, spindle))
     }
 
-    /// The share of the axial depth that is in the workpiece at `t`, 0 to 1.
+    /// Fraction of the axial depth that is engaged at the time `t`, 0 to 1.
     pub fn depth_share(&self, t: f64) -> f64 {
         match *self {
             Self::Air => 0.0,
@@ -90,7 +89,7 @@ impl Passage {
         }
     }
 
-    /// The first time after `t` at which the rate of the axial depth jumps.
+    /// The first time after `t`, s, at which the rate of the axial depth is discontinuous.
     pub fn next_knot(&self, t: f64) -> f64 {
         let Self::Ramp {
             start_s,
@@ -100,7 +99,7 @@ impl Passage {
         else {
             return f64::INFINITY;
         };
-        // Where the ramps meet before the full depth is reached, their crossing is a knot too.
+        // If the ramps cross below the full depth, their crossing is a knot too.
         let knots = [
             start_s,
             start_s + ramp_s,
@@ -114,7 +113,7 @@ impl Passage {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// True where the tool meets no more of the workpiece from `t` on.
+    /// True if the tool has left the workpiece for good at the time `t`, s.
     pub fn is_over(&self, t: f64, cutter: &Cutter, spindle: &Spindle) -> bool {
         match *self {
             Self::Air => true,
@@ -122,20 +121,20 @@ impl Passage {
             Self::Ramp { end_s, .. } => t >= end_s,
             Self::Feed { end_s, .. } => {
                 let radius_m = cutter.radius_m.unwrap_or(0.0);
-                // A turn more, so that no tooth is in the middle of its last pass.
-                let turn_feed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64;
-                (t - end_s) * feed_speed(cutter, spindle) > radius_m + turn_feed_m
+                // One revolution more, so that no tooth is within its last passing.
+                let revolution_feed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64;
+                (t - end_s) * feed_speed(cutter, spindle) > radius_m + revolution_feed_m
             }
         }
     }
 
-    /// When a tooth that passes φ = start at `open_s` and φ = exit at `close_s` has material in front of it.
-    pub fn spans(&self, cutter: &Cutter, spindle: &Spindle, open_s: f64, close_s: f64) -> Spans {
+    /// The times at which a tooth has material in front of it, if it passes the start angle at `open_s` and the exit angle at `close_s`, s.
+    pub fn spans(&self, cutter: &Cutter, spindle: &Spindle, open_s: f64, close_s: f64) -> MaterialWindows {
         let whole = Some([open_s, close_s]);
         match *self {
-            Self::Air => Spans::default(),
-            Self::Steady => Spans { spans: [whole, None] },
-            Self::Ramp { start_s, end_s, .. } => Spans {
+            Self::Air => MaterialWindows::default(),
+            Self::Steady => MaterialWindows { spans: [whole, None] },
+            Self::Ramp { start_s, end_s, .. } => MaterialWindows {
                 spans: [intersection(whole, Some([start_s, end_s])), None],
             },
             Self::Feed { start_s, end_s } => {
@@ -144,12 +143,12 @@ impl Passage {
                 let opened_rad = spindle.angle_rad(open_s);
                 let sin = |t: f64| (cutter.start_rad + (spindle.angle_rad(t) - opened_rad)).sin();
                 let window = [open_s, close_s];
-                // sin φ less the place of a face over the radius: concave in t (a spindle that fluctuates slowly against a
-                // tooth pass bends it little), positive beyond the face.
+                // sin φ minus the position of a face over the radius is positive beyond the face. It is concave in t, since
+                // the spindle speed varies slowly compared with a tooth passing.
                 let behind_front = positive(|t| sin(t) - (1.0 - speed * (t - start_s)), window);
                 let behind_end = positive(|t| sin(t) - (1.0 - speed * (t - end_s)), window);
                 let [before, after] = complement(behind_end, window);
-                Spans {
+                MaterialWindows {
                     spans: [
                         intersection(behind_front, before),
                         intersection(behind_front, after),
@@ -160,7 +159,7 @@ impl Passage {
     }
 }
 
-/// m/s.
+/// Feed speed, m/s, at the mean spindle speed.
 fn feed_speed(cutter: &Cutter, spindle: &Spindle) -> f64 {
     cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * spindle.speed_rad_per_s() / std::f64::consts::TAU
 }
@@ -171,9 +170,9 @@ fn intersection(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     (both[0] < both[1]).then_some(both)
 }
 
-/// What a stretch leaves of the window, before and after it.
-fn complement(stretch: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>; 2] {
-    match stretch {
+/// The parts of `window` before and after `excluded`.
+fn complement(excluded: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>; 2] {
+    match excluded {
         None => [Some(window), None],
         Some([from, to]) => [
             (window[0] < from).then_some([window[0], from]),
@@ -182,7 +181,7 @@ fn complement(stretch: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>;
     }
 }
 
-/// The stretch of the window in which a concave function is positive.
+/// The window within [`from`, `to`] in which the concave function `f` is positive; `None` if there is none.
 fn positive(f: impl Fn(f64) -> f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
     let top = maximum(&f, from, to);
     if f(top) <= 0.0 {
@@ -193,9 +192,9 @@ fn positive(f: impl Fn(f64) -> f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
     Some([left, right])
 }
 
-/// Where a concave function is largest, by ternary search.
+/// The argument at which a concave function is largest, from ternary search.
 fn maximum(f: &impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
-    // (2/3)^100 of the window: flat to rounding long before.
+    // The bracket shrinks to (2/3)^100 of the window, below rounding.
     for _ in 0..100 {
         let third = (to - from) / 3.0;
         if f(from + third) < f(to - third) {
@@ -204,11 +203,11 @@ fn maximum(f: &impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
             to -= third;
         }
     }
-    // The ends of the window are left and right of any inner point that rounding prefers.
+    // The midpoint of the bracket.
     0.5 * (from + to)
 }
 
-/// The zero between `negative` and `positive`, to the last bit, by bisection.
+/// The zero of `f` between an argument with a negative and one with a positive value, from bisection to the last bit.
 fn root(f: &impl Fn(f64) -> f64, mut negative: f64, mut positive: f64) -> f64 {
     loop {
         let middle = 0.5 * (negative + positive);
@@ -236,18 +235,18 @@ mod tests {
             let feed_m_per_s = 0.15e-3 * 30.0;
             let (start_s, end_s) = (1.0, 5.0);
             let passage = Passage::Feed { start_s, end_s };
-            let turn_s = 60.0 / 900.0;
+            let revolution_s = 60.0 / 900.0;
             for pass in 0..120 {
-                let open_s = f64::from(pass) * turn_s + cutter.start_rad / spindle.speed_rad_per_s();
-                let close_s = f64::from(pass) * turn_s + cutter.exit_rad / spindle.speed_rad_per_s();
+                let open_s = f64::from(pass) * revolution_s + cutter.start_rad / spindle.speed_rad_per_s();
+                let close_s = f64::from(pass) * revolution_s + cutter.exit_rad / spindle.speed_rad_per_s();
                 let spans = passage.spans(&cutter, &spindle, open_s, close_s);
-                // The rule of the passage, asked at many instants.
+                // The geometric condition, evaluated at many instants.
                 for i in 0..500 {
                     let t = open_s + (close_s - open_s) * (f64::from(i) + 0.5) / 500.0;
                     let x_m = radius_m * spindle.angle_rad(t).sin();
                     let front_m = radius_m - feed_m_per_s * (t - start_s);
                     let end_m = radius_m - feed_m_per_s * (t - end_s);
-                    // Not within rounding of a face.
+                    // Points within rounding of a face are not compared.
                     if (x_m - front_m).abs() > 1e-9 && (x_m - end_m).abs() > 1e-9 {
                         assert_eq!(
                             spans.contain(t),
@@ -265,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_grows_to_the_whole_depth_and_back() {
+    fn the_depth_of_a_ramp_grows_linearly_to_its_full_value_and_back() {
         let ramp = Passage::Ramp {
             start_s: 1.0,
             ramp_s: 0.5,

@@ -1,48 +1,48 @@
-//! Porous material: how much of the depth of cut is solid where a tooth stands.
+//! Porous workpiece material: the solid fraction of the axial depth at the location of a tooth.
 
 use quietcut_model::cutter::{Cutter, Tooth};
 use quietcut_model::spindle::Spindle;
 
-/// A foam of columns along the tool axis, over the plane of feed and normal.
+/// A random foam whose pores are columns along the tool axis.
 ///
-/// On a square lattice every node is solid or a pore by chance; between nodes the solid share s goes over smoothly
-/// (twice differentiable). A tooth cuts s of its axial depth, so its force is s times that of the full depth, while the
-/// solid part is cut down to the same surface. Walls of pores stand at all angles to the edge: the pressures along the
-/// cut, towards the axis and along it vary each by itself, by ± `strength` from node to node. As the tool feeds on, a
-/// tooth meets the pores of the pass before a feed further: that spreads the force between the harmonics of the
-/// tooth-passing frequency, and its components are not in proportion (thesis section 7.2.1).
+/// Each node of a square lattice in the plane of feed and normal is solid or a pore at random. Between nodes the solid fraction s is
+/// interpolated twice differentiably. A tooth cuts the fraction s of its axial depth, so its force is s times the force in solid
+/// material; the surface that it leaves is the same. The tangential, radial and axial cutting pressures vary independently by
+/// ± `strength` from node to node. The tool feeds between two tooth passings, so that the force has a broad spectrum between the
+/// harmonics of the tooth-passing frequency, and its three components are not proportional (thesis section 7.2.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pores {
-    /// Share of the nodes that are pores, 0 to 1.
+    /// Fraction of the lattice nodes that are pores, 0 to 1.
     pub share: f64,
-    /// Distance of the nodes, m.
+    /// Distance between neighbouring lattice nodes, m.
     pub size_m: f64,
-    /// By which part the pressures vary, 0 to 1.
+    /// Relative amplitude by which the three cutting pressures vary between nodes, 0 to 1.
     pub strength: f64,
-    /// Which of all foams it is.
+    /// Seed of the random foam.
     pub seed: u64,
 }
 
 impl Pores {
-    /// What of the depth counts where `tooth` stands at `t`, for the tangential force, that towards the axis and that
-    /// along it; the tool feeds steadily along x from 0 at t = 0. A tool of unknown size has its teeth on its axis.
-    pub(super) fn met(&self, cutter: &Cutter, spindle: &Spindle, tooth: &Tooth, t: f64) -> [f64; 3] {
-        let turns = spindle.speed_rad_per_s() * t / std::f64::consts::TAU;
-        let fed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * turns;
+    /// Fractions of the axial depth that act in tangential, radial and axial force at the location of `tooth` at `t`, in s.
+    ///
+    /// The tool axis feeds at constant speed along x from 0 at t = 0. For a tool without diameter the teeth lie on its axis.
+    pub(super) fn at_tooth(&self, cutter: &Cutter, spindle: &Spindle, tooth: &Tooth, t: f64) -> [f64; 3] {
+        let revolutions = spindle.speed_rad_per_s() * t / std::f64::consts::TAU;
+        let fed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64 * revolutions;
         let (sin, cos) = (spindle.angle_rad(t) + tooth.angle_rad).sin_cos();
         let radius_m = cutter.radius_m.unwrap_or(0.0);
         self.at(fed_m + radius_m * sin, radius_m * cos)
     }
 
-    /// The solid share at a place of the workpiece, times the pressure in each of the three directions.
+    /// Solid fraction at a point of the workpiece times the relative tangential, radial and axial pressure.
     pub(super) fn at(&self, x_m: f64, y_m: f64) -> [f64; 3] {
-        let place = Place::of(x_m / self.size_m, y_m / self.size_m);
-        let solid = place.between(|i, j| f64::from(self.chance(i, j, 0) >= self.share));
+        let cell = LatticeCell::at(x_m / self.size_m, y_m / self.size_m);
+        let solid = cell.interpolate(|i, j| f64::from(self.chance(i, j, 0) >= self.share));
         if self.strength == 0.0 || solid == 0.0 {
             return [solid; 3];
         }
         [1, 2, 3].map(|direction| {
-            let sign = place.between(|i, j| {
+            let sign = cell.interpolate(|i, j| {
                 if self.chance(i, j, direction) < 0.5 {
                     -1.0
                 } else {
@@ -53,7 +53,7 @@ impl Pores {
         })
     }
 
-    /// A uniform number from 0 to 1 of a node, another one for each purpose.
+    /// A uniform random number from 0 to 1 that depends on the node, the purpose and the seed only.
     fn chance(&self, i: i64, j: i64, purpose: u64) -> f64 {
         let bits = mixed(self.seed ^ mixed((i as u64) ^ mixed((j as u64) ^ mixed(purpose))));
         // The upper 53 bits.
@@ -61,14 +61,14 @@ impl Pores {
     }
 }
 
-/// A place between four nodes.
-struct Place {
+/// A point between four lattice nodes: the lower left node and the interpolation weights of the upper and right ones.
+struct LatticeCell {
     nodes: (i64, i64),
     weights: (f64, f64),
 }
 
-impl Place {
-    fn of(x: f64, y: f64) -> Self {
+impl LatticeCell {
+    fn at(x: f64, y: f64) -> Self {
         let (i, j) = (x.floor(), y.floor());
         Self {
             nodes: (i as i64, j as i64),
@@ -76,19 +76,19 @@ impl Place {
         }
     }
 
-    fn between(&self, node: impl Fn(i64, i64) -> f64) -> f64 {
+    fn interpolate(&self, node: impl Fn(i64, i64) -> f64) -> f64 {
         let ((i, j), (u, v)) = (self.nodes, self.weights);
         let along = |j: i64| node(i, j) * (1.0 - u) + node(i + 1, j) * u;
         along(j) * (1.0 - v) + along(j + 1) * v
     }
 }
 
-/// 6u⁵ − 15u⁴ + 10u³: first and second derivative are zero at both ends.
+/// The smooth step 6u⁵ − 15u⁴ + 10u³ from 0 to 1; its first and second derivatives are zero at both ends.
 fn smooth(u: f64) -> f64 {
     u * u * u * (10.0 + u * (6.0 * u - 15.0))
 }
 
-/// The finalizer of SplitMix64 (Steele, Lea and Flood, 2014): every bit of the input moves half of the output.
+/// The finalizer of SplitMix64 (Steele, Lea and Flood, 2014): each input bit flips half of the output bits on average.
 fn mixed(bits: u64) -> u64 {
     let mut z = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_foam_has_its_share_of_pores_everywhere_and_no_pattern() {
+    fn pore_fraction_is_as_set_and_nodes_are_uncorrelated() {
         for share in [0.0, 0.3, 0.7, 1.0] {
             let pores = Pores {
                 share,
@@ -112,7 +112,7 @@ mod tests {
             let at = |i: i64, j: i64| pores.at(2e-4 * i as f64, 2e-4 * j as f64)[0];
             let places = || (-150..150).flat_map(|i| (-150..150).map(move |j| (i, j)));
             let mean = places().map(|(i, j)| at(i, j)).sum::<f64>() / 90_000.0;
-            // A standard deviation is at most 0.5/300.
+            // The standard deviation of the mean of 300² nodes is at most 0.5/300.
             assert!((mean - (1.0 - share)).abs() < 0.008, "{share}: {mean}");
             for (di, dj) in [(1, 0), (0, 1), (1, 1), (7, -3)] {
                 let centred = |i, j| at(i, j) - (1.0 - share);
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn between_nodes_the_share_is_smooth() {
+    fn the_solid_fraction_between_nodes_is_smooth() {
         let pores = Pores {
             share: 0.5,
             size_m: 1e-3,
@@ -140,14 +140,14 @@ mod tests {
             let x = 1e-5 * f64::from(k) - 0.02;
             let [before, at, after] = [x - h, x, x + h].map(|x| pores.at(x, 0.3e-3)[0]);
             assert!((0.0..=1.0).contains(&at));
-            // The steepest slope of the passage is 1.875 over a node, its second derivative 5.8.
+            // The smooth step has at most the slope 1.875 and the second derivative 5.8, per node distance.
             assert!((after - before).abs() < 2.0 * h / 1e-3 * 1.9);
             assert!((after - 2.0 * at + before).abs() < 6.0 * (h / 1e-3_f64).powi(2) + 1e-15);
         }
     }
 
     #[test]
-    fn pressures_vary_each_by_itself_about_one() {
+    fn the_three_pressures_vary_independently_about_one() {
         let pores = Pores {
             share: 0.0,
             size_m: 1e-3,
@@ -162,7 +162,7 @@ mod tests {
                 .map(|place| (at(place)[a] - 1.0) * (at(place)[b] - 1.0))
                 .sum::<f64>()
                 / 4e4;
-            // Standard deviations are 0.4/200 and 0.16/200.
+            // Standard deviations over 200² nodes: 0.4/200 of the mean and 0.16/200 of the covariance.
             assert!(
                 (mean - 1.0).abs() < 0.01 && together.abs() < 0.004,
                 "{mean} {together}"

@@ -1,30 +1,30 @@
-//! What a sensor without any fault but its delay reads of a motion, sample by sample.
+//! Samples of one channel, taken from the simulated motion by an ideal sensor with a constant delay.
 
 use super::Model;
 use super::effect::Pickup;
 use super::segment::{Motion, Segment, Workspace};
 use quietcut_recording::Quantity;
 
-/// The samples of one channel, as a motion is computed.
+/// Samples of one channel, collected while the motion is integrated.
 ///
-/// Where a structure has no acceleration at an instant ([`super::Dynamics::velocity_jumps`]) it is the mean over one sample,
-/// (v(t + h/2) − v(t − h/2))/h.
+/// If a step of the force makes the velocity jump ([`super::Dynamics::velocity_jumps`]), an acceleration sample is the mean over one
+/// sampling interval h, (v(t + h/2) − v(t − h/2))/h.
 pub struct Reading {
     pickup: Pickup,
     workspace: Workspace,
     rate_hz: f64,
     count: usize,
     is_mean: bool,
-    /// The samples; where they are means, the velocities half a sample before each and one more.
+    /// Samples; for mean accelerations the velocities half a sampling interval before each sample, and one after the last.
     values: Vec<f64>,
 }
 
 impl Reading {
-    /// `count` samples of what `pickup` reads of the motion of `model`.
+    /// A channel of `count` samples that `pickup` reads from the motion of `model` at `rate_hz`, in Hz.
     pub fn new(model: &Model, pickup: Pickup, rate_hz: f64, count: usize) -> Self {
         let is_mean = pickup.quantity == Quantity::Acceleration && model.dynamics.velocity_jumps();
         Self {
-            workspace: Workspace::seeing(model, &pickup.modes),
+            workspace: Workspace::at_sensor(model, &pickup.modes),
             values: Vec::with_capacity(count + 1),
             pickup,
             rate_hz,
@@ -33,7 +33,7 @@ impl Reading {
         }
     }
 
-    /// Takes what there is of it in the newest stretch of the motion. What is held at rest, or pulled, until t = 0 stands still before.
+    /// Takes the samples that lie in the newest integration step. Before t = 0 the tool stands still at its initial displacement.
     pub fn observe(&mut self, segment: &Segment<'_>) {
         let (early, count) = if self.is_mean {
             (0.5, self.count + 1)
@@ -72,7 +72,7 @@ impl Reading {
         }
     }
 
-    /// What it is of, and its samples: fewer than were asked for where the motion ended before.
+    /// The pickup and its samples in SI units; fewer than requested if the simulation ended earlier.
     pub fn samples(self) -> (Pickup, Vec<f64>) {
         let samples = if self.is_mean {
             let pairs = self.values.windows(2);

@@ -1,4 +1,4 @@
-//! A virtual cut as a recording.
+//! Recording of a virtual cut: response channels, tachometer level and sidecar.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -13,28 +13,28 @@ use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Channel, Kind, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar};
 
-/// How the motion of the tool is recorded.
+/// Model of the data acquisition that records the motion of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Recorder {
-    /// By the accelerometer: with its band, range, noise, 16 bits and clock; `seed` makes the noise repeat.
+    /// The digital accelerometer with its bandwidth, range, noise, 16-bit resolution and clock error.
     Sensor {
-        /// The sensor.
+        /// Sensor model.
         accelerometer: Accelerometer,
-        /// Seed of noise and jitter.
+        /// Seed of noise and jitter; the same seed gives the same recording.
         seed: u64,
     },
-    /// Without any fault, at this rate in Hz: the acceleration itself. Where a structure's velocity jumps there is none,
-    /// and it is the mean over one sample.
+    /// Ideal sampling without noise and filter. If the velocity of the structure jumps with the force, acceleration samples are means over
+    /// one sampling interval.
     Ideal {
-        /// Samples per second.
+        /// Sampling rate, Hz.
         rate_hz: f64,
     },
-    /// As [`Self::Ideal`], all channels but the tachometer through one anti-aliasing filter of linear phase, flat to 0.35
-    /// and closed from 0.5 of the rate, without delay.
+    /// Ideal sampling after one linear-phase anti-aliasing filter without delay: pass band to 0.35, stop band from 0.5 of the rate. The
+    /// tachometer is not filtered.
     Filtered {
-        /// Samples per second.
+        /// Sampling rate, Hz.
         rate_hz: f64,
-        /// The motion is taken this many times as often, and then filtered.
+        /// Ratio of the rate at which the motion is evaluated to the sampling rate.
         oversampling: usize,
     },
 }
@@ -56,14 +56,14 @@ impl Recorder {
 }
 
 impl VirtualCut {
-    /// Cuts, and records what is [measured](Self::measured) in the directions of the structure, and the tachometer; `path`
-    /// is where the recording will be written.
+    /// Simulates the cut and records the [measured](Self::measured) quantities in all directions of the structure, and the tachometer.
+    /// `path` is the path of the recording's file.
     ///
-    /// Time is the true one: a sensor whose clock is off samples at another rate than it says. Forces and displacements
-    /// are those at the instants of the samples.
+    /// The time base is the true time, so that a sensor with a clock error has its true sampling rate. Forces and displacements are sampled
+    /// at the same instants as the acceleration.
     ///
     /// # Errors
-    /// As [`VirtualCut::hear`], and a wheel too fine for the sample rate.
+    /// As [`VirtualCut::hear`]; also a tachometer wheel too fine for the sampling rate.
     pub fn record(
         &self,
         case: &Case,
@@ -100,8 +100,8 @@ impl VirtualCut {
             .map(|(pickup, truth)| Channel {
                 name: pickup.name.clone(),
                 quantity: pickup.quantity,
-                samples: match sensors.felt(&pickup) {
-                    Some(felt) => felt
+                samples: match sensors.measured(&pickup) {
+                    Some(measured) => measured
                         .iter()
                         .take(samples)
                         .map(|value| pickup.read(*value))
@@ -134,7 +134,7 @@ impl VirtualCut {
         Ok((recording, statistics))
     }
 
-    /// What is measured, by quantity and direction.
+    /// The response channels by quantity and direction.
     fn pickups(&self, case: &Case) -> Result<Vec<Pickup>, VirtualCutError> {
         let directions = &case.structure()?.directions;
         let effects = Effects::of_case(case)?.and(&self.effects);
@@ -176,8 +176,8 @@ impl VirtualCut {
         Ok(sidecar)
     }
 
-    /// The level of the tachometer, 0 to 1: high for half a pitch of the wheel from each edge on. An edge rises over
-    /// two samples, as an anti-aliased one does, so that its middle can be found between samples.
+    /// Tachometer level, 0 to 1: high for half a pitch of the wheel after each edge. An edge rises over two samples, as after an
+    /// anti-aliasing filter, so that its midpoint can be interpolated between samples.
     fn level(
         &self,
         tachometer: TachometerModel,
@@ -187,7 +187,7 @@ impl VirtualCut {
         seed: Option<u64>,
     ) -> Result<Vec<f64>, VirtualCutError> {
         let [pitch_s, _] = spindle.bounds_s(TAU / f64::from(tachometer.wheel.positions));
-        // A rise and a fall of two samples each and a flat between.
+        // Two samples for each rise and fall, and one for each level between them.
         let least = 6.0 / rate_hz;
         if pitch_s < least {
             return Err(VirtualCutError::WheelTooFine {
@@ -222,14 +222,14 @@ impl VirtualCut {
     }
 }
 
-/// The accelerometers of a recording, one for each delay and place of its channels.
+/// The accelerometers of a recording: one for each combination of delay and sensor location.
 struct Sensors {
     accelerometer: Option<(Accelerometer, u64)>,
-    /// Beside a channel that each of them is for.
+    /// One pickup that the sampler serves, and the sampler.
     samplers: Vec<(Pickup, Sampler)>,
 }
 
-/// True where one accelerometer has what both channels read.
+/// True if the same accelerometer serves both channels.
 fn is_one_sensor(a: &Pickup, b: &Pickup) -> bool {
     a.quantity == b.quantity && a.delay_s == b.delay_s && a.modes == b.modes
 }
@@ -249,7 +249,7 @@ impl Sensors {
         {
             if !samplers.iter().any(|(known, _)| is_one_sensor(known, pickup)) {
                 let sampler = Sampler::new(model, accelerometer)
-                    .seeing(model, &pickup.modes)
+                    .at_sensor(model, &pickup.modes)
                     .late_by(pickup.delay_s);
                 samplers.push((pickup.clone(), sampler));
             }
@@ -260,7 +260,7 @@ impl Sensors {
         }
     }
 
-    /// How much longer than the last sample the motion must go on, s.
+    /// Time that the simulation must continue beyond the last sample, s.
     fn tail_s(&self) -> f64 {
         self.samplers
             .iter()
@@ -274,8 +274,8 @@ impl Sensors {
         }
     }
 
-    /// What the sensor of a channel says, back in m/s²; `None` where it has none.
-    fn felt(&self, pickup: &Pickup) -> Option<Vec<[f64; 3]>> {
+    /// Measured acceleration of a channel, m/s²; `None` for channels without an accelerometer.
+    fn measured(&self, pickup: &Pickup) -> Option<Vec<[f64; 3]>> {
         let (accelerometer, seed) = self.accelerometer?;
         let (_, sampler) = self
             .samplers

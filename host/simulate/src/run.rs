@@ -1,4 +1,4 @@
-//! Runs a model from its initial state to an end.
+//! Time integration of a model from its initial state.
 
 use super::error::SimulateError;
 use super::integrator::{Integrator, Statistics};
@@ -8,13 +8,13 @@ use super::segment::Segment;
 use super::settings::Settings;
 
 impl Model {
-    /// Integrates from t = 0, the structure at rest, to `end_s`; `observe` sees every stretch of the motion in order.
+    /// Integrates from rest at t = 0 to `end_s`, s; `observe` receives every integration step in the order of time.
     ///
-    /// The error per step is controlled (see [`Settings`]); steps end exactly where a tooth enters, leaves, loses or
-    /// finds contact, and where the surface in front of a tooth has a kink from one of these.
+    /// The local error is controlled (see [`Settings`]). Steps end exactly where a tooth enters or leaves the arc, loses or regains contact,
+    /// and where the surface in front of a tooth has a kink from one of these events.
     ///
     /// # Errors
-    /// The motion diverges; a tooth neither cuts nor leaves the surface; the size of the tool is needed and unknown.
+    /// The motion diverges, a tooth can neither keep nor lose contact, or the tool diameter is required and missing.
     pub fn run(
         &self,
         end_s: f64,
@@ -24,7 +24,7 @@ impl Model {
         self.run_from(vec![0.0; self.order()], end_s, settings, observe)
     }
 
-    /// As [`Self::run`], from the states `y` (see [`Self::order`]); before t = 0 the tool was at rest.
+    /// Integrates from the initial states `y` (see [`Self::order`]), otherwise as [`Self::run`]; before t = 0 the tool is at rest.
     ///
     /// # Errors
     /// As [`Self::run`].

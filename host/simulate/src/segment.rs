@@ -1,43 +1,43 @@
-//! A smooth stretch of the motion, and the tool within it.
+//! One integration step with dense output, and the motion of the tool within it.
 
-use super::model::{Model, Stretch};
+use super::model::{Model, StepContext};
 use quietcut_model::Dynamics;
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// A stretch of the motion, to be read while it is the newest one.
+/// The newest integration step: the motion of the tool at any instant between its two ends (dense output).
 pub struct Segment<'a> {
     pub(super) model: &'a Model,
-    pub(super) stretch: Stretch<'a>,
+    pub(super) context: StepContext<'a>,
     pub(super) quartics: &'a [Quartic],
     pub(super) displacement: &'a [Quartic; 3],
     pub(super) from_s: f64,
     pub(super) to_s: f64,
 }
 
-/// The tool at one instant, in the machine's x, y, z.
+/// Motion of the tool and force on it at one instant, in the machine's x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// m.
+    /// Displacement of the tool, m.
     pub displacement_m: [f64; 3],
-    /// m/s.
+    /// Velocity of the tool, m/s.
     pub velocity_m_per_s: [f64; 3],
-    /// m/s²; `None` where the structure has none at an instant, see [`super::Dynamics::velocity_jumps`].
+    /// Acceleration of the tool, m/s²; `None` if a step of the force makes the velocity jump, see [`super::Dynamics::velocity_jumps`].
     pub acceleration_m_per_s2: Option<[f64; 3]>,
-    /// Force on the tool, N.
+    /// Force of cut and drive on the tool, N.
     pub force_n: [f64; 3],
 }
 
-/// Buffers in which a [`Motion`] is computed.
+/// Buffers for the evaluation of a [`Motion`].
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     pub(super) state: Vec<f64>,
     pub(super) rate: Vec<f64>,
-    /// The equations as they are seen from where the modes have other shapes than at the tool.
+    /// Equations whose output is the motion at a sensor away from the tool tip; `None` for the motion of the tool.
     pub(super) seen: Option<Dynamics>,
 }
 
 impl Workspace {
-    /// Buffers for the states of `model`.
+    /// Buffers for the motion of the tool of `model`.
     pub fn new(model: &Model) -> Self {
         let zeros = vec![0.0; model.order()];
         Self {
@@ -47,9 +47,9 @@ impl Workspace {
         }
     }
 
-    /// Buffers for the motion that a sensor sees, where each mode of `model`'s structure has so many times its shape at the tool; with no
-    /// modes said, the tool's.
-    pub fn seeing(model: &Model, modes: &[f64]) -> Self {
+    /// Buffers for the motion at a sensor: `modes[r]` is the shape of mode r at the sensor divided by its shape at the tool. An empty
+    /// list means a sensor at the tool.
+    pub fn at_sensor(model: &Model, modes: &[f64]) -> Self {
         Self {
             seen: (!modes.is_empty()).then(|| model.dynamics.seen(modes)),
             ..Self::new(model)
@@ -58,17 +58,17 @@ impl Workspace {
 }
 
 impl Segment<'_> {
-    /// Where it begins, s.
+    /// Start time of the step, s.
     pub fn from_s(&self) -> f64 {
         self.from_s
     }
 
-    /// Where it ends, s.
+    /// End time of the step, s.
     pub fn to_s(&self) -> f64 {
         self.to_s
     }
 
-    /// The motion at `t` within the stretch.
+    /// The motion at the time `t`, s, within the step.
     pub fn motion(&self, t: f64, workspace: &mut Workspace) -> Motion {
         let u = (t - self.from_s) / (self.to_s - self.from_s);
         for (state, quartic) in workspace.state.iter_mut().zip(self.quartics) {
@@ -76,7 +76,7 @@ impl Segment<'_> {
         }
         let displacement_m = std::array::from_fn(|axis| at(&self.displacement[axis], u));
         let force_n = self.model.rate(
-            self.stretch,
+            self.context,
             (t, displacement_m),
             &workspace.state,
             &mut workspace.rate,

@@ -1,4 +1,4 @@
-//! The accelerometer and the tachometer as they are: band, range, noise, 16 bits, a clock of its own, jitter.
+//! Models of a digital accelerometer (bandwidth, range, noise, 16-bit resolution, clock error) and of a tachometer (jitter).
 
 use std::f64::consts::PI;
 
@@ -13,37 +13,38 @@ use super::{Model, Segment, Spindle, Workspace};
 
 /// Standard gravity, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// The motion is taken this many times as often as the sensor samples, and then filtered.
+/// Ratio of the rate at which the motion is evaluated to the sampling rate of the sensor. A choice: the low pass then has a transition
+/// band of 0.23 to 0.5 of the sampling rate with [`HALF`] taps on each side.
 const OVERSAMPLING: usize = 4;
-/// Half the length of the filter, in oversampled steps.
+/// Taps of the anti-aliasing filter on each side of its centre, in oversampled steps: the length that gives the transition band above.
 const HALF: usize = 32;
 
-/// A digital accelerometer at the tool, its axes the machine's.
+/// A triaxial digital accelerometer at the tool, aligned with the machine axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accelerometer {
-    /// Full scale, g: counts end at ±32 768.
+    /// Full scale, g, at ±32 768 counts.
     pub range_g: f64,
-    /// White noise of each axis, g per √Hz.
+    /// Amplitude spectral density of the white noise of each axis, g/√Hz.
     pub noise_g_per_root_hertz: f64,
-    /// The rate it is meant to have, Hz.
+    /// Nominal sampling rate, Hz.
     pub nominal_rate_hz: f64,
-    /// How much faster its clock runs, as a fraction: up to 0.03 either way.
+    /// Relative error of the sensor's clock, true rate over nominal rate − 1; within ± 0.03.
     pub clock_error: f64,
-    /// Standard deviation of the time stamp of a block, s: how late the interrupt is served.
+    /// Standard deviation of the time stamp of a block, s, from the interrupt latency.
     pub stamp_jitter_s: f64,
 }
 
-/// A tachometer on the spindle. Its first edge after the gap, or its only one, is at spindle angle 0.
+/// A tachometer wheel on the spindle. Its first edge after the gap, or its only edge, is at the spindle angle 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TachometerModel {
-    /// The wheel.
+    /// Positions of the wheel, and how many of them are missing.
     pub wheel: Wheel,
-    /// Standard deviation of the time of an edge, s.
+    /// Standard deviation of the time stamp of an edge, s.
     pub jitter_s: f64,
 }
 
 impl Accelerometer {
-    /// The IIS3DWB at ±16 g on its nominal clock; microcontrollers stamp to about a microsecond.
+    /// The sensor IIS3DWB at ±16 g without clock error; time stamps of a microcontroller scatter by about 1 µs.
     pub const IIS3DWB_16G: Self = Self {
         range_g: 16.0,
         noise_g_per_root_hertz: 75e-6,
@@ -52,12 +53,12 @@ impl Accelerometer {
         stamp_jitter_s: 1e-6,
     };
 
-    /// The rate it really has, Hz.
+    /// True sampling rate, Hz, with the clock error.
     pub fn rate_hz(&self) -> f64 {
         self.nominal_rate_hz * (1.0 + self.clock_error)
     }
 
-    /// What the signal chain is told of it: the nominal rate, not the true one.
+    /// Sensor settings of the signal chain; they hold the nominal rate, not the true one.
     pub fn sensor(&self) -> Sensor {
         Sensor {
             nominal_rate: Hertz(self.nominal_rate_hz as f32),
@@ -66,19 +67,18 @@ impl Accelerometer {
         }
     }
 
-    /// m/s² per count.
+    /// Resolution, m/s² per count.
     fn count(&self) -> f64 {
-        // The data sheet's 0.488 mg at 16 g, in proportion.
+        // The data sheet states 0.488 mg per count at ±16 g; the resolution is proportional to the range.
         0.488e-3 / 16.0 * self.range_g * STANDARD_GRAVITY
     }
 }
 
-/// Takes samples off the motion while it is computed.
+/// Samples the acceleration of the tool while the motion is integrated.
 ///
-/// Each sample is the acceleration through a filter of linear phase, flat to 0.23 and closed from 0.5 of the sample
-/// rate (6.1 and 13.3 kHz for the IIS3DWB), without delay: a real one is late by a constant that its maker states. The
-/// filter works on differences of the velocity over a quarter of a sample, so that a jump of the velocity is the
-/// impulse that it is.
+/// Each sample is the acceleration after a linear-phase low pass without delay: pass band to 0.23, stop band from 0.5 of the sampling
+/// rate (6.1 and 13.3 kHz for the IIS3DWB). A real sensor adds a constant delay, see [`Self::late_by`]. The filter input is the
+/// difference of the velocity over a quarter of the sampling interval, so that a jump of the velocity acts as an impulse of acceleration.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     accelerometer: Accelerometer,
@@ -86,16 +86,16 @@ pub struct Sampler {
     delay_s: f64,
     filter: [f64; 2 * HALF + 1],
     workspace: Workspace,
-    /// Velocities taken so far; number k is that at (k − ½) steps.
+    /// Number of velocities evaluated so far; velocity k belongs to the time (k − ½) oversampled steps.
     taken: usize,
     velocity: [f64; 3],
-    /// The newest accelerations, a ring.
+    /// Ring buffer of the newest accelerations, m/s².
     ring: Vec<[f64; 3]>,
     samples: Vec<[f64; 3]>,
 }
 
 impl Sampler {
-    /// A sampler of `model`'s motion from t = 0, where the tool is at rest.
+    /// A sampler of the motion of `model` at the tool; the tool is at rest before t = 0.
     pub fn new(model: &Model, accelerometer: Accelerometer) -> Self {
         Self {
             accelerometer,
@@ -110,27 +110,27 @@ impl Sampler {
         }
     }
 
-    /// The same from where the modes have so many times their shapes at the tool: see [`Workspace::seeing`].
+    /// The same sampler at another location than the tool; `modes` are the ratios of the mode shapes, see [`Workspace::at_sensor`].
     #[must_use]
-    pub fn seeing(self, model: &Model, modes: &[f64]) -> Self {
+    pub fn at_sensor(self, model: &Model, modes: &[f64]) -> Self {
         Self {
-            workspace: Workspace::seeing(model, modes),
+            workspace: Workspace::at_sensor(model, modes),
             ..self
         }
     }
 
-    /// The same with samples that are late by so much, s.
+    /// The same sampler with a constant delay of the samples, s.
     #[must_use]
     pub fn late_by(self, delay_s: f64) -> Self {
         Self { delay_s, ..self }
     }
 
-    /// How much longer than the last sample the motion must go on, s, but for the delay.
+    /// Time that the simulation must continue beyond the last sample, s, without the delay: half the filter length.
     pub fn tail_s(&self) -> f64 {
         (HALF + 1) as f64 * self.step_s
     }
 
-    /// Takes what `segment` has.
+    /// Takes the samples that lie in the newest integration step.
     pub fn observe(&mut self, segment: &Segment<'_>) {
         loop {
             let t = (self.taken as f64 - 0.5) * self.step_s - self.delay_s;
@@ -149,14 +149,14 @@ impl Sampler {
     fn take(&mut self, velocity: [f64; 3]) {
         let length = self.ring.len();
         if self.taken > 0 {
-            // This acceleration stands at step `taken − 1`.
+            // This acceleration belongs to the oversampled step `taken − 1`.
             let index = self.taken - 1;
             self.ring[index % length] =
                 std::array::from_fn(|axis| (velocity[axis] - self.velocity[axis]) / self.step_s);
             if index >= HALF && (index - HALF).is_multiple_of(OVERSAMPLING) {
                 let mut sum = [0.0; 3];
                 for (offset, weight) in self.filter.iter().enumerate() {
-                    // Before the start the ring is still zero, as was the motion.
+                    // Before t = 0 the ring holds zeros, as the tool is at rest.
                     let acceleration = self.ring[(index + 1 + offset) % length];
                     for (sum, acceleration) in sum.iter_mut().zip(acceleration) {
                         *sum += weight * acceleration;
@@ -169,12 +169,12 @@ impl Sampler {
         self.taken += 1;
     }
 
-    /// The samples so far without noise, m/s²; number k is that at k over the sensor's rate.
+    /// The samples so far without noise, m/s²; sample k belongs to the time k divided by the true sampling rate.
     pub fn samples(&self) -> &[[f64; 3]] {
         &self.samples
     }
 
-    /// The samples as counts in blocks, with noise, clips and time stamps; `seed` makes them repeat.
+    /// The samples as blocks of counts with noise, clipping and time stamps; the same seed gives the same blocks.
     pub fn blocks(&self, seed: u64) -> Vec<Block> {
         let Accelerometer {
             noise_g_per_root_hertz,
@@ -183,7 +183,7 @@ impl Sampler {
         } = self.accelerometer;
         let rate_hz = self.accelerometer.rate_hz();
         let count = self.accelerometer.count();
-        // White to half the sample rate.
+        // White noise with the bandwidth of half the sampling rate.
         let noise = noise_g_per_root_hertz * STANDARD_GRAVITY * (0.5 * rate_hz).sqrt();
         let mut noise_source = stream(seed, Stream::Noise);
         let mut stamp_source = stream(seed, Stream::Stamps);
@@ -197,9 +197,9 @@ impl Sampler {
             };
             for sample in samples {
                 let counts: Counts = sample.map(|acceleration| {
-                    let felt = acceleration + noise * normal(&mut noise_source);
-                    // The conversion saturates, as the sensor does.
-                    (felt / count).round() as i16
+                    let measured = acceleration + noise * normal(&mut noise_source);
+                    // The conversion to i16 saturates, as the sensor does.
+                    (measured / count).round() as i16
                 });
                 block.clipped += u16::from(is_clipped(counts));
                 // A chunk has at most as many samples as a block has room for.
@@ -212,7 +212,7 @@ impl Sampler {
 }
 
 impl TachometerModel {
-    /// One mark per turn, stamped to two microseconds.
+    /// One edge per revolution with 2 µs standard deviation of its time stamp.
     pub const ONE_MARK: Self = Self {
         wheel: Wheel {
             positions: 1,
@@ -221,7 +221,7 @@ impl TachometerModel {
         jitter_s: 2e-6,
     };
 
-    /// The edges of a spindle from t = 0 to `end_s`, in their order; `seed` makes them repeat.
+    /// Time stamps of the edges from t = 0 to `end_s`, s, with jitter, in the order of time; the same seed gives the same jitter.
     pub fn edges(&self, spindle: &Spindle, end_s: f64, seed: u64) -> Vec<Edge> {
         let mut source = stream(seed, Stream::Edges);
         let mut edges: Vec<Edge> = self
@@ -234,10 +234,10 @@ impl TachometerModel {
         edges
     }
 
-    /// When the edges really come, s.
+    /// True times of the edges from t = 0 to `end_s`, s, without jitter.
     pub fn true_edges_s(&self, spindle: &Spindle, end_s: f64) -> impl Iterator<Item = f64> {
         let positions = u64::from(self.wheel.positions);
-        let there = positions - u64::from(self.wheel.missing);
+        let present = positions - u64::from(self.wheel.missing);
         let spindle = *spindle;
         (0_u64..)
             .map(move |number| {
@@ -247,12 +247,12 @@ impl TachometerModel {
                 )
             })
             .take_while(move |(_, t)| *t <= end_s)
-            .filter(move |(number, _)| number % positions < there)
+            .filter(move |(number, _)| number % positions < present)
             .map(|(_, t)| t)
     }
 }
 
-/// What random numbers are for: each purpose has its own, so that one does not change another.
+/// Independent random streams of one seed: noise, time stamps of blocks and edges of the tachometer do not influence each other.
 enum Stream {
     Noise = 1,
     Stamps = 2,
@@ -270,11 +270,12 @@ fn normal(source: &mut ChaCha8Rng) -> f64 {
 }
 
 fn nanoseconds(t: f64) -> Nanoseconds {
-    // Jitter before the start of the clock is cut off by the conversion.
+    // The conversion clips times before the start of the clock to 0.
     Nanoseconds((t * 1e9).round() as u64)
 }
 
-/// A windowed sinc for the oversampled steps: half at 0.365 of the sample rate, Kaiser window with β = 7 (−70 dB).
+/// Weights of the anti-aliasing low pass at the oversampled rate: a sinc with the −6 dB point at 0.365 of the sampling rate, under a Kaiser
+/// window with β = 7 (stop band −70 dB).
 fn low_pass() -> [f64; 2 * HALF + 1] {
     let cutoff = 0.365 / OVERSAMPLING as f64;
     let weights: [f64; 2 * HALF + 1] = std::array::from_fn(|index| {
@@ -291,7 +292,7 @@ fn low_pass() -> [f64; 2 * HALF + 1] {
     weights.map(|weight| weight / sum)
 }
 
-/// The modified Bessel function of order 0, by its series.
+/// Modified Bessel function I₀(x), from its power series.
 fn bessel_i0(x: f64) -> f64 {
     let mut term = 1.0;
     let mut sum = 1.0;

@@ -1,20 +1,21 @@
-//! How exactly to integrate.
+//! Tolerances and bounds of the time integration.
 
-/// How exactly to integrate.
+/// Tolerances and bounds of the time integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Error allowed per step, m.
+    /// Absolute tolerance of the local error of the displacement, m.
     pub absolute_m: f64,
-    /// Error allowed per step, as a share of the amplitude of the motion.
+    /// Relative tolerance of the local error, as a fraction of the amplitude of the motion.
     pub relative: f64,
-    /// A displacement beyond this ends the run as diverged, m.
+    /// Displacement beyond which the motion counts as diverged, m.
     pub largest_m: f64,
-    /// More steps than this end the run: of equations that are too stiff to be worth it.
+    /// Largest number of steps, accepted and rejected; more end the run as too stiff.
     pub steps_max: u64,
 }
 
 impl Default for Settings {
-    /// A millionth of a micrometer, a hundred-millionth of the amplitude; a tool does not move by 0.1 m.
+    /// Tolerances of 1e-12 m and of 1e-8 of the amplitude, far below the error of any measurement; a displacement above 0.1 m is no vibration
+    /// of a tool.
     fn default() -> Self {
         Self {
             absolute_m: 1e-12,

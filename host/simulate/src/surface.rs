@@ -1,71 +1,73 @@
-//! The surface that a tooth leaves: what the next one has in front of it.
+//! The machined surface that a tooth leaves and the next tooth cuts (regeneration).
 
 use std::collections::VecDeque;
 
 use quietcut_model::cutter::{Cutter, Immersion, Tooth};
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// Places, as fractions of a piece, at which a surface that was left standing is taken over.
-pub(super) const TAKEN_AT: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
+/// Interpolation nodes, as fractions of a step, for the surface below a tooth that is out of contact. Six equidistant nodes: the polynomial
+/// of degree 5 has the order of the integrator.
+pub(super) const SURFACE_NODES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// What one tooth left behind over the last pass or so, by the time at which it passed.
+/// The surface behind one tooth over somewhat more than the last tooth passing, as a function of the time of the passing.
 ///
-/// Heights are measured as [`Cutter::reach_m`] measures, in the frame that feeds with the tool.
+/// Heights, m, are along the chip thickness as in [`Cutter::reach_m`], in the frame that feeds with the tool.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
-    pieces: VecDeque<Piece>,
+    arcs: VecDeque<SurfaceArc>,
 }
 
+/// The surface that corresponds to one integration step, from `from_s` to `to_s`.
 #[derive(Clone, Copy, Debug)]
-struct Piece {
+struct SurfaceArc {
     from_s: f64,
     to_s: f64,
-    shape: Shape,
+    profile: Profile,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Shape {
-    /// The tooth cut it: it lies where the edge was.
+/// Height of a surface arc over the time.
+enum Profile {
+    /// Cut by the tooth: the surface is the path of the edge, from the displacement of the tool.
     Cut([Quartic; 3]),
-    /// The edge did not reach it, it was left by an earlier tooth: Newton's divided differences on [`TAKEN_AT`].
-    Left([f64; 6]),
+    /// Not reached by the edge: the surface of an earlier passing, as Newton's divided differences at [`SURFACE_NODES`].
+    Uncut([f64; 6]),
 }
 
 impl Surface {
-    /// The tooth was at the surface from `from_s` to `to_s` while the tool moved along `displacement`.
+    /// Appends the arc that the tooth cuts from `from_s` to `to_s`, s, while the tool moves along `displacement`.
     pub(super) fn push_cut(&mut self, from_s: f64, to_s: f64, displacement: [Quartic; 3]) {
-        self.pieces.push_back(Piece {
+        self.arcs.push_back(SurfaceArc {
             from_s,
             to_s,
-            shape: Shape::Cut(displacement),
+            profile: Profile::Cut(displacement),
         });
     }
 
-    /// The tooth was off the surface from `from_s` to `to_s`; `heights` are those of the surface at [`TAKEN_AT`].
-    pub(super) fn push_left(&mut self, from_s: f64, to_s: f64, mut heights: [f64; 6]) {
+    /// Appends the arc that the tooth does not reach from `from_s` to `to_s`, s; `heights`, m, are at [`SURFACE_NODES`].
+    pub(super) fn push_uncut(&mut self, from_s: f64, to_s: f64, mut heights: [f64; 6]) {
         for order in 1..heights.len() {
             for i in (order..heights.len()).rev() {
-                heights[i] = (heights[i] - heights[i - 1]) / (TAKEN_AT[i] - TAKEN_AT[i - order]);
+                heights[i] = (heights[i] - heights[i - 1]) / (SURFACE_NODES[i] - SURFACE_NODES[i - order]);
             }
         }
-        self.pieces.push_back(Piece {
+        self.arcs.push_back(SurfaceArc {
             from_s,
             to_s,
-            shape: Shape::Left(heights),
+            profile: Profile::Uncut(heights),
         });
     }
 
-    /// Forgets what was left before `t`.
+    /// Removes the arcs that end before `t`, s.
     pub(super) fn forget_before(&mut self, t: f64) {
-        while self.pieces.front().is_some_and(|piece| piece.to_s < t) {
-            self.pieces.pop_front();
+        while self.arcs.front().is_some_and(|arc| arc.to_s < t) {
+            self.arcs.pop_front();
         }
     }
 
-    /// Height of the surface that `tooth` left at `t`, m; before the first record the tool was at rest.
+    /// Height of the surface that `tooth` left at the time `t`, m; before the first arc the tool was at rest.
     ///
-    /// `within` are the ends of the stretch that the caller looks at: where two pieces meet at one of its ends,
-    /// the piece inside the stretch counts.
+    /// `within` are the ends of the evaluated step, s. Where two arcs meet at one of these ends, the arc inside the step is used.
     pub(super) fn height_m(
         &self,
         cutter: &Cutter,
@@ -75,21 +77,21 @@ impl Surface {
         within: [f64; 2],
     ) -> f64 {
         let key = t.clamp(within[0], within[1]);
-        let index = self.pieces.partition_point(|piece| piece.to_s <= key);
-        let piece = match self.pieces.get(index).or(self.pieces.back()) {
-            // The first record begins with a step, so a time before it is before the start.
-            Some(piece) if index > 0 || piece.from_s <= key => piece,
+        let index = self.arcs.partition_point(|arc| arc.to_s <= key);
+        let arc = match self.arcs.get(index).or(self.arcs.back()) {
+            // Before the first arc the tool is at rest.
+            Some(arc) if index > 0 || arc.from_s <= key => arc,
             _ => return cutter.reach_m(tooth, place, [0.0; 3]),
         };
-        let u = ((t - piece.from_s) / (piece.to_s - piece.from_s)).clamp(0.0, 1.0);
-        match &piece.shape {
-            Shape::Cut(displacement) => {
+        let u = ((t - arc.from_s) / (arc.to_s - arc.from_s)).clamp(0.0, 1.0);
+        match &arc.profile {
+            Profile::Cut(displacement) => {
                 let x = std::array::from_fn(|axis| at(&displacement[axis], u));
                 cutter.reach_m(tooth, place, x)
             }
-            Shape::Left(differences) => differences
+            Profile::Uncut(differences) => differences
                 .iter()
-                .zip(TAKEN_AT)
+                .zip(SURFACE_NODES)
                 .rev()
                 .fold(0.0, |height, (difference, node)| height * (u - node) + difference),
         }
@@ -102,16 +104,20 @@ mod tests {
     use crate::tests::slot_cutter;
 
     #[test]
-    fn a_surface_left_standing_is_kept_to_the_fifth_degree() {
+    fn an_uncut_surface_of_degree_five_is_interpolated_exactly() {
         let polynomial = |t: f64| 1.0 + t - 2.0 * t.powi(2) + 0.5 * t.powi(3) - t.powi(4) + 3.0 * t.powi(5);
         let mut surface = Surface::default();
         let (from, to) = (2.0, 2.5);
-        surface.push_left(from, to, TAKEN_AT.map(|u| polynomial(from + u * (to - from))));
+        surface.push_uncut(
+            from,
+            to,
+            SURFACE_NODES.map(|u| polynomial(from + u * (to - from))),
+        );
         let cutter = slot_cutter();
         for i in 0..=10 {
             let t = from + f64::from(i) * 0.05;
             let height = surface.height_m(&cutter, &cutter.teeth[0], cutter.immersion(1.0), t, [from, to]);
-            // Rounding of six differences of numbers up to 300.
+            // Rounding error of six divided differences of numbers up to 300.
             assert!((height - polynomial(t)).abs() < 1e-11, "{t}: {height}");
         }
     }

@@ -1,4 +1,4 @@
-//! A virtual cut of a case: what is asked for, and what comes of it.
+//! A virtual cut: cutting conditions, model, and simulated sensor output.
 
 use quietcut_core::acceleration::Block;
 use quietcut_core::tachometer::Edge;
@@ -12,60 +12,60 @@ use super::{
 use quietcut_model::case::{Case, CaseError};
 use quietcut_recording::Quantity;
 
-/// A cut of a case.
+/// A simulated cut of a case: spindle speed, axial depth, entry, duration and effects.
 #[derive(Clone, Debug)]
 pub struct VirtualCut {
-    /// Spindle speed, rev/min.
+    /// Spindle speed at the start, rev/min.
     pub spindle_rpm: f64,
-    /// The speed to which it glides by the end, rev/min; `None` where it stays. The feed axis moves steadily, with the
-    /// feed per tooth of the case at the speed in the middle.
+    /// Spindle speed at the end of a linear speed sweep, rev/min; `None` for a constant speed. The feed speed is constant and gives the feed
+    /// per tooth of the case at the mean spindle speed.
     pub last_rpm: Option<f64>,
     /// Axial depth of cut, mm.
     pub depth_mm: f64,
-    /// How long it is watched, s.
+    /// Duration of the simulation, s.
     pub seconds: f64,
-    /// How the tool comes into the workpiece.
+    /// Entry into, and exit from, the workpiece.
     pub entry: Entry,
-    /// Air before and after the cut, s.
+    /// Time without contact before and after the cut, s.
     pub air_s: f64,
-    /// Pores of the material; `None` where it is solid.
+    /// Pores of the workpiece material; `None` for solid material.
     pub pores: Option<Pores>,
-    /// What the case does not have, or has otherwise.
+    /// Effects that are added to the case or replace those of its extensions.
     pub effects: Effects,
-    /// What a recording of it has, besides the tachometer, in every direction of the structure.
+    /// Quantities that are recorded besides the tachometer, each in every direction of the structure.
     pub measured: Vec<Quantity>,
 }
 
-/// How the tool comes into the workpiece, and out.
+/// Entry of the tool into the workpiece, and its exit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Entry {
-    /// In full cut from the start to the end.
+    /// Full engagement from start to end.
     None,
-    /// The depth grows, and shrinks, over so many seconds.
+    /// The axial depth grows linearly at the start, and decreases linearly at the end.
     Ramp {
-        /// Duration, s.
+        /// Duration of the growth, and of the decrease, s.
         seconds: f64,
     },
-    /// Through the face of the workpiece: immersion grows as the tool feeds in, and shrinks as it feeds out.
+    /// Through the faces of the workpiece: the immersion grows as the tool feeds in, and decreases as it feeds out.
     Feed,
 }
 
-/// Why a case cannot be cut.
+/// A virtual cut that cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum VirtualCutError {
     /// The case lacks a section.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// An effect that cannot be.
+    /// An effect with invalid parameters, or one that the model does not support here.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// The equations cannot be set up.
+    /// The equation of motion cannot be assembled.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The simulation cannot go on.
+    /// The time integration failed.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// Pulses of the tachometer that run into each other.
+    /// Tachometer pulses too short for the sampling rate.
     #[error(
         "a tachometer wheel with {positions} positions at {spindle_rpm} rev/min is too fine for {rate_hz:.0} samples per second: at least {needed_hz:.0} Hz are needed"
     )]
@@ -74,48 +74,48 @@ pub enum VirtualCutError {
         positions: u16,
         /// Spindle speed, rev/min.
         spindle_rpm: f64,
-        /// Samples per second.
+        /// Sampling rate, Hz.
         rate_hz: f64,
-        /// Samples per second needed.
+        /// Smallest sampling rate for this wheel, Hz.
         needed_hz: f64,
     },
-    /// Forces that turn around within the time.
+    /// Wear that makes the cutting force negative within the duration.
     #[error(
         "wear of {relative_rate_per_s} per s makes the cutting force negative within {seconds} s: a larger rate or a shorter time is needed"
     )]
     WornOut {
-        /// The rate, 1/s.
+        /// Relative rate of wear, 1/s.
         relative_rate_per_s: f64,
-        /// The time, s.
+        /// Duration of the cut, s.
         seconds: f64,
     },
-    /// The time is over before the cut is whole.
+    /// A duration too short to reach full engagement.
     #[error(
         "{seconds} s are too short: with {air_s} s of air at both ends, way in and way out take {needed_s:.2} s, so give more than that"
     )]
     TooShort {
-        /// The time given, s.
+        /// Duration of the cut, s.
         seconds: f64,
-        /// Air, s.
+        /// Time without contact before and after the cut, s.
         air_s: f64,
-        /// The time needed, s.
+        /// Shortest possible duration, s.
         needed_s: f64,
     },
 }
 
-/// What the sensors of a cut deliver, and what it took.
+/// Output of accelerometer and tachometer in a virtual cut, and the statistics of its integration.
 #[derive(Clone, Debug)]
 pub struct Heard {
-    /// Samples in blocks.
+    /// Acceleration samples in blocks, as the sensor delivers them.
     pub blocks: Vec<Block>,
-    /// Edges of the tachometer, in their order.
+    /// Edges of the tachometer in the order of time.
     pub edges: Vec<Edge>,
-    /// What the integration took.
+    /// Numbers of steps and events of the integration.
     pub statistics: Statistics,
 }
 
 impl VirtualCut {
-    /// A cut with entry and exit through the faces of the workpiece, and a fifth of a second of air at both ends.
+    /// A cut of `depth_mm` at constant speed that enters and leaves through the faces of the workpiece, with 0.2 s without contact at each end.
     pub fn new(spindle_rpm: f64, depth_mm: f64, seconds: f64) -> Self {
         Self {
             spindle_rpm,
@@ -130,11 +130,11 @@ impl VirtualCut {
         }
     }
 
-    /// The model of this cut of `case`.
+    /// The equation of motion of this cut of `case`.
     ///
     /// # Errors
-    /// The case lacks a section or has an extension that cannot be simulated; the time is too short; the tool's
-    /// size is needed and not known.
+    /// The case lacks a section or has an extension that cannot be simulated, the duration is too short, or the tool diameter is required and
+    /// missing.
     pub fn model(&self, case: &Case) -> Result<Model, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
         let cutter = effects.cutter(Cutter::new(
@@ -152,7 +152,7 @@ impl VirtualCut {
         if self.pores.is_some() && cutter.radius_m.is_none() {
             return Err(SimulateError::NoDiameter.into());
         }
-        let spindle = effects.spindle(self.turning());
+        let spindle = effects.spindle(self.spindle_motion());
         let passage = self.passage(&cutter, &spindle)?;
         let (dynamics, terms) = effects.dynamics(case.structure()?)?;
         if cutter.force.process_damping.is_some() && dynamics.velocity_jumps() && !terms.is_empty() {
@@ -178,24 +178,24 @@ impl VirtualCut {
         })
     }
 
-    /// How the spindle turns in this cut of `case`.
+    /// The spindle motion in this cut of `case`, with its speed modulation.
     ///
     /// # Errors
     /// The case has an extension that cannot be simulated.
     pub fn spindle(&self, case: &Case) -> Result<Spindle, VirtualCutError> {
         let effects = Effects::of_case(case)?.and(&self.effects);
-        Ok(effects.spindle(self.turning()))
+        Ok(effects.spindle(self.spindle_motion()))
     }
 
-    /// How the spindle is told to turn.
-    fn turning(&self) -> Spindle {
+    /// The commanded spindle motion, without speed modulation.
+    fn spindle_motion(&self) -> Spindle {
         match self.last_rpm {
             Some(last_rpm) => Spindle::gliding(self.spindle_rpm, last_rpm, self.seconds),
             None => Spindle::new(self.spindle_rpm),
         }
     }
 
-    /// When the tool is in full cut, from and to in s.
+    /// Start and end of full engagement, s.
     ///
     /// # Errors
     /// As [`Self::model`].
@@ -255,10 +255,10 @@ impl VirtualCut {
         }
     }
 
-    /// Cuts, and listens with these sensors; `seed` makes their noise repeat.
+    /// Simulates the cut and the output of accelerometer and tachometer; the same `seed` gives the same noise.
     ///
     /// # Errors
-    /// As [`Self::model`], and what [`Model::run`] says.
+    /// As [`Self::model`] and [`Model::run`].
     pub fn hear(
         &self,
         case: &Case,

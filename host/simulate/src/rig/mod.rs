@@ -1,4 +1,4 @@
-//! Virtual test rigs: a shaker, a hammer or a hand on a structure, and the sensors that record it.
+//! Virtual test rigs: a structure excited by a shaker, by hammer impacts or by a released static pull, and the sensors that record it.
 
 mod noise;
 mod signal;
@@ -16,25 +16,25 @@ use super::{Drive, Model, Reading, Settings, SimulateError, Statistics};
 use quietcut_model::structure::{Direction, Structure};
 use quietcut_recording::{Channel, Kind, Quantity, Recording, Sidecar};
 
-/// A test of a structure.
+/// A modal test of a structure: excitation force in one direction and measured responses.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    /// The direction in which the force acts.
+    /// Direction of the excitation force.
     pub direction: Direction,
-    /// The force that is asked for.
+    /// Commanded force over time.
     pub signal: Signal,
-    /// How much less the force is per velocity of the tool, N s/m, at a shaker whose amplitude is not controlled: its
-    /// force drops where the structure resonates. The recorded force is the true one.
+    /// Force drop of a shaker without force control, N s/m: the true force is the commanded force minus this times the velocity of the
+    /// tool, so that it drops at resonance. The recording contains the true force.
     pub drop_ns_per_m: f64,
-    /// Samples per second.
+    /// Sampling rate, Hz.
     pub sample_rate_hz: f64,
-    /// What is measured besides the force, in every direction of the structure.
+    /// Quantities measured besides the force, each in every direction of the structure.
     pub measured: Vec<Quantity>,
-    /// What the structure or the sensors have that the case has not.
+    /// Effects of structure and sensors that are added to the case.
     pub effects: Effects,
 }
 
-/// The force of a rig along one axis.
+/// The excitation force of a rig along one machine axis.
 struct Driven {
     axis: usize,
     signal: Signal,
@@ -64,7 +64,7 @@ impl Drive for Driven {
 }
 
 impl Rig {
-    /// A rig that measures displacement and acceleration.
+    /// A rig with an ideal force source that measures displacement and acceleration.
     pub fn new(direction: Direction, signal: Signal, sample_rate_hz: f64) -> Self {
         Self {
             direction,
@@ -76,10 +76,10 @@ impl Rig {
         }
     }
 
-    /// The recording without noise, from rest at t = 0; `path` is where it will be written.
+    /// Simulates the test from rest at t = 0 and returns the recording without noise; `path` is the path of the recording's file.
     ///
     /// # Errors
-    /// The structure is indefinite or has not the direction, an effect cannot be, or the motion diverges.
+    /// The structure is indefinite or lacks the direction, an effect does not apply to it, or the motion diverges.
     pub fn record(
         &self,
         structure: &Structure,
@@ -128,7 +128,7 @@ impl Rig {
         Ok((recording, statistics))
     }
 
-    /// The force channel, then what is measured, by quantity and direction.
+    /// The force channel, then the response channels by quantity and direction.
     fn pickups(&self, structure: &Structure, driven: usize) -> Vec<Pickup> {
         let mut pickups = vec![Pickup::of_axis(Quantity::Force, driven)];
         for quantity in &self.measured {
@@ -166,7 +166,7 @@ fn channels(readings: Vec<Reading>) -> Vec<Channel> {
 }
 
 impl Signal {
-    /// What kind of recording it makes.
+    /// The kind of recording that this excitation produces.
     pub fn kind(&self) -> Kind {
         match self {
             Self::Tones { .. } => Kind::Shaker,

@@ -1,4 +1,4 @@
-//! The noise of sensors: white and normal, per time sample.
+//! Sensor noise: white and normally distributed, independent for each sample.
 
 use std::collections::BTreeMap;
 
@@ -8,18 +8,18 @@ use rand_distr::{Distribution, StandardNormal};
 
 use quietcut_recording::{Quantity, Recording};
 
-/// How much noise each sample of each channel gets.
+/// Standard deviation of the white noise of each channel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Noise {
-    /// Standard deviation as a share of the channel's root mean square, for channels that are not named. The level of a
-    /// tachometer gets none.
+    /// Standard deviation divided by the channel's root mean square, for channels not listed in `absolute`. A tachometer level gets no
+    /// noise.
     pub relative: f64,
-    /// Standard deviation by channel, in the SI unit of the channel.
+    /// Standard deviation by channel name, in the SI unit of the channel.
     pub absolute: BTreeMap<String, f64>,
 }
 
 impl Noise {
-    /// Adds noise; the same seed adds the same. Each channel has a stream of its own.
+    /// Adds noise to every channel. The same seed gives the same noise; channels are independent of each other.
     pub fn add(&self, recording: &mut Recording, seed: u64) {
         for (index, channel) in recording.channels.iter_mut().enumerate() {
             let deviation = self.absolute.get(&channel.name).copied().unwrap_or_else(|| {

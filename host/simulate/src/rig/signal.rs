@@ -1,58 +1,58 @@
-//! The forces that rigs ask for.
+//! Excitation forces of a test rig over time.
 
 use std::f64::consts::{PI, TAU};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A force over time.
+/// The commanded excitation force of a test over time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Signal {
-    /// Sum of a·cos(2πft + φ) over (f in Hz, φ in rad), with an amplitude that goes evenly from `first_n` to `last_n`.
+    /// Multisine a(t)·Σ cos(2πft + φ); the amplitude a changes linearly from `first_n` to `last_n`.
     Tones {
-        /// Frequencies and phases.
+        /// Frequency f, Hz, and phase φ, rad, of each tone.
         tones: Vec<(f64, f64)>,
-        /// Amplitude of each tone at the start, N.
+        /// Amplitude of every tone at the start, N.
         first_n: f64,
-        /// Amplitude of each tone at the end, N.
+        /// Amplitude of every tone at the end, N.
         last_n: f64,
-        /// Duration, s.
+        /// Duration of the multisine, s.
         seconds: f64,
     },
-    /// One frequency after the other; each step begins at phase 0 and is followed by a pause.
+    /// Step sine: one frequency after the other. Each step begins at phase 0 and is followed by a pause without force.
     StepSine {
-        /// The steps in their order.
+        /// The steps in the order of excitation.
         steps: Vec<Step>,
-        /// How long each is excited, s.
+        /// Excitation time of each step, s.
         dwell_s: f64,
-        /// How long nothing is done after each, s.
+        /// Pause without force after each step, s.
         pause_s: f64,
     },
-    /// A frequency that glides evenly in time.
+    /// Linear sine sweep: the frequency changes linearly in time.
     Sweep {
-        /// First frequency, Hz.
+        /// Frequency at the start, Hz.
         first_hz: f64,
-        /// Last frequency, Hz; below the first for a backward sweep.
+        /// Frequency at the end, Hz; below `first_hz` in a backward sweep.
         last_hz: f64,
-        /// Amplitude, N.
+        /// Force amplitude, N.
         amplitude_n: f64,
-        /// Duration, s.
+        /// Duration of the sweep, s.
         seconds: f64,
     },
-    /// Blows of a hammer: half sines.
+    /// Hammer impacts: half-sine pulses.
     Impacts {
-        /// The blows in their order.
+        /// The impacts in the order of time.
         impacts: Vec<Impact>,
-        /// Duration of the record, s.
+        /// Duration of the recording, s.
         seconds: f64,
     },
-    /// Pulled slowly, then let go.
+    /// Free decay after a slow static pull.
     Release {
-        /// The pull, N.
+        /// Static force at the end of the pull, N.
         force_n: f64,
-        /// How long the pull grows, as half a cosine, s; it is held for a fifth of that.
+        /// Time in which the force grows as half a cosine, s; it is then held for a fifth of that time and removed.
         pull_s: f64,
-        /// How long the structure is watched after it was let go, s.
+        /// Recording time after the force is removed, s.
         seconds: f64,
     },
 }
@@ -60,25 +60,25 @@ pub enum Signal {
 /// One step of a step-sine test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Frequency, Hz.
+    /// Excitation frequency, Hz.
     pub frequency_hz: f64,
-    /// Amplitude, N.
+    /// Force amplitude, N.
     pub amplitude_n: f64,
 }
 
-/// One blow of a hammer.
+/// One hammer impact: a half-sine force pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact {
-    /// When it begins, s.
+    /// Start time of the impact, s.
     pub start_s: f64,
-    /// Its peak, N.
+    /// Peak force of the impact, N.
     pub peak_n: f64,
-    /// How long it lasts, s.
+    /// Duration of the pulse, s.
     pub pulse_s: f64,
 }
 
 impl Signal {
-    /// Tones of equal amplitude with phases drawn by `seed`; one tone alone has phase −π/2, a sine.
+    /// A multisine with tones of equal amplitude and random phases from `seed`; a single tone gets the phase −π/2, a sine.
     pub fn tones(frequencies_hz: &[f64], [first_n, last_n]: [f64; 2], seconds: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let tones = match frequencies_hz {
@@ -96,7 +96,7 @@ impl Signal {
         }
     }
 
-    /// Every frequency at every level, level after level.
+    /// A step-sine test of all frequencies at the first force level, then at the next level, and so on.
     pub fn step_sine(frequencies_hz: &[f64], levels_n: &[f64], dwell_s: f64, pause_s: f64) -> Self {
         let steps = levels_n
             .iter()
@@ -114,8 +114,8 @@ impl Signal {
         }
     }
 
-    /// `count` blows with `spacing_s` between them, the first a tenth of that after the start. Peaks scatter by a fifth
-    /// either way, as a hand's do.
+    /// `count` impacts at intervals of `spacing_s`; the first is at 0.1·`spacing_s`. Peak forces are uniformly distributed within ± 20 %
+    /// of `peak_n`, as those of a manual hammer test.
     pub fn impacts(count: usize, peak_n: f64, pulse_s: f64, spacing_s: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let impacts = (0..count)
@@ -146,7 +146,7 @@ impl Signal {
         }
     }
 
-    /// The force at `t`, N.
+    /// The commanded force at the time `t`, N.
     pub fn force_n(&self, t: f64) -> f64 {
         match self {
             Self::Tones {
@@ -179,8 +179,8 @@ impl Signal {
                 amplitude_n,
                 seconds,
             } => {
-                let turns = first_hz * t + 0.5 * (last_hz - first_hz) / seconds * t * t;
-                amplitude_n * (TAU * turns).sin()
+                let cycles = first_hz * t + 0.5 * (last_hz - first_hz) / seconds * t * t;
+                amplitude_n * (TAU * cycles).sin()
             }
             Self::Impacts { impacts, .. } => impacts
                 .iter()
@@ -195,7 +195,7 @@ impl Signal {
         }
     }
 
-    /// A quarter of the shortest period, s; knots say where pulses are.
+    /// The longest step that resolves the force, s: a quarter of the shortest period. Pulses are resolved by their knots.
     pub fn longest_step_s(&self) -> f64 {
         let highest_hz = match self {
             Self::Tones { tones, .. } => tones
@@ -212,13 +212,13 @@ impl Signal {
         0.25 / highest_hz
     }
 
-    /// The first time after `t` at which the force or one of its lower derivatives jumps.
+    /// The first time after `t`, s, at which the force or one of its lower derivatives is discontinuous.
     pub fn next_knot_s(&self, t: f64) -> f64 {
         match self {
             Self::Tones { .. } | Self::Sweep { .. } => f64::INFINITY,
             Self::StepSine { dwell_s, pause_s, .. } => {
                 let index = (t / (dwell_s + pause_s)).floor();
-                // The next but one start too: rounding may put `index` on either side of a start.
+                // Two starts ahead: rounding may place `index` on either side of a start.
                 [0.0, 1.0, 2.0]
                     .iter()
                     .flat_map(|ahead| {
