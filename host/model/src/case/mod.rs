@@ -6,6 +6,7 @@
 
 mod check;
 mod deviation;
+mod effects;
 mod error;
 mod file;
 mod limits;

@@ -5,6 +5,7 @@ use std::path::Path;
 use proptest::prelude::*;
 
 use super::*;
+use crate::case::Case;
 
 fn case(text: &str) -> Case {
     Case::parse(Path::new("machine.toml"), text).unwrap_or_else(|error| panic!("{error}"))

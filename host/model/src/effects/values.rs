@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::spec::{EffectSpec, Prior, ValueKind};
+use super::parameter::{Prior, ValueKind};
 use super::{EffectError, EffectName};
 use crate::structure::Direction;
 
@@ -101,10 +101,6 @@ impl Values {
         self.effect
     }
 
-    fn spec(&self) -> &'static EffectSpec {
-        self.effect.spec()
-    }
-
     pub(super) fn put(&mut self, key: &str, value: Value) {
         self.by_key.insert(key.into(), value);
     }
@@ -112,9 +108,9 @@ impl Values {
     /// The bounds of a key; those of the main parameter for the VALUE of the command line.
     fn prior(&self, key: &str) -> Prior {
         let parameter = if key.is_empty() {
-            self.spec().main()
+            self.effect.spec().main()
         } else {
-            self.spec().parameter(key)
+            self.effect.spec().parameter(key)
         };
         parameter.map_or(Prior::ANY, |parameter| parameter.prior)
     }
@@ -139,6 +135,7 @@ impl Values {
     /// A list of numbers that is not as long as that of the locations.
     pub(super) fn by_location(self) -> Result<Vec<Self>, EffectError> {
         let has_number_per_mode = self
+            .effect
             .spec()
             .parameters
             .iter()

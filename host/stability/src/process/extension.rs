@@ -13,7 +13,10 @@ use quietcut_model::{Cutter, Effects, ForceLaw, ModelError, Term};
 fn effects(case: &Case, wanted: impl Fn(&EffectSpec) -> bool) -> Result<Effects, StabilityError> {
     let all = Effects::of_case(case).map_err(|cause| wrong(case, cause.into()))?;
     Ok(Effects(
-        all.0.into_iter().filter(|effect| wanted(effect.spec())).collect(),
+        all.0
+            .into_iter()
+            .filter(|effect| wanted(effect.id().spec()))
+            .collect(),
     ))
 }
 
