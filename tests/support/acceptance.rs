@@ -1,5 +1,5 @@
-//! The cuts that quietcut must judge right: a robot at ten speeds, a fifth below and above its limit, with entry and exit
-//! and all faults of the sensors.
+//! Acceptance cuts of the chatter detector: a milling robot at ten spindle speeds, at 0.8 and 1.2 times its stability limit, with
+//! entry, exit and all errors of the sensors.
 
 use std::fmt;
 
@@ -12,7 +12,8 @@ use quietcut_core::working_point::Tool;
 
 use crate::command;
 
-/// rev/min, limit in mm, what is heard a fifth above it, and at how many hertz: `lobes kuka-kr90-acetal.toml --at`.
+/// Spindle speed in rev/min, stability limit in mm, kind of chatter at 1.2 times the limit and its frequency in Hz, from
+/// `quietcut lobes kuka-kr90-acetal.toml --at`.
 pub const LIMITS: [(f64, f64, Verdict, f64); 10] = [
     (600.0, 3.174, Verdict::Hopf, 16.91),
     (800.0, 1.664, Verdict::Hopf, 17.30),
@@ -26,14 +27,14 @@ pub const LIMITS: [(f64, f64, Verdict, f64); 10] = [
     (2400.0, 5.443, Verdict::Hopf, 19.13),
 ];
 
-/// The share of the limit at which there is no alarm.
+/// Depth relative to the stability limit at which the detector must not report chatter.
 pub const BELOW: f64 = 0.8;
-/// The share of the limit at which chatter is called.
+/// Depth relative to the stability limit at which the detector must report chatter.
 pub const ABOVE: f64 = 1.2;
 
-/// A cut and who listens to it; sensors differ from speed to speed.
+/// Acceptance cut with its sensors, which differ between the speeds.
 pub struct AcceptanceCut {
-    /// The robot.
+    /// Case of the milling robot.
     pub case: Case,
     /// The cut.
     pub cut: VirtualCut,
@@ -41,16 +42,16 @@ pub struct AcceptanceCut {
     pub accelerometer: Accelerometer,
     /// The tachometer.
     pub tachometer: TachometerModel,
-    /// Makes the noise of the sensors repeat.
+    /// Seed of the sensor noise.
     pub seed: u64,
 }
 
 impl AcceptanceCut {
-    /// The cut at the speed with this index in [`LIMITS`], at this share of the limit.
+    /// Acceptance cut at the speed with this index in [`LIMITS`]; `share` is the depth relative to the limit.
     pub fn new(index: usize, share: f64) -> Self {
         let case = Case::read(command::cases().join("kuka-kr90-acetal.toml")).expect("a case");
         let (rpm, limit_mm, ..) = LIMITS[index];
-        // Growth per tooth above the limit is 1.5 to 3 %: twelve seconds of full cut are 240 teeth at the least.
+        // Chatter grows by 1.5 to 3 % per tooth passing above the limit; 12 s of full engagement are at least 240 tooth passings.
         let mut cut = VirtualCut::new(rpm, share * limit_mm, 20.0);
         cut.seconds = 2.0 * cut_way_s(rpm) + 12.0 + 2.0 * cut.air_s;
         let accelerometer = Accelerometer {
@@ -78,7 +79,7 @@ impl AcceptanceCut {
         }
     }
 
-    /// What the pipeline is told: nothing but sensors and teeth.
+    /// Settings of the signal chain: only sensors and number of teeth.
     pub fn settings(&self) -> Settings {
         settings(&self.case, self.accelerometer, self.tachometer)
     }
@@ -91,7 +92,7 @@ impl fmt::Display for AcceptanceCut {
     }
 }
 
-/// Settings for these sensors and the tool of the case.
+/// Settings of the signal chain for these sensors and the tool of the case.
 pub fn settings(case: &Case, accelerometer: Accelerometer, tachometer: TachometerModel) -> Settings {
     let teeth = case.tool().expect("a tool").teeth;
     Settings {
@@ -105,7 +106,7 @@ pub fn settings(case: &Case, accelerometer: Accelerometer, tachometer: Tachomete
     }
 }
 
-/// From the first touch to half immersion: radius over feed speed.
+/// Time from first contact to half immersion, s: tool radius divided by feed speed.
 fn cut_way_s(rpm: f64) -> f64 {
     6.35 / (0.15 * 2.0 * rpm / 60.0)
 }

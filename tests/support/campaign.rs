@@ -1,5 +1,5 @@
-//! How often the detector is right: many seeds of the sensors' noise, of cuts below and above the limit, with runout,
-//! ramps and a shaking structure.
+//! Error rates of the chatter detector over many noise seeds: cuts below and above the stability limit, with runout, depth ramps and
+//! random excitation of the structure.
 
 use std::fmt;
 use std::sync::Mutex;
@@ -14,23 +14,23 @@ use crate::command;
 use crate::shaking::Shaking;
 use crate::virtual_cut::{Outcome, SimulatedCut};
 
-/// One line of the table: cuts that differ in nothing but chance, and what is right for them.
+/// One line of the table: cuts that differ only in random numbers, with their correct verdict.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// What is cut.
+    /// Description of the cuts.
     pub name: String,
-    /// What must be called, and at how many hertz; `None` where no alarm is right.
+    /// Correct kind of chatter and its frequency in Hz; `None` for a stable cut.
     pub right: Option<(Verdict, f64)>,
     cut: VirtualCut,
-    /// Teeth; the arc of immersion ends at 180° and has the same part of a pitch as the case's.
+    /// Number of teeth; the immersion ends at 180° and has the same ratio to the tooth pitch as in the case.
     teeth: u32,
-    /// Density of a force that shakes the structure, N/√Hz.
+    /// Spectral density of a random force on the structure, N/√Hz.
     shaking: f64,
-    /// Noise of the sensor over that of its data sheet, which is what the signal chain is told.
+    /// Noise of the sensor relative to its data sheet; the signal chain assumes the data sheet.
     noise: f64,
 }
 
-/// What came of a line.
+/// Results of the cuts of one line.
 #[derive(Clone, Debug)]
 pub struct Rates {
     line: Line,
@@ -49,7 +49,7 @@ impl Line {
         }
     }
 
-    /// Below and above the limit at the speed with this index in [`LIMITS`].
+    /// Two lines, below and above the stability limit, at the speed with this index in [`LIMITS`].
     pub fn pair(index: usize) -> [Self; 2] {
         let (rpm, limit_mm, kind, chatter_hz) = LIMITS[index];
         [
@@ -58,7 +58,7 @@ impl Line {
         ]
     }
 
-    /// Runout of a tool that is stable near μ = −1: |μ| is 0.97 to 0.99.
+    /// Stable cut near a flip with runout: Floquet multiplier near −1 with |μ| from 0.97 to 0.99.
     pub fn runout(teeth: u32, offset_um: f64) -> Self {
         let (rpm, depth_mm) = match teeth {
             2 => (1050.0, 1.2),
@@ -74,7 +74,7 @@ impl Line {
         line
     }
 
-    /// The depth grows over so many tooth passings.
+    /// Cut above the limit whose depth increases over this number of tooth passings.
     pub fn ramp(index: usize, passings: f64) -> Self {
         let [_, mut line] = Self::pair(index);
         let seconds = passings * 30.0 / line.cut.spindle_rpm;
@@ -83,7 +83,7 @@ impl Line {
         line
     }
 
-    /// Below the limit, on a structure that is shaken.
+    /// Stable cut with a random force on the structure.
     pub fn shaken(index: usize, newton_per_root_hertz: f64) -> Self {
         let [mut line, _] = Self::pair(index);
         line.shaking = newton_per_root_hertz;
@@ -91,7 +91,7 @@ impl Line {
         line
     }
 
-    /// Below the limit, with a sensor noisier than the signal chain is told.
+    /// Stable cut with a sensor whose noise exceeds the data sheet by the factor `noise`.
     pub fn noisy(index: usize, noise: f64) -> Self {
         let [mut line, _] = Self::pair(index);
         line.noise = noise;
@@ -109,7 +109,7 @@ impl Line {
         Case::parse(&path, &text).expect("a case")
     }
 
-    /// Range, clock and tachometer differ from one to the next.
+    /// Sensors of cut `number`: range, clock error and tachometer vary.
     fn sensors(number: u64) -> (Accelerometer, TachometerModel) {
         let index = number as usize;
         let accelerometer = Accelerometer {
@@ -127,10 +127,10 @@ impl Line {
         (accelerometer, tachometer)
     }
 
-    /// Cuts with so many seeds.
+    /// Runs the cuts of the line with this number of seeds.
     pub fn run(self, seeds: u64) -> Rates {
         let case = self.case();
-        // What the structure is shaken by differs with the seed, what the sensors do not see does not.
+        // A random force requires a new simulation for each seed; sensor noise alone does not.
         let cuts = if self.shaking > 0.0 { seeds } else { seeds.min(4) };
         let simulated: Vec<SimulatedCut> = (0..cuts)
             .map(|number| {
@@ -150,7 +150,7 @@ impl Line {
     }
 }
 
-/// Runs lines, as many at once as there are processors, in the order given.
+/// Runs all lines in parallel on all processors; results keep the order of the lines.
 pub fn run(lines: Vec<Line>, seeds: u64) -> Vec<Rates> {
     let count = lines.len();
     let queue = Mutex::new(lines.into_iter().enumerate());
@@ -180,14 +180,14 @@ impl Rates {
         })
     }
 
-    /// Cuts with the wrong alarm: any, where none is right.
+    /// Number of cuts with a wrong alarm; for a stable cut any alarm is wrong.
     pub fn wrong(&self) -> usize {
         let right = self.line.right.map(|(kind, _)| kind);
         self.alarms().filter(|(_, kind, _)| Some(*kind) != right).count()
     }
 
-    /// Cuts with the right alarm before the vibration was so many times the forced one; where loss of contact keeps it below that,
-    /// while it is cut at all.
+    /// Number of cuts with the correct alarm before the vibration exceeded the forced vibration by the factor `ratio`; if loss of
+    /// contact limits the vibration to less, before the end of the cut.
     pub fn in_time(&self, ratio: f64) -> usize {
         let right = self.line.right.map(|(kind, _)| kind);
         let is_in_time = |outcome: &&Outcome| {
@@ -199,14 +199,14 @@ impl Rates {
         self.outcomes.iter().filter(is_in_time).count()
     }
 
-    /// The largest error of the frequency told with the first alarm, Hz.
+    /// Largest error of the chatter frequency in the first alarm, Hz.
     pub fn frequency_error_hz(&self) -> f64 {
         let right = self.line.right.map_or(0.0, |(_, hz)| hz);
         self.alarms()
             .fold(0.0, |worst, (.., hz)| worst.max((hz - right).abs()))
     }
 
-    /// Whether there is chatter to be called.
+    /// Whether the cuts chatter.
     pub fn has_chatter(&self) -> bool {
         self.line.right.is_some()
     }
@@ -218,12 +218,12 @@ impl Rates {
 }
 
 impl Rates {
-    /// What is cut.
+    /// Description of the cuts.
     pub fn name(&self) -> &str {
         &self.line.name
     }
 
-    /// Rates in words: of false alarms below the limit, of verdicts in time and of the right kind above it.
+    /// Rates as text: false alarms of stable cuts; timely and correct verdicts of cuts with chatter.
     pub fn findings(&self) -> String {
         let cuts = self.cuts();
         if self.line.right.is_none() {
@@ -248,10 +248,10 @@ impl fmt::Display for Rates {
     }
 }
 
-/// Entry and exit through the faces, and twelve seconds of full cut: at 1.5 to 3 % per tooth 240 teeth at the least.
+/// Cut with entry and exit through the side faces and 12 s of full engagement, at least 240 tooth passings.
 fn long_cut(rpm: f64, depth_mm: f64) -> VirtualCut {
     let mut cut = VirtualCut::new(rpm, depth_mm, 20.0);
-    // From the first touch to half immersion: radius over feed speed.
+    // Time from first contact to half immersion: tool radius divided by feed speed.
     let way_s = 6.35 / (0.15 * 2.0 * rpm / 60.0);
     cut.seconds = 2.0 * way_s + 12.0 + 2.0 * cut.air_s;
     cut

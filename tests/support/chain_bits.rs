@@ -1,7 +1,7 @@
-//! Runs the signal chain on fixed inputs and boils its results down to one number per part.
+//! Runs the signal chain on fixed inputs and computes one digest of the results of each stage.
 //!
-//! Compiled into the counting image and into the tests: both must come to the same numbers, for the
-//! chain computes the same bits on every target.
+//! The instruction-counting firmware image and the tests both contain this file. Their digests must agree, since the chain computes
+//! the same bits on every target.
 
 use quietcut_core::acceleration::Counts;
 use quietcut_core::decimation::{self, Decimation, Sample};
@@ -25,7 +25,7 @@ impl Digest {
     }
 
     fn float(&mut self, value: f32) {
-        // The sign and payload of a NaN are the processor's own.
+        // Sign and payload of a NaN depend on the processor.
         self.word(if value.is_nan() { u32::MAX } else { value.to_bits() });
     }
 
@@ -37,18 +37,18 @@ impl Digest {
     }
 }
 
-/// A linear congruential generator: the same numbers everywhere.
+/// Linear congruential generator with the same numbers on every target.
 struct Noise(u32);
 
 impl Noise {
     fn next(&mut self) -> u32 {
         self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        // The lower bits have short periods.
+        // The lower bits of a linear congruential generator have short periods.
         self.0 ^ (self.0 >> 16)
     }
 }
 
-/// All functions of `math` on numbers of all sizes, signs and kinds.
+/// Digest of all functions of `math` over small, large, negative and special numbers.
 pub fn of_math() -> u32 {
     let (mut digest, mut noise) = (Digest::new(), Noise(1));
     for _ in 0..5000 {
@@ -76,7 +76,7 @@ pub fn of_math() -> u32 {
     digest.0
 }
 
-/// Counts of a cut: noise, gravity and two tones, 4000 samples.
+/// 4000 sensor samples of an artificial cut: noise, gravity and two sines.
 pub fn counts() -> impl Iterator<Item = Counts> {
     let mut noise = Noise(2);
     (0..4000).map(move |n| {
@@ -86,7 +86,7 @@ pub fn counts() -> impl Iterator<Item = Counts> {
     })
 }
 
-/// Both bands of the cascade, at rates with all kinds of stages.
+/// Digest of both bands of the decimation cascade at sampling rates that use every kind of stage.
 pub fn of_decimation() -> u32 {
     let mut digest = Digest::new();
     for rate in [1_000.0, 10_000.0, 25_600.0, 26_667.0] {
@@ -103,7 +103,7 @@ pub fn of_decimation() -> u32 {
     digest.0
 }
 
-/// Memory for the spectra, too large for a stack.
+/// Buffers of the spectra, too large for a stack.
 pub struct Memory {
     /// The tool band's block.
     pub tool: Overlap<TOOL_POINTS>,
@@ -120,7 +120,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Nothing in it.
+    /// Creates empty buffers.
     #[allow(clippy::new_without_default)] // `const` is what it is for
     pub const fn new() -> Self {
         Self {
@@ -133,7 +133,7 @@ impl Memory {
         }
     }
 
-    /// Fills both blocks with the cut.
+    /// Fills both blocks with samples of the artificial cut.
     pub fn fill(&mut self) {
         for counts in counts() {
             let sample = counts.map(|count| i32::from(count) << decimation::FRACTION_BITS);
@@ -142,7 +142,7 @@ impl Memory {
         }
     }
 
-    /// The tool band's spectrum over all axes.
+    /// Power spectrum of the tool band, summed over all axes.
     pub fn tool_spectrum(&mut self) -> PowerSpectrum<'_> {
         let rate = Hertz(13_333.0);
         spectrum::tool_spectrum(
@@ -155,14 +155,14 @@ impl Memory {
         )
     }
 
-    /// The structure band's spectrum over all axes.
+    /// Power spectrum of the structure band, summed over all axes.
     pub fn structure_spectrum(&mut self) -> PowerSpectrum<'_> {
         let (work, power) = (&mut self.structure_work, &mut self.structure_power);
         spectrum::structure_spectrum(&self.structure, &[0, 1, 2], Hertz(1_666.7), 1e-6, work, power)
     }
 }
 
-/// The search for a tone that is no harmonic.
+/// Searches for a spectral line that is no spindle harmonic.
 pub fn search(spectrum: PowerSpectrum<'_>) -> Search {
     let last = spectrum.power.len() as f32 * spectrum.bin.0;
     let rotation = Rotation {
@@ -172,7 +172,7 @@ pub fn search(spectrum: PowerSpectrum<'_>) -> Search {
     spectrum.dominant_non_harmonic(rotation, Hertz(0.0), Hertz(last))
 }
 
-/// Both spectra and what is found in them.
+/// Digest of both spectra and of the lines found in them.
 pub fn of_spectra(memory: &mut Memory) -> u32 {
     fn note(digest: &mut Digest, spectrum: PowerSpectrum<'_>) {
         spectrum.power.iter().for_each(|&power| digest.float(power));

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
-/// No run of the command in a test takes longer, not even on a busy machine; a hang must end a test.
+/// Longest run of the command in a test: a choice that ends a hanging command even on a busy machine.
 const LONGEST: Duration = Duration::from_secs(120);
 
 /// The folder of the case files.
@@ -17,7 +17,7 @@ pub fn cases() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("cases")
 }
 
-/// The command beside the test that runs: in the same target folder, of the same profile.
+/// Path of the command built in the same target folder and profile as the running test.
 pub fn binary() -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own path");
     let folder = test
@@ -33,15 +33,15 @@ pub fn binary() -> PathBuf {
     binary
 }
 
-/// A folder of its own for a test, gone afterwards.
+/// Temporary folder of a test, deleted on drop.
 pub fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")
 }
 
-/// What a run left behind.
+/// Result of a run of the command.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Exit status; `None` where a signal ended it.
+    /// Exit status; `None` if a signal ended the command.
     pub status: Option<i32>,
     /// Standard output.
     pub stdout: String,
@@ -50,13 +50,13 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// The answer, which must be all of standard output.
+    /// Parses standard output, which must be one JSON object.
     pub fn json(&self) -> serde_json::Value {
         assert_eq!(self.status, Some(0), "{self:?}");
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:?}"))
     }
 
-    /// Asserts bad input: status 2, nothing on standard output, and all of `words` in one message.
+    /// Asserts an input error: exit status 2, empty standard output, and one message that contains all `words`.
     #[track_caller]
     pub fn refused(&self, words: &[&str]) {
         assert_eq!(self.status, Some(2), "{self:?}");
@@ -68,19 +68,19 @@ impl Outcome {
     }
 }
 
-/// A run that has started.
+/// Running command.
 #[derive(Debug)]
 pub struct Running {
     child: Child,
 }
 
 impl Running {
-    /// Closes standard output, as `head` does when it has enough.
+    /// Closes the reading end of standard output, as `head` does.
     pub fn stop_reading(&mut self) {
         drop(self.child.stdout.take());
     }
 
-    /// Waits for the end; a run that does not end is killed and fails the test.
+    /// Waits for the end of the command; a hanging command is killed and fails the test.
     pub fn finish(mut self) -> Outcome {
         let drain = |stream: Option<Box<dyn Read + Send>>| {
             std::thread::spawn(move || {
@@ -118,8 +118,7 @@ impl Running {
     }
 }
 
-/// While this is held no child process is started. What a test opens meanwhile and marks to be closed in children is
-/// in none of them.
+/// Lock that prevents the start of child processes, so that no child inherits the files that a test opens meanwhile.
 pub fn alone() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)

@@ -1,4 +1,4 @@
-//! Simulated cuts as steps of a pipeline.
+//! Simulated cuts as input of the signal chain.
 
 use quietcut::case::Case;
 use quietcut::simulate::{Accelerometer, Entry, TachometerModel, VirtualCut};
@@ -10,18 +10,18 @@ use crate::acceptance::settings;
 use crate::command;
 use crate::said::{Step, steps};
 
-/// A cut of `kuka-kr90-acetal`, heard by a sensor whose clock is off by 2 %.
+/// Simulated cut of `kuka-kr90-acetal`; the clock of its sensor has an error of 2 %.
 pub struct Cut {
-    /// Settings for it.
+    /// Settings of the signal chain for this cut.
     pub settings: Settings,
-    /// The working point.
+    /// Working point of the cut.
     pub working_point: WorkingPoint,
-    /// Blocks with their edges.
+    /// Blocks of samples with their tachometer edges.
     pub steps: Vec<Step>,
 }
 
 impl Cut {
-    /// Cuts for so long, `entry` included; `seed` makes the noise of the sensors repeat.
+    /// Simulates a cut of this duration, including `entry`; `seed` sets the sensor noise.
     pub fn new(entry: Entry, spindle_rpm: f64, depth_mm: f64, seconds: f64, seed: u64) -> Self {
         let case = Case::read(command::cases().join("kuka-kr90-acetal.toml")).expect("a case");
         let accelerometer = Accelerometer {

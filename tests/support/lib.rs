@@ -1,6 +1,5 @@
-//! What several tests share: where the binary, the cases and the measured data are, the firmware
-//! images and the emulator that runs them.
-// A helper that cannot do its work fails the test that called it.
+//! Shared code of the integration tests: paths of command, cases and measured data, firmware images, emulator.
+// A helper function that fails must fail the test that calls it.
 #![allow(clippy::expect_used, clippy::panic)]
 
 pub mod acceptance;

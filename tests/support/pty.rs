@@ -10,10 +10,10 @@ use std::time::Duration;
 use crate::command::alone;
 use quietcut::device::pseudo_terminal::PseudoTerminal;
 
-/// How long the threads wait before they look whether they are still wanted.
+/// Longest wait of the threads before they check whether to stop: a choice.
 const TURN: Duration = Duration::from_millis(20);
 
-/// A serial device that lasts as long as this.
+/// Serial device that exists until this value is dropped.
 pub struct Pty {
     path: String,
     wanted: Arc<AtomicBool>,
@@ -21,7 +21,7 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// A serial device that passes bytes to and from this socket.
+    /// Creates a serial device that forwards bytes to and from this socket.
     pub fn to_socket(socket: UnixStream) -> Self {
         let alone = alone();
         let terminal = PseudoTerminal::new().expect("a pseudo-terminal");
@@ -60,13 +60,13 @@ impl Drop for Pty {
     fn drop(&mut self) {
         self.wanted.store(false, Ordering::Relaxed);
         for thread in self.threads.drain(..) {
-            // A thread that failed has said so.
+            // A panic of the thread has already been printed.
             let _ = thread.join();
         }
     }
 }
 
-/// Passes bytes on until one end is closed or nobody wants them any more.
+/// Forwards bytes from the terminal to the socket until one end is closed or `wanted` is false.
 fn to_socket(mut terminal: PseudoTerminal, mut socket: UnixStream, wanted: &AtomicBool) {
     let mut bytes = [0; 4096];
     while wanted.load(Ordering::Relaxed) {
@@ -79,7 +79,7 @@ fn to_socket(mut terminal: PseudoTerminal, mut socket: UnixStream, wanted: &Atom
     }
 }
 
-/// Passes bytes back; where nobody reads them at the other end the sender is held back.
+/// Forwards bytes from the socket to the terminal; a full terminal blocks the sender.
 fn from_socket(mut terminal: PseudoTerminal, mut socket: UnixStream, wanted: &AtomicBool) {
     let mut bytes = [0; 4096];
     while wanted.load(Ordering::Relaxed) {

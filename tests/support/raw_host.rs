@@ -1,22 +1,22 @@
-//! A host that says what it likes, right or wrong.
+//! Host that sends arbitrary bytes, valid or invalid.
 
 use std::time::{Duration, Instant};
 
 use quietcut::device::port::Port;
 use quietcut_core::protocol::{Decoder, MAX_FRAME, Reply, Request, Response, encode};
 
-/// The longest wait for a response: the emulator on a busy machine.
+/// Longest wait for a response: a choice that allows for the emulator on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(30);
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A host at a port that sends bytes and hears responses one by one.
+/// Host at a port that sends bytes and receives responses one by one.
 pub struct RawHost {
     port: Box<dyn Port>,
     decoder: Decoder,
 }
 
 impl RawHost {
-    /// A host at this port.
+    /// Creates a host at this port.
     pub fn new(port: Box<dyn Port>) -> Self {
         Self {
             port,
@@ -29,11 +29,11 @@ impl RawHost {
         self.port.send(bytes, SECOND).expect("the line takes bytes");
     }
 
-    /// The next response.
+    /// Receives the next response.
     pub fn hear(&mut self) -> Response {
         let began = Instant::now();
         while began.elapsed() < PATIENCE {
-            // One byte at a time: what comes behind the frame is left for the next call.
+            // Reads one byte at a time, so that bytes after the frame remain for the next call.
             let mut byte = [0];
             if self.port.receive(&mut byte, SECOND).expect("the line holds") == 1
                 && let Some(frame) = self.decoder.push(byte[0])
@@ -44,7 +44,7 @@ impl RawHost {
         panic!("the device says nothing within {PATIENCE:?}");
     }
 
-    /// The reply to a request under this sequence number.
+    /// Sends a request with this sequence number and returns its reply.
     pub fn ask(&mut self, number: u16, request: &Request) -> Reply {
         self.say(&frame(number, request));
         match self.hear() {
@@ -54,7 +54,7 @@ impl RawHost {
     }
 }
 
-/// The frame of a request under this sequence number.
+/// Encodes a request with this sequence number as a frame.
 pub fn frame(number: u16, request: &Request) -> Vec<u8> {
     let mut buffer = [0; MAX_FRAME];
     encode(request, number, &mut buffer)
@@ -62,12 +62,12 @@ pub fn frame(number: u16, request: &Request) -> Vec<u8> {
         .to_vec()
 }
 
-/// A frame that is right in all but its version.
+/// Valid frame except for its protocol version.
 pub fn frame_of_version(version: u8, number: u16) -> Vec<u8> {
     let [low, high] = number.to_le_bytes();
     let mut raw = vec![version, low, high, 0];
     raw.extend(quietcut_core::checksum::crc32([&raw[..]]).to_le_bytes());
-    // COBS by hand: each zero is replaced by the distance to the next.
+    // COBS encoding: each zero byte is replaced by the distance to the next one.
     let mut cobs = Vec::new();
     for part in raw.split(|&byte| byte == 0) {
         cobs.push(part.len() as u8 + 1);

@@ -1,4 +1,4 @@
-//! What a pipeline says of a cut: on the host, and from a device, in a form that can be compared to the bit.
+//! Outputs of the signal chain for a cut, on the host and on a device, for a comparison bit by bit.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -15,17 +15,17 @@ use quietcut_core::units::Nanoseconds;
 use quietcut_core::working_point::WorkingPoint;
 use quietcut_firmware::stimulus::Stimulus;
 
-/// Everything that can be subscribed to.
+/// Subscription to all events of a device.
 pub const ALL: Subscription = Subscription {
     reports: Reports::All,
     spectra: true,
     strobes: true,
 };
 
-/// Samples and edges of one step.
+/// Block of samples and tachometer edges of one step of the signal chain.
 pub type Step = (Block, Vec<Edge>);
 
-/// What sensors heard in steps: an edge belongs to the block before whose successor it came.
+/// Splits a sensor signal into steps; a tachometer edge belongs to the last block that starts before it.
 pub fn steps(heard: Heard) -> Vec<Step> {
     let mut edges = heard.edges.into_iter().peekable();
     let ends: Vec<_> = heard.blocks.iter().skip(1).map(|block| block.time).collect();
@@ -38,7 +38,7 @@ pub fn steps(heard: Heard) -> Vec<Step> {
     steps.collect()
 }
 
-/// Steps as the virtual spindle of an emulated board sends them.
+/// Converts steps to the stimuli of the emulated board.
 pub fn stimuli(steps: &[Step]) -> Vec<Stimulus> {
     let of = |(block, edges): &Step| {
         let edges = edges.iter().copied().map(Stimulus::Edge);
@@ -47,14 +47,14 @@ pub fn stimuli(steps: &[Step]) -> Vec<Stimulus> {
     steps.iter().flat_map(of).collect()
 }
 
-/// What was said. Numbers are kept by their bits: a NaN equals itself, and 0 is not −0.
+/// Recorded outputs of the signal chain. Numbers are compared by their bits: a NaN equals itself, and 0 differs from −0.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Said {
-    /// Reports in postcard, in their order.
+    /// Serialized reports (postcard), in order.
     pub reports: Vec<Vec<u8>>,
-    /// Coordinates of the stroboscopic map, by the block that made them.
+    /// Stroboscopic samples, keyed by the number of their block.
     pub strobes: BTreeMap<u32, Vec<u8>>,
-    /// Bins of the spectra, by band and by the block that completed them.
+    /// Bins of the spectra, keyed by band and number of the completing block.
     pub spectra: BTreeMap<(bool, u32), Vec<u32>>,
 }
 
@@ -66,7 +66,7 @@ fn bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
 }
 
 impl Said {
-    /// Runs the host's pipeline over a cut.
+    /// Runs the signal chain on the host over a cut.
     pub fn on_host(
         settings: Settings,
         table: Option<&[u8]>,
@@ -98,7 +98,7 @@ impl Said {
         said
     }
 
-    /// Listens to a device until it has said something of as many blocks, and then falls silent.
+    /// Collects the events of a device until it has reported `blocks` blocks and sends nothing more.
     pub fn from_device(client: &mut Client, blocks: usize, patience: Duration) -> Self {
         let mut said = Self::default();
         let quiet = Duration::from_millis(200);
@@ -139,7 +139,7 @@ impl Said {
         }
     }
 
-    /// Asserts that a device said the same; names the first report that differs in words.
+    /// Asserts that the device gave the same outputs; a failure shows the first report that differs.
     pub fn assert_same(&self, device: &Self) {
         self.assert_same_reports(device);
         assert!(
@@ -151,7 +151,7 @@ impl Said {
         assert!(self.spectra == device.spectra, "bins of the spectra differ");
     }
 
-    /// The same of the reports alone.
+    /// Asserts that the device gave the same reports.
     pub fn assert_same_reports(&self, device: &Self) {
         let pairs = self.reports.iter().zip(&device.reports);
         for (number, (here, there)) in pairs.enumerate() {
@@ -166,7 +166,7 @@ impl Said {
         assert_eq!(self.reports.len(), device.reports.len(), "number of reports");
     }
 
-    /// The first chatter that was called.
+    /// Kind of the first reported chatter.
     pub fn first_alarm(&self) -> Option<Verdict> {
         let verdicts = self.reports.iter().map(|bytes| {
             let report: Report = postcard::from_bytes(bytes).expect("a report");

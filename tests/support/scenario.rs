@@ -1,4 +1,4 @@
-//! What happens between a host and a device, whatever port the device is at: emulated or simulated.
+//! Scenarios of the protocol between host and device, for emulated and simulated devices.
 
 use quietcut::device::Client;
 use quietcut::device::port::Port;
@@ -13,12 +13,12 @@ use crate::small_table::table;
 /// Opens the line to the device of a test; one line is open at a time.
 pub type Open<'a> = &'a dyn Fn() -> Box<dyn Port>;
 
-/// A session of the host's client, and what the device says of itself.
+/// Connects a client; returns it with the identity of the device.
 pub fn connect(open: Open<'_>) -> (Client, Info) {
     Client::connect(open()).expect("the device answers")
 }
 
-/// Uploads a table by the host's client; what the device says of itself afterwards.
+/// Uploads a table with the client; returns the identity and memory of the device afterwards.
 pub fn upload(client: &mut Client, bytes: &[u8]) -> Info {
     let table = LobeTable::parse(bytes).expect("a table");
     client
@@ -27,12 +27,12 @@ pub fn upload(client: &mut Client, bytes: &[u8]) -> Info {
         .info
 }
 
-/// Name of the table in use; empty where there is none.
+/// Name of the table in use; empty if there is none.
 pub fn name_in_use(info: &Info) -> &str {
     info.table.as_ref().map_or("", |table| table.name.as_str())
 }
 
-/// The real command uploads a table to the serial port `port`, tells the working point and asks for both.
+/// Uploads a table with the command to the serial port `port`, sets the working point, and reads both back.
 pub fn the_command_uploads_tells_and_asks(port: &str) {
     let folder = folder();
     let run = |arguments: &[&str]| quietcut(folder.path(), arguments).json();
@@ -56,7 +56,7 @@ pub fn the_command_uploads_tells_and_asks(port: &str) {
     let direction = ["--feed-direction-deg", "30"];
     let told = run(&[&["work", port, "--json"], &cut[..], &direction[..]].concat());
     assert_eq!(told["feed_direction_deg"], 30.0);
-    // Another run, another session, the same device.
+    // A second run of the command opens a new session with the same device.
     let info = run(&["info", port, "--json"]);
     assert_eq!(info["table"]["name"], "kuka", "{info}");
     assert_eq!(info["working_point"], expected);
@@ -64,8 +64,8 @@ pub fn the_command_uploads_tells_and_asks(port: &str) {
     assert_eq!(info["frame_errors"], 0, "{info}");
 }
 
-/// The real command replays a recording of chatter on the device at the serial port `port`: the answer is, to the last digit, that of the
-/// pipeline in the command, and the device is left as it was but for the table.
+/// Replays a recording with chatter on the device at the serial port `port`: the output equals, to the last digit, that of the signal
+/// chain on the host, and the device keeps its settings except for the table.
 pub fn a_recording_is_heard_there_as_it_is_here(port: &str) {
     let folder = folder();
     let run = |arguments: &[&str]| {
@@ -102,8 +102,8 @@ pub fn a_recording_is_heard_there_as_it_is_here(port: &str) {
     }
 }
 
-/// Frames that are cut short, changed, out of order, too long or of another version are each refused by name, and do
-/// nothing: table and slots stay.
+/// Truncated, damaged, disordered, oversized frames and frames of another version are refused with their own errors and change neither
+/// table nor slots.
 pub fn bad_frames_are_named_and_harm_nothing(open: Open<'_>) {
     let (mut client, _) = connect(open);
     upload(&mut client, &table("kept", 1.5, 50));
@@ -121,7 +121,7 @@ pub fn bad_frames_are_named_and_harm_nothing(open: Open<'_>) {
             other => panic!("{other:?}"),
         }
     };
-    // A commit would do harm, were it done.
+    // An executed commit would change the table.
     let good = frame(101, &Request::UploadCommit);
     let truncated = [&good[..good.len() - 4], &[0]].concat();
     let error = refusal(&truncated);
@@ -146,7 +146,7 @@ pub fn bad_frames_are_named_and_harm_nothing(open: Open<'_>) {
     );
     let error = refusal(&[0x55; 2000]);
     assert!(matches!(error, FrameError::TooLong { .. }), "{error}");
-    // Ends the frame without an end.
+    // A zero byte ends the unfinished frame.
     host.say(&[0]);
     host.say(&frame_of_version(99, 101));
     let Response::FrameRefused(FrameError::Version { theirs: 99, .. }) = host.hear() else {
@@ -159,7 +159,7 @@ pub fn bad_frames_are_named_and_harm_nothing(open: Open<'_>) {
     assert_eq!(after, before);
 }
 
-/// A table that comes with a wrong CRC, past the checks of the host's client, is refused; the last good one stays in use.
+/// A table with a wrong CRC, sent without the checks of the client, is refused; the last valid table stays in use.
 pub fn a_table_with_a_wrong_crc_does_not_replace_the_last_good_one(open: Open<'_>) {
     let (mut client, _) = connect(open);
     let before = upload(&mut client, &table("good", 1.5, 50));

@@ -1,27 +1,27 @@
-//! A random force on the structure: what floor, drives and the material itself do besides the cut.
+//! Random force on the structure, which models excitation by floor, drives and material.
 
 use quietcut::simulate::Drive;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// White noise of the force in each axis, constant over steps of 0.5 ms.
+/// White-noise force in each axis, constant over steps of 0.5 ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shaking {
-    /// One-sided density, N per √Hz.
+    /// One-sided spectral density (square root), N/√Hz.
     pub newton_per_root_hertz: f64,
-    /// Makes it repeat.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// One force after another.
+/// Force vector in N of each time step.
 struct Steps(Vec<[f64; 3]>);
 
 impl Shaking {
-    /// A hundredth of the period of the robot's modes at 17 to 19 Hz: for them it is white.
+    /// Time step, s: about 1/100 of the period of the robot modes at 17 to 19 Hz, so that the force is white for them.
     const STEP_S: f64 = 0.5e-3;
 
-    /// The force from 0 on.
+    /// Random force from time 0 over this duration.
     pub fn for_seconds(self, seconds: f64) -> Box<dyn Drive> {
         let mut source = ChaCha8Rng::seed_from_u64(self.seed);
         let deviation_n = self.newton_per_root_hertz * (0.5 / Self::STEP_S).sqrt();
@@ -41,7 +41,7 @@ impl Drive for Steps {
     }
 
     fn next_knot_s(&self, t: f64) -> f64 {
-        // Times within a billionth of a step of a knot count as the knot.
+        // A time within 1e-9 steps of a step boundary counts as the boundary.
         ((t / Shaking::STEP_S + 1e-9).floor() + 1.0) * Shaking::STEP_S
     }
 }

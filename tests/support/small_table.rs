@@ -1,4 +1,4 @@
-//! Lobe tables of any size, made up.
+//! Artificial lobe tables of any size.
 // Some test crates include this file as a private module.
 #![allow(unreachable_pub, clippy::expect_used)]
 
