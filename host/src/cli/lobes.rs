@@ -44,8 +44,8 @@ pub struct Args {
     /// Compute the probability of a stable cut at every speed and depth from the standard deviations of the case.
     #[arg(long, requires = "rpm", conflicts_with_all = ["nominal", "cells"])]
     probability: bool,
-    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal). The chart
-    /// shows them, and wrong predictions are counted.
+    /// Trial cuts, a CSV file with the columns rpm [rev/min], depth [mm] and outcome (stable, chatter, marginal), or the table
+    /// that identify --method inverse-stability reads. The chart shows them, and wrong predictions are counted.
     #[arg(long, value_name = "FILE", requires = "rpm", conflicts_with = "cells")]
     cuts: Option<PathBuf>,
     /// Seed of the random parameters that are drawn from the standard deviations.
@@ -81,7 +81,7 @@ pub fn run(args: Args) -> Result<(), Error> {
             lobes_cells::run(&case, method.as_ref(), grid, args.out, args.output)
         }
         (Some(rpm), Some(depth_mm)) => {
-            let maker = |case: &Case| args.method.on(case).ok();
+            let maker = |case: &Case| args.method.on(case).map_err(|error| error.to_string());
             let uncertainty = if args.nominal {
                 None
             } else {

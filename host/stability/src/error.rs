@@ -91,7 +91,7 @@ pub enum StabilityError {
     /// The standard deviations of the case are so large that many drawn machines are not physical.
     #[error(
         "{}: with its deviations (keys that end in _std) {percent:.0} % of the machines are impossible: a damping ratio \
-         or a frequency below 0, or indefinite matrices; smaller deviations are needed",
+         or a frequency below 0, or indefinite matrices; smaller deviations are needed (the first one: {reason})",
         path.display()
     )]
     Deviations {
@@ -99,6 +99,8 @@ pub enum StabilityError {
         path: PathBuf,
         /// Percentage of drawn machines that are not physical.
         percent: f64,
+        /// Why the first of them is impossible.
+        reason: String,
     },
     /// A speed or depth that is out of range.
     #[error("{quantity} {value}: {expected} is needed")]

@@ -18,6 +18,8 @@ pub struct Ambient {
     pub rate_hz: f64,
     /// Spindle frequency whose harmonics were removed, Hz; `None` if no speed is known.
     pub turn_hz: Option<f64>,
+    /// Why a recorded tachometer does not give the angle of the spindle; the stated speed was used instead, if there is one.
+    pub tachometer_fault: Option<String>,
 }
 
 /// Fewest samples per period of the highest frequency after decimation.
@@ -37,7 +39,7 @@ impl Ambient {
             .map(of)
             .find(|channels| !channels.is_empty())?;
         let mut samples: Vec<Vec<f64>> = chosen.iter().map(|channel| channel.samples.clone()).collect();
-        let turn_hz = without_harmonics(recording, &mut samples, high_hz);
+        let (turn_hz, tachometer_fault) = without_harmonics(recording, &mut samples, high_hz);
         let every = (recording.sample_rate_hz / (PER_PERIOD * high_hz))
             .floor()
             .max(1.0) as usize;
@@ -46,6 +48,7 @@ impl Ambient {
             names: chosen.iter().map(|channel| channel.name.clone()).collect(),
             rate_hz: recording.sample_rate_hz / every as f64,
             turn_hz,
+            tachometer_fault,
         })
     }
 
@@ -56,13 +59,19 @@ impl Ambient {
 }
 
 /// Removes the mean and all spindle harmonics up to 1.2 `high_hz` by least squares over the record, and trims it to the range in
-/// which the spindle angle is known. Returns the spindle frequency, Hz.
-fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f64) -> Option<f64> {
+/// which the spindle angle is known. Returns the spindle frequency, Hz, and why a recorded tachometer does not give it.
+fn without_harmonics(
+    recording: &Recording,
+    samples: &mut [Vec<f64>],
+    high_hz: f64,
+) -> (Option<f64>, Option<String>) {
     let cut = recording.sidecar.cut.unwrap_or_default();
     let rate_hz = recording.sample_rate_hz;
+    let mut fault = None;
     let (first, angle) = match SpindleAngle::new(recording, cut.teeth.unwrap_or(1)) {
         Ok(angle) => (angle.first, angle.rad),
-        Err(_) => {
+        Err(error) => {
+            fault = recording.channel("tacho").map(|_| error.to_string());
             let rad_per_sample = cut.spindle_rpm.map_or(0.0, |rpm| TAU * rpm / 60.0 / rate_hz);
             let count = recording.len();
             (
@@ -107,7 +116,7 @@ fn without_harmonics(recording: &Recording, samples: &mut [Vec<f64>], high_hz: f
             }
         }
     }
-    (turn_hz > 0.0).then_some(turn_hz)
+    ((turn_hz > 0.0).then_some(turn_hz), fault)
 }
 
 /// Every so many samples, after a low-pass that is flat to a third of the new rate and closed from two thirds on (windowed sinc,

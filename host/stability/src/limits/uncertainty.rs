@@ -48,8 +48,8 @@ const SAMPLES_NEAR: usize = 16;
 /// Number of steps over the whole depth, as in a chart.
 const SAMPLES: usize = 40;
 
-/// Function that builds the method for a case; `None` if the case is not a valid machine.
-pub type Maker<'a> = dyn Fn(&Case) -> Option<Box<dyn Method>> + Sync + 'a;
+/// Function that builds the method for a case; the reason if the case is not a valid machine.
+pub type Maker<'a> = dyn Fn(&Case) -> Result<Box<dyn Method>, String> + Sync + 'a;
 
 /// Case with deviations, and the method for its machines.
 pub struct Uncertainty<'a> {
@@ -182,12 +182,13 @@ impl<'a> Uncertainty<'a> {
             return Err(StabilityError::Deviations {
                 path: self.case.path.clone(),
                 percent: 100.0 * impossible,
+                reason: batches.first_reason().unwrap_or_default().into(),
             });
         }
         Ok(())
     }
 
-    /// Line of a machine, at least up to its first limit; `None` if the machine is not valid.
+    /// Line of a machine, at least up to its first limit; the reason if the machine is not valid.
     fn line(
         &self,
         machine: &DVector<f64>,
@@ -195,14 +196,15 @@ impl<'a> Uncertainty<'a> {
         depth_mm: f64,
         planes: &[Plane],
         whole: bool,
-    ) -> Result<Option<SpeedLine>, StabilityError> {
+    ) -> Result<Result<SpeedLine, String>, StabilityError> {
         let mut case = self.case.clone();
         let mut moves = self.variables.iter().zip(machine.iter());
         if !moves.all(|(variable, deviations)| variable.shift(&mut case, *deviations)) {
-            return Ok(None);
+            return Ok(Err("a parameter lies outside of its bounds".into()));
         }
-        let Some(method) = (self.maker)(&case) else {
-            return Ok(None);
+        let method = match (self.maker)(&case) {
+            Ok(method) => method,
+            Err(reason) => return Ok(Err(reason)),
         };
         let predicted_mm = planes
             .iter()
@@ -214,17 +216,17 @@ impl<'a> Uncertainty<'a> {
         if !whole && near_mm < 0.7 * depth_mm {
             let line = method.line(rpm, near_mm, SAMPLES_NEAR)?;
             if limit_of(&line).is_some() {
-                return Ok(Some(line));
+                return Ok(Ok(line));
             }
         }
-        method.line(rpm, depth_mm, SAMPLES).map(Some)
+        method.line(rpm, depth_mm, SAMPLES).map(Ok)
     }
 }
 
-/// Drawn machine, by its standard normal variables, with its line; `None` if the machine is not valid.
+/// Drawn machine, by its standard normal variables, with its line; the reason if the machine is not valid.
 struct Drawn {
     machine: DVector<f64>,
-    line: Option<SpeedLine>,
+    line: Result<SpeedLine, String>,
 }
 
 /// Batches of machines, each stratified.
@@ -232,11 +234,25 @@ struct Batches(Vec<Vec<Drawn>>);
 
 impl Batches {
     fn lines(&self) -> impl Iterator<Item = &SpeedLine> {
-        self.0.iter().flatten().filter_map(|drawn| drawn.line.as_ref())
+        self.0
+            .iter()
+            .flatten()
+            .filter_map(|drawn| drawn.line.as_ref().ok())
+    }
+
+    /// Why the first machine that cannot exist does not.
+    fn first_reason(&self) -> Option<&str> {
+        let reasons = self
+            .0
+            .iter()
+            .flatten()
+            .filter_map(|drawn| drawn.line.as_ref().err());
+        reasons.map(String::as_str).next()
     }
 
     fn limits(&self) -> Limits {
-        let of_batch = |batch: &Vec<Drawn>| Sorted::new(batch.iter().filter_map(|drawn| drawn.line.as_ref()));
+        let of_batch =
+            |batch: &Vec<Drawn>| Sorted::new(batch.iter().filter_map(|drawn| drawn.line.as_ref().ok()));
         Limits {
             all: Sorted::new(self.lines()),
             by_batch: self.0.iter().map(of_batch).collect(),
@@ -256,6 +272,7 @@ impl Batches {
                 let limit = drawn
                     .line
                     .as_ref()
+                    .ok()
                     .map(|line| limit_of(line).unwrap_or(f64::INFINITY));
                 limit.is_some_and(|limit_mm| limit_mm < percentile_mm)
             });

@@ -137,7 +137,7 @@ impl Family {
         let Some(percent) = self.percentile else {
             return Ok(lines);
         };
-        let maker = |case: &Case| collocation_of(case).ok();
+        let maker = |case: &Case| collocation_of(case).map_err(|error| error.to_string());
         let Some(uncertainty) = Uncertainty::new(&self.case, &maker, SEED) else {
             return Ok(lines);
         };
