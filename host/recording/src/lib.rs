@@ -37,6 +37,7 @@
 mod assemble;
 mod blocks;
 mod csv;
+pub mod cut_table;
 mod error;
 pub mod file;
 mod formats;

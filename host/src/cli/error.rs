@@ -8,8 +8,8 @@ use crate::device::DeviceError;
 use crate::file::FileError;
 use crate::lobe_table::BuildError;
 use crate::plan::PlanError;
+use crate::recording::cut_table::CutTableError;
 use crate::stability::StabilityError;
-use crate::trial_cuts::TestCutsError;
 
 type Cause = Box<dyn StdError + Send + Sync>;
 
@@ -112,10 +112,10 @@ impl From<BuildError> for Error {
     }
 }
 
-impl From<TestCutsError> for Error {
-    fn from(error: TestCutsError) -> Self {
+impl From<CutTableError> for Error {
+    fn from(error: CutTableError) -> Self {
         match error {
-            TestCutsError::File(cause) => cause.into(),
+            CutTableError::File(cause) => cause.into(),
             other => Self::input(other),
         }
     }

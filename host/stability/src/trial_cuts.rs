@@ -1,28 +1,18 @@
 //! Trial cuts with observed outcomes, and how often a method predicts them correctly.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
 use crate::error::StabilityError;
 use crate::limits::method::Method;
 use crate::limits::speed_line::SpeedLine;
-use quietcut_recording::file::{FileError, read_text};
+use quietcut_recording::cut_table::{self, CutTableError};
+
+pub use quietcut_recording::cut_table::Outcome;
 
 /// Number of steps in depth at which Floquet multipliers are computed. A choice: half more than the least of a chart.
 const SAMPLES: usize = 60;
-
-/// Observed outcome of a trial cut.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Outcome {
-    /// The vibration decayed.
-    Stable,
-    /// The vibration grew, or stayed large.
-    Chatter,
-    /// The outcome could not be classified.
-    Marginal,
-}
 
 /// Trial cut: spindle speed, axial depth and observed outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -50,67 +40,23 @@ pub struct Calls {
     pub undecided: usize,
 }
 
-/// Error on reading a file of trial cuts.
-#[derive(Debug, thiserror::Error)]
-pub enum TestCutsError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// A line of the file is not a valid trial cut.
-    #[error(
-        "{}, line {line}: {found}; `rpm [rev/min],depth [mm],outcome` is needed with outcomes stable, chatter and marginal",
-        path.display()
-    )]
-    Wrong {
-        /// Path of the file.
-        path: PathBuf,
-        /// Line number, from 1.
-        line: usize,
-        /// Text of the line.
-        found: String,
-    },
-}
-
-/// Column heads of a file of trial cuts.
+/// Columns of a file of trial cuts.
 const HEADER: [&str; 3] = ["rpm [rev/min]", "depth [mm]", "outcome"];
 
-/// Reads trial cuts from a CSV file with the columns `rpm [rev/min],depth [mm],outcome`.
+/// Reads the trial cuts of a table; the chatter frequency is not kept.
 ///
 /// # Errors
-/// The file cannot be read, has other columns, or contains an invalid speed, depth or outcome.
-pub fn read(path: &Path) -> Result<Vec<TestCut>, TestCutsError> {
-    let text = read_text(path)?;
-    let wrong = |line: usize, found: String| TestCutsError::Wrong {
-        path: path.into(),
-        line,
-        found,
-    };
-    let mut lines = text.lines().enumerate();
-    match lines.next() {
-        Some((_, header)) if header.split(',').map(str::trim).eq(HEADER) => {}
-        header => return Err(wrong(1, format!("`{}`", header.map_or("", |(_, line)| line)))),
-    }
-    lines
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(index, line)| cut(line).ok_or_else(|| wrong(index + 1, format!("`{line}`"))))
-        .collect()
-}
-
-fn cut(line: &str) -> Option<TestCut> {
-    let [rpm, depth_mm, outcome] = line.split(',').map(str::trim).collect::<Vec<_>>()[..] else {
-        return None;
-    };
-    let positive = |text: &str| text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
-    Some(TestCut {
-        rpm: positive(rpm)?,
-        depth_mm: positive(depth_mm)?,
-        outcome: match outcome {
-            "stable" => Outcome::Stable,
-            "chatter" => Outcome::Chatter,
-            "marginal" => Outcome::Marginal,
-            _ => return None,
-        },
-    })
+/// The file cannot be read, has other columns, or a speed, depth or outcome that cannot be.
+pub fn read(path: &Path) -> Result<Vec<TestCut>, CutTableError> {
+    let cuts = cut_table::read(path)?;
+    Ok(cuts
+        .iter()
+        .map(|cut| TestCut {
+            rpm: cut.rpm,
+            depth_mm: cut.depth_mm,
+            outcome: cut.outcome,
+        })
+        .collect())
 }
 
 /// Trial cuts as the text of a CSV file; the inverse of [`read`].

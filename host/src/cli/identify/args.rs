@@ -16,7 +16,8 @@ use crate::identify::law::Extra;
 )]
 pub struct Args {
     /// Recordings; for modes also a table of receptances; for inverse-stability a table of cuts with the columns
-    /// rpm,depth_mm,chatter_hz,verdict: the verdict is stable, chatter, hopf or period-doubling, and chatter_hz is empty for a stable cut.
+    /// rpm,depth_mm,chatter_hz,verdict: the verdict is stable, chatter, hopf, period-doubling or marginal, and chatter_hz is empty for a
+    /// stable cut. The table that lobes --cuts reads is accepted too.
     #[arg(value_name = "REC", required = true)]
     pub(super) recordings: Vec<PathBuf>,
     /// Identification method.

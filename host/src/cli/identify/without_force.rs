@@ -6,8 +6,9 @@ use super::args::Args;
 use crate::case::Case;
 use crate::identify::ambient::Ambient;
 use crate::identify::inverse_stability::{Before, Errors, InverseMode, Spread, identified_modes, modes};
-use crate::identify::{case_file, observed_cut, subspace};
-use crate::recording::{Kind, Recording};
+use crate::identify::observed_cut::ObservedCut;
+use crate::identify::{case_file, subspace};
+use crate::recording::{Kind, Recording, cut_table};
 use crate::stability::{CubicTerms, Problem};
 
 /// Identifies modes from a recording of motion under unmeasured excitation.
@@ -35,6 +36,18 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Ident
     let found = subspace::modes(&ambient, band_hz)
         .map_err(|error| Error::input(format!("{}: {error}", recording.path.display())))?;
     let mut warnings = Vec::new();
+    if let Some(fault) = &ambient.tachometer_fault {
+        warnings.push(format!(
+            "the tachometer is ignored ({fault}); {}",
+            match ambient.turn_hz {
+                Some(turn_hz) => format!(
+                    "the harmonics of the configured speed, {:.1} rev/min, are removed",
+                    60.0 * turn_hz
+                ),
+                None => "no speed is configured, so the motion still contains the spindle harmonics".into(),
+            }
+        ));
+    }
     if recording.sidecar.kind == Some(Kind::Cutting) {
         warnings.push(
             "this recording was made in a cut: the modes include the stiffness and damping of the cutting process"
@@ -87,7 +100,15 @@ pub(super) fn inverse_stability(args: &Args) -> Result<IdentifyOutput, Error> {
             args.recordings.len()
         )));
     };
-    let cuts = observed_cut::read(path).map_err(|error| Error::input(error.to_string()))?;
+    let table = cut_table::read(path)?;
+    let cuts: Vec<ObservedCut> = table.iter().filter_map(ObservedCut::new).collect();
+    if cuts.is_empty() {
+        return Err(Error::input(format!(
+            "{}: there are no cuts that were stable or chattered; a row for each cut is needed",
+            path.display()
+        )));
+    }
+    let marginal = table.len() - cuts.len();
     let Some(start) = &args.start else {
         return Err(Error::input(
             "--method inverse-stability needs --start CASE.toml: tool, material and cut, and an initial structure",
@@ -121,8 +142,15 @@ pub(super) fn inverse_stability(args: &Args) -> Result<IdentifyOutput, Error> {
         .and_then(std::path::Path::file_stem)
         .unwrap_or_default()
         .to_string_lossy();
+    let warnings = (marginal > 0).then(|| {
+        format!(
+            "{}: {marginal} marginal cuts are ignored; they may lie on either side of the limit",
+            path.display()
+        )
+    });
     Ok(IdentifyOutput {
         modes: Some(of_modes),
+        warnings: warnings.into_iter().collect(),
         messages: lines,
         table: Some(case_file::modal(&name, &directions, &identified)),
         ..IdentifyOutput::of("inverse-stability", Vec::new(), Vec::new())
