@@ -8,11 +8,35 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use quietcut_numerics::eigenvalues::of_real;
-use quietcut_numerics::singular_values::{Vectors, decompose};
+use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
+use quietcut_numerics::singular_values::{SingularValueError, Vectors, decompose};
 
 /// Rounds of moving the poles; they settle within a few.
 const ROUNDS: usize = 20;
+
+/// Why no sum of modes can be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RationalFitError {
+    /// Fewer equations than unknowns.
+    #[error("{lines} frequencies and {functions} functions other than zero do not determine {modes} modes")]
+    Undetermined {
+        /// Number of frequencies.
+        lines: usize,
+        /// Number of functions that are not zero.
+        functions: usize,
+        /// Number of modes.
+        modes: usize,
+    },
+    /// The least-squares equations have no computable singular values.
+    #[error(transparent)]
+    Equations(#[from] SingularValueError),
+    /// The least-squares equations have no solution.
+    #[error("{0}")]
+    Solution(&'static str),
+    /// The poles cannot be computed.
+    #[error(transparent)]
+    Poles(#[from] EigenvalueError),
+}
 
 /// A sum of modes H_k(s) = Σ_r R_kr/(s − λ_r) + R*_kr/(s − λ*_r) + d_k + e_k/s², s = iω.
 #[derive(Clone, Debug)]
@@ -39,14 +63,18 @@ impl RationalFit {
     }
 }
 
-/// Fits `modes` modes; `None` where there are too few frequencies or the equations break down.
+/// Fits `modes` modes to `functions`, which have a value for each frequency.
 ///
-/// `functions` have a value for each frequency.
-pub(super) fn fit(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) -> Option<RationalFit> {
-    let (first, last) = (*frequency_hz.first()?, *frequency_hz.last()?);
-    if modes == 0 || frequency_hz.len() < 2 * modes + 4 || functions.is_empty() {
-        return None;
-    }
+/// # Errors
+/// There are too few frequencies, or an iteration exceeds its bound.
+pub(super) fn fit(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+    modes: usize,
+) -> Result<RationalFit, RationalFitError> {
+    let (&[first, .., last], false) = (frequency_hz, frequency_hz.len() < 2 * modes + 4 || modes == 0) else {
+        return Err(undetermined(frequency_hz, functions, modes));
+    };
     // Lightly damped, over the band.
     let mut poles: Vec<Complex64> = (0..modes)
         .map(|mode| {
@@ -76,10 +104,23 @@ fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     row
 }
 
+fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) -> RationalFitError {
+    let is_zero = |function: &&&[Complex64]| function.iter().all(|h| h.norm_sqr() == 0.0);
+    RationalFitError::Undetermined {
+        lines: frequency_hz.len(),
+        functions: functions.len() - functions.iter().filter(is_zero).count(),
+        modes,
+    }
+}
+
 /// Poles of the next round: zeros of σ(s) = 1 + Σ c_n φ_n(s), which makes σH a sum of the old poles.
-fn moved(frequency_hz: &[f64], functions: &[&[Complex64]], poles: &[Complex64]) -> Option<Vec<Complex64>> {
+fn moved(
+    frequency_hz: &[f64],
+    functions: &[&[Complex64]],
+    poles: &[Complex64],
+) -> Result<Vec<Complex64>, RationalFitError> {
     let own = 2 * poles.len();
-    let scale = TAU * frequency_hz.last()?;
+    let scale = TAU * frequency_hz.last().copied().unwrap_or(0.0);
     let rows = 2 * frequency_hz.len();
     let mut left = DMatrix::<f64>::zeros(0, own);
     let mut right = DVector::<f64>::zeros(0);
@@ -119,10 +160,12 @@ fn moved(frequency_hz: &[f64], functions: &[&[Complex64]], poles: &[Complex64]) 
         }
     }
     if left.nrows() < own {
-        return None;
+        return Err(undetermined(frequency_hz, functions, poles.len()));
     }
-    let c = decompose(left, Vectors::Both).ok()?.solve(&right, 1e-13).ok()?;
-    zeros(poles, &c)
+    let c = decompose(left, Vectors::Both)?
+        .solve(&right, 1e-13)
+        .map_err(RationalFitError::Solution)?;
+    Ok(zeros(poles, &c)?)
 }
 
 /// Scales the first columns to one: the basis spans many powers of ten, and these unknowns are not used.
@@ -136,7 +179,7 @@ fn balance(matrix: &mut DMatrix<f64>, columns: usize) {
 }
 
 /// Zeros of 1 + Σ c_n φ_n: eigenvalues of A − b cᵀ in real form, turned to the stable side.
-fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Option<Vec<Complex64>> {
+fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, EigenvalueError> {
     let size = 2 * poles.len();
     let mut matrix = DMatrix::<f64>::zeros(size, size);
     for (n, pole) in poles.iter().enumerate() {
@@ -149,8 +192,7 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Option<Vec<Complex64>> {
             matrix[(at, column)] -= 2.0 * c[column];
         }
     }
-    let mut upper: Vec<Complex64> = of_real(matrix)
-        .ok()?
+    let mut upper: Vec<Complex64> = of_real(matrix)?
         .iter()
         .filter(|value| value.im > 0.0)
         .map(|value| Complex64::new(-value.re.abs(), value.im))
@@ -161,16 +203,19 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Option<Vec<Complex64>> {
         let omega = highest * (0.9 + 0.05 * upper.len() as f64);
         upper.push(Complex64::new(-0.05 * omega, omega));
     }
-    Some(upper)
+    Ok(upper)
 }
 
 /// Residues by least squares, for poles that are settled.
+///
+/// # Errors
+/// There is no frequency, or an iteration exceeds its bound.
 pub fn residues(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
     poles: Vec<Complex64>,
-) -> Option<RationalFit> {
-    let scale = TAU * frequency_hz.last()?;
+) -> Result<RationalFit, RationalFitError> {
+    let scale = TAU * frequency_hz.last().copied().unwrap_or(0.0);
     let width = 2 * poles.len() + 2;
     let mut matrix = DMatrix::<f64>::zeros(2 * frequency_hz.len(), width);
     for (k, &hertz) in frequency_hz.iter().enumerate() {
@@ -181,13 +226,15 @@ pub fn residues(
     }
     let norms: Vec<f64> = matrix.column_iter().map(|column| column.norm()).collect();
     balance(&mut matrix, width);
-    let decomposed = decompose(matrix.clone(), Vectors::Both).ok()?;
+    let decomposed = decompose(matrix.clone(), Vectors::Both)?;
     let (mut all, mut rest) = (0.0, 0.0);
     let mut residues = Vec::with_capacity(functions.len());
     for function in functions {
         let values = function.iter().flat_map(|h| [h.re, h.im]);
         let right = DVector::from_iterator(2 * frequency_hz.len(), values);
-        let solution = decomposed.solve(&right, 1e-13).ok()?;
+        let solution = decomposed
+            .solve(&right, 1e-13)
+            .map_err(RationalFitError::Solution)?;
         // Each function counts alike, however small it is.
         let norm = right.norm_squared();
         if norm > 0.0 {
@@ -202,7 +249,7 @@ pub fn residues(
         };
         residues.push((0..poles.len()).map(residue).collect());
     }
-    Some(RationalFit {
+    Ok(RationalFit {
         poles,
         residues,
         rest: if all > 0.0 { (rest / all).sqrt() } else { 0.0 },
@@ -212,6 +259,24 @@ pub fn residues(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_reason_of_a_fit_that_breaks_down_reaches_the_caller() {
+        let frequency_hz: Vec<f64> = (0..40).map(|k| 5.0 + f64::from(k)).collect();
+        let mut function = vec![Complex64::ONE; 40];
+        let error = fit(&frequency_hz[..3], &[&function[..3]], 1).unwrap_err();
+        assert!(error.to_string().starts_with("3 frequencies"), "{error}");
+        let error = fit(&frequency_hz, &[&[Complex64::ZERO; 40]], 1).unwrap_err();
+        assert!(
+            matches!(error, RationalFitError::Undetermined { functions: 0, .. }),
+            "{error}"
+        );
+        function[7].re = f64::NAN;
+        let error = fit(&frequency_hz, &[&function], 2).unwrap_err();
+        assert!(error.to_string().contains("check the data"), "{error}");
+        let error = zeros(&[Complex64::new(-1.0, f64::INFINITY)], &DVector::zeros(2)).unwrap_err();
+        assert!(error.to_string().contains("check the data"), "{error}");
+    }
 
     #[test]
     fn poles_and_residues_of_known_modes_come_back() {

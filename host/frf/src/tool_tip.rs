@@ -6,7 +6,7 @@
 
 use num_complex::Complex64;
 
-use super::rational_fit::{RationalFit, fit};
+use super::rational_fit::{RationalFit, RationalFitError, fit};
 use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 
@@ -63,8 +63,11 @@ pub fn calibrate(
         .iter()
         .map(|entry| entry.receptance.as_slice())
         .collect();
-    let modes = modes(measured.frequency_hz(), &functions)
-        .ok_or_else(|| refused("no mode can be fitted to it; a band with a resonance is needed".into()))?;
+    let modes = modes(measured.frequency_hz(), &functions).map_err(|error| {
+        refused(format!(
+            "no mode can be fitted to it: {error}; a band with a resonance is needed"
+        ))
+    })?;
     let mut entries: Vec<Frf> = measured.entries().to_vec();
     for mode in mode_numbers(&modes) {
         let hertz = modes.frequency_hz(mode);
@@ -124,8 +127,11 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
         .iter()
         .flat_map(|(at_sensor, at_tip)| [at_sensor.receptance.as_slice(), at_tip.receptance.as_slice()])
         .collect();
-    let modes = modes(tip.frequency_hz(), &functions)
-        .ok_or_else(|| refused("no mode can be fitted to it; a band with a resonance is needed".into()))?;
+    let modes = modes(tip.frequency_hz(), &functions).map_err(|error| {
+        refused(format!(
+            "no mode can be fitted to it: {error}; a band with a resonance is needed"
+        ))
+    })?;
     let mut ratios = Vec::new();
     for mode in mode_numbers(&modes) {
         for response in [Direction::X, Direction::Y, Direction::Z] {
@@ -158,13 +164,19 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
 }
 
 /// The fewest modes that describe the functions.
-fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Option<RationalFit> {
+fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit, RationalFitError> {
     let mut best: Option<RationalFit> = None;
+    let mut refused = None;
     // A mode may only help once the next is there, too.
     let mut in_vain = 0;
     for count in 1..=MODES_MAX {
-        let Some(next) = fit(frequency_hz, functions, count) else {
-            continue;
+        let next = match fit(frequency_hz, functions, count) {
+            Ok(next) => next,
+            Err(error) => {
+                // The smallest model has the plainest reason.
+                refused.get_or_insert(error);
+                continue;
+            }
         };
         match &best {
             Some(before) if next.rest > (1.0 - WORTH) * before.rest => in_vain += 1,
@@ -177,7 +189,7 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Option<RationalFit
             break;
         }
     }
-    best
+    best.ok_or_else(|| refused.unwrap_or(RationalFitError::Solution("no model order is tried")))
 }
 
 /// Poles that are modes: lightly damped, and seen in a function.

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 use super::receptances::Receptances;
-use quietcut_numerics::eigenvalues::of_complex;
+use quietcut_numerics::eigenvalues::{EigenvalueError, of_complex};
 
 /// Part of the unit circle that the band takes: the receptances need not close to a circle.
 const ARC: f64 = 0.9;
@@ -27,8 +27,11 @@ struct Sums {
     denominator: Vec<Complex64>,
 }
 
-/// Poles λ in rad/s of the models of order 1 to `highest`, by order.
-pub(super) fn poles(data: &Receptances, highest: usize) -> Vec<Vec<Complex64>> {
+/// Poles λ in rad/s of the models of order 1 to `highest`, by order. An order whose equations break down has none.
+///
+/// # Errors
+/// The eigenvalue iteration of the companion matrix exceeds its bound.
+pub(super) fn poles(data: &Receptances, highest: usize) -> Result<Vec<Vec<Complex64>>, EigenvalueError> {
     let [from_hz, to_hz] = data.band_hz();
     let period_s = ARC / (to_hz - from_hz);
     let powers: Vec<Vec<Complex64>> = data
@@ -46,10 +49,11 @@ pub(super) fn poles(data: &Receptances, highest: usize) -> Vec<Vec<Complex64>> {
         .collect();
     (1..=highest)
         .map(|order| {
-            let roots = denominator(&sums, order, highest)
-                .and_then(|a| roots(&a))
-                .unwrap_or_default();
-            roots
+            let roots = match denominator(&sums, order, highest) {
+                Some(a) => roots(&a)?,
+                None => Vec::new(),
+            };
+            Ok(roots
                 .into_iter()
                 .filter(|z| z.norm() > 0.0)
                 .map(|z| {
@@ -62,7 +66,7 @@ pub(super) fn poles(data: &Receptances, highest: usize) -> Vec<Vec<Complex64>> {
                     };
                     Complex64::new(z.norm().ln(), turn) / period_s + Complex64::new(0.0, TAU * from_hz)
                 })
-                .collect()
+                .collect())
         })
         .collect()
 }
@@ -126,7 +130,7 @@ fn ridge(matrix: &mut DMatrix<Complex64>) {
 
 /// Roots of a₀ + a₁z + … + a_n zⁿ: inverses of the eigenvalues of the companion matrix of the reversed polynomial, whose
 /// leading coefficient is a₀ = 1.
-fn roots(a: &[Complex64]) -> Option<Vec<Complex64>> {
+fn roots(a: &[Complex64]) -> Result<Vec<Complex64>, EigenvalueError> {
     let order = a.len() - 1;
     let mut companion = DMatrix::<Complex64>::zeros(order, order);
     for i in 0..order {
@@ -135,12 +139,22 @@ fn roots(a: &[Complex64]) -> Option<Vec<Complex64>> {
             companion[(i + 1, i)] = Complex64::ONE;
         }
     }
-    let inverses = of_complex(companion).ok()?;
-    Some(
-        inverses
-            .into_iter()
-            .filter(|value| value.norm() > 1e-12)
-            .map(|value| value.inv())
-            .collect(),
-    )
+    let inverses = of_complex(companion)?;
+    Ok(inverses
+        .into_iter()
+        .filter(|value| value.norm() > 1e-12)
+        .map(|value| value.inv())
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roots_that_cannot_be_computed_are_an_error() {
+        let overflow = [Complex64::ONE, Complex64::new(f64::INFINITY, 0.0), Complex64::ONE];
+        let error = crate::modes::ModesError::from(roots(&overflow).unwrap_err());
+        assert!(error.to_string().contains("check the data"), "{error}");
+    }
 }

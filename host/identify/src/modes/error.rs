@@ -1,5 +1,8 @@
 //! Why no modes are identified.
 
+use quietcut_frf::rational_fit::RationalFitError;
+use quietcut_numerics::eigenvalues::EigenvalueError;
+
 /// Why no modes are identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModesError {
@@ -29,4 +32,10 @@ pub enum ModesError {
     /// The fit does not converge.
     #[error("the fit of {0} modes does not converge; fewer modes or another band are needed")]
     NotConverged(usize),
+    /// The poles of the common denominator cannot be computed.
+    #[error(transparent)]
+    Poles(#[from] EigenvalueError),
+    /// The residues of the poles cannot be computed.
+    #[error(transparent)]
+    Residues(#[from] RationalFitError),
 }

@@ -87,7 +87,7 @@ pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, Mod
                 rejected: rejected.len(),
             });
         }
-        let start = PoleResidue::start(data, &starts).ok_or(ModesError::NotConverged(starts.len()))?;
+        let start = PoleResidue::start(data, &starts)?;
         let refined = refinement::refine(data, start).ok_or(ModesError::NotConverged(starts.len()))?;
         let Some((mode, why)) = spurious(&refined, [from_hz, to_hz]) else {
             return Ok(model(data, &refined, stabilization, rejected));

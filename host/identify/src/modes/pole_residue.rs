@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
+use super::error::ModesError;
 use super::receptances::Receptances;
 use super::shape;
 use super::stabilization::matrix_of;
@@ -37,7 +38,10 @@ pub(super) struct PoleResidue {
 
 impl PoleResidue {
     /// Residues of the poles by linear least squares, each cut to rank one.
-    pub(super) fn start(data: &Receptances, poles: &[Complex64]) -> Option<Self> {
+    ///
+    /// # Errors
+    /// The residues cannot be computed, or have no rank-one part.
+    pub(super) fn start(data: &Receptances, poles: &[Complex64]) -> Result<Self, ModesError> {
         let functions: Vec<&[Complex64]> = data.values.iter().map(Vec::as_slice).collect();
         let fit = residues(&data.frequency_hz, &functions, poles.to_vec())?;
         let modes = poles
@@ -48,13 +52,14 @@ impl PoleResidue {
                 shape::normalize(&mut right, &mut left, &shared(data));
                 Some(Shaped { pole, right, left })
             })
-            .collect::<Option<Vec<_>>>()?;
+            .collect::<Option<Vec<_>>>()
+            .ok_or(ModesError::NotConverged(poles.len()))?;
         let mut start = Self {
             modes,
             outside: vec![[0.0; 2]; data.values.len()],
         };
         start.fit_outside(data);
-        Some(start)
+        Ok(start)
     }
 
     /// U and L by linear least squares on the residual of the modes.

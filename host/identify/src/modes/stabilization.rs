@@ -11,7 +11,7 @@ use super::rejected::{Rejected, reject};
 use crate::criteria::{
     LEAST_HEIGHT, LEAST_ORDERS, ORDERS_SHARE, OVERDAMPED, SAME_DAMPING, SAME_FREQUENCY, SAME_SHAPE,
 };
-use quietcut_frf::rational_fit::residues;
+use quietcut_frf::rational_fit::{RationalFitError, residues};
 
 /// A pole of a model of some order.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl Stabilization {
 /// Compares the models of order 1 to `highest_order`, or as many as the lines allow.
 ///
 /// # Errors
-/// Fewer lines than three for each unknown of the lowest orders.
+/// Fewer lines than three for each unknown of the lowest orders, or an iteration that exceeds its bound.
 pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stabilization, ModesError> {
     let lines = data.frequency_hz.len();
     let highest = highest_order.min((lines - 1) / 3);
@@ -97,14 +97,14 @@ pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stab
     };
     let mut lines = 0;
     let mut before: Vec<Candidate> = Vec::new();
-    for (index, mut poles) in denominator::poles(data, highest).into_iter().enumerate() {
+    for (index, mut poles) in denominator::poles(data, highest)?.into_iter().enumerate() {
         let order = index + 1;
         poles.retain(in_band);
         if order == highest {
             found.unstable = poles.iter().copied().filter(|pole| pole.re >= 0.0).collect();
         }
         poles.retain(|pole| pole.re < 0.0 && -pole.re < OVERDAMPED * pole.norm());
-        let mut now = candidates(data, order, &poles);
+        let mut now = candidates(data, order, &poles)?;
         connect(&mut now, &before, &mut lines);
         found.candidates.extend(now.iter().cloned());
         before = now;
@@ -113,17 +113,19 @@ pub(super) fn stabilize(data: &Receptances, highest_order: usize) -> Result<Stab
     Ok(found)
 }
 
-fn candidates(data: &Receptances, order: usize, poles: &[Complex64]) -> Vec<Candidate> {
+fn candidates(
+    data: &Receptances,
+    order: usize,
+    poles: &[Complex64],
+) -> Result<Vec<Candidate>, RationalFitError> {
     let functions: Vec<&[Complex64]> = data.values.iter().map(Vec::as_slice).collect();
-    let Some(fit) = residues(&data.frequency_hz, &functions, poles.to_vec()) else {
-        return Vec::new();
-    };
+    let fit = residues(&data.frequency_hz, &functions, poles.to_vec())?;
     let sizes: Vec<f64> = data
         .values
         .iter()
         .map(|values| (values.iter().map(|h| h.norm_sqr()).sum::<f64>() / values.len() as f64).sqrt())
         .collect();
-    poles
+    let found = poles
         .iter()
         .enumerate()
         .map(|(r, &pole)| {
@@ -149,7 +151,8 @@ fn candidates(data: &Receptances, order: usize, poles: &[Complex64]) -> Vec<Cand
                 shape,
             }
         })
-        .collect()
+        .collect();
+    Ok(found)
 }
 
 /// Distance of two poles in units of the stability criteria: 1 and below is the same pole.

@@ -176,6 +176,12 @@ fn what_the_record_cannot_tell_is_said() {
         Err(error) => assert!(matches!(error, AmbientError::Nothing(..)), "{error}"),
         Ok(found) => assert!(found.modes.iter().all(|mode| mode.is_vague()), "{found:?}"),
     }
+    // A gap that a reader lets pass: the reason names the data.
+    let mut gap = ambient.clone();
+    gap.channels[0][10] = f64::NAN;
+    let error = modes(&gap, BAND_HZ).unwrap_err();
+    assert!(matches!(error, AmbientError::SingularValues(_)), "{error}");
+    assert!(error.to_string().contains("check the data"), "{error}");
     // Intervals of a short record are wide.
     let width = |seconds: f64| {
         let ambient = Ambient::new(&recording(seconds, 4), BAND_HZ[1]).unwrap();
