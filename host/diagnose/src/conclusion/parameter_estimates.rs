@@ -1,6 +1,7 @@
 //! Causes with estimated parameters and their 90 % intervals.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
+use quietcut_numerics::eigenvalues::of_symmetric;
 
 use crate::baseline::direction_of;
 use crate::candidates::cause::{Location, Part};
@@ -191,10 +192,9 @@ fn moved(
         scale => covariance[(i, j)] / scale,
     };
     let correlation = DMatrix::from_fn(scales.len(), scales.len(), of);
-    let Some(center) = parts_of(inner).filter(|_| correlation.iter().all(|value| value.is_finite())) else {
+    let (Some(center), Ok(correlation)) = (parts_of(inner), of_symmetric(correlation)) else {
         return Vec::new();
     };
-    let correlation = SymmetricEigen::new(correlation);
     correlation
         .eigenvalues
         .iter()
