@@ -1,7 +1,6 @@
 //! Student's distribution: intervals from few samples.
 
-/// 90 % of a normal distribution lie within this many deviations.
-pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_2;
+pub use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// 90 % of Student's distribution with so many degrees of freedom lie within this many deviations.
 ///

@@ -7,8 +7,7 @@ use serde::Serialize;
 use crate::conclusion::lobes::{Chart, Lobes};
 use crate::conclusion::residual_views::ResidualView;
 
-/// Half-width of the 90 % interval of a normal distribution, in standard deviations.
-pub(crate) const NINETY_PERCENT: f64 = 1.644_853_626_951_472_6;
+pub(crate) use quietcut_numerics::statistics::NINETY_PERCENT;
 
 /// Outcome of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
