@@ -13,7 +13,7 @@ fn case_text() -> String {
     fs::read_to_string(cases().join("kuka-kr90-acetal.toml")).expect("the case is there")
 }
 
-/// Runs `lobes` on the case with one text replaced by another.
+/// Runs `quietcut lobes` on the case file after one text of it was replaced.
 fn with(folder: &Path, right: &str, wrong: &str) -> Outcome {
     let text = case_text();
     assert!(text.contains(right), "{right}");

@@ -1,4 +1,4 @@
-//! The demonstration: what it shows is true, and it needs nothing but the command.
+//! `quietcut demo`: its results are correct, and it needs no other file.
 #![allow(clippy::expect_used, clippy::panic)]
 
 use std::fs;

@@ -1,4 +1,4 @@
-//! How often the detector is right, over many seeds of noise.
+//! Error rates of the chatter detector over many noise seeds.
 //!
 //! The whole table, with so many seeds for each line (20 take some minutes), or of the lines that contain a text (`QUIETCUT_LINES=shaken`):
 //!
@@ -12,13 +12,13 @@ use quietcut_testkit::results::Campaign;
 use quietcut_tests::acceptance::LIMITS;
 use quietcut_tests::campaign::{Line, Rates, run};
 
-/// By when chatter must be called: the vibration over the forced one.
+/// Largest ratio of the vibration to the forced vibration at the first alarm.
 const IN_TIME: f64 = 5.0;
 
-/// How well the frequency must be told with the first alarm: at 1100 rev/min, where the aliases lie closest together, they are 1.3 Hz apart.
+/// Largest allowed error of the chatter frequency in the first alarm, Hz: at 1100 rev/min, where the aliases lie closest together, they are 1.3 Hz apart.
 const SAME_HZ: f64 = 0.5;
 
-/// Prints every line; none may have a wrong alarm, or one that is late or at another frequency.
+/// Prints every line; no line may have a wrong alarm, a late alarm, or an alarm at another frequency.
 fn check(rates: &[Rates]) {
     for line in rates {
         println!("{line}");

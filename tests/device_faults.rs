@@ -1,4 +1,4 @@
-//! The command against devices with faults: each its own message and exit status 2.
+//! The command with faulty devices: each fault has its own message and exit status 2.
 #![allow(clippy::expect_used)]
 
 use std::fs;
@@ -18,14 +18,14 @@ use quietcut_firmware::defaults;
 use quietcut_tests::command::{Outcome, alone, folder, quietcut, start};
 use quietcut_tests::small_table::table;
 
-/// A device at a pseudo-terminal that answers each request with what a script makes of it.
+/// Scripted device at a pseudo-terminal.
 struct FaultyDevice {
     path: String,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// What goes back: bytes, or the plug is pulled.
+/// Reaction of the script: response bytes, or the device is unplugged.
 enum Act {
     Send(Vec<u8>),
     Unplug,
@@ -117,7 +117,7 @@ fn frame(sequence: u16, response: &Response) -> Vec<u8> {
         .to_vec()
 }
 
-/// A device whose every reply is spoiled in the same way.
+/// Device that damages every reply in the same way.
 fn spoiled(spoil: fn(&mut Vec<u8>)) -> FaultyDevice {
     let mut sequence = Sequence::default();
     FaultyDevice::new(move |request, _| {
@@ -242,7 +242,7 @@ fn a_port_that_is_unplugged() {
     monitor.finish().refused(&[&device.path, "unplugged"]);
 }
 
-/// A device that does what the command asks until the first request that `is_last`, and then is gone.
+/// Device that executes requests until the first one for which `is_last` is true, and is then unplugged.
 fn unplugged_at(is_last: fn(&Request) -> bool) -> FaultyDevice {
     let mut sequence = Sequence::default();
     FaultyDevice::new(move |request, asked| {

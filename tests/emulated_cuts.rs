@@ -1,4 +1,4 @@
-//! The cuts of `simulated_cuts`, all twenty, in the emulator: what it says is the same to the bit as on the host.
+//! The twenty cuts of `simulated_cuts` in the emulator: its reports equal those of the host bit by bit.
 #![allow(clippy::expect_used)]
 
 use std::sync::Mutex;
@@ -10,14 +10,14 @@ use quietcut_tests::acceptance::{ABOVE, AcceptanceCut, BELOW, LIMITS};
 use quietcut_tests::emulator::{Emulator, Memory, PATIENCE};
 use quietcut_tests::said::{Said, steps, stimuli};
 
-/// Every report; spectra and stroboscopic samples, which take longer to send than to compute, are compared in `emulated_device`.
+/// Subscription to every report; spectra and stroboscopic samples, which take longer to send than to compute, are compared in `emulated_device`.
 const REPORTS: Subscription = Subscription {
     reports: Reports::All,
     spectra: false,
     strobes: false,
 };
 
-/// Lets host and emulator hear the cut; what the emulator said.
+/// Runs the signal chain over the cut on host and emulator; returns the outputs of the emulator.
 fn emulated(cut: &AcceptanceCut) -> Said {
     let heard = cut
         .cut

@@ -17,7 +17,7 @@ use quietcut_tests::small_table::table;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A session of the host's client with an emulated device.
+/// Connects the client to an emulated device.
 fn connect(emulator: &Emulator<'_>) -> (Client, Info) {
     scenario::connect(&|| Box::new(emulator.port()))
 }
@@ -173,7 +173,7 @@ fn a_damaged_table_is_not_used() {
     assert!(matches!(info.slots[slot], Slot::Damaged(_)), "{info:?}");
 }
 
-/// Sets host and device up alike and lets both hear the same cut; the device through `feed`.
+/// Configures host and device equally and runs both over the same cut; the device gets it through `feed`.
 fn assert_same_to_the_bit(cut: &Cut, feed: impl FnOnce(&mut Emulator<'_>, &[Step]) + Send) -> Cost {
     let memory = Memory::erased();
     let mut emulator = Emulator::start(&memory);
@@ -294,7 +294,7 @@ fn keeps_up_with_the_sensor() {
     assert!(seconds_on_the_board(most) < 0.8 * QUEUED_BLOCKS * of_a_block);
 }
 
-/// Blocks that wait in the real board's queue.
+/// Number of blocks in the queue of the real board.
 const QUEUED_BLOCKS: f64 = 16.0;
 
 /// The real board runs at 160 MHz; an instruction takes it 1.5 cycles or so, its flash and the floating point unit included.

@@ -1,4 +1,4 @@
-//! The programs in `host/examples` that users start from run, and find what is true.
+//! The example programs in `host/examples` run and print correct results.
 #![allow(clippy::expect_used, clippy::panic, dead_code, missing_docs, unreachable_pub)]
 
 use std::time::Duration;

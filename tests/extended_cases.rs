@@ -1,4 +1,4 @@
-//! What `diagnose` writes runs in `simulate`, `lobes` and `table`, and says there what was found.
+//! Extended cases from `diagnose` are valid in `simulate`, `lobes` and `table`, and contain the identified causes.
 
 #![allow(clippy::expect_used)]
 
@@ -81,7 +81,7 @@ fn a_spring_that_was_found_moves_the_limits_and_the_table() {
     assert!((from - exact).abs() < error, "{from} {exact} {error}");
 }
 
-/// The lowest limit of a table of a case at 900 rev/min, and how far the table says that it may be off, mm.
+/// Lowest limit of a lobe table at 900 rev/min and its stated interpolation error, mm.
 fn lowest(folder: &Path, case: &str) -> [f64; 2] {
     run(
         folder,

@@ -1,4 +1,4 @@
-//! Where the images lie: an image linked at another board's addresses builds, and does not run.
+//! Memory addresses of the firmware images: an image linked for another board builds but does not run.
 #![allow(clippy::expect_used, clippy::panic)]
 
 use std::fs;

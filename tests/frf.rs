@@ -1,4 +1,4 @@
-//! `quietcut frf`: from recordings of a known structure to tables and pictures, and what it refuses.
+//! `quietcut frf`: tables and charts from recordings of a known structure, and refused input.
 #![allow(clippy::expect_used)]
 
 use std::f64::consts::TAU;
@@ -16,7 +16,7 @@ const FREQUENCY_HZ: f64 = 17.4;
 const DAMPING: f64 = 0.02;
 const MASS_KG: f64 = 60.0;
 
-/// Acceleration of the structure at the sensor, by blows along y: exact impulse responses, each of one sample.
+/// Acceleration at the sensor after impacts along y of one sample each: exact impulse responses of the structure.
 fn blows(ratio: f64) -> Recording {
     let samples = (50.0 * RATE) as usize;
     let mut force = vec![0.0; samples];

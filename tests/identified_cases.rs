@@ -1,4 +1,4 @@
-//! What `identify` writes goes on to `lobes` and `table`.
+//! Cases that `identify` writes are valid input of `lobes` and `table`.
 
 #![allow(clippy::expect_used, clippy::panic)]
 
@@ -44,7 +44,7 @@ fn limit_mm(folder: &Path, case: &str, rpm: &str) -> f64 {
         .unwrap_or_else(|| panic!("{answer}"))
 }
 
-/// Value and interval, which must hold the value and have a width.
+/// Value and 90 % interval of a parameter; the interval must contain the value and have a positive width.
 #[track_caller]
 fn figure(figure: &Value) -> (f64, [f64; 2]) {
     let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{figure}"));

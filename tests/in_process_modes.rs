@@ -1,4 +1,4 @@
-//! From virtual cuts that excite the machine to its modes, and to the lobes that these give: all by the command.
+//! Modes of the machine from simulated cuts that excite it, and the lobes of these modes, computed with the command.
 #![allow(clippy::expect_used)]
 
 use std::path::Path;
@@ -60,7 +60,7 @@ fn limits(folder: &Path, case: &str, factor: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Within 3 % in depth, or between the limits of the truth at speeds 0.3 % off.
+/// Whether a limit agrees with the true one: within 3 % in depth, or between the true limits at speeds that differ by 0.3 %.
 fn assert_lobes(folder: &Path, found: &str, way: &str) {
     let truth = [0.997, 1.0, 1.003].map(|factor| limits(folder, &case("kuka-kr90-acetal"), factor));
     let mut worst = 0.0_f64;

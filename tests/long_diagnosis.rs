@@ -1,4 +1,4 @@
-//! What a diagnosis of four long records costs: 60 s at 2 kHz each. By one command, which prints the seconds:
+//! Computing time of a diagnosis of four records of 60 s at 2 kHz. This command prints it in s:
 //! `cargo test --release -p quietcut-tests --test long_diagnosis -- --ignored --nocapture`.
 #![allow(clippy::expect_used)]
 
@@ -8,7 +8,7 @@ use std::time::Instant;
 use quietcut_testkit::results::Campaign;
 use quietcut_tests::command::{folder, quietcut};
 
-/// Longer than anyone waits, on two cores that do nothing else.
+/// Largest allowed computing time on two idle cores, s: a choice.
 const LONGEST_S: f64 = 30.0;
 
 const MACHINE: &str = "name = \"long\"

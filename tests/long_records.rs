@@ -1,4 +1,4 @@
-//! What a long record costs the command: 60 s of six channels at 10 240 Hz, to nine receptances, on one thread.
+//! Computing time of nine receptances from a record of 60 s with six channels at 10240 Hz, on one thread.
 #![allow(clippy::expect_used)]
 
 use std::path::Path;

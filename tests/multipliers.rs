@@ -1,4 +1,4 @@
-//! Growth per tooth of small motions against reference multipliers.
+//! Growth of small motions per tooth passing, compared with reference Floquet multipliers.
 //!
 //! The references were computed by Chebyshev collocation of the monodromy operator and by a characteristic-matrix
 //! Newton, which agree to 2e-8.
@@ -26,7 +26,7 @@ fn cutter(case: &Case, depth_mm: f64) -> Cutter {
     cutter
 }
 
-/// A case in full cut from the start.
+/// Simulation of a case at full engagement from the start.
 fn steady(case: &Case, spindle_rpm: f64, depth_mm: f64) -> Model {
     Model {
         dynamics: Dynamics::new(case.structure().unwrap()).unwrap(),
@@ -255,7 +255,7 @@ fn small_motions_grow_as_the_multipliers_say() {
     }
 }
 
-/// A short push in the middle of a run.
+/// Short force pulse during a simulation.
 struct Push {
     at_s: f64,
     length_s: f64,

@@ -1,4 +1,4 @@
-//! `lobes` by receptances: the methods that need no more, and measured tables in place of a structure.
+//! `quietcut lobes` from receptances: methods that require only receptances, and measured tables in place of a structure.
 
 #![allow(clippy::expect_used)]
 

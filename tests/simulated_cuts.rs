@@ -1,16 +1,16 @@
-//! Simulated cuts of the robot below and above its limit, with entry, exit and all faults of the sensors: no alarm
-//! below, the right kind above, in time.
+//! Simulated cuts of the robot below and above its stability limit, with entry, exit and all errors of the sensors: no alarm below the
+//! limit; above it a timely alarm of the correct kind.
 
 use quietcut_tests::acceptance::{ABOVE, AcceptanceCut, BELOW, LIMITS};
 use quietcut_tests::virtual_cut::{Outcome, SimulatedCut};
 
-/// By when chatter must be called: the vibration over the forced one.
+/// Largest ratio of the vibration to the forced vibration at the first alarm.
 const IN_TIME: f64 = 5.0;
 
-/// How well the frequency must be told with the first alarm, Hz: at 1100 rev/min, where the aliases lie closest together, they are 1.3 Hz apart.
+/// Largest allowed error of the chatter frequency in the first alarm, Hz: at 1100 rev/min, where the aliases lie closest together, they are 1.3 Hz apart.
 const SAME_HZ: f64 = 0.5;
 
-/// The cut at this share of the limit; sensors differ from speed to speed.
+/// Cut at this depth relative to the stability limit; sensors differ between the speeds.
 fn cut(index: usize, share: f64) -> Outcome {
     let acceptance = AcceptanceCut::new(index, share);
     let outcome = SimulatedCut::of(&acceptance).judged(acceptance.seed);

@@ -1,5 +1,5 @@
-//! The simulated device behind its pseudo-terminal: tables come, stay and survive bad frames, and a recording is heard
-//! there as it is heard here.
+//! Simulated device at its pseudo-terminal: uploaded tables persist and survive invalid frames, and a recording gives the same verdicts
+//! as on the host.
 #![allow(clippy::expect_used, clippy::panic)]
 
 use std::fs;

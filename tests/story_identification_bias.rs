@@ -1,4 +1,4 @@
-//! Story: a model that mispredicts the very data that it was identified from.
+//! Story: an identified model with a large prediction error on its own data.
 //!
 //! One mode of a milling robot with cubic stiffness and damping is measured as in chapter 5 of the thesis: step-sine at
 //! three force levels, without any noise. Higher-order FRF (eqs 5.15 to 5.17) give parameters that are wrong by up to a fifth and
@@ -88,7 +88,7 @@ fn measured(case: &Case, levels_n: &[f64]) -> Vec<Dwell> {
     found.dwells
 }
 
-/// What both methods make of the same dwells.
+/// Estimates of both methods from the same dwells.
 struct Identified {
     responses: Vec<Response>,
     hfrf: HfrfFit,

@@ -1,7 +1,7 @@
-//! Story: lobes of a linear model are wrong in the pockets, and why.
+//! Story: why the lobes of a linear model are wrong between the lobes at large depths (in the pockets).
 //!
-//! The thesis's own campaign, on a virtual robot with the cubic terms of Table 6.2. A hammer sees its linear part, and the
-//! lobes of that are believed. Ten speeds from 480 to 620 rev/min by eight depths are cut at half immersion; each cut is
+//! The thesis's own campaign, on a virtual robot with the cubic terms of Table 6.2. A hammer test identifies its linear
+//! part, whose lobes are the baseline. Ten speeds from 480 to 620 rev/min by eight depths are cut at half immersion; each cut is
 //! judged by its own vibration once per tooth. Circles, crosses and squares are set against the lobes, before and after the
 //! cubic terms are identified. Then `diagnose` is given what is believed, shaker records and the cuts: it names the cubic terms,
 //! and says how it would have called the cuts.
@@ -32,9 +32,9 @@ use quietcut::trial_cuts::{Calls, Outcome, TestCut};
 use quietcut_tests::command::{cases, folder, quietcut};
 use rayon::prelude::*;
 
-/// What the robot is.
+/// True case of the robot.
 const TRUTH: &str = "kuka-kr90-half-cubic";
-/// What a tap test makes of it.
+/// Baseline case of the robot from a tap test.
 const BELIEF: &str = "kuka-kr90-half";
 
 /// Depths of the chart, mm.

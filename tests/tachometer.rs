@@ -1,4 +1,4 @@
-//! A real tachometer: a 60−2 wheel on a crank, recorded with an oscilloscope at 10 kHz, base line swinging once a turn.
+//! A real tachometer: a 60−2 wheel on a crank, recorded with an oscilloscope at 10 kHz, whose base line varies once per revolution.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
@@ -19,7 +19,7 @@ fn levels() -> Vec<f32> {
         .collect()
 }
 
-/// Speeds of the turns, from levels sampled at 10 kHz.
+/// Spindle speed of each revolution, from levels sampled at 10 kHz.
 fn turn_speeds(levels: impl Iterator<Item = f32>) -> (Vec<f32>, TachometerState) {
     let tachometer = Tachometer::new(Wheel {
         positions: 60,

@@ -1,4 +1,4 @@
-//! UFF 58 files that quietcut writes, read by pyuff, the reader of others.
+//! UFF 58 files of quietcut, read with the independent reader pyuff.
 #![allow(clippy::expect_used)]
 
 use std::path::{Path, PathBuf};
