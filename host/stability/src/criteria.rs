@@ -40,6 +40,18 @@ pub(crate) const KRYLOV_ANY: f64 = 0.25;
 /// rivals for the largest. Unfounded.
 pub(crate) const CROWD: usize = 24;
 
+/// Size from which a Floquet multiplier does not depend on the surface cut before. It is then an eigenvalue of the
+/// transition matrix Φ(w) to a relative error of the inverse, 1e-6, which starts Newton's method.
+pub(crate) const GROWN: f64 = 1e6;
+
+/// Largest ratio of the norm of a period map to its largest multiplier at which Krylov spaces are trusted. Their residual
+/// of 1e-7 relative to the norm then lies below the multiplier; beyond it they may see rounding only.
+pub(crate) const NORMAL: f64 = 1e7;
+
+/// Largest number of elements of the working mesh in a tooth period. Elements of five radians then cover some thousand
+/// vibrations; more are refused. Unfounded.
+pub(crate) const ELEMENTS_MAX: f64 = 4000.0;
+
 // Dominant multiplier of one cut.
 
 /// Share of the largest multiplier of the coarse scan above which another may be the largest on the working mesh. The
@@ -53,6 +65,13 @@ pub(crate) const KAPPA_MAX: f64 = 20.0;
 /// Size of a multiplier above which the winding number looks for it. The complex depth w (1 − 1/μ) is then five times
 /// w at most, which the meshes resolve.
 pub(crate) const WOUND: f64 = 0.25;
+
+/// Relative distances beyond the largest multiplier found, or beyond [`WOUND`], at which the winding number shows in turn
+/// that no larger one exists. The last is the error of the bound; the sequence is unfounded.
+pub(crate) const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
+
+/// Further relative distances, used while the verdict is open after [`MARGINS`]. Unfounded.
+pub(crate) const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
 
 // Limits along the depth.
 
@@ -94,6 +113,16 @@ pub(crate) const CELL_FOLLOWED: f64 = 0.4;
 
 // Spread of limits.
 
+/// Number of drawn machines in a batch: a power of 2, as stratification requires. The choice of 64 is unfounded.
+pub(crate) const BATCH: u32 = 64;
+
+/// Least and largest number of batches. Four give an estimate of their scatter; 128 are 8 192 machines, a limit on
+/// computing time.
+pub(crate) const BATCHES: std::ops::RangeInclusive<u32> = 4..=128;
+
+/// Number of batches of the pilot, after which the directions of stratification are updated: the least of [`BATCHES`].
+pub(crate) const PILOT: u32 = 4;
+
 /// Half the relative width of the 90 % interval of a percentile at which no further batch is drawn. Unfounded: an
 /// accuracy of 1 % was aimed at.
 pub(crate) const PERCENTILE_SETTLED: f64 = 7e-3;
@@ -107,6 +136,10 @@ pub(crate) const IMPOSSIBLE_MAX: f64 = 0.2;
 pub(crate) const BATCHES_OF_CELLS: u32 = 4;
 
 // Loops of receptances.
+
+/// Height of a peak in a table of receptances, as a share of the highest, above which it counts as a resonance. A
+/// peak of noise costs computing time only. Unfounded.
+pub(crate) const PEAK_SHARE: f64 = 0.01;
 
 /// Damping ratio below which a mode counts as undamped and its receptance as infinite. Unfounded.
 pub(crate) const UNDAMPED: f64 = 1e-9;
@@ -158,6 +191,9 @@ pub(crate) const DISTURBANCE: f64 = 0.02;
 pub(crate) const DISTURBANCE_PERIODS: usize = 40;
 
 // Lobe tables.
+
+/// Largest number of layers into which one case is divided. It limits the size of a table. Unfounded.
+pub(crate) const LAYERS_MAX: usize = 12;
 
 /// Share of the largest depth by which a limit may differ from the straight line between neighbouring entries before
 /// a speed is added. Unfounded.

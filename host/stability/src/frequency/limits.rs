@@ -83,7 +83,7 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
 /// Number of roots with Re s > `sigma` (1/s) at an axial depth (m), by the Nyquist criterion on the determinant D(s).
 ///
 /// The zeros of D are the roots, its poles the poles of the structure. Along the line Re s = `sigma` from the real axis
-/// to infinity the argument of D grows by π (P − N)/2 for P poles and N roots right of the line, conjugates included.
+/// to infinity the argument of D grows by π (P − N) for P poles and N roots right of the line, conjugates included.
 /// `None` if the line meets a root, or if the table cannot be continued to it.
 pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64) -> Option<i32> {
     let grid = open_loop.grid(depth_m.max(1e-9).recip())?;

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use num_complex::Complex64;
 
-use crate::criteria::UNDAMPED;
+use crate::criteria::{PEAK_SHARE, UNDAMPED};
 use crate::error::StabilityError;
 use crate::problem::linear::{CubicTerms, Problem, cutting};
 use crate::process::treatment::Treated;
@@ -191,7 +191,7 @@ impl FrequencyProblem {
     }
 }
 
-/// Peaks of a table higher than a hundredth of the highest, with their half bandwidth.
+/// Peaks of a table higher than [`PEAK_SHARE`] times the highest, with their half bandwidth.
 ///
 /// Peaks due to noise are harmless and only cost computing time.
 fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {
@@ -202,7 +202,7 @@ fn peaks(interpolation: &Interpolation) -> Vec<Resonance> {
     let mut peaks = Vec::new();
     for index in 1..size.len().saturating_sub(1) {
         let peak = size[index];
-        if peak < size[index - 1] || peak <= size[index + 1] || peak < 0.01 * highest {
+        if peak < size[index - 1] || peak <= size[index + 1] || peak < PEAK_SHARE * highest {
             continue;
         }
         // Distance on one side to 1/√2 of the peak, or to the foot of the next peak.

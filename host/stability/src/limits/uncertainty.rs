@@ -24,19 +24,9 @@ use super::plane::{Linearized, Plane};
 use super::sampling::{Basis, Variable};
 use super::speed_line::SpeedLine;
 use super::spread::{LimitSpread, Percentile, PercentileIntervals, Percentiles};
-use crate::criteria::{BATCHES_OF_CELLS, IMPOSSIBLE_MAX};
+use crate::criteria::{BATCH, BATCHES, BATCHES_OF_CELLS, IMPOSSIBLE_MAX, PILOT};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
-
-/// Machines in a batch: a power of 2, as stratification requires. A choice.
-const BATCH: u32 = 64;
-
-/// Least and largest number of batches: four give an estimate of the scatter, 128 are 8 192 machines, a limit on
-/// computing time.
-const BATCHES: std::ops::RangeInclusive<u32> = 4..=128;
-
-/// Batches of the pilot: the least number of batches.
-const PILOT: u32 = 4;
 
 /// Shares of machines at which percentiles are computed.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];

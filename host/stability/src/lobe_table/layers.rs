@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::error::BuildError;
 use super::request::TableRequest;
+use crate::criteria::LAYERS_MAX;
 use crate::error::StabilityError;
 use crate::limits::chart::chart;
 use crate::limits::method::Method;
@@ -25,9 +26,6 @@ const ANY_FEED_MM: f32 = 100.0;
 
 /// Number of speeds at which the dependence of limits on feed and direction is probed. Unfounded.
 pub(super) const PROBES: usize = 16;
-
-/// The most layers that one case is divided into.
-const LAYERS_MAX: usize = 12;
 
 /// Seed of the draws for percentiles; fixed, so that a table can be reproduced.
 const SEED: u64 = 1;

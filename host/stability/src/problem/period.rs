@@ -19,6 +19,7 @@ use super::element::Step;
 use super::exponential::Exponential;
 use super::gauss::Gauss;
 use super::linear::Problem;
+use crate::criteria::ELEMENTS_MAX;
 use crate::error::StabilityError;
 
 pub(crate) use crate::problem::element::{Element, Port};
@@ -56,9 +57,6 @@ pub(crate) const DECAY_MAX: f64 = 5.0;
 
 /// Largest number of Gauss nodes in an element: the largest rule that is cached.
 const NODES_MAX: u32 = 40;
-
-/// The most elements of the working resolution that a period may have: of five radians each, some thousand vibrations.
-const ELEMENTS_MAX: f64 = 4000.0;
 
 /// Refuses speeds and depths (mm) at which the motion oscillates too often within a tooth period.
 ///

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, Dyn};
 use num_complex::Complex64;
 
 use super::krylov::{self, LinearMap};
+use crate::criteria::{GROWN, NORMAL};
 use crate::problem::period::Period;
 use quietcut_numerics::eigenvalues;
 
@@ -15,14 +16,6 @@ const WHOLE: usize = 110;
 
 /// Largest size for which all eigenvalues are computed if block Arnoldi does not converge: about one second.
 const UNSETTLED_WHOLE_MAX: usize = 400;
-
-/// Size from which a Floquet multiplier does not depend on the surface cut before: it is then an eigenvalue of Φ(w), to
-/// a relative error of 1/GROWN.
-const GROWN: f64 = 1e6;
-
-/// Largest ratio of the norm of the map to its largest multiplier. Krylov spaces with residuals of 1e-7 then resolve
-/// that multiplier; beyond it they may see only rounding of a strongly non-normal map.
-const NORMAL: f64 = 1e7;
 
 /// Matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at an axial depth, m.
 ///

@@ -13,21 +13,15 @@
 use num_complex::Complex64;
 
 use super::characteristic::{Characteristic, Workspace};
-use crate::criteria::WOUND;
+use crate::criteria::{FINE_MARGINS, MARGINS, WOUND};
 
-/// How far beyond [`WOUND`], or beyond the largest multiplier, it is shown that there is none, in turn.
-const MARGINS: [f64; 5] = [2.8, 0.3, 0.05, 0.01, 2e-3];
-
-/// The same while a verdict is not certain.
-const FINE_MARGINS: [f64; 2] = [4e-4, 1e-4];
-
-/// How many operations all evaluations together may take: seconds.
+/// Largest number of floating-point operations of all evaluations together: a few seconds. A choice.
 const OPERATIONS_MAX: f64 = 3e9;
 
 /// Largest number of evaluation points on half of a circle: a limit on computing time.
 const POINTS_MAX: usize = 8192;
 
-/// From so many candidates Newton begins.
+/// Largest number of candidates from which Newton's method starts: a limit on computing time.
 const CANDIDATES_MAX: usize = 6;
 
 /// Largest number of multipliers that are searched one by one: a limit on computing time.
