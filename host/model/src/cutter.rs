@@ -1,4 +1,4 @@
-//! The teeth: where they are, and how thick a chip they see.
+//! Geometry of the teeth: angles, runout, and chip thickness.
 
 use std::f64::consts::TAU;
 
@@ -8,58 +8,58 @@ use super::force_law::ForceLaw;
 use crate::ModelError;
 use crate::milling::{Cut, Material, Runout, Tool};
 
-/// The tool in its cut, in SI units and in the machine's axes.
+/// The engaged tool in SI units and in the machine's axes.
 ///
-/// Tooth j stands at φⱼ = θ + ψⱼ with the spindle angle θ, clockwise from the normal of the feed (thesis Fig. 3.1).
-/// A tooth with the larger ψ comes first: the surface in front of tooth j was left by tooth j + 1.
+/// Tooth j is at the immersion angle φⱼ = θ + ψⱼ with the spindle angle θ, clockwise from the normal of the feed (thesis Fig. 3.1). A tooth with
+/// larger ψ passes earlier: tooth j cuts the surface left by tooth j + 1.
 #[derive(Clone, Debug)]
 pub struct Cutter {
     /// The teeth in the order of ψ.
     pub teeth: Vec<Tooth>,
-    /// Immersion angle where teeth enter, rad.
+    /// Immersion angle of entry, rad.
     pub start_rad: f64,
-    /// Immersion angle where teeth leave, rad.
+    /// Immersion angle of exit, rad.
     pub exit_rad: f64,
     /// Axial depth of cut, m.
     pub depth_m: f64,
     /// Feed per tooth, mean over the teeth, m.
     pub feed_per_tooth_m: f64,
-    /// Half the diameter, m, where it is known.
+    /// Radius of the tool, m; `None` if the case has no diameter.
     pub radius_m: Option<f64>,
-    /// True where the depth of cut follows the axial vibration, b = b₀ − z (thesis eq. 3.5).
+    /// True if the axial depth follows the axial vibration, b = b₀ − z (thesis eq. 3.5).
     pub axial_depth_modulation: bool,
-    /// How hard a chip pushes.
+    /// Cutting force law.
     pub force: ForceLaw,
     feed_direction: [f64; 2],
     sin_edge: f64,
     cos_edge: f64,
 }
 
-/// One tooth.
+/// Angle, runout and neighbours of one tooth.
 #[derive(Clone, Copy, Debug)]
 pub struct Tooth {
-    /// ψ, rad in [0, 2π).
+    /// Angle ψ of the tooth on the tool, rad in [0, 2π).
     pub angle_rad: f64,
-    /// How far its radius exceeds the mean, m.
+    /// Radial runout of the tooth, m: its radius minus the mean radius.
     pub radial_m: f64,
-    /// The tooth that passed here before it.
+    /// Index of the preceding tooth, which left the surface in front.
     pub ahead: usize,
-    /// The tooth that passes here after it.
+    /// Index of the following tooth, which cuts the surface behind.
     pub behind: usize,
-    /// Angle to the tooth ahead, rad.
+    /// Pitch angle to the preceding tooth, rad.
     pub pitch_rad: f64,
-    /// How far the tool feeds while it turns by that angle, m.
+    /// Feed during a rotation by the pitch angle, m.
     pub feed_m: f64,
 }
 
 impl Cutter {
-    /// The tool in its cut; `axial_depth_m` deep.
+    /// The tool in a cut of the axial depth `axial_depth_m`, m.
     ///
     /// # Errors
-    /// The tool's pitches do not go once around.
+    /// The number of pitch angles differs from the number of teeth, or their sum is not 360 degrees.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_m: f64) -> Result<Self, ModelError> {
         let edge_rad = tool.edge_angle_deg.to_radians();
-        // A right angle is exact: the axial vibration is then not in the chip at all.
+        // Exact values for 90 degrees: axial vibration then has no influence on the chip thickness.
         let (sin_edge, cos_edge) = if tool.edge_angle_deg == 90.0 {
             (1.0, 0.0)
         } else {
@@ -85,7 +85,7 @@ impl Cutter {
         Ok(cutter)
     }
 
-    /// The same with another feed.
+    /// The same tool with another mean feed per tooth, m.
     pub fn with_feed_per_tooth_m(mut self, feed_per_tooth_m: f64) -> Self {
         let count = self.teeth.len() as f64;
         for tooth in &mut self.teeth {
@@ -95,7 +95,7 @@ impl Cutter {
         self
     }
 
-    /// Puts the tool's axis beside the spindle's.
+    /// Sets the radial runout of all teeth from the offset of the tool axis to the spindle axis.
     pub fn set_runout(&mut self, runout: Runout) {
         let count = self.teeth.len() as f64;
         for (index, tooth) in self.teeth.iter_mut().enumerate() {
@@ -104,7 +104,7 @@ impl Cutter {
         }
     }
 
-    /// The place at the immersion angle `phi_rad`.
+    /// Sine and radial direction at the immersion angle `phi_rad`, rad.
     pub fn immersion(&self, phi_rad: f64) -> Immersion {
         let (sin, cos) = phi_rad.sin_cos();
         let [a, b] = self.feed_direction;
@@ -114,18 +114,18 @@ impl Cutter {
         }
     }
 
-    /// How far the edge of a tooth stands out along the chip thickness, m: thesis eq. 3.1 without its feed.
+    /// Position of the edge of a tooth along the chip thickness, m, at the displacement `x` of the tool, m: thesis eq. 3.1 without feed.
     pub fn reach_m(&self, tooth: &Tooth, at: Immersion, x: [f64; 3]) -> f64 {
         let outward = at.outward[0] * x[0] + at.outward[1] * x[1];
         (outward + tooth.radial_m) * self.sin_edge - x[2] * self.cos_edge
     }
 
-    /// How far a surface recedes along the chip thickness while the tool feeds on by `feed_m`, m.
+    /// Contribution of the feed `feed_m`, m, to the chip thickness, m.
     pub fn recession_m(&self, at: Immersion, feed_m: f64) -> f64 {
         feed_m * at.sin * self.sin_edge
     }
 
-    /// The depth of cut at the axial displacement `z_m`, m.
+    /// Axial depth of cut, m, at the axial displacement `z_m`, m; never negative.
     pub fn depth_at_m(&self, nominal_m: f64, z_m: f64) -> f64 {
         if self.axial_depth_modulation {
             (nominal_m - z_m).max(0.0)
@@ -146,7 +146,7 @@ fn teeth(tool: &Tool, feed_per_tooth_m: f64) -> Result<Vec<Tooth>, ModelError> {
     }
     let mut angle_rad = 0.0;
     let teeth = (0..count).map(|index| {
-        // Exact fractions of a turn where the teeth stand evenly.
+        // Exact fractions of a revolution for equal pitch.
         let equal = TAU * index as f64 / count as f64;
         if index > 0 {
             angle_rad += tool.pitch_deg[index].to_radians();

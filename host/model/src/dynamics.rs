@@ -1,11 +1,11 @@
-//! The structure, ready to be integrated: first-order form and cubic terms.
+//! Equation of motion of the structure in first-order form, with cubic terms.
 
 use nalgebra::{DMatrix, Matrix3xX, MatrixXx3};
 
 use crate::structure::{FirstOrder, Form, Matrices, Structure, StructureError};
 use quietcut_numerics::dormand_prince::Quartic;
 
-/// ẋ = A x + B F − f₃(x), u = C x: [`FirstOrder`] with the cubic terms of the structure, if it has any.
+/// Equation of motion ẋ = A x + B F − f₃(x), u = C x: [`FirstOrder`] with the cubic terms f₃ of the structure, if it has any.
 ///
 /// Axes are the machine's x, y, z; SI units: m, m/s, N. Velocity and acceleration of the tool are u̇ = C ẋ and
 /// ü = C A ẋ. The latter holds where C B = 0, as for all matrices. Complex modes whose residues do not sum to zero have
@@ -13,31 +13,31 @@ use quietcut_numerics::dormand_prince::Quartic;
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     order: usize,
-    /// A, row by row.
+    /// System matrix A, row by row, 1/s.
     a: Vec<f64>,
-    /// B, one row of three per state.
+    /// Input matrix B, one row of three entries (force along x, y, z) per state.
     b: Vec<[f64; 3]>,
     c: [Vec<f64>; 3],
     ca: [Vec<f64>; 3],
-    /// C B, (m/s)/N: not zero where a jump of the force is one of the velocity.
+    /// C B, (m/s)/N: jump of the velocity per jump of the force; zero for matrices.
     cb: [[f64; 3]; 3],
-    /// C A B, 1/kg.
+    /// C A B, 1/kg: acceleration of the tool per force.
     cab: [[f64; 3]; 3],
     cubic: Option<Cubic>,
     sizes: Vec<f64>,
     velocity_jumps: bool,
 }
 
-/// f₃ in the rates of v: damping·v∘³ + stiffness·q∘³ with q the first `freedoms` states and v as many after them.
+/// Cubic terms f₃ = damping·v∘³ + stiffness·q∘³ in v̇; q are the first `degrees_of_freedom` states and v the following ones.
 #[derive(Clone, Debug)]
 struct Cubic {
-    freedoms: usize,
+    degrees_of_freedom: usize,
     damping: Vec<f64>,
     stiffness: Vec<f64>,
 }
 
 impl Dynamics {
-    /// The equations of `structure`.
+    /// The equation of motion of `structure`.
     ///
     /// # Errors
     /// Mass, damping or stiffness is indefinite.
@@ -48,14 +48,14 @@ impl Dynamics {
         let c = DMatrix::from_fn(3, order, |axis, state| c[(axis, state)]);
         let ca = &c * &a;
         let jump = &c * &b;
-        // The modes of real matrices cancel but for rounding and for the digits that a file gives them; less than a
-        // millionth of what does not cancel is below any sensor.
+        // The residues of modes with a mass matrix sum to zero except for rounding and the digits of the file. A sum below
+        // 1e-6 of the residues is below the resolution of any sensor.
         let velocity_jumps = jump.amax() > 1e-6 * c.amax() * b.amax() * order as f64;
         let cubic = match structure.equation() {
             Some(matrices) if structure.is_nonlinear() => Some(cubic(&matrices, &a)?),
             _ => None,
         };
-        // States of modes and joints move the tool by up to |C| each; states of matrices are displacements already.
+        // A unit state of modes and joints moves the tool by up to |C|; states of matrices are displacements.
         let size = |state: usize| {
             let moved = c.column(state).amax();
             match &structure.form {
@@ -114,7 +114,7 @@ impl Dynamics {
         self.note_products();
     }
 
-    /// The motion of something else than the tool, as [`FirstOrder::seen`] has it; to be looked at: a force on it is not one on the tool.
+    /// The same equations with the motion of a sensor away from the tool as output, see [`FirstOrder::seen`]. Forces still act on the tool.
     #[must_use]
     pub fn seen(&self, modes: &[f64]) -> Self {
         let FirstOrder { a, c, .. } = self.first_order().seen(modes);
@@ -128,7 +128,7 @@ impl Dynamics {
         seen
     }
 
-    /// The linear part, without cubic terms.
+    /// The linear part of the equations, without cubic terms.
     pub fn first_order(&self) -> FirstOrder {
         FirstOrder {
             a: DMatrix::from_row_slice(self.order, self.order, &self.a),
@@ -142,12 +142,12 @@ impl Dynamics {
         self.order
     }
 
-    /// About the size of each state while the tool is displaced by one meter: what error control measures by.
+    /// Magnitude of each state for a displacement of the tool of 1 m: the scale of the error control.
     pub fn sizes(&self) -> &[f64] {
         &self.sizes
     }
 
-    /// True where a jump of the force makes the velocity jump: then there is no acceleration at that instant.
+    /// True if a jump of the force makes the velocity jump (C B ≠ 0): the acceleration is then an impulse at that instant.
     pub fn velocity_jumps(&self) -> bool {
         self.velocity_jumps
     }
@@ -157,7 +157,7 @@ impl Dynamics {
         std::array::from_fn(|axis| dot(&self.c[axis], x))
     }
 
-    /// Displacement of the tool, m, from the interpolants of the states.
+    /// Displacement of the tool, m, as a polynomial of the time, from the dense output of the states.
     pub fn displacement_quartics(&self, x: &[Quartic]) -> [Quartic; 3] {
         std::array::from_fn(|axis| {
             let mut sum = [0.0; 5];
@@ -170,12 +170,12 @@ impl Dynamics {
         })
     }
 
-    /// Velocity of the tool, m/s, from the rate of the states.
+    /// Velocity of the tool, m/s, from the time derivative of the states.
     pub fn velocity(&self, rate: &[f64]) -> [f64; 3] {
         std::array::from_fn(|axis| dot(&self.c[axis], rate))
     }
 
-    /// Acceleration of the tool, m/s², from the rate of the states; `None` where the velocity may jump.
+    /// Acceleration of the tool, m/s², from the time derivative of the states; `None` if the velocity may jump.
     pub fn acceleration(&self, rate: &[f64]) -> Option<[f64; 3]> {
         (!self.velocity_jumps).then(|| std::array::from_fn(|axis| dot(&self.ca[axis], rate)))
     }
@@ -192,7 +192,7 @@ impl Dynamics {
         })
     }
 
-    /// C B, (m/s)/N: what the velocity of the tool jumps by with the force on it; zero where it does not.
+    /// C B, (m/s)/N: jump of the velocity of the tool per jump of the force; zero if the velocity does not jump.
     pub fn velocity_per_force(&self) -> [[f64; 3]; 3] {
         if self.velocity_jumps {
             self.cb
@@ -201,12 +201,12 @@ impl Dynamics {
         }
     }
 
-    /// C A B, 1/kg: acceleration of the tool per force on it.
+    /// C A B, 1/kg: acceleration of the tool per force on the tool.
     pub fn acceleration_per_force(&self) -> [[f64; 3]; 3] {
         self.cab
     }
 
-    /// Puts the velocity of one axis to zero, as friction that begins to hold does: by an impulse along it.
+    /// Sets the velocity of one axis to zero by an impulse along that axis, as at the onset of stick.
     pub fn halt(&self, axis: usize, x: &mut [f64]) {
         let per_impulse = self.cab[axis][axis];
         if per_impulse > 0.0 {
@@ -217,18 +217,21 @@ impl Dynamics {
         }
     }
 
-    /// ẋ under the force in N.
+    /// Writes ẋ under the `force`, N, on the tool.
     pub fn rate(&self, x: &[f64], force: [f64; 3], rate: &mut [f64]) {
         for ((rate, a), b) in rate.iter_mut().zip(self.a.chunks_exact(self.order)).zip(&self.b) {
             *rate = dot(a, x) + b[0] * force[0] + b[1] * force[1] + b[2] * force[2];
         }
         if let Some(cubic) = &self.cubic {
-            let freedoms = cubic.freedoms;
-            let (q, v) = (&x[..freedoms], &x[freedoms..2 * freedoms]);
-            for ((rate, damping), stiffness) in rate[freedoms..]
+            let degrees_of_freedom = cubic.degrees_of_freedom;
+            let (q, v) = (
+                &x[..degrees_of_freedom],
+                &x[degrees_of_freedom..2 * degrees_of_freedom],
+            );
+            for ((rate, damping), stiffness) in rate[degrees_of_freedom..]
                 .iter_mut()
-                .zip(cubic.damping.chunks_exact(freedoms))
-                .zip(cubic.stiffness.chunks_exact(freedoms))
+                .zip(cubic.damping.chunks_exact(degrees_of_freedom))
+                .zip(cubic.stiffness.chunks_exact(degrees_of_freedom))
             {
                 *rate -= dot_cubes(damping, v) + dot_cubes(stiffness, q);
             }
@@ -244,20 +247,20 @@ fn dot_cubes(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b * b * b).sum()
 }
 
-/// C₃ and K₃ for the states (q, q̇/s): M⁻¹C₃ s² and M⁻¹K₃/s.
+/// Cubic coefficient matrices M⁻¹C₃·s² and M⁻¹K₃/s for the states (q, q̇/s).
 fn cubic(matrices: &Matrices, a: &DMatrix<f64>) -> Result<Cubic, StructureError> {
-    let freedoms = matrices.mass.nrows();
-    let scale = a[(0, freedoms)];
+    let degrees_of_freedom = matrices.mass.nrows();
+    let scale = a[(0, degrees_of_freedom)];
     let mass = matrices.mass.clone().lu();
     let of = |matrix: &Option<DMatrix<f64>>, factor: f64| -> Result<Vec<f64>, StructureError> {
         let Some(matrix) = matrix else {
-            return Ok(vec![0.0; freedoms * freedoms]);
+            return Ok(vec![0.0; degrees_of_freedom * degrees_of_freedom]);
         };
         let divided = mass.solve(matrix).ok_or(StructureError::SingularMass)?;
         Ok((divided.transpose() * factor).as_slice().to_vec())
     };
     Ok(Cubic {
-        freedoms,
+        degrees_of_freedom,
         damping: of(&matrices.cubic_damping, scale * scale)?,
         stiffness: of(&matrices.cubic_stiffness, scale.recip())?,
     })

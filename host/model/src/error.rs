@@ -1,25 +1,25 @@
-//! Why the equations of a machine cannot be set up.
+//! Errors of the machine model.
 
 use crate::effects::EffectError;
 use crate::structure::StructureError;
 
-/// What is wrong with a model.
+/// A machine model that cannot be assembled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// A structure that no machine has.
+    /// A structure with indefinite or singular matrices.
     #[error(transparent)]
     Structure(#[from] StructureError),
-    /// An effect that the structure cannot have.
+    /// An effect that does not apply to the structure.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// Pitches that do not fit the number of teeth or do not go once around.
+    /// Pitch angles that do not fit the number of teeth, or whose sum is not 360 degrees.
     #[error(
         "{teeth} teeth with the pitches {pitch_deg:?} degrees: as many pitches as teeth are needed, with the sum 360"
     )]
     Pitch {
         /// Number of teeth.
         teeth: usize,
-        /// The pitches.
+        /// Pitch angles, degrees.
         pitch_deg: Vec<f64>,
     },
 }

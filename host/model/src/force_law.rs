@@ -1,41 +1,41 @@
-//! How hard a chip pushes an edge, and how the flank behind the edge is damped.
+//! Cutting force on an edge: linear-edge law, chip-thickness exponent, process damping and wear.
 
 use super::immersion::Immersion;
 use crate::milling::Material;
 
-/// The force on an edge of axial depth b with the chip thickness h (thesis eqs 3.2 to 3.4): tangential, radial and axial
-/// F = b·(K_c·h + K_e/sin γ), and what may be added to that:
+/// Cutting force on an edge of axial depth b at the chip thickness h (thesis eqs 3.2 to 3.4): the tangential, radial and axial components are
+/// F = b·(K_c·h + K_e/sin γ) each. Optional extensions:
 ///
-/// - a chip law: K_c·h₀·(h/h₀)^p instead of K_c·h;
-/// - process damping: −(C/V)·b·v_n along the chip thickness, and friction times that against the turning;
-/// - wear: all of it times 1 + r·t.
+/// - power law of the chip thickness: K_c·h₀·(h/h₀)^p instead of K_c·h;
+/// - process damping: −(C/V)·b·v_n along the chip thickness, and μ times that force tangentially, against the spindle rotation;
+/// - wear: the whole force times 1 + r·t.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceLaw {
-    /// K_c and K_e.
+    /// Cutting coefficients K_c and edge coefficients K_e.
     material: Material,
     sin_edge: f64,
     cos_edge: f64,
     cutting: Coefficients,
     edge: Coefficients,
-    /// `None` for a force in proportion to the chip.
+    /// Power law of the chip thickness; `None` for a force linear in the chip thickness.
     pub chip: Option<ChipLaw>,
-    /// `None` where the flank does not touch.
+    /// Process damping of the flank; `None` without process damping.
     pub process_damping: Option<ProcessDamping>,
-    /// r, 1/s.
+    /// Relative rate r of wear, 1/s.
     pub wear_per_s: f64,
 }
 
-/// K·b·h₀·(h/h₀)^p instead of K·b·h.
+/// Power law of the chip thickness: the cutting force is K·b·h₀·(h/h₀)^p instead of K·b·h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChipLaw {
-    /// p, positive.
+    /// Exponent p, positive.
     pub exponent: f64,
-    /// h₀, m, positive.
+    /// Reference chip thickness h₀, m, positive: there the power law equals the linear law.
     pub reference_m: f64,
 }
 
 impl ChipLaw {
-    /// h₀·(h/h₀)^p, m; odd in h: in the linear model a chip of negative thickness pulls.
+    /// Effective chip thickness h₀·(h/h₀)^p, m; odd in h, as in the linear model a negative chip thickness gives a negative force.
     pub fn effective_m(self, thickness_m: f64) -> f64 {
         self.reference_m
             * (thickness_m.abs() / self.reference_m)
@@ -43,23 +43,23 @@ impl ChipLaw {
                 .copysign(thickness_m)
     }
 
-    /// The slope p·(h/h₀)^(p − 1) of it; infinite at 0 for p < 1.
+    /// Derivative p·(h/h₀)^(p − 1) of the effective chip thickness; infinite at h = 0 for p < 1.
     pub fn slope(self, thickness_m: f64) -> f64 {
         self.exponent * (thickness_m.abs() / self.reference_m).powf(self.exponent - 1.0)
     }
 }
 
-/// The force −(C/V)·b·v_n of the flank on the surface just cut.
+/// Process damping: the flank force −(C/V)·b·v_n at the cutting speed V and the velocity v_n along the chip thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProcessDamping {
-    /// C, N/m.
+    /// Process damping coefficient C, N/m.
     pub n_per_m: f64,
-    /// Share of it that acts tangentially, against the turning.
+    /// Friction coefficient μ: ratio of the tangential flank force, against the spindle rotation, to the normal one.
     pub friction: f64,
 }
 
-/// Coefficients of the tangential force and, by the edge angle, of what the radial and axial forces add up to in
-/// the plane of the tool (towards the axis) and along it.
+/// Force components of an edge: tangential, towards the tool axis and along the tool axis. The latter two follow from the radial and axial
+/// components and the edge angle.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
     tangential: f64,
@@ -80,8 +80,8 @@ impl Coefficients {
         self.tangential == 0.0 && self.inward == 0.0 && self.axial == 0.0
     }
 
-    /// The force in the machine's x, y, z. The tangential one points against the motion of the tooth, (−cos φ, sin φ) in
-    /// feed and normal.
+    /// Force vector in the machine's x, y, z. The tangential force is directed against the cutting motion of the tooth: (−cos φ, sin φ) in
+    /// feed and normal direction.
     fn force(self, at: Immersion) -> [f64; 3] {
         let [x, y] = at.outward;
         [
@@ -93,7 +93,7 @@ impl Coefficients {
 }
 
 impl ForceLaw {
-    /// The linear-edge law of a material at an edge angle given by its sine and cosine.
+    /// The linear-edge law of a material; the edge angle γ is given as [sin γ, cos γ].
     pub fn new(material: Material, [sin_edge, cos_edge]: [f64; 2]) -> Self {
         let of = |[tangential, radial, axial]: [f64; 3]| {
             Coefficients::new(tangential, radial, axial, sin_edge, cos_edge)
@@ -115,12 +115,12 @@ impl ForceLaw {
         }
     }
 
-    /// The coefficients.
+    /// The cutting and edge coefficients.
     pub fn material(&self) -> Material {
         self.material
     }
 
-    /// The same law with other coefficients.
+    /// The same law with the coefficients of another material.
     #[must_use]
     pub fn with_material(self, material: Material) -> Self {
         Self {
@@ -131,13 +131,13 @@ impl ForceLaw {
         }
     }
 
-    /// Force of the chip on the tool, N, with the chip thickness and depth in m; without process damping and wear.
+    /// Cutting force on the tool, N, in the machine's x, y, z at the chip thickness and axial depth, m; without process damping and wear.
     pub fn force_n(&self, at: Immersion, thickness_m: f64, depth_m: f64) -> [f64; 3] {
         self.force_of_n(at, thickness_m, [depth_m; 3])
     }
 
-    /// As [`Self::force_n`], with a depth for the tangential force, one for that towards the axis and one for that along
-    /// it: in solid material they are the same.
+    /// Cutting force as [`Self::force_n`], with separate effective depths, m, for the components tangential, towards the axis and along the
+    /// axis; in solid material they are equal.
     pub fn force_of_n(&self, at: Immersion, thickness_m: f64, depths_m: [f64; 3]) -> [f64; 3] {
         let thickness_m = self
             .chip
@@ -151,7 +151,7 @@ impl ForceLaw {
         .force(at)
     }
 
-    /// The matrix D of process damping, N s/m, at the cutting speed V in m/s: F = −D v; without wear.
+    /// Matrix D of process damping, N s/m, in the force F = −D v at the cutting speed V, m/s; without wear.
     pub fn damping_ns_per_m(&self, at: Immersion, depth_m: f64, cutting_speed_m_per_s: f64) -> [[f64; 3]; 3] {
         let Some(damping) = self.process_damping else {
             return [[0.0; 3]; 3];
@@ -161,18 +161,19 @@ impl ForceLaw {
             at.outward[1] * self.sin_edge,
             -self.cos_edge,
         ];
-        // A force of 1 N towards the axis along the chip thickness, and its friction.
+        // A unit normal force along the chip thickness, directed towards the axis, and its friction force.
         let force = Coefficients::new(damping.friction, 1.0, 0.0, self.sin_edge, self.cos_edge).force(at);
         let size = damping.n_per_m / cutting_speed_m_per_s * depth_m;
         force.map(|force| normal.map(|normal| -size * force * normal))
     }
 
-    /// 1 + r·t.
+    /// Wear factor 1 + r·t of the cutting force at the time `t`, s.
     pub fn wear(&self, t: f64) -> f64 {
         1.0 + self.wear_per_s * t
     }
 
-    /// True where a tooth feels a force the moment it touches: then the force, or its rate, jumps at loss of contact.
+    /// True if the cutting force or its derivative is discontinuous at loss of contact: with edge force, process damping or an exponent
+    /// below 1.
     pub fn jumps_at_contact(&self) -> bool {
         !self.edge.are_zero()
             || self.process_damping.is_some()

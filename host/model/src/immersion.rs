@@ -1,10 +1,10 @@
-//! A point of the engagement arc.
+//! Directions at one immersion angle.
 
-/// A point of the engagement arc.
+/// Sine and radial direction at one immersion angle φ.
 #[derive(Clone, Copy, Debug)]
 pub struct Immersion {
-    /// sin φ: how much of the feed lies along the chip.
+    /// sin φ, the component of the feed along the radial direction.
     pub sin: f64,
-    /// Radially outwards, in the machine's x and y.
+    /// Unit vector radially outwards, in the machine's x and y.
     pub(super) outward: [f64; 2],
 }

@@ -1,19 +1,20 @@
-//! What a term of the equation of motion does along a motion that is known.
+//! Restoring force along a measured motion.
 
 use super::{At, Branch, Term};
 
-/// Displacement and velocity of the tool in the machine's axes, finely sampled; an axis without motion is empty.
+/// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals; the vectors of an axis without motion are
+/// empty.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
-    /// Time between samples, s.
+    /// Sampling interval, s.
     pub step_s: f64,
-    /// Time of the first sample from the start of the record, s.
+    /// Time of the first sample from the start of the recording, s.
     pub start_s: f64,
-    /// Displacement, m.
+    /// Displacement of the tool by axis, m.
     pub x: [Vec<f64>; 3],
-    /// Velocity, m/s.
+    /// Velocity of the tool by axis, m/s.
     pub v: [Vec<f64>; 3],
-    /// Speeds below this cannot be told from rest, m/s.
+    /// Noise level of the velocity by axis, m/s: below it a velocity is indistinguishable from rest.
     pub rest_m_per_s: [f64; 3],
 }
 
@@ -23,12 +24,12 @@ impl Motion {
         self.x.iter().map(Vec::len).max().unwrap_or(0)
     }
 
-    /// True where there is no motion.
+    /// True if the motion has no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// How far it swings from end to end, along the axis along which that is most, m.
+    /// Largest peak-to-peak displacement of the three axes, m.
     pub fn swing_m(&self) -> f64 {
         let swing = |x: &Vec<f64>| {
             let ends = x
@@ -39,7 +40,7 @@ impl Motion {
         self.x.iter().map(swing).fold(0.0, f64::max)
     }
 
-    /// The tool at a sample.
+    /// Time, displacement and velocity of the tool at a sample.
     pub fn at(&self, sample: usize) -> At {
         let of = |signal: &[Vec<f64>; 3]| {
             std::array::from_fn(|axis| signal[axis].get(sample).copied().unwrap_or(0.0))
@@ -51,7 +52,7 @@ impl Motion {
         }
     }
 
-    /// Moves the motion along an axis so far towards its past.
+    /// Advances the motion along an axis in time by `seconds`: sample k gets the value at `seconds` later.
     pub fn advance(&mut self, axis: usize, seconds: f64) {
         let place = seconds / self.step_s;
         for signal in [&mut self.x[axis], &mut self.v[axis]] {
@@ -61,19 +62,19 @@ impl Motion {
         }
     }
 
-    /// Root mean square of the displacement along an axis, m.
+    /// Root mean square displacement along an axis, m.
     pub fn size_m(&self, axis: usize) -> f64 {
         let squares: f64 = self.x[axis].iter().map(|x| x * x).sum();
         (squares / self.x[axis].len().max(1) as f64).sqrt()
     }
 
-    /// Largest displacement along an axis, m.
+    /// Largest absolute displacement along an axis, m.
     pub fn largest_m(&self, axis: usize) -> f64 {
         self.x[axis].iter().fold(0.0, |most, x| x.abs().max(most))
     }
 }
 
-/// A signal between its samples, by a cubic through four of them; `place` counts samples.
+/// Catmull–Rom (cubic) interpolation of a signal at `place`, counted in samples; the end samples are repeated.
 pub fn between(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
@@ -90,10 +91,10 @@ pub fn between(samples: &[f64], place: f64) -> f64 {
     b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
 }
 
-/// f_r of a term along `motion`, N, in the machine's axes.
+/// Restoring force f_r, N, in the machine's axes at each sample of `motion`.
 ///
-/// Branches follow the motion as they do in a simulation. A term that can hold an axis and has no
-/// state of its own (dry friction) is blended between its branches where the speed cannot be told from rest.
+/// Regimes follow the motion as in a simulation. For dry friction without internal states, f_r is interpolated linearly between the two slip
+/// directions while the velocity is below the noise level [`Motion::rest_m_per_s`].
 pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
     if let Some(axis) = term.holds().filter(|_| term.states() == 0) {
         let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; motion.len()]);
@@ -110,7 +111,8 @@ pub fn restoring_along(term: &dyn Term, motion: &Motion) -> [Vec<f64>; 3] {
     restoring_from(term, motion, &mut own)
 }
 
-/// The same for a term that cannot hold an axis by itself, from its own states at the first sample to those at the last.
+/// Restoring force f_r, N, along `motion` for a force without locked regime; updates the internal states `own` from the first sample to the
+/// last.
 pub fn restoring_from(term: &dyn Term, motion: &Motion, own: &mut [f64]) -> [Vec<f64>; 3] {
     let count = motion.len();
     let mut force: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; count]);
@@ -133,10 +135,10 @@ pub fn restoring_from(term: &dyn Term, motion: &Motion, own: &mut [f64]) -> [Vec
     force
 }
 
-/// The branch that holds at `at`, coming from another.
+/// The regime at `at`, after the regime `branch` of the previous sample.
 fn settled(term: &dyn Term, branch: Option<Branch>, at: &At, own: &[f64]) -> Branch {
     let mut now = branch.unwrap_or_else(|| term.next(None, at, own, 0.0));
-    // A sampled motion may pass several ends of branches at once.
+    // Between two samples a motion may pass through several regimes.
     for _ in 0..4 {
         if term.margin(now, at, own, 0.0) >= 0.0 {
             break;
@@ -146,7 +148,7 @@ fn settled(term: &dyn Term, branch: Option<Branch>, at: &At, own: &[f64]) -> Bra
     now
 }
 
-/// Heun's method from one sample to the next in two steps, with the motion even between them.
+/// Integrates the internal states from one sample to the next with two steps of Heun's method; the motion is linear between samples.
 fn step(term: &dyn Term, branch: Branch, (from, to): (&At, &At), step_s: f64, own: &mut [f64]) {
     let mix = |share: f64| At {
         t: from.t + share * step_s,

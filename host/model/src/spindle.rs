@@ -1,17 +1,17 @@
-//! The turning of the spindle.
+//! Spindle angle and speed over time: constant speed, sinusoidal speed modulation, or linear speed sweep.
 
 use std::f64::consts::TAU;
 
-/// A spindle; its angle is 0 at t = 0, where tooth 1 stands at immersion angle 0.
+/// Spindle motion; at t = 0 the spindle angle is 0 and tooth 1 is at the immersion angle 0.
 ///
-/// Its speed is constant, fluctuates as Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)), or glides from one speed to another.
+/// The speed is constant, modulated as Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)), or changes linearly from one speed to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spindle {
     speed_rad_per_s: f64,
     turning: Turning,
 }
 
-/// How the speed changes.
+/// Variation of the spindle speed over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Turning {
     Steady,
@@ -19,7 +19,7 @@ enum Turning {
     Gliding(Glide),
 }
 
-/// A speed that grows or falls evenly from t = 0 on, and is constant before and afterwards.
+/// A linear change of the spindle speed from t = 0 on; the speed is constant before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Glide {
     /// First and last speed, rad/s.
@@ -35,7 +35,7 @@ impl Glide {
 
     fn angle_rad(self, t: f64) -> f64 {
         let within = t.clamp(0.0, self.seconds);
-        // The mean speed of the way so far, and what is before or beyond.
+        // Mean speed within the sweep, and constant speed before or after it.
         0.5 * (self.speeds[0] + self.speed(within)) * within + self.speed(t) * (t - within)
     }
 
@@ -48,38 +48,38 @@ impl Glide {
         if angle_rad >= whole {
             return self.seconds + (angle_rad - whole) / last;
         }
-        // first·t + ½·a·t² = angle, in the form that does not cancel.
+        // Root of first·t + ½·a·t² = angle, in the form without cancellation.
         let acceleration = (last - first) / self.seconds;
         2.0 * angle_rad / (first + (first * first + 2.0 * acceleration * angle_rad).sqrt())
     }
 }
 
-/// How a speed fluctuates.
+/// Sinusoidal speed modulation Ω(t) = Ω₀(1 + δ sin(2πf_m t + ψ)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fluctuation {
-    /// δ, between −1 and 1.
+    /// Relative amplitude δ of the speed modulation, between −1 and 1.
     pub delta: f64,
-    /// f_m, Hz, positive.
+    /// Modulation frequency f_m, Hz, positive.
     pub frequency_hz: f64,
-    /// ψ, rad.
+    /// Phase ψ of the modulation at t = 0, rad.
     pub phase_rad: f64,
 }
 
 impl Fluctuation {
-    /// ∫ sin(2πf_m s + ψ) ds from 0 to `t`, times δ: how far the spindle is ahead of its mean, s.
+    /// Lead of the spindle over its mean rotation, s: δ·∫ sin(2πf_m s + ψ) ds from 0 to `t`.
     fn ahead_s(self, t: f64) -> f64 {
         let omega = TAU * self.frequency_hz;
         self.delta / omega * (self.phase_rad.cos() - (omega * t + self.phase_rad).cos())
     }
 
-    /// Speed at `t` over the mean speed.
+    /// Speed at the time `t` divided by the mean speed.
     fn share(self, t: f64) -> f64 {
         1.0 + self.delta * (TAU * self.frequency_hz * t + self.phase_rad).sin()
     }
 }
 
 impl Spindle {
-    /// A spindle at this speed, which must be positive.
+    /// A spindle with the constant speed `spindle_rpm`, rev/min, positive.
     pub fn new(spindle_rpm: f64) -> Self {
         Self {
             speed_rad_per_s: spindle_rpm * TAU / 60.0,
@@ -87,8 +87,8 @@ impl Spindle {
         }
     }
 
-    /// A spindle whose speed glides evenly from one to the other in `seconds`; all must be positive. Its mean speed is
-    /// that in the middle.
+    /// A spindle whose speed changes linearly from `first_rpm` to `last_rpm`, rev/min, in `seconds`; all positive. Its mean speed is the
+    /// arithmetic mean of both.
     pub fn gliding(first_rpm: f64, last_rpm: f64, seconds: f64) -> Self {
         let speeds = [first_rpm, last_rpm].map(|rpm| rpm * TAU / 60.0);
         Self {
@@ -97,7 +97,7 @@ impl Spindle {
         }
     }
 
-    /// The same with a speed that fluctuates about the mean one.
+    /// The same spindle with speed modulation about its mean speed.
     #[must_use]
     pub fn fluctuating(self, fluctuation: Fluctuation) -> Self {
         Self {
@@ -106,7 +106,7 @@ impl Spindle {
         }
     }
 
-    /// How its speed fluctuates; `None` where it does not.
+    /// The speed modulation; `None` for a constant or linearly changing speed.
     pub fn fluctuation(&self) -> Option<Fluctuation> {
         match self.turning {
             Turning::Fluctuating(fluctuation) => Some(fluctuation),
@@ -114,12 +114,12 @@ impl Spindle {
         }
     }
 
-    /// The mean speed Ω₀, rad/s.
+    /// Mean spindle speed Ω₀, rad/s.
     pub fn speed_rad_per_s(&self) -> f64 {
         self.speed_rad_per_s
     }
 
-    /// The speed at `t`, rad/s.
+    /// Spindle speed at the time `t`, rad/s.
     pub fn speed_at_rad_per_s(&self, t: f64) -> f64 {
         match self.turning {
             Turning::Steady => self.speed_rad_per_s,
@@ -128,7 +128,7 @@ impl Spindle {
         }
     }
 
-    /// The angle turned through since t = 0, rad.
+    /// Spindle angle at the time `t`, rad, from 0 at t = 0.
     pub fn angle_rad(&self, t: f64) -> f64 {
         match self.turning {
             Turning::Steady => self.speed_rad_per_s * t,
@@ -137,7 +137,7 @@ impl Spindle {
         }
     }
 
-    /// When the spindle has turned through `angle_rad` since t = 0, s.
+    /// Time at which the spindle angle is `angle_rad`, s (inverse of [`Self::angle_rad`]).
     pub fn time_s(&self, angle_rad: f64) -> f64 {
         let mean_s = angle_rad / self.speed_rad_per_s;
         match self.turning {
@@ -147,7 +147,7 @@ impl Spindle {
         }
     }
 
-    /// How long before `t` the spindle stood `angle_rad` back, s.
+    /// Delay between the spindle angle at `t` and that `angle_rad` earlier, s; for the pitch angle this is the regenerative delay.
     pub fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
         match self.turning {
             Turning::Steady => angle_rad / self.speed_rad_per_s,
@@ -155,7 +155,7 @@ impl Spindle {
         }
     }
 
-    /// [`Self::delay_s`] over that at the mean speed.
+    /// [`Self::delay_s`] divided by the delay at the mean speed.
     pub fn delay_share(&self, t: f64, angle_rad: f64) -> f64 {
         match self.turning {
             Turning::Steady => 1.0,
@@ -165,13 +165,12 @@ impl Spindle {
         }
     }
 
-    /// How long after `t` the spindle stands `angle_rad` further, s.
+    /// Time from `t` until the spindle has rotated by `angle_rad`, s.
     pub fn advance_s(&self, t: f64, angle_rad: f64) -> f64 {
         -self.delay_s(t, -angle_rad)
     }
 
-    /// The shortest and the longest time in which the spindle ever turns through `angle_rad`, s: bounds, and exact
-    /// where the speed is constant.
+    /// Lower and upper bound of the time in which the spindle rotates by `angle_rad`, s; exact for a constant speed.
     pub fn bounds_s(&self, angle_rad: f64) -> [f64; 2] {
         let fastest_and_slowest = match self.turning {
             Turning::Steady => [self.speed_rad_per_s; 2],
@@ -185,12 +184,12 @@ impl Spindle {
     }
 }
 
-/// t with t + ahead(t) = `mean_s`, to rounding: Newton between bounds, since the left side grows.
+/// Solves t + lead(t) = `mean_s` for t, s, by Newton's method with bisection as safeguard; the left side increases monotonically.
 fn inverse(fluctuation: Fluctuation, mean_s: f64) -> f64 {
     let reach_s = 2.0 * fluctuation.delta.abs() / (TAU * fluctuation.frequency_hz);
     let (mut low, mut high) = (mean_s - reach_s, mean_s + reach_s);
     let mut t = mean_s;
-    // Bisection alone halves a reach of a second to rounding in 60 steps; Newton takes five.
+    // Bisection alone reaches rounding in 60 steps from a bracket of a second; Newton's method takes about five.
     for _ in 0..60 {
         let excess_s = t + fluctuation.ahead_s(t) - mean_s;
         if excess_s > 0.0 {
@@ -218,12 +217,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_gliding_spindle_reaches_its_last_speed_and_time_and_angle_are_inverse() {
+    fn a_linear_speed_change_reaches_its_last_speed_and_time_and_angle_are_inverse() {
         for (first, last) in [(450.0, 690.0), (690.0, 450.0)] {
             let spindle = Spindle::gliding(first, last, 60.0);
             let rpm = |t: f64| spindle.speed_at_rad_per_s(t) * 60.0 / TAU;
             assert!((rpm(-1.0) - first).abs() < 1e-9 && (rpm(61.0) - last).abs() < 1e-9);
-            // The mean speed for a minute.
+            // 570 revolutions: the mean speed for one minute.
             assert!((spindle.angle_rad(60.0) / TAU - 570.0).abs() < 1e-9);
             for i in -20..700 {
                 let t = 0.1 * f64::from(i);
@@ -243,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn time_and_angle_of_a_fluctuating_spindle_are_inverse_and_its_speed_is_the_rate() {
+    fn time_and_angle_of_a_modulated_spindle_are_inverse_and_its_speed_is_the_rate() {
         for delta in [0.0, 1e-3, 0.3, -0.95] {
             let spindle = Spindle::new(900.0).fluctuating(Fluctuation {
                 delta,

@@ -1,4 +1,4 @@
-//! Terms that the equation of motion gets besides the structure of the case: friction, play, springs that are not linear.
+//! Restoring forces in addition to the linear structure: friction, backlash, hysteresis, nonlinear springs and dampers.
 
 use std::fmt::Debug;
 
@@ -7,18 +7,18 @@ use num_complex::Complex64;
 
 use super::Dynamics;
 
-/// The tool at an instant, in the machine's x, y, z.
+/// Time, displacement and velocity of the tool at one instant, in the machine's x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct At {
     /// Time, s.
     pub t: f64,
-    /// Displacement, m.
+    /// Displacement of the tool, m.
     pub x: [f64; 3],
-    /// Velocity, m/s.
+    /// Velocity of the tool, m/s.
     pub v: [f64; 3],
 }
 
-/// How f_r changes with the motion, rows force, columns motion along x, y, z.
+/// Jacobian of a restoring force f_r with respect to displacement and velocity; rows force, columns motion, along x, y, z.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
     /// ∂f_r/∂x, N/m.
@@ -27,36 +27,36 @@ pub struct Slopes {
     pub damping: [[f64; 3]; 3],
 }
 
-/// Which of the smooth pieces of a term holds; each term counts its own.
+/// Regime of a restoring force, numbered by each force itself: within a regime, such as stick or slip, f_r is smooth.
 pub type Branch = u8;
 
-/// A term f_r on the restoring side: M ẍ + C ẋ + K x + f_r = F, with f_r in N along x, y, z.
+/// A restoring force f_r, N, along x, y, z in the equation of motion M ẍ + C ẋ + K x + f_r = F.
 ///
-/// A term may have states of its own, and pieces (branches) on each of which it is smooth: the integrator ends a step
-/// exactly where [`Term::margin`] falls below zero and asks [`Term::next`] what follows. A branch that is
-/// [`Term::locked`] holds the velocity of one axis, as friction at rest does: its force is then what the others leave.
+/// A restoring force may have internal states and several regimes (branches), in each of which it is smooth. The integrator ends a step
+/// exactly where [`Term::margin`] falls below zero; [`Term::next`] then selects the next regime. A [`Term::locked`] regime keeps one axis
+/// at rest, as sticking friction does: f_r then balances all other forces on that axis.
 pub trait Term: Debug + Send + Sync {
-    /// Number of states of its own. They are displacements in m: error control measures them as such.
+    /// Number of internal states. They are displacements in m, which the error control of the integrator assumes.
     fn states(&self) -> usize {
         0
     }
 
-    /// Moves its states along a way that is known, from wherever they were to `at`, and true; false where they do not follow from the
-    /// way alone but from its speed.
+    /// Updates the internal states `own` to the displacement `at`, if they depend on the path only; false if they are rate-dependent and
+    /// must be integrated.
     fn follow(&self, _at: &At, _own: &mut [f64]) -> bool {
         false
     }
 
-    /// Brings states that a long step has carried beyond where they can be back to there.
+    /// Limits internal states that a long integration step has carried beyond their admissible range.
     fn confine(&self, _own: &mut [f64]) {}
 
-    /// Puts its own states to what they are where a motion is found going on; a simulation begins with zeros.
+    /// Sets the internal states for a recording that begins during a motion; a simulation begins with zero states.
     fn begin(&self, _at: &At, _own: &mut [f64]) {}
 
-    /// f_r, N.
+    /// Restoring force f_r, N, in the given regime.
     fn restoring_n(&self, branch: Branch, at: &At, own: &[f64]) -> [f64; 3];
 
-    /// Slopes of f_r; `None` for a term that has no slope everywhere, or states of its own.
+    /// Jacobian of f_r; `None` for a force that is not differentiable everywhere, or that has internal states.
     fn slopes(&self, _at: &At) -> Option<Slopes> {
         None
     }
@@ -67,41 +67,44 @@ pub trait Term: Debug + Send + Sync {
         None
     }
 
-    /// Rates of its own states.
+    /// Time derivatives of the internal states, m/s.
     fn rate(&self, _branch: Branch, _at: &At, _own: &[f64], _rate: &mut [f64]) {}
 
-    /// The axis whose velocity could be held, where a branch of this term can.
+    /// The axis that a locked regime keeps at rest; `None` for a force without a locked regime.
     fn holds(&self) -> Option<usize> {
         None
     }
 
-    /// True where `branch` holds the velocity of [`Self::holds`]; [`Self::restoring_n`] is not asked then.
+    /// True if `branch` keeps the axis of [`Self::holds`] at rest (stick); [`Self::restoring_n`] is not evaluated in such a regime.
     fn locked(&self, _branch: Branch) -> bool {
         false
     }
 
-    /// Not below zero while `branch` goes on. `holding_n` is the f_r that would hold the axis, 0 where there is none.
+    /// Event function of the regime `branch`: negative from the end of the regime on. `holding_n` is the force f_r, N, that keeps the axis at
+    /// rest; 0 without a locked regime.
     fn margin(&self, _branch: Branch, _at: &At, _own: &[f64], _holding_n: f64) -> f64 {
         f64::INFINITY
     }
 
-    /// The branch at the start (`None`), or after `before` has ended.
+    /// The regime at the start (`before` = `None`), or after the regime `before` has ended.
     fn next(&self, _before: Option<Branch>, _at: &At, _own: &[f64], _holding_n: f64) -> Branch {
         0
     }
 }
 
-/// Room and branches of a set of terms while they are integrated.
+/// The current regime of each restoring force, in their order.
 #[derive(Clone, Copy, Debug)]
 pub struct Branches<'a>(pub &'a [Branch]);
 
-/// Number of own states of all `terms`.
+/// Number of internal states of all restoring forces `terms`.
 pub fn states(terms: &[Box<dyn Term>]) -> usize {
     terms.iter().map(|term| term.states()).sum()
 }
 
-/// ẏ of structure and terms under `force` (N, from outside) with the tool at `x`; `y` are the states of the structure
-/// and, behind them, those of the terms in their order. f_r of held axes, in x, y, z, is returned.
+/// Writes ẏ of structure and restoring forces under the external `force`, N, at the time `t`, s, and displacement `x`, m.
+///
+/// `y` holds the states of the structure, followed by the internal states of the restoring forces in their order. Returns the force f_r, N,
+/// of sticking axes along x, y, z.
 pub fn rate(
     dynamics: &Dynamics,
     terms: &[Box<dyn Term>],
@@ -120,7 +123,7 @@ pub fn rate(
     };
     let mut left = minus(force, restoring(terms, branches, &at, own_y));
     if dynamics.velocity_jumps() {
-        // The velocity feels the force itself: a few rounds settle both, damping is small beside the inertia.
+        // The velocity depends on the force directly: fixed-point iteration, which converges for damping small against inertia.
         for _ in 0..40 {
             let before = at.v;
             at.v = dynamics.velocity_under(&y[..order], left);
@@ -148,7 +151,7 @@ fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| a[axis] - b[axis])
 }
 
-/// Sum of f_r of all terms that hold nothing.
+/// Sum of f_r, N, of all restoring forces that are not locked.
 fn restoring(terms: &[Box<dyn Term>], branches: Branches<'_>, at: &At, own: &[f64]) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let mut place = 0;
@@ -167,7 +170,7 @@ fn restoring(terms: &[Box<dyn Term>], branches: Branches<'_>, at: &At, own: &[f6
     sum
 }
 
-/// Holds the locked axes: their accelerations become zero. f_r of what holds them.
+/// Sets the accelerations of the locked axes to zero in `rate`; returns the holding force f_r, N.
 fn hold(
     dynamics: &Dynamics,
     terms: &[Box<dyn Term>],
@@ -189,7 +192,7 @@ fn hold(
     holding
 }
 
-/// f_r that makes the acceleration of the `locked` axes zero, from ẏ without it.
+/// The holding force f_r, N, that makes the accelerations of the `locked` axes zero; `rate` is ẏ without it.
 pub fn holding_n(dynamics: &Dynamics, locked: [bool; 3], rate: &[f64]) -> [f64; 3] {
     let Some(free) = dynamics.acceleration(rate) else {
         return [0.0; 3];

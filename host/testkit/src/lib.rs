@@ -1,4 +1,4 @@
-//! What unit tests of several crates share: the cases of the project, the folder of measured records, and the files of results.
+//! Support for tests of several crates: the project's cases, the folder of measured recordings, and the files of campaign results.
 //!
 //! A dev-dependency only. It knows the layers up to `quietcut-model`; that crate and those below it cannot use it.
 //!
@@ -15,15 +15,15 @@ use std::path::PathBuf;
 use quietcut_model::case::Case;
 use quietcut_model::structure::{Form, Robot};
 
-/// The folder of files that the tests of the workspace share, `tests/` at its root.
+/// The folder `tests/` at the root of the workspace.
 pub fn tests_folder() -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "..", "..", "tests"].iter().collect()
 }
 
-/// The path `NAME` in the folder of measured records, which `QUIETCUT_DATA` names.
+/// Path of the file `name` in the folder of measured recordings, given by the environment variable `QUIETCUT_DATA`.
 ///
-/// A test that uses it has `measured` in its name and is `#[ignore]`d, so that it counts as skipped where there are no such records;
-/// `tests/run` runs it where they are.
+/// A test that uses it has `measured` in its name and is `#[ignore]`d, so that it is skipped without these recordings; `tests/run` runs it if
+/// they are present.
 ///
 /// # Panics
 /// `QUIETCUT_DATA` is not set.

@@ -1,24 +1,24 @@
-//! Figures of a campaign in `tests/results/NAME.json`, from which `host/VALIDATION.md` is assembled.
+//! Results of a test campaign in `tests/results/NAME.json`, from which `host/VALIDATION.md` is assembled.
 
 use std::process::Command;
 
 use serde_json::json;
 
-/// A campaign: how its figures come about.
+/// A test campaign and the command that reproduces its figures.
 #[derive(Clone, Debug)]
 pub struct Campaign<'a> {
-    /// Name of its file, without ending.
+    /// Name of its result file, without extension.
     pub name: &'a str,
     /// Heading on the page.
     pub title: &'a str,
     /// The command that prints the figures.
     pub command: &'a str,
-    /// How many seeds, and of what.
+    /// Number and kind of the random seeds.
     pub seeds: &'a str,
 }
 
 impl Campaign<'_> {
-    /// Writes the figures, each with its name, beside commit and compiler.
+    /// Writes name and value of each figure to the result file, with commit and compiler version.
     ///
     /// # Panics
     /// The file cannot be written.
@@ -43,7 +43,7 @@ impl Campaign<'_> {
     }
 }
 
-/// `None` where the program is missing or fails.
+/// First line of a program's output; `None` if the program is missing or fails.
 fn first_line_of(program: &str, arguments: &[&str]) -> Option<String> {
     let output = Command::new(program)
         .args(arguments)

@@ -1,4 +1,4 @@
-//! From the shape of a case file to a case: every value is judged here.
+//! Conversion of a case file to a case, with a check of every value.
 
 mod extensions;
 mod job;

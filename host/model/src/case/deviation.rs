@@ -1,11 +1,11 @@
-//! How well a parameter is known.
+//! Standard deviations of the parameters of a case.
 
 /// The standard deviation of one parameter, in the unit of that parameter: a key `…_std` of the case.
 ///
 /// Deviations are independent of one another and normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
-    /// Which parameter.
+    /// The uncertain parameter.
     pub parameter: Parameter,
     /// Its standard deviation, positive.
     pub std: f64,
@@ -71,7 +71,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// Where it stands in the case file; rows, columns and modes count from 1.
+    /// Key of the parameter in the case file; rows, columns and modes count from 1.
     pub fn key(self) -> String {
         let entry = |matrix: &str, i: usize, j: usize| format!("structure.{matrix}[{}][{}]", i + 1, j + 1);
         let shape = |mode: usize, side: &str, index: usize, imaginary: bool| {

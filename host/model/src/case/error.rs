@@ -1,4 +1,4 @@
-//! What is wrong with a case file, where, and what would be right.
+//! Errors of a case file, with their line and the expected value.
 
 use std::path::PathBuf;
 
@@ -35,7 +35,7 @@ pub enum CaseError {
         key: String,
         /// The value as read.
         found: String,
-        /// What would be right.
+        /// The expected value.
         expected: String,
     },
     /// Values of extensions that are not possible beside each other, or a key that is missing.
@@ -48,7 +48,7 @@ pub enum CaseError {
         /// The fault.
         error: EffectError,
     },
-    /// A table that is needed for what is asked of the case.
+    /// A missing table that the task requires.
     #[error("{}: there is no [{section}]; {what_for}", path.display())]
     MissingSection {
         /// The file.

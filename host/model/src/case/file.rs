@@ -1,4 +1,4 @@
-//! The shape of a case file as it stands in TOML, before any value is judged.
+//! Structure of a case file in TOML, before its values are checked.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ pub(super) struct CaseFile {
     pub(super) extension: ExtensionsFile,
 }
 
-/// Both kinds of structure in one: the kind decides which keys may be there.
+/// All kinds of structure in one table: `kind` decides which keys are allowed.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StructureFile {

@@ -1,12 +1,12 @@
-//! What the machine's spindle can do.
+//! Limits of the machine's spindle.
 
-/// Limits of the machine; advice stays within.
+/// Limits of spindle speed and power; advised speeds stay within them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineLimits {
     /// Slowest spindle speed, rev/min.
     pub rpm_min: f64,
     /// Fastest spindle speed, rev/min.
     pub rpm_max: f64,
-    /// Spindle power, W; `None` where the case does not say.
+    /// Spindle power, W; `None` if the case does not give it.
     pub power_w: Option<f64>,
 }

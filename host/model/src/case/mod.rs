@@ -28,9 +28,9 @@ use crate::structure::Structure;
 /// One machine and one job.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Where it was read from.
+    /// Path of the case file.
     pub path: PathBuf,
-    /// Its name; the file's where it gives none.
+    /// Name of the case; the file name without extension if the file gives none.
     pub name: String,
     /// The machine. Its values are finite and of the right shape; whether the matrices are definite is judged
     /// where they are used.
@@ -41,11 +41,11 @@ pub struct Case {
     pub material: Option<Material>,
     /// The cut.
     pub cut: Option<Cut>,
-    /// What the machine can do.
+    /// Limits of spindle speed and power.
     pub limits: Option<MachineLimits>,
-    /// Where the robot stood.
+    /// Posture of the robot at which the structure was measured.
     pub posture: Posture,
-    /// How well parameters are known.
+    /// Standard deviations of parameters (keys `…_std`).
     pub deviations: Vec<Deviation>,
     /// Extensions of the model by name, as they stand in the file. Names, keys and values are those of the
     /// [`EffectSpec`]s; whether the structure has the direction is checked where the effect is used.
@@ -98,7 +98,7 @@ impl Case {
         })
     }
 
-    /// True where the case has this effect as an extension.
+    /// True if the case has this effect as an extension.
     pub fn has(&self, effect: EffectName) -> bool {
         self.extensions.contains_key(effect.name())
     }

@@ -1,4 +1,4 @@
-//! The value of a parameter in a case, and its change.
+//! Reads and changes the value of a parameter in a case.
 
 use num_complex::Complex64;
 
@@ -7,16 +7,16 @@ use super::deviation::Parameter;
 use crate::structure::{Form, Joint, Matrices, Mode};
 
 impl Parameter {
-    /// The value of the parameter in a case; `None` where the case has no such thing.
+    /// Value of the parameter in a case; `None` if the case has no such parameter.
     pub fn value(self, case: &Case) -> Option<f64> {
-        // Looking at a value and changing it must not be two lists: a copy is looked at.
+        // Reading uses the same table as changing, on a copy.
         self.slot(&mut case.clone()).map(|value| *value)
     }
 
-    /// Changes the value of the parameter in a case.
+    /// Adds `by` to the value of the parameter in a case.
     ///
-    /// Start and exit angle stay within 0 to 180 degrees, outside of which a tooth cuts no chip. False where the case
-    /// has no such thing, or no machine, tool or cut has the value that comes out.
+    /// Start and exit angle stay within 0 to 180 degrees, outside of which a tooth cuts no chip. False if the case
+    /// lacks the parameter, or if the new value is outside its physical range.
     pub fn shift(self, case: &mut Case, by: f64) -> bool {
         let Some(value) = self.slot(case) else {
             return false;

@@ -1,18 +1,18 @@
-//! Where the robot stood.
+//! Posture of a robot.
 
 use quietcut_recording::RecordedPosture;
 
-/// What the robot's joints were at when the structure was measured.
+/// Posture of the robot at which the structure was measured.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Posture {
-    /// An index that means the same on host and device; 0 on a machine tool.
+    /// Index of the posture, shared by host and device; 0 on a machine tool.
     pub index: u8,
     /// Joint angles, degrees, from the base on.
     pub joints_deg: Vec<f64>,
 }
 
 impl Posture {
-    /// As it stands beside a recording; `None` where no joints are known.
+    /// The posture as an entry of a recording's sidecar; `None` without joint angles.
     pub fn recorded(&self) -> Option<RecordedPosture> {
         (!self.joints_deg.is_empty()).then(|| RecordedPosture {
             joints_deg: self.joints_deg.clone(),

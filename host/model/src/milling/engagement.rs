@@ -1,10 +1,10 @@
-//! When which tooth cuts.
+//! Engagement of the teeth over one tooth-passing period.
 
 use std::f64::consts::PI;
 
 use super::{Cut, Tool};
 
-/// Share of a pitch below which an interval is taken for rounding of angles given in degrees.
+/// Fraction of a pitch below which a subinterval counts as rounding of angles given in degrees and is dropped. A choice.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// The teeth that cut during one tooth period of a tool with equal pitch.
@@ -18,18 +18,18 @@ pub struct Engagement {
     pub start: f64,
     /// Immersion angle of exit, rad.
     pub exit: f64,
-    /// Angle from tooth to tooth θ, rad.
+    /// Pitch angle θ, rad.
     pub pitch: f64,
 }
 
-/// A part of the tooth period during which the same teeth cut.
+/// A subinterval of the tooth-passing period with a constant number of teeth in cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Phase where it begins, rad.
+    /// Phase at its start, rad.
     pub from: f64,
-    /// Phase where it ends, rad.
+    /// Phase at its end, rad.
     pub to: f64,
-    /// Number of teeth that cut; 0 is free flight.
+    /// Number of teeth in cut; 0 means free vibration.
     pub teeth: usize,
 }
 
@@ -78,7 +78,7 @@ impl Engagement {
         self.start + tooth as f64 * self.pitch + phase
     }
 
-    /// Share of a revolution that a tooth cuts, times the number of teeth: the mean number of cutting teeth.
+    /// Mean number of teeth in cut: the engaged fraction of a revolution times the number of teeth.
     pub fn mean_teeth(&self) -> f64 {
         (self.exit - self.start) / self.pitch
     }

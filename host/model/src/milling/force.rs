@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Engagement, Material, Tool};
 
-/// A vector that turns with the tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal, axial direction.
+/// A vector that rotates with the tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal, axial direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TurningVector {
-    /// Part that does not turn.
+    /// Constant part, independent of φ.
     pub constant: Vector3<f64>,
     /// Coefficient of cos φ.
     pub cosine: Vector3<f64>,
@@ -87,12 +87,12 @@ impl ToothForce {
         }
     }
 
-    /// Force per depth and displacement α(φ) = cutting·normalᵀ, Pa, of one tooth.
+    /// Directional coefficient matrix α(φ) = cutting·normalᵀ of one tooth, Pa: force per axial depth and displacement.
     pub fn directional(&self, angle: f64) -> Matrix3<f64> {
         self.cutting.at(angle) * self.normal.at(angle).transpose()
     }
 
-    /// Force per depth of a chip that the feed alone makes, N/m: cutting·normalᵀ f_t e_x + edge.
+    /// Force per axial depth of one tooth at the chip thickness of the feed alone, N/m: cutting·normalᵀ f_t e_x + edge.
     pub fn forced(&self, angle: f64, feed_per_tooth_m: f64) -> Vector3<f64> {
         self.cutting.at(angle) * (self.normal.at(angle).x * feed_per_tooth_m) + self.edge.at(angle)
     }

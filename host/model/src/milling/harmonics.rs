@@ -1,4 +1,4 @@
-//! Fourier series of what a cut does over a tooth period.
+//! Fourier series of the directional coefficients and of the forced excitation over the tooth-passing period.
 
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
@@ -16,7 +16,7 @@ pub struct Harmonic {
 }
 
 impl ToothForce {
-    /// The k-th harmonic, in closed form; that of −k is the conjugate, that of 0 the average.
+    /// The k-th harmonic, in closed form. Harmonic −k is its complex conjugate, harmonic 0 the average.
     pub fn harmonic(&self, engagement: &Engagement, feed_per_tooth_m: f64, k: i32) -> Harmonic {
         let (cutting, normal, edge) = (
             exponentials(&self.cutting),
@@ -54,7 +54,7 @@ fn integral(engagement: &Engagement, m: i32, k: i32) -> Complex64 {
     let (m, turns) = (f64::from(m), f64::from(k) * std::f64::consts::TAU / pitch);
     let rate = m - turns;
     let sum = if rate.abs() < 1e-9 {
-        // N is a whole number: a rate is zero or at least one.
+        // N is an integer, so that the rate is zero or at least one in magnitude.
         Complex64::cis(turns * start) * (exit - start)
     } else {
         let at_exit = Complex64::cis(m * exit - turns * (exit - start));

@@ -1,19 +1,19 @@
-//! The cutting process: what turns a displacement of the tool into a force.
+//! The linear cutting process: force on the tool from its displacement.
 
 use nalgebra::Vector3;
 
 use super::{Cut, Engagement, Material, Tool, ToothForce};
 
-/// Everything that turns a displacement into a force.
+/// The linear cutting process of a tool with equal pitch: force coefficients, engagement and feed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Process {
-    /// The force on a tooth.
+    /// Force on one tooth.
     pub force: ToothForce,
-    /// When which tooth cuts.
+    /// Engagement of the teeth over the tooth-passing period.
     pub engagement: Engagement,
     /// Feed per tooth, m.
     pub feed_per_tooth_m: f64,
-    /// True where the depth follows the axial vibration: then F gets −(β_e + β_f) z (eq. 3.7).
+    /// True if the axial depth follows the axial vibration z: F then contains −(β_e + β_f) z (eq. 3.7).
     pub axial_depth_modulation: bool,
 }
 
@@ -28,8 +28,8 @@ impl Process {
         }
     }
 
-    /// Force per depth, N/m, of the `teeth` that cut at a phase of the tooth period, rad, where the chip is that of the feed:
-    /// on every orbit of the tooth period.
+    /// Force per axial depth, N/m, of the `teeth` in cut at a phase of the tooth-passing period, rad, at the chip thickness of the feed. On
+    /// an orbit with the tooth-passing period the vibration cancels in the chip thickness.
     pub fn forced(&self, teeth: usize, phase: f64) -> Vector3<f64> {
         (0..teeth)
             .map(|tooth| {

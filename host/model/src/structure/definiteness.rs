@@ -1,4 +1,4 @@
-//! Are mass, damping and stiffness those of a passive structure, and if not, which entry is to blame?
+//! Definiteness of mass, damping and stiffness matrices, and the entries that violate it.
 
 use std::fmt;
 
@@ -7,22 +7,22 @@ use quietcut_numerics::eigenvalues::of_symmetric;
 
 use super::{Direction, Matrices};
 
-/// Eigenvalues above −this share of the largest count as zero: rounding, and printed matrices with few digits,
-/// move the zero of a free body about this much.
+/// Relative threshold below which a negative eigenvalue counts as zero. Rounding and matrices printed with few digits shift the zero
+/// eigenvalue of a free body by about this much.
 const ZERO: f64 = 1e-9;
 
-/// A matrix that no passive structure has.
+/// An indefinite matrix, which no passive structure can have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Indefinite {
-    /// mass, damping or stiffness.
+    /// Name of the matrix: mass, damping or stiffness.
     pub matrix: &'static str,
-    /// The smallest eigenvalue of its symmetric part.
+    /// Smallest eigenvalue of its symmetric part, in the unit of the matrix.
     pub eigenvalue: f64,
-    /// The smallest set of changed entries that makes it definite; empty where no one or two changes do.
+    /// Smallest set of entries whose change makes the matrix definite; empty if one or two changes do not suffice.
     pub remedy: Vec<Remedy>,
 }
 
-/// One change of a matrix that, alone or with others, makes it definite.
+/// A change of one entry that, alone or together with another, makes the matrix definite.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remedy {
     /// The off-diagonal entries (row, column) and (column, row) have the wrong sign.
@@ -42,7 +42,7 @@ pub enum Remedy {
         row: usize,
         /// The entry as it is.
         value: f64,
-        /// What it must exceed.
+        /// Lower bound that the entry must exceed.
         above: f64,
         /// Name of the degree of freedom.
         direction: Direction,
@@ -92,9 +92,9 @@ impl fmt::Display for Remedy {
     }
 }
 
-/// Everything that is indefinite in a structure's matrices, in the order mass, stiffness, damping.
+/// The indefinite matrices of a structure, in the order mass, stiffness, damping.
 ///
-/// The symmetric parts are judged: only they store or dissipate energy. Mass must be positive definite, stiffness
+/// The test uses the symmetric parts, since only these store or dissipate energy. Mass must be positive definite, stiffness
 /// and damping at least positive semidefinite.
 pub(super) fn indefinite(matrices: &Matrices, directions: &[Direction]) -> Vec<Indefinite> {
     let judged = [
@@ -126,7 +126,7 @@ fn judge(
     })
 }
 
-/// Scaled so that the diagonal is one, where it is positive: translations and rotations have different units.
+/// Tests a symmetric matrix after scaling its positive diagonal entries to 1, since translations and rotations have different units.
 fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     let scale = symmetric
         .diagonal()
@@ -150,11 +150,11 @@ fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
     of_symmetric(symmetric.clone()).map_or(f64::NAN, |eigen| eigen.eigenvalues.min())
 }
 
-/// Searches one change, then two: a turned sign, or a turned sign and a larger diagonal entry.
+/// Searches for one change, then two: a reversed sign, or a reversed sign and a larger diagonal entry.
 ///
-/// Where entries (i,j), (j,k) and (i,k) have the wrong product, turning any one of them helps. Mass, damping and
-/// stiffness of a mechanism come from diagonal matrices by the same change of coordinates, so an entry whose sign
-/// differs from that in the mass matrix is tried first.
+/// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them suffices. Mass, damping and stiffness of a
+/// mechanism follow from diagonal matrices by the same change of coordinates, so entries whose sign differs from that in the mass matrix
+/// are tried first.
 fn remedy(
     symmetric: &DMatrix<f64>,
     strict: bool,
@@ -207,8 +207,8 @@ fn with_turned_sign(symmetric: &DMatrix<f64>, (i, j): (usize, usize)) -> DMatrix
     turned
 }
 
-/// The value that the diagonal entry `row` must exceed for the whole to be definite, sᵀ R⁻¹ s with s the rest of
-/// the row and R the matrix without it (Schur complement); `None` where R is not definite itself.
+/// Lower bound of the diagonal entry `row` for a definite matrix, sᵀ R⁻¹ s (Schur complement): s is the remainder of the row, R the matrix
+/// without row and column. `None` if R is not definite.
 fn least_diagonal(symmetric: &DMatrix<f64>, row: usize, strict: bool) -> Option<f64> {
     let rest = symmetric.clone().remove_row(row).remove_column(row);
     if rest.is_empty() {

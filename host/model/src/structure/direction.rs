@@ -23,7 +23,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All six.
+    /// All six degrees of freedom.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 
     /// The name in files: x, y, z, rx, ry, rz.
@@ -38,7 +38,7 @@ impl Direction {
         }
     }
 
-    /// 0, 1, 2 for x, y, z; `None` for rotations, which neither force nor chip thickness sees.
+    /// Index 0, 1, 2 of x, y, z; `None` for rotations, in which neither cutting force nor chip thickness acts.
     pub fn axis(self) -> Option<usize> {
         match self {
             Self::X => Some(0),
@@ -55,13 +55,13 @@ impl fmt::Display for Direction {
     }
 }
 
-/// Feed, normal and axial direction, as columns, of a feed that is turned by `angle_deg` from x towards y.
+/// Matrix whose columns are the feed, normal and axial direction of a feed at `angle_deg` from x towards y, degrees.
 pub fn feed_axes(angle_deg: f64) -> Matrix3<f64> {
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0)
 }
 
-/// A name that is no direction.
+/// A word that is not the name of a direction.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is no direction; x, y, z, rx, ry or rz is needed")]
 pub struct UnknownDirection(pub String);

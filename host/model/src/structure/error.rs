@@ -1,4 +1,4 @@
-//! A structure that cannot be used.
+//! Errors of a structure.
 
 use std::fmt;
 
@@ -6,10 +6,10 @@ use quietcut_numerics::eigenvalues::EigenvalueError;
 
 use super::Indefinite;
 
-/// Why the structure of a case cannot be used.
+/// A structure whose matrices are not those of a passive structure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StructureError {
-    /// Matrices that no passive structure has.
+    /// Mass, damping or stiffness matrices that are indefinite.
     Indefinite(Vec<Indefinite>),
     /// The mass matrix has no inverse.
     SingularMass,

@@ -1,4 +1,4 @@
-//! The linear structure in first-order form, whatever form the case has.
+//! The linear structure in first-order form, from matrices, modes or joints.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, MatrixXx3};
 use num_complex::Complex64;
@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use super::{Direction, Form, Matrices, Mode, Structure, StructureError, feed_axes};
 use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 
-/// ẋ = A x + B F, u = C x with F and u the force on and the displacement of the tool centre point in x, y, z.
+/// First-order form ẋ = A x + B F, u = C x; F is the force on the tool centre point and u its displacement, along x, y, z.
 ///
 /// Real, n states. From matrices x = (q, q̇/s) with s the root of ‖M⁻¹K‖, so that all entries of A are frequencies.
 /// From complex modes x holds real and imaginary part of each modal coordinate η̇ = λη + Ψᴸᵀ F, and
@@ -48,7 +48,7 @@ impl FirstOrder {
         Some(Matrix3::from_fn(|i, j| h[(i, j)]))
     }
 
-    /// The same structure seen by a feed that is turned by `angle_deg` from x towards y.
+    /// The same structure in the axes of a feed direction at `angle_deg` from x towards y, degrees.
     ///
     /// Force and displacement are then in feed, normal and axial direction.
     pub fn turned(&self, angle_deg: f64) -> Self {
@@ -60,8 +60,8 @@ impl FirstOrder {
         }
     }
 
-    /// What is looked at instead of the tool, where each mode moves it by so many times what it moves the tool; modes that are not
-    /// among them move it as the tool. Of a structure of modes, whose two states each stand side by side.
+    /// The same structure with the motion of a sensor away from the tool as output: `modes[r]` is the shape of mode r at the sensor divided by
+    /// its shape at the tool, 1 for modes beyond the list. Only for modal structures, whose two states per mode are adjacent.
     #[must_use]
     pub fn seen(&self, modes: &[f64]) -> Self {
         let mut seen = self.clone();
@@ -88,7 +88,7 @@ impl FirstOrder {
 }
 
 impl Structure {
-    /// The structure in first-order form, in the machine's directions; cubic terms are left out.
+    /// The structure in first-order form, in the machine's directions, without cubic terms.
     ///
     /// # Errors
     /// Mass, damping or stiffness is indefinite, or the poles cannot be computed.
@@ -114,7 +114,7 @@ fn from_matrices(matrices: &Matrices, directions: &[Direction]) -> Result<FirstO
     from_second_order(matrices, &seen)
 }
 
-/// M q̈ + C q̇ + K q = Jᵀ F, u = J q.
+/// First-order form of M q̈ + C q̇ + K q = Jᵀ F, u = J q.
 fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<FirstOrder, StructureError> {
     let size = jacobian.ncols();
     let inverse_mass = matrices
@@ -124,7 +124,7 @@ fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<F
         .ok_or(StructureError::SingularMass)?;
     let stiffness = &inverse_mass * &matrices.stiffness;
     let damping = &inverse_mass * &matrices.damping;
-    // A free mass has no frequency of its own: its damping rate sets the scale, or 1/s.
+    // A free mass has no natural frequency: its damping rate sets the scale, or 1/s without damping.
     let scale = match stiffness.norm().sqrt().max(damping.norm()) {
         scale if scale > 0.0 => scale,
         _ => 1.0,
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn turning_the_feed_by_a_right_angle_swaps_the_directions() {
+    fn rotating_the_feed_by_a_right_angle_swaps_the_directions() {
         let case = case("kuka-kr90-full");
         let first_order = case.structure().unwrap().first_order().unwrap();
         let machine = first_order.receptance(100.0).unwrap();

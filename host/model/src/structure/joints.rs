@@ -1,4 +1,4 @@
-//! A robot: stiff links on compliant joints, and what it is at a posture.
+//! A robot of rigid links on compliant joints, linearized at a posture.
 //!
 //! With the joint angles' deviations q from the posture, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ F and u = J q: the tool-space
 //! matrices of thesis eq. 3.14, J⁻ᵀ · J⁻¹, where J has an inverse, and still right where it has none (a straight wrist) and for
@@ -16,15 +16,15 @@ pub struct Joint {
     pub axis: Unit<Vector3<f64>>,
     /// A point on the axis, m.
     pub point_m: Vector3<f64>,
-    /// N m/rad.
+    /// Joint stiffness, N m/rad.
     pub stiffness_nm_per_rad: f64,
-    /// N m s/rad.
+    /// Joint damping, N m s/rad.
     pub damping_nms_per_rad: f64,
-    /// On the cube of the angle, N m/rad³.
+    /// Cubic stiffness coefficient of the joint angle, N m/rad³.
     pub cubic_stiffness_nm_per_rad3: f64,
-    /// On the cube of the angular velocity, N m s³/rad³.
+    /// Cubic damping coefficient of the joint's angular velocity, N m s³/rad³.
     pub cubic_damping_nms3_per_rad3: f64,
-    /// Inertia of motor and gear about the axis, as the link feels it, kg m².
+    /// Inertia of motor and gear about the axis, reflected to the link side, kg m².
     pub rotor_kg_m2: f64,
     /// Mass of the link, kg.
     pub mass_kg: f64,
@@ -45,7 +45,7 @@ pub struct Robot {
     pub angles_rad: Vec<f64>,
 }
 
-/// Where things are at a posture.
+/// Positions and orientations of joints, links and tool at a posture, in the base frame.
 struct Placed {
     /// Axis and a point on it, of each joint.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
@@ -55,7 +55,7 @@ struct Placed {
 }
 
 impl Robot {
-    /// The same at other angles, rad.
+    /// The same robot at the joint angles `angles_rad`, rad.
     pub fn at(&self, angles_rad: &[f64]) -> Self {
         Self {
             angles_rad: angles_rad.to_vec(),
@@ -85,12 +85,12 @@ impl Robot {
         }
     }
 
-    /// The tool centre point, m.
+    /// Position of the tool centre point in the base frame, m.
     pub fn tool_place_m(&self) -> Vector3<f64> {
         self.placed().tool_m
     }
 
-    /// J, 3 × n: displacement of the tool centre point, m, per joint angle, rad.
+    /// Jacobian J, 3 × n: displacement of the tool centre point, m, per joint angle, rad.
     pub fn jacobian(&self) -> Matrix3xX<f64> {
         let placed = self.placed();
         jacobian(&placed, self.joints.len(), placed.tool_m)
@@ -103,7 +103,7 @@ impl Robot {
         jacobian(&placed, self.joints.len(), center)
     }
 
-    /// M(q₀), kg m².
+    /// Mass matrix M(q₀) in joint angles, kg m².
     pub fn mass(&self) -> DMatrix<f64> {
         let placed = self.placed();
         let mut mass = DMatrix::from_diagonal(&self.of_joints(|joint| joint.rotor_kg_m2).diagonal());

@@ -1,8 +1,8 @@
-//! A structure by its matrices.
+//! Structure in matrix form.
 
 use nalgebra::DMatrix;
 
-/// M q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = F, with ∘³ the cube of each element.
+/// Mass, damping and stiffness matrices in M q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = F, with ∘³ the cube of each element.
 ///
 /// All square with one row per direction; SI: kg, N s/m, N/m, N s³/m³, N/m³.
 #[derive(Clone, Debug, PartialEq)]

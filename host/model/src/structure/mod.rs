@@ -1,4 +1,4 @@
-//! The structure: how the tool centre point gives way to a force.
+//! The structure: linear dynamics of the tool centre point, with optional cubic terms.
 
 mod definiteness;
 mod direction;
@@ -20,17 +20,17 @@ pub use matrices::Matrices;
 pub use modal::ModalPart;
 pub use modes::Mode;
 
-/// A structure as a case gives it, in the machine's directions.
+/// The structure of a case, in the machine's directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
     /// The direction of each degree of freedom (matrices) or of each entry of the mode shapes (modes).
-    /// Forces and chip thickness see x, y and z.
+    /// Cutting forces and chip thickness involve x, y and z only.
     pub directions: Vec<Direction>,
-    /// The equations.
+    /// Representation of the dynamics: matrices, modes or joints.
     pub form: Form,
 }
 
-/// The ways to say how a structure moves.
+/// Representations of the dynamics of a structure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
     /// Mass, damping and stiffness.
@@ -42,10 +42,10 @@ pub enum Form {
 }
 
 impl Structure {
-    /// Judges mass, damping and stiffness.
+    /// Checks that mass, damping and stiffness are definite.
     ///
     /// # Errors
-    /// What is indefinite, its smallest eigenvalue, and the entries to blame.
+    /// Each indefinite matrix with its smallest eigenvalue and the entries that cause it.
     pub fn check(&self) -> Result<(), StructureError> {
         let found = match &self.form {
             Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
@@ -59,7 +59,7 @@ impl Structure {
         }
     }
 
-    /// The equation of motion in coordinates of its own, displacements or joint angles; `None` for modes, which have none.
+    /// The equation of motion in physical coordinates, displacements or joint angles; `None` for modes, which have no such matrices.
     pub fn equation(&self) -> Option<Cow<'_, Matrices>> {
         match &self.form {
             Form::Matrices(matrices) => Some(Cow::Borrowed(matrices)),
@@ -68,7 +68,7 @@ impl Structure {
         }
     }
 
-    /// True where the case has cubic terms that are not all zero.
+    /// True if the structure has a cubic term different from zero.
     pub fn is_nonlinear(&self) -> bool {
         match &self.form {
             Form::Matrices(matrices) => [&matrices.cubic_damping, &matrices.cubic_stiffness]

@@ -1,23 +1,24 @@
-//! The modes of a structure in first-order form, and how a pole moves while shapes stay.
+//! Modes of a structure in first-order form, and the change of its matrix A with a pole at constant mode shapes.
 
 use nalgebra::{DMatrix, Matrix3};
 use num_complex::Complex64;
 
 use super::FirstOrder;
 
-/// Poles closer than this, relative, are one mode: what belongs to each of them alone is not defined.
+/// Relative distance below which two poles form one mode: the mode shapes of (nearly) repeated poles are not defined individually. A choice
+/// between rounding of the eigenvalues and the spacing of distinct modes.
 const SAME: f64 = 1e-6;
 
-/// A mode: all that moves with one pole pair λ = −ζω + iω√(1 − ζ²).
+/// Modal part of A for one pole pair λ = −ζω + iω√(1 − ζ²).
 ///
-/// A = Σ_r λ_r P_r + conjugates, with projectors P_r. A mode that moves to another pole keeps P_r, and with it the residue of
-/// the receptance, right·leftᵀ: shapes stay. That is the same for structures by matrices and by modes.
-/// Modes of the same pole, as those of a round tool, are one and move together.
+/// A = Σ_r λ_r P_r + conjugates, with projectors P_r. A change of the pole leaves P_r unchanged, and
+/// with it the residue right·leftᵀ of the receptance. This holds for matrices and modes alike. Repeated poles, as of a round tool, form one
+/// modal part.
 #[derive(Clone, Debug)]
 pub struct ModalPart {
-    /// λ, rad/s, above the real axis.
+    /// Pole λ, rad/s, with positive imaginary part.
     pub pole: Complex64,
-    /// P, n × n.
+    /// Projector P, n × n.
     projector: DMatrix<Complex64>,
 }
 
@@ -50,16 +51,16 @@ impl ModalPart {
         Matrix3::from_fn(|i, j| residue[(i, j)])
     }
 
-    /// The change of A while the pole moves by δλ: 2 Re(δλ P).
+    /// Change of A for a change δλ of the pole, rad/s, at constant mode shapes: 2 Re(δλ P).
     pub fn moved(&self, by: Complex64) -> DMatrix<f64> {
         self.projector.map(|entry| 2.0 * (entry * by).re)
     }
 }
 
 impl FirstOrder {
-    /// The modes by rising frequency; poles on the real axis are none.
+    /// The oscillatory modes in the order of increasing frequency; real poles are excluded.
     ///
-    /// A pole without a full set of shapes, as at critical damping, is left out: it cannot move while they stay.
+    /// A defective pole, as at critical damping, is also excluded: it has no full set of mode shapes.
     pub fn modal_parts(&self) -> Vec<ModalPart> {
         let mut groups: Vec<Vec<Complex64>> = Vec::new();
         for pole in self.poles().into_iter().filter(|pole| pole.im > 0.0) {
@@ -87,7 +88,7 @@ impl FirstOrder {
     }
 }
 
-/// A basis of the vectors that a matrix multiplies by about `pole`, by inverse iteration of `count` vectors.
+/// Orthonormal basis of the invariant subspace of `matrix` at the eigenvalue `pole`, from inverse iteration with `count` vectors.
 fn invariant(matrix: &DMatrix<f64>, pole: Complex64, count: usize) -> Option<DMatrix<Complex64>> {
     let size = matrix.nrows();
     // A shift beside the pole keeps the matrix regular, and separates the vectors by 1e7 in each of three steps.
@@ -112,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mode_moves_as_its_file_entry_does() {
+    fn derivatives_of_a_mode_are_those_of_its_file_entry() {
         use crate::structure::Form;
 
         let case = case("kuka-kr90-acetal");
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn poles_of_matrices_move_as_they_are_told_and_the_others_stay() {
+    fn a_change_of_one_pole_of_matrices_leaves_the_others_unchanged() {
         for name in ["staubli-tx200", "kuka-kr90-full", "insperger-2dof-ad1"] {
             let structure = first_order(name);
             let parts = structure.modal_parts();

@@ -1,8 +1,8 @@
-//! A structure by its complex modes.
+//! Structure in complex modal form.
 
 use num_complex::Complex64;
 
-/// One complex mode: H(s) gets right·leftᵀ/(s − λ) and the conjugate of the whole at the conjugate pole.
+/// One complex mode. It contributes right·leftᵀ/(s − λ) to the receptance H(s), plus the complex conjugate term at the conjugate pole.
 ///
 /// λ = −ζω + iω√(1 − ζ²) with ω = 2π·frequency; no conjugation and no further factor in the residue.
 #[derive(Clone, Debug, PartialEq)]
