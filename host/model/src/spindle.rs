@@ -8,26 +8,26 @@ use std::f64::consts::TAU;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spindle {
     speed_rad_per_s: f64,
-    turning: Turning,
+    profile: SpeedProfile,
 }
 
 /// Variation of the spindle speed over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Turning {
+enum SpeedProfile {
     Steady,
     Fluctuating(Fluctuation),
-    Gliding(Glide),
+    Sweep(LinearSweep),
 }
 
 /// A linear change of the spindle speed from t = 0 on; the speed is constant before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Glide {
+struct LinearSweep {
     /// First and last speed, rad/s.
     speeds: [f64; 2],
     seconds: f64,
 }
 
-impl Glide {
+impl LinearSweep {
     fn speed(self, t: f64) -> f64 {
         let share = (t / self.seconds).clamp(0.0, 1.0);
         self.speeds[0] * (1.0 - share) + self.speeds[1] * share
@@ -83,7 +83,7 @@ impl Spindle {
     pub fn new(spindle_rpm: f64) -> Self {
         Self {
             speed_rad_per_s: spindle_rpm * TAU / 60.0,
-            turning: Turning::Steady,
+            profile: SpeedProfile::Steady,
         }
     }
 
@@ -93,7 +93,7 @@ impl Spindle {
         let speeds = [first_rpm, last_rpm].map(|rpm| rpm * TAU / 60.0);
         Self {
             speed_rad_per_s: 0.5 * (speeds[0] + speeds[1]),
-            turning: Turning::Gliding(Glide { speeds, seconds }),
+            profile: SpeedProfile::Sweep(LinearSweep { speeds, seconds }),
         }
     }
 
@@ -101,15 +101,15 @@ impl Spindle {
     #[must_use]
     pub fn fluctuating(self, fluctuation: Fluctuation) -> Self {
         Self {
-            turning: Turning::Fluctuating(fluctuation),
+            profile: SpeedProfile::Fluctuating(fluctuation),
             ..self
         }
     }
 
     /// The speed modulation; `None` for a constant or linearly changing speed.
     pub fn fluctuation(&self) -> Option<Fluctuation> {
-        match self.turning {
-            Turning::Fluctuating(fluctuation) => Some(fluctuation),
+        match self.profile {
+            SpeedProfile::Fluctuating(fluctuation) => Some(fluctuation),
             _ => None,
         }
     }
@@ -121,45 +121,47 @@ impl Spindle {
 
     /// Spindle speed at the time `t`, rad/s.
     pub fn speed_at_rad_per_s(&self, t: f64) -> f64 {
-        match self.turning {
-            Turning::Steady => self.speed_rad_per_s,
-            Turning::Fluctuating(fluctuation) => self.speed_rad_per_s * fluctuation.share(t),
-            Turning::Gliding(glide) => glide.speed(t),
+        match self.profile {
+            SpeedProfile::Steady => self.speed_rad_per_s,
+            SpeedProfile::Fluctuating(fluctuation) => self.speed_rad_per_s * fluctuation.share(t),
+            SpeedProfile::Sweep(sweep) => sweep.speed(t),
         }
     }
 
     /// Spindle angle at the time `t`, rad, from 0 at t = 0.
     pub fn angle_rad(&self, t: f64) -> f64 {
-        match self.turning {
-            Turning::Steady => self.speed_rad_per_s * t,
-            Turning::Fluctuating(fluctuation) => self.speed_rad_per_s * (t + fluctuation.ahead_s(t)),
-            Turning::Gliding(glide) => glide.angle_rad(t),
+        match self.profile {
+            SpeedProfile::Steady => self.speed_rad_per_s * t,
+            SpeedProfile::Fluctuating(fluctuation) => self.speed_rad_per_s * (t + fluctuation.ahead_s(t)),
+            SpeedProfile::Sweep(sweep) => sweep.angle_rad(t),
         }
     }
 
     /// Time at which the spindle angle is `angle_rad`, s (inverse of [`Self::angle_rad`]).
     pub fn time_s(&self, angle_rad: f64) -> f64 {
         let mean_s = angle_rad / self.speed_rad_per_s;
-        match self.turning {
-            Turning::Steady => mean_s,
-            Turning::Fluctuating(fluctuation) => inverse(fluctuation, mean_s),
-            Turning::Gliding(glide) => glide.time_s(angle_rad),
+        match self.profile {
+            SpeedProfile::Steady => mean_s,
+            SpeedProfile::Fluctuating(fluctuation) => inverse(fluctuation, mean_s),
+            SpeedProfile::Sweep(sweep) => sweep.time_s(angle_rad),
         }
     }
 
     /// Delay between the spindle angle at `t` and that `angle_rad` earlier, s; for the pitch angle this is the regenerative delay.
     pub fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
-        match self.turning {
-            Turning::Steady => angle_rad / self.speed_rad_per_s,
-            Turning::Fluctuating(_) | Turning::Gliding(_) => t - self.time_s(self.angle_rad(t) - angle_rad),
+        match self.profile {
+            SpeedProfile::Steady => angle_rad / self.speed_rad_per_s,
+            SpeedProfile::Fluctuating(_) | SpeedProfile::Sweep(_) => {
+                t - self.time_s(self.angle_rad(t) - angle_rad)
+            }
         }
     }
 
     /// [`Self::delay_s`] divided by the delay at the mean speed.
     pub fn delay_share(&self, t: f64, angle_rad: f64) -> f64 {
-        match self.turning {
-            Turning::Steady => 1.0,
-            Turning::Fluctuating(_) | Turning::Gliding(_) => {
+        match self.profile {
+            SpeedProfile::Steady => 1.0,
+            SpeedProfile::Fluctuating(_) | SpeedProfile::Sweep(_) => {
                 self.delay_s(t, angle_rad) * self.speed_rad_per_s / angle_rad
             }
         }
@@ -172,13 +174,13 @@ impl Spindle {
 
     /// Lower and upper bound of the time in which the spindle rotates by `angle_rad`, s; exact for a constant speed.
     pub fn bounds_s(&self, angle_rad: f64) -> [f64; 2] {
-        let fastest_and_slowest = match self.turning {
-            Turning::Steady => [self.speed_rad_per_s; 2],
-            Turning::Fluctuating(fluctuation) => {
+        let fastest_and_slowest = match self.profile {
+            SpeedProfile::Steady => [self.speed_rad_per_s; 2],
+            SpeedProfile::Fluctuating(fluctuation) => {
                 let delta = fluctuation.delta.abs();
                 [1.0 + delta, 1.0 - delta].map(|share| self.speed_rad_per_s * share)
             }
-            Turning::Gliding(Glide { speeds: [a, b], .. }) => [a.max(b), a.min(b)],
+            SpeedProfile::Sweep(LinearSweep { speeds: [a, b], .. }) => [a.max(b), a.min(b)],
         };
         fastest_and_slowest.map(|speed| angle_rad / speed)
     }

@@ -6,14 +6,14 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use crate::cutting::force_test::CuttingTest;
-use quietcut_model::milling::{Material, Tool, ToothForce, TurningVector};
+use quietcut_model::milling::{Material, RotatingVector, Tool, ToothForce};
 
 /// A test with the quantities that stay constant during the fit.
 pub(super) struct Prepared<'a> {
     pub(super) test: &'a CuttingTest,
     /// a e and a e/sin γ at an angle, N per unit of each coefficient and meter of chip; N per unit.
-    pub(super) cutting: [TurningVector; 3],
-    pub(super) edge: [TurningVector; 3],
+    pub(super) cutting: [RotatingVector; 3],
+    pub(super) edge: [RotatingVector; 3],
     /// Samples within one of an entry or exit: half of what they measure is another engagement.
     pub(super) switching: BTreeSet<usize>,
     pub(super) revolutions: Vec<[usize; 2]>,
@@ -45,7 +45,7 @@ fn vectors(test: &CuttingTest) -> [ToothForce; 3] {
 }
 
 pub(super) fn prepared(test: &CuttingTest) -> Prepared<'_> {
-    let scaled = |vector: TurningVector| TurningVector {
+    let scaled = |vector: RotatingVector| RotatingVector {
         constant: vector.constant * test.depth_m,
         cosine: vector.cosine * test.depth_m,
         sine: vector.sine * test.depth_m,

@@ -277,7 +277,7 @@ fn force(
     let engagement = problem.process.engagement;
     let density = means.dynamometer_n_per_root_hertz.powi(2);
     let mut information = DMatrix::zeros(unknowns.len(), unknowns.len());
-    let intervals = engagement.intervals();
+    let intervals = engagement.subintervals();
     let phases = intervals
         .iter()
         .filter(|interval| interval.teeth > 0)

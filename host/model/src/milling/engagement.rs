@@ -10,7 +10,7 @@ const NEGLIGIBLE: f64 = 1e-9;
 /// The teeth that cut during one tooth period of a tool with equal pitch.
 ///
 /// The period starts when a tooth enters. At phase ψ from 0 to the pitch θ, tooth k stands at the immersion angle
-/// start + kθ + ψ, and cuts while that is below the exit angle. Two intervals follow: in the first one more tooth
+/// start + kθ + ψ, and cuts while that is below the exit angle. Two subintervals follow: in the first one more tooth
 /// cuts than in the second; either may be empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Engagement {
@@ -24,7 +24,7 @@ pub struct Engagement {
 
 /// A subinterval of the tooth-passing period with a constant number of teeth in cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
+pub struct Subinterval {
     /// Phase at its start, rad.
     pub from: f64,
     /// Phase at its end, rad.
@@ -43,8 +43,8 @@ impl Engagement {
         }
     }
 
-    /// The intervals of one tooth period, in order, together [0, θ].
-    pub fn intervals(&self) -> Vec<Interval> {
+    /// The subintervals of one tooth period, in order, together [0, θ].
+    pub fn subintervals(&self) -> Vec<Subinterval> {
         let pitches = (self.exit - self.start) / self.pitch;
         let mut always = pitches.floor();
         let mut rest = pitches - always;
@@ -57,20 +57,20 @@ impl Engagement {
         let switch = rest * self.pitch;
         // The number of teeth in the cut is small and not negative.
         let always = always as usize;
-        let mut intervals = Vec::with_capacity(2);
+        let mut subintervals = Vec::with_capacity(2);
         if switch > 0.0 {
-            intervals.push(Interval {
+            subintervals.push(Subinterval {
                 from: 0.0,
                 to: switch,
                 teeth: always + 1,
             });
         }
-        intervals.push(Interval {
+        subintervals.push(Subinterval {
             from: switch,
             to: self.pitch,
             teeth: always,
         });
-        intervals
+        subintervals
     }
 
     /// Immersion angle, rad, of the k-th cutting tooth at a phase: the one that entered k periods ago.
@@ -107,14 +107,14 @@ mod tests {
                 (60.0, 120.0),
             ] {
                 let engagement = engagement(teeth, start, exit);
-                let intervals = engagement.intervals();
+                let subintervals = engagement.subintervals();
                 let mut end = 0.0;
                 let mut sum = 0.0;
-                for interval in &intervals {
-                    assert_eq!(interval.from, end);
-                    assert!(interval.to > interval.from);
-                    end = interval.to;
-                    sum += interval.teeth as f64 * (interval.to - interval.from);
+                for subinterval in &subintervals {
+                    assert_eq!(subinterval.from, end);
+                    assert!(subinterval.to > subinterval.from);
+                    end = subinterval.to;
+                    sum += subinterval.teeth as f64 * (subinterval.to - subinterval.from);
                 }
                 assert_eq!(end, engagement.pitch);
                 // Rounding of a few operations on angles below 2π.
@@ -125,10 +125,10 @@ mod tests {
 
     #[test]
     fn two_teeth_at_full_immersion_cut_all_the_time_one_by_one() {
-        let intervals = engagement(2, 0.0, 180.0).intervals();
-        assert_eq!(intervals.len(), 1);
-        assert_eq!(intervals[0].teeth, 1);
-        let half = engagement(2, 90.0, 180.0).intervals();
+        let subintervals = engagement(2, 0.0, 180.0).subintervals();
+        assert_eq!(subintervals.len(), 1);
+        assert_eq!(subintervals[0].teeth, 1);
+        let half = engagement(2, 90.0, 180.0).subintervals();
         assert_eq!((half[0].teeth, half[1].teeth), (1, 0));
         assert!((half[0].to - PI / 2.0).abs() < 1e-15);
     }

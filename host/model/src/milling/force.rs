@@ -6,7 +6,7 @@ use super::{Engagement, Material, Tool};
 
 /// A vector that rotates with the tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal, axial direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TurningVector {
+pub struct RotatingVector {
     /// Constant part, independent of φ.
     pub constant: Vector3<f64>,
     /// Coefficient of cos φ.
@@ -15,7 +15,7 @@ pub struct TurningVector {
     pub sine: Vector3<f64>,
 }
 
-impl TurningVector {
+impl RotatingVector {
     /// The vector at immersion angle φ, rad.
     pub fn at(&self, angle: f64) -> Vector3<f64> {
         let (sin, cos) = angle.sin_cos();
@@ -55,11 +55,11 @@ impl TurningVector {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToothForce {
     /// K_tc times the direction of the cutting force, Pa: eq. 7.2 with +k_rc cos γ in row 3.
-    pub cutting: TurningVector,
+    pub cutting: RotatingVector,
     /// Direction in which displacement makes the chip thicker, without unit (eq. 3.1).
-    pub normal: TurningVector,
+    pub normal: RotatingVector,
     /// Edge force per depth, N/m (eq. 3.6).
-    pub edge: TurningVector,
+    pub edge: RotatingVector,
 }
 
 impl ToothForce {
@@ -78,7 +78,7 @@ impl ToothForce {
         );
         Self {
             cutting: scaled(cutting, PA_PER_MPA),
-            normal: TurningVector {
+            normal: RotatingVector {
                 constant: Vector3::new(0.0, 0.0, -cos),
                 cosine: Vector3::new(0.0, sin, 0.0),
                 sine: Vector3::new(sin, 0.0, 0.0),
@@ -116,17 +116,17 @@ pub struct Averaged {
 }
 
 /// Tangential, radial and axial force in feed, normal and axial direction (eq. 3.4).
-fn projected(tangential: f64, radial: f64, axial: f64, sin: f64, cos: f64) -> TurningVector {
+fn projected(tangential: f64, radial: f64, axial: f64, sin: f64, cos: f64) -> RotatingVector {
     let inward = radial * sin + axial * cos;
-    TurningVector {
+    RotatingVector {
         constant: Vector3::new(0.0, 0.0, radial * cos - axial * sin),
         cosine: Vector3::new(-tangential, -inward, 0.0),
         sine: Vector3::new(-inward, tangential, 0.0),
     }
 }
 
-fn scaled(vector: TurningVector, factor: f64) -> TurningVector {
-    TurningVector {
+fn scaled(vector: RotatingVector, factor: f64) -> RotatingVector {
+    RotatingVector {
         constant: vector.constant * factor,
         cosine: vector.cosine * factor,
         sine: vector.sine * factor,

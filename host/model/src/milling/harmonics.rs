@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
-use super::{Engagement, ToothForce, TurningVector};
+use super::{Engagement, RotatingVector, ToothForce};
 
 /// One coefficient of the Fourier series over the tooth period, which starts when a tooth enters, of the sum over all
 /// cutting teeth: α(t) = Σ_k α_k e^{ikΩt} with Ω = 2π/τ.
@@ -39,7 +39,7 @@ impl ToothForce {
 }
 
 /// Coefficients of e^{−iφ}, 1, e^{iφ}.
-fn exponentials(vector: &TurningVector) -> [Vector3<Complex64>; 3] {
+fn exponentials(vector: &RotatingVector) -> [Vector3<Complex64>; 3] {
     let half = |sign: f64| {
         vector.cosine.zip_map(&vector.sine, |cos, sin| {
             Complex64::new(0.5 * cos, 0.5 * sign * sin)

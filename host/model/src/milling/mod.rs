@@ -9,8 +9,8 @@ mod process;
 mod tool;
 
 pub use cut::Cut;
-pub use engagement::{Engagement, Interval};
-pub use force::{Averaged, ToothForce, TurningVector};
+pub use engagement::{Engagement, Subinterval};
+pub use force::{Averaged, RotatingVector, ToothForce};
 pub use harmonics::Harmonic;
 pub use material::Material;
 pub use process::Process;

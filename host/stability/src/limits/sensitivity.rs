@@ -16,7 +16,7 @@ use crate::error::StabilityError;
 use crate::problem::linear::Problem;
 use crate::spectrum::floquet_mode::{FloquetMode, Node};
 use crate::spectrum::stability_loss::StabilityLoss;
-use quietcut_model::milling::{ToothForce, TurningVector};
+use quietcut_model::milling::{RotatingVector, ToothForce};
 use quietcut_model::structure::{FirstOrder, ModalPart};
 
 /// Derivative of the problem along one parameter, per unit of the parameter.
@@ -53,7 +53,7 @@ impl Tangent {
     /// Derivative per relative change of K_tc, with constant ratios K_rc/K_tc and K_ac/K_tc and constant edge
     /// coefficients.
     pub fn cutting_force(problem: &Problem) -> Self {
-        let zero = TurningVector {
+        let zero = RotatingVector {
             constant: Vector3::zeros(),
             cosine: Vector3::zeros(),
             sine: Vector3::zeros(),
@@ -102,8 +102,8 @@ impl Tangent {
     }
 }
 
-fn slope(low: &TurningVector, high: &TurningVector, length: f64) -> TurningVector {
-    TurningVector {
+fn slope(low: &RotatingVector, high: &RotatingVector, length: f64) -> RotatingVector {
+    RotatingVector {
         constant: (high.constant - low.constant) / length,
         cosine: (high.cosine - low.cosine) / length,
         sine: (high.sine - low.sine) / length,

@@ -81,7 +81,7 @@ impl<'a> ToothPeriod<'a> {
         let gauss = Gauss::new(NODES);
         let speed_rad_per_s = problem.speed_rad_per_s(linear.tooth_period_s(rpm));
         let mut subintervals = Vec::new();
-        for interval in engagement.intervals() {
+        for interval in engagement.subintervals() {
             let length = interval.to - interval.from;
             // Directional coefficients oscillate at twice the rotation of the tool.
             let angle = fastest * length * seconds_per_radian + 2.0 * length;

@@ -97,7 +97,7 @@ impl Period {
         let exponential = Exponential::new(&structure.a);
         let mut elements = Vec::new();
         let mut flight = DMatrix::identity(structure.order(), structure.order());
-        for interval in engagement.intervals() {
+        for interval in engagement.subintervals() {
             let length = interval.to - interval.from;
             let duration = length * seconds_per_radian;
             if interval.teeth == 0 {

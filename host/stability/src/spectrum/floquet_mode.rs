@@ -182,7 +182,7 @@ fn subintervals(problem: &Problem, rpm: f64, kappa_m: f64) -> (Vec<Basis>, Vec<S
     let seconds_per_radian = problem.tooth_period_s(rpm) / engagement.pitch;
     let rates = Rates::new(problem);
     let (mut bases, mut subintervals) = (Vec::new(), Vec::new());
-    for interval in engagement.intervals() {
+    for interval in engagement.subintervals() {
         let length = interval.to - interval.from;
         let duration = length * seconds_per_radian;
         // Free flight is divided as well: the quadrature of yᵀ dG x needs short subintervals.

@@ -175,7 +175,7 @@ fn transition_by_runge_kutta(problem: &Problem, rpm: f64, kappa: Complex64) -> D
     };
     let mut x = DMatrix::<Complex64>::identity(structure.order(), structure.order());
     let half = Complex64::from(0.5);
-    for interval in process.engagement.intervals() {
+    for interval in process.engagement.subintervals() {
         let turn = (interval.to - interval.from) / STEPS as f64;
         let h = Complex64::from(turn * period_s / process.engagement.pitch);
         for step in 0..STEPS {
