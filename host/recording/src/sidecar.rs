@@ -169,6 +169,13 @@ impl Sidecar {
                 return Err(wrong(key, value, "a number of 0 or more"));
             }
         }
+        for (key, value) in [("cut.start_deg", cut.start_deg), ("cut.exit_deg", cut.exit_deg)] {
+            if let Some(value) = value
+                && !value.is_finite()
+            {
+                return Err(wrong(key, value, "a finite angle"));
+            }
+        }
         if let (Some(start), Some(exit)) = (cut.start_deg, cut.exit_deg)
             && !(0.0 <= start && start < exit && exit <= 360.0)
         {

@@ -103,6 +103,14 @@ fn the_sidecar_names_and_scales_channels() {
         ),
         ("sample_rate_hz = 10.0\n[cut]\nteeth = 0\n", vec!["cut.teeth = 0"]),
         (
+            "sample_rate_hz = 10.0\n[cut]\nstart_deg = nan\n",
+            vec!["cut.start_deg = NaN", "finite"],
+        ),
+        (
+            "sample_rate_hz = 10.0\n[cut]\nexit_deg = inf\n",
+            vec!["cut.exit_deg = inf", "finite"],
+        ),
+        (
             "sample_rate_hz = 10.0\n[channels.nose]\nat = \"x\"\n",
             vec!["channels.nose", "data"],
         ),
