@@ -142,6 +142,44 @@ fn wrong_recordings() {
 }
 
 #[test]
+fn samples_that_are_no_numbers_are_refused_or_left_out_by_every_verb() {
+    let folder = folder();
+    fs::write(folder.path().join("case.toml"), case_text()).expect("a file can be written");
+    let text = RECORDING.replace("0.0002,0.1", "0.0002,nan") + "0.0003,0.1,0\n";
+    fs::write(folder.path().join("a.csv"), text).expect("a file can be written");
+    let verbs: [&[&str]; 4] = [
+        &["frf", "a.csv"],
+        &[
+            "identify",
+            "a.csv",
+            "--method",
+            "output-only",
+            "--band-hz",
+            "5,60",
+        ],
+        &["diagnose", "case.toml", "a.csv"],
+        &["replay", "a.csv", "--teeth", "2"],
+    ];
+    for verb in verbs {
+        let with = |more: &[&str]| quietcut(folder.path(), &[verb, more].concat());
+        with(&[]).refused(&[
+            "a.csv, line 4",
+            "\"nan\" in column \"ax\"",
+            "--from-s",
+            "--until-s",
+        ]);
+        with(&["--from-s", "0.0001"]).refused(&["a.csv", "\"ax\"", "sample 3 at 0.0002 s is NaN"]);
+        with(&["--until-s", "0.0001"]).refused(&["a.csv", "--until-s 0.0001 leaves 1 samples", "0.0003 s"]);
+        // The part before has too little in it, but nothing of it is refused as no number.
+        let before = with(&["--until-s", "0.0002"]);
+        assert!(
+            !before.stderr.contains("NaN") && !before.stderr.contains("nan"),
+            "{before:?}"
+        );
+    }
+}
+
+#[test]
 fn wrong_sidecars_of_recordings() {
     let folder = folder();
     let replay = |sidecar: &str| {

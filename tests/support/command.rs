@@ -80,6 +80,22 @@ impl Running {
         drop(self.child.stdout.take());
     }
 
+    /// Sends the signal of Ctrl-C.
+    pub fn interrupt(&self) {
+        let id = self.child.id().to_string();
+        let sent = Command::new("sh").args(["-c", "kill -INT \"$0\"", &id]).status();
+        assert!(sent.expect("a shell").success(), "the command has ended already");
+    }
+
+    /// Whether the command has installed its handler of Ctrl-C, from the mask of caught signals that Linux shows.
+    pub fn catches_interrupt(&self) -> bool {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        // Signal n is bit n − 1; SIGINT is 2.
+        mask.is_some_and(|mask| mask & 0b10 != 0)
+    }
+
     /// Waits for the end of the command; a hanging command is killed and fails the test.
     pub fn finish(mut self) -> Outcome {
         let drain = |stream: Option<Box<dyn Read + Send>>| {
@@ -126,13 +142,18 @@ pub fn alone() -> MutexGuard<'static, ()> {
 
 /// Starts the command with `arguments` in `folder`.
 pub fn start<S: AsRef<OsStr>>(folder: &Path, arguments: &[S]) -> Running {
+    start_on(folder, arguments, Stdio::piped())
+}
+
+/// Starts the command with `arguments` in `folder`, with `stderr` as its standard error.
+pub fn start_on<S: AsRef<OsStr>>(folder: &Path, arguments: &[S], stderr: impl Into<Stdio>) -> Running {
     let _alone = alone();
     let child = Command::new(binary())
         .args(arguments)
         .current_dir(folder)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
+        .stderr(stderr)
         .spawn()
         .expect("the command can be started");
     Running { child }

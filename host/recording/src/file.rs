@@ -2,6 +2,7 @@
 
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
@@ -55,19 +56,57 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write_with(path, |writer| writer.write_all(bytes))
 }
 
+/// Files that are being written aside. Who holds it may create, rename and remove such files.
+static ASIDE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn being_written() -> MutexGuard<'static, Vec<PathBuf>> {
+    ASIDE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every file that is being written aside, and keeps all later writes from beginning or ending: for a process that is
+/// about to exit, so that an interrupt leaves no half-written file.
+pub fn abandon_writing() {
+    let mut aside = being_written();
+    for path in aside.drain(..) {
+        // Nothing can be done about a file that cannot be removed.
+        let _ = std::fs::remove_file(path);
+    }
+    // The lock stays taken: a write that is going on waits there until the process has exited.
+    std::mem::forget(aside);
+}
+
 /// Writes what `fill` writes to `path`: afterwards the file is there whole, or what was there before still is.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), FileError> {
     let failed = |cause| FileError::Write {
         path: path.into(),
         cause,
     };
-    let aside = aside(path).map_err(failed)?;
+    let aside = {
+        let mut known = being_written();
+        let aside = aside(path).map_err(failed)?;
+        known.push(aside.path().into());
+        aside
+    };
+    let name = aside.path().to_owned();
+    let filled = filled(aside, fill);
+    let mut known = being_written();
+    known.retain(|other| *other != name);
+    filled
+        .and_then(|aside| Ok(aside.persist(path)?))
+        .map(|_| ())
+        .map_err(failed)
+}
+
+/// The file with what `fill` writes, on the disk; removed where that fails.
+fn filled(
+    aside: NamedTempFile,
+    fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<NamedTempFile> {
     let mut writer = BufWriter::new(aside);
-    fill(&mut writer).map_err(failed)?;
-    let aside = writer.into_inner().map_err(|error| failed(error.into_error()))?;
-    aside.as_file().sync_all().map_err(failed)?;
-    aside.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+    fill(&mut writer)?;
+    let aside = writer.into_inner()?;
+    aside.as_file().sync_all()?;
+    Ok(aside)
 }
 
 /// What stands behind the last dot of a file's name, in lower case; empty where there is none.

@@ -1,12 +1,9 @@
 //! `quietcut diagnose`: compares recordings with the simulation of a case and finds the causes of the prediction error.
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-
 use super::segment::RecordedSegment;
-use super::{Error, Output};
+use super::{Error, Output, progress};
 use crate::case::Case;
 use crate::diagnose::answer::Outcome;
 use crate::diagnose::lobes::{believed, lobes};
@@ -52,7 +49,7 @@ pub fn run(args: Args) -> Result<(), Error> {
         None => Vec::new(),
     };
     let recordings = args.segment.read(&args.recordings)?;
-    let bar = progress_bar();
+    let bar = progress::bar(Some(STAGES), "{spinner} {bar:24} {msg} {elapsed}");
     let options = Options { seed: args.seed };
     let mut diagnosis = diagnose_watched(&case, &recordings, &options, &|stage| {
         bar.set_message(stage_message(stage));
@@ -92,19 +89,6 @@ fn add_limits(case: &Case, recordings: &[Recording], cuts: &[TestCut], diagnosis
 /// Length of the progress bar: the number of stages of a diagnosis, including the stability limits and the second search of
 /// long recordings.
 const STAGES: u64 = 9;
-
-fn progress_bar() -> ProgressBar {
-    let target = if std::io::stderr().is_terminal() {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    };
-    let bar = ProgressBar::with_draw_target(Some(STAGES), target);
-    match ProgressStyle::with_template("{bar:24} {msg} {elapsed}") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
-}
 
 fn stage_message(stage: Stage) -> &'static str {
     match stage {

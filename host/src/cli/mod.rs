@@ -1,6 +1,7 @@
 //! The command line: one file per verb, each with its arguments and a `run`.
 //!
-//! Exit status 0: success. Exit status 2: wrong usage or wrong input, with one message on stderr. Exit status 1: any other failure.
+//! Exit status 0: success. Exit status 2: wrong usage or wrong input, with one message on stderr. Exit status 130: interrupted by
+//! Ctrl-C. Exit status 1: any other failure. An output file is complete or unchanged.
 
 mod channels;
 pub mod demo;
@@ -19,6 +20,7 @@ mod number;
 mod output;
 pub mod plan;
 pub mod port;
+mod progress;
 mod range;
 pub mod replay;
 mod segment;
@@ -75,7 +77,15 @@ pub fn main() -> ExitCode {
     // clap ends the process itself: exit status 2 for wrong usage, 0 for help.
     let cli = Cli::parse();
     log_to_stderr(cli.verbose);
-    match panic::catch_unwind(|| run(cli.verb)) {
+    if let Err(error) = leave_nothing_half_written(&cli.verb) {
+        tracing::warn!("Ctrl-C may leave a half-written file aside: {error}");
+    }
+    if let Some(doing) = cli.verb.doing() {
+        progress::show(doing);
+    }
+    let outcome = panic::catch_unwind(|| run(cli.verb));
+    progress::clear();
+    match outcome {
         Ok(Ok(())) | Ok(Err(Error::ReaderGone)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             eprintln!("quietcut: {error}");
@@ -83,6 +93,35 @@ pub fn main() -> ExitCode {
         }
         // The panic hook has already printed the message.
         Err(_) => ExitCode::from(1),
+    }
+}
+
+/// Exit status of a command that was interrupted, as shells have it: 128 and the number of the signal.
+const INTERRUPTED: i32 = 130;
+
+/// Ctrl-C ends the command at once; files that are being written are removed first. `monitor` ends by itself.
+fn leave_nothing_half_written(verb: &Verb) -> Result<(), ctrlc::Error> {
+    if matches!(verb, Verb::Monitor(_)) {
+        return Ok(());
+    }
+    ctrlc::set_handler(|| {
+        crate::file::abandon_writing();
+        std::process::exit(INTERRUPTED);
+    })
+}
+
+impl Verb {
+    /// What the command does while it prints nothing; `None` where the verb shows its own progress or answers at once.
+    fn doing(&self) -> Option<&'static str> {
+        match self {
+            Self::Simulate(_) => Some("simulating"),
+            Self::Frf(_) => Some("estimating frequency responses"),
+            Self::Identify(_) => Some("identifying"),
+            Self::Lobes(_) => Some("computing stability limits"),
+            Self::Table(_) => Some("building the lobe table"),
+            Self::Replay(_) => Some("reading the recording"),
+            _ => None,
+        }
     }
 }
 
@@ -115,7 +154,10 @@ fn log_to_stderr(verbose: u8) {
         .with_target(false)
         .without_time()
         .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr)
+        .with_writer(|| {
+            progress::clear();
+            std::io::stderr()
+        })
         .init();
 }
 

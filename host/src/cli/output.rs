@@ -32,6 +32,7 @@ impl Output {
 }
 
 fn print(text: &dyn Display) -> Result<(), Error> {
+    super::progress::clear();
     let mut stdout = io::stdout().lock();
     writeln!(stdout, "{text}")
         .and_then(|()| stdout.flush())

@@ -1,12 +1,9 @@
 //! `quietcut plan`: the smallest set of tests that reduces the uncertainty of the stability limits to a given width.
 
 use std::fmt::Write;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-
-use super::{Error, Output, Range, positive};
+use super::{Error, Output, Range, positive, progress};
 use crate::case::Case;
 use crate::file;
 use crate::plan::{Means, Plan, Prior, Request, Step, Test, plan};
@@ -100,7 +97,10 @@ struct Tests {
 pub fn run(args: Args) -> Result<(), Error> {
     let case = Case::read(&args.case)?;
     let request = request(&args);
-    let bar = progress_bar(request.speeds_rpm.len());
+    let bar = progress::bar(
+        Some(request.speeds_rpm.len() as u64),
+        "{spinner} limits {bar:40} {pos}/{len} {elapsed}",
+    );
     let found = plan(&case, &request, || bar.inc(1))?;
     bar.finish_and_clear();
     if let Some(path) = &args.out {
@@ -139,19 +139,6 @@ fn request(args: &Args) -> Request {
             ..Means::default()
         },
         linear: args.linear,
-    }
-}
-
-fn progress_bar(speeds: usize) -> ProgressBar {
-    let target = if std::io::stderr().is_terminal() {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    };
-    let bar = ProgressBar::with_draw_target(Some(speeds as u64), target);
-    match ProgressStyle::with_template("limits {bar:40} {pos}/{len}") {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
     }
 }
 
