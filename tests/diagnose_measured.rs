@@ -9,7 +9,7 @@ use quietcut::diagnose::answer::Outcome;
 use quietcut::diagnose::{Diagnosis, Options, diagnose};
 use quietcut::identify::response;
 use quietcut::identify::restoring_force::{Record, Term};
-use quietcut::recording::{Channel, Kind, Quantity, Recording, Sidecar};
+use quietcut::recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut_testkit::measured;
 
 fn recording(
@@ -34,7 +34,7 @@ fn recording(
             channel("x", Quantity::Displacement, displacement),
         ],
         sidecar: Sidecar {
-            kind: Some(Kind::Shaker),
+            kind: Some(TestKind::Shaker),
             input: input.map(|name| vec![name.into()]),
             ..Sidecar::default()
         },

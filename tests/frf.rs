@@ -6,7 +6,7 @@ use std::path::Path;
 
 use num_complex::Complex64;
 use quietcut::frf::{FrfTable, MeasurementSettings, measure};
-use quietcut::recording::{Channel, Kind, Quantity, Recording, Sidecar};
+use quietcut::recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut::simulate::rig::{Rig, Signal};
 use quietcut::structure::Direction;
 use quietcut_tests::command::{folder, quietcut};
@@ -56,7 +56,7 @@ fn blows(ratio: f64) -> Recording {
             channel("ay", Quantity::Acceleration, acceleration),
         ],
         sidecar: Sidecar {
-            kind: Some(Kind::Hammer),
+            kind: Some(TestKind::Hammer),
             ..Sidecar::default()
         },
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use nix::sys::resource::{UsageWho, getrusage};
-use quietcut::recording::{Channel, Kind, Quantity, Recording, Sidecar};
+use quietcut::recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut_tests::command::{binary, folder};
 use rand::{RngExt, SeedableRng};
 
@@ -45,7 +45,7 @@ fn recording() -> Recording {
         since_s: 0.0,
         channels,
         sidecar: Sidecar {
-            kind: Some(Kind::Shaker),
+            kind: Some(TestKind::Shaker),
             ..Sidecar::default()
         },
     }

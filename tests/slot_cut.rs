@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use quietcut::recording::{Recording, Sensed, Speed};
+use quietcut::recording::{Recording, Sensed, SpindleSettings};
 use quietcut_core::monitor::{Monitor, State};
 use quietcut_testkit::measured;
 
@@ -10,7 +10,7 @@ use quietcut_testkit::measured;
 #[ignore = "measured records: QUIETCUT_DATA names their folder"]
 fn the_tone_of_the_measured_slot_cut_is_detected() {
     let path = measured("milling/slot_5000rpm_4flutes.mat");
-    let speed = Speed {
+    let speed = SpindleSettings {
         rpm: Some(5000.0),
         teeth: Some(4),
     };

@@ -7,9 +7,7 @@ use std::fmt::Write as _;
 use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
-use quietcut::recording::{
-    Channel, Kind as RecordKind, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar,
-};
+use quietcut::recording::{Channel, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar, TestKind};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -408,7 +406,7 @@ impl CutBench {
                     samples: level(&sensed[sensors.len()]),
                 });
                 let mut sidecar = Sidecar {
-                    kind: Some(RecordKind::Cutting),
+                    kind: Some(TestKind::Cutting),
                     cut: Some(self.said_of(run)),
                     ..Sidecar::default()
                 };

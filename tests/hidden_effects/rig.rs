@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 use nalgebra::{Complex, DMatrix};
-use quietcut::recording::{Channel, Kind as RecordKind, Quantity, RecordedChannel, Recording, Sidecar};
+use quietcut::recording::{Channel, Quantity, RecordedChannel, Recording, Sidecar, TestKind};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -41,7 +41,7 @@ pub(crate) struct Run {
 /// A test: its runs and its sensors.
 #[derive(Debug)]
 pub(crate) struct Rig {
-    pub(crate) kind: RecordKind,
+    pub(crate) kind: TestKind,
     pub(crate) runs: Vec<Run>,
     pub(crate) sensors: Vec<Sensor>,
     pub(crate) rate_hz: f64,
@@ -80,7 +80,7 @@ impl Rig {
         let samples = (cycles / (machine.omega[0] / TAU) * rate_hz) as usize;
         let steps = (machine.omega[1] / (0.12 * rate_hz)).ceil() as usize;
         let mut rig = Self {
-            kind: RecordKind::Shaker,
+            kind: TestKind::Shaker,
             runs: Vec::new(),
             sensors: sensors(random, machine),
             rate_hz,
@@ -97,11 +97,11 @@ impl Rig {
         };
         let variant = random.random::<f64>();
         rig.kind = match test {
-            Test::Shaker if variant < 0.25 => RecordKind::Hammer,
-            Test::Shaker => RecordKind::Shaker,
-            Test::Sweep if variant < 0.3 => RecordKind::StepSine,
-            Test::Sweep => RecordKind::Sweep,
-            Test::FreeDecay => RecordKind::FreeDecay,
+            Test::Shaker if variant < 0.25 => TestKind::Hammer,
+            Test::Shaker => TestKind::Shaker,
+            Test::Sweep if variant < 0.3 => TestKind::StepSine,
+            Test::Sweep => TestKind::Sweep,
+            Test::FreeDecay => TestKind::FreeDecay,
         };
         let levels: &[f64] = if random.random::<bool>() {
             &[1.0, 0.3]
@@ -147,7 +147,7 @@ impl Rig {
             })
             .collect();
         Self {
-            kind: RecordKind::Sweep,
+            kind: TestKind::Sweep,
             runs: vec![Run {
                 force_n,
                 driven: vec![axis],
@@ -176,7 +176,7 @@ impl Rig {
             driven: driven.to_vec(),
             pull_n: [0.0; 3],
         };
-        if self.kind == RecordKind::FreeDecay {
+        if self.kind == TestKind::FreeDecay {
             for &axis in driven {
                 run.pull_n[axis] = 1.0;
             }
@@ -326,7 +326,7 @@ impl Rig {
             .enumerate()
             .map(|(number, (run, sensed))| {
                 let mut channels = Vec::new();
-                if self.kind != RecordKind::FreeDecay {
+                if self.kind != TestKind::FreeDecay {
                     for &axis in &run.driven {
                         channels.push(Channel {
                             name: format!("f{}", letter(axis)),
@@ -386,7 +386,7 @@ impl Lab for Bench {
         let sensors = &self.rig.sensors;
         // One sensor that is late tells of what is let go no more than a record that begins earlier.
         let only_late =
-            kind == Kind::SensorDelay && self.rig.kind == RecordKind::FreeDecay && sensors.len() == 1;
+            kind == Kind::SensorDelay && self.rig.kind == TestKind::FreeDecay && sensors.len() == 1;
         if kind == Kind::CommonForce || only_late || !Cause::possible(kind, &self.machine) {
             Vec::new()
         } else if kind.of_sensor() {
@@ -413,7 +413,7 @@ impl Lab for Bench {
     }
 
     fn is_let_go(&self) -> bool {
-        self.rig.kind == RecordKind::FreeDecay
+        self.rig.kind == TestKind::FreeDecay
     }
 
     /// The free motions of the believed machine, each run's by itself.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use quietcut::recording::Kind as RecordKind;
+use quietcut::recording::TestKind;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -10,7 +10,7 @@ use super::machine::Machine;
 
 /// A force of time, of about unit size, for a test of `kind` that lasts so long.
 pub(crate) fn signal(
-    kind: RecordKind,
+    kind: TestKind,
     seconds: f64,
     random: &mut ChaCha8Rng,
     machine: &Machine,
@@ -18,7 +18,7 @@ pub(crate) fn signal(
     let [low, high] = machine.omega.map(|omega| omega / TAU);
     let (first, last) = (0.35 * low, 2.2 * high);
     match kind {
-        RecordKind::Hammer => {
+        TestKind::Hammer => {
             let spacing = seconds / 4.0;
             // Smooth, so that it is known between its samples, of which it has twenty or more.
             let pulse = 1.2 / high;
@@ -33,7 +33,7 @@ pub(crate) fn signal(
                     .sum()
             })
         }
-        RecordKind::Sweep => {
+        TestKind::Sweep => {
             let (from, to) = if random.random::<bool>() {
                 (first, last)
             } else {
@@ -41,7 +41,7 @@ pub(crate) fn signal(
             };
             Box::new(move |t| (TAU * (from * t + 0.5 * (to - from) / seconds * t * t)).sin())
         }
-        RecordKind::StepSine => {
+        TestKind::StepSine => {
             let count = 8;
             let dwell = seconds / f64::from(count);
             let tones: Vec<f64> = (0..count)

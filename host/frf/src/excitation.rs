@@ -1,6 +1,6 @@
 //! How a structure was driven.
 
-use quietcut_recording::{Kind, Sidecar};
+use quietcut_recording::{Sidecar, TestKind};
 
 /// How the structure was driven, which decides how a record is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,11 +20,13 @@ impl Excitation {
     pub(super) fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {
-            Some(Kind::Cutting) if glides => Self::Sweep,
-            Some(Kind::Hammer) => Self::Hammer,
-            Some(Kind::StepSine) => Self::StepSine,
-            Some(Kind::Sweep) => Self::Sweep,
-            Some(Kind::Shaker | Kind::Cutting | Kind::Idle | Kind::FreeDecay) | None => Self::Random,
+            Some(TestKind::Cutting) if glides => Self::Sweep,
+            Some(TestKind::Hammer) => Self::Hammer,
+            Some(TestKind::StepSine) => Self::StepSine,
+            Some(TestKind::Sweep) => Self::Sweep,
+            Some(TestKind::Shaker | TestKind::Cutting | TestKind::Idle | TestKind::FreeDecay) | None => {
+                Self::Random
+            }
         }
     }
 

@@ -1,13 +1,15 @@
-//! From the columns of a file and its sidecar to a recording in SI units.
+//! Combines the columns of a file with its sidecar into a recording in SI units.
 
 use std::path::Path;
 
 use super::raw::{Raw, RawColumn};
 use super::{Channel, Quantity, Recording, RecordingError, Sensitivity, Sidecar, Unit};
 
-/// How far a time stamp may be from even sampling, in sample intervals: stamps are often printed with few digits.
+/// Largest deviation of a time stamp from even sampling, in sample intervals. It allows for stamps printed with few digits, and detects a
+/// missing sample (deviation 1). The value is a choice between the two.
 const UNEVEN: f64 = 0.25;
 
+/// Builds the recording: applies names, units and sensitivities of the sidecar, and determines the sample rate.
 pub(super) fn recording(path: &Path, raw: Raw, sidecar: Sidecar) -> Result<Recording, RecordingError> {
     let mut time = None;
     let mut channels: Vec<Channel> = Vec::with_capacity(raw.columns.len());
@@ -60,7 +62,7 @@ pub(super) fn recording(path: &Path, raw: Raw, sidecar: Sidecar) -> Result<Recor
     })
 }
 
-/// A column under its conventional name, in SI units.
+/// Converts a column to a channel with its standard name, in SI units.
 fn channel(path: &Path, column: RawColumn, sidecar: &Sidecar) -> Result<Channel, RecordingError> {
     let RawColumn {
         name,
@@ -94,7 +96,7 @@ fn channel(path: &Path, column: RawColumn, sidecar: &Sidecar) -> Result<Channel,
         factor /= sensitivity.volts_per_unit;
     }
     let name = said.name.unwrap_or_else(|| conventional(&name));
-    // A voltage may be anything: what it is, its sensitivity would say.
+    // A voltage without sensitivity may represent any quantity, so it contradicts no channel name.
     if let Some(expected) = Quantity::of_name(&name)
         && ![expected, Quantity::Voltage, Quantity::Unknown].contains(&quantity)
     {
@@ -117,13 +119,13 @@ fn channel(path: &Path, column: RawColumn, sidecar: &Sidecar) -> Result<Channel,
     })
 }
 
-/// Names are lower case; time is called t.
+/// Standard form of a channel name: lower case, with `t` for time.
 fn conventional(name: &str) -> String {
     let name = name.to_lowercase();
     if name == "time" { "t".into() } else { name }
 }
 
-/// Rate and first time of evenly spaced stamps.
+/// Sample rate (samples per second) and first time (s) of evenly spaced time stamps; uneven stamps are an error.
 fn even_rate(path: &Path, time: &[f64]) -> Result<(f64, f64), RecordingError> {
     let wrong = |what: String| RecordingError::Content {
         path: path.into(),

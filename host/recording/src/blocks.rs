@@ -1,4 +1,4 @@
-//! A recording as the device would have sensed it: counts in blocks, tachometer edges, settings.
+//! Converts a recording into the input of the monitor on the device: blocks of sensor counts, tachometer edges, settings.
 
 use quietcut_core::acceleration::{Block, Counts, MAX_BLOCK_SAMPLES, Sensor, is_clipped};
 use quietcut_core::monitor::Settings;
@@ -8,7 +8,7 @@ use quietcut_core::working_point::{Tool, WorkingPoint};
 
 use super::{Channel, Quantity, Recording, RecordingError};
 
-/// m/s² per count of the IIS3DWB in its four ranges, ±2 g to ±16 g.
+/// Acceleration per count, m/s², of the IIS3DWB accelerometer in its ranges ±2, ±4, ±8 and ±16 g (sensitivities of its data sheet, mg/LSB).
 const COUNT: [f64; 4] = [
     0.061e-3 * 9.806_65,
     0.122e-3 * 9.806_65,
@@ -16,45 +16,46 @@ const COUNT: [f64; 4] = [
     0.488e-3 * 9.806_65,
 ];
 
-/// Counts at the end of the range: one below, so that a sample which just fits is not taken for a clipped one.
+/// Largest count that a converted sample takes: one below 32 767, so that the largest sample is not counted as clipped.
 const FULL_SCALE: f64 = 32_766.0;
 
-/// A tachometer level that swings less than this part of its whole range has no edge there.
+/// Smallest change of the tachometer level that counts as an edge, as a fraction of its range over the recording. A choice, above the noise
+/// of usual sensors.
 const LEAST_SWING: f64 = 0.02;
 
-/// What the device would have sensed.
+/// Input of the monitor as the device would have acquired it during the recording.
 #[derive(Clone, Debug)]
 pub struct Sensed {
-    /// How the pipeline must be set up.
+    /// Settings of the monitor: sensor, tool, tachometer wheel, assumed speed.
     pub settings: Settings,
-    /// The cut, where the recording says all of it.
+    /// Working point of the cut; `None` if the sidecar lacks depth, entry angle, exit angle or feed.
     pub working_point: Option<WorkingPoint>,
-    /// The samples.
+    /// Blocks of accelerometer counts, in order.
     pub blocks: Vec<Block>,
-    /// The tachometer edges, in order.
+    /// Rising tachometer edges, in order.
     pub edges: Vec<Edge>,
-    /// False where the unit of the channels is not known: then amplitudes mean nothing in m/s².
+    /// False if the unit of the channels is unknown; amplitudes are then relative, not in m/s².
     pub is_calibrated: bool,
 }
 
-/// What the user says of the spindle and the tool where the recording does not.
+/// Spindle speed and number of teeth given by the user; they override the recording.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Speed {
-    /// Spindle speed, rev/min; goes before a recorded tachometer, whose edges are then left out.
+pub struct SpindleSettings {
+    /// Spindle speed, rev/min; it replaces a recorded tachometer, whose edges are then ignored.
     pub rpm: Option<f64>,
-    /// Number of teeth; goes before what the recording says.
+    /// Number of teeth; it overrides the sidecar.
     pub teeth: Option<u8>,
 }
 
 impl Sensed {
-    /// Turns a recording into what the device would have sensed.
+    /// Converts a recording into blocks of counts, tachometer edges and settings.
     ///
-    /// Acceleration channels ax, ay, az become counts of the smallest range of the sensor that holds them. A recording
-    /// of a single channel of unknown unit is scaled by its own maximum.
+    /// The acceleration channels ax, ay, az are quantized in the smallest range of the sensor that holds them. A single channel of unknown
+    /// unit is scaled by its maximum.
     ///
     /// # Errors
-    /// No acceleration, neither tachometer nor speed, unknown number of teeth.
-    pub fn new(recording: &Recording, speed: Speed) -> Result<Self, RecordingError> {
+    /// The recording has no acceleration channel, neither tachometer nor spindle speed, or no number of teeth.
+    pub fn new(recording: &Recording, speed: SpindleSettings) -> Result<Self, RecordingError> {
         let (axes, is_calibrated) = axes(recording)?;
         let largest = axes
             .iter()
@@ -63,8 +64,7 @@ impl Sensed {
             .fold(0.0_f64, |largest, sample| largest.max(sample.abs()));
         let count = count(largest, is_calibrated);
         let teeth = teeth(recording, speed)?;
-        // A stated speed goes before the tachometer, as the number of teeth does: that is the way around a tachometer that
-        // miscounts.
+        // A given speed replaces the tachometer, so that recordings with a faulty tachometer can be replayed.
         let wheel = wheel(recording).filter(|_| speed.rpm.is_none());
         let cut = recording.sidecar.cut.unwrap_or_default();
         let rpm = speed.rpm.or(cut.spindle_rpm.filter(|_| cut.last_rpm.is_none()));
@@ -78,7 +78,7 @@ impl Sensed {
             sensor: Sensor {
                 nominal_rate: Hertz(rate as f32),
                 meters_per_second2_per_count: count as f32,
-                // Without a unit nothing is known of the sensor but the rounding of counts.
+                // Without a unit the only known noise is that of quantization: variance count²/12, spread over 0 to rate/2.
                 noise_meters_per_second2_per_root_hertz: if is_calibrated {
                     Sensor::IIS3DWB_16G.noise_meters_per_second2_per_root_hertz
                 } else {
@@ -103,7 +103,7 @@ impl Sensed {
         })
     }
 
-    /// For each block the edges that belong to it: those before the next block begins.
+    /// Pairs each block with its tachometer edges: the edges after the previous pair and before the start of the next block.
     pub fn steps(&self) -> impl Iterator<Item = (&Block, &[Edge])> {
         let mut rest = self.edges.as_slice();
         let ends = self
@@ -120,7 +120,7 @@ impl Sensed {
     }
 }
 
-/// The channels of the three axes, and whether their unit is known.
+/// Acceleration channels of the axes x, y, z, and whether their unit is known.
 fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), RecordingError> {
     let axes = ["ax", "ay", "az"].map(|name| recording.channel(name));
     if axes.iter().any(Option::is_some) {
@@ -147,21 +147,22 @@ fn axes(recording: &Recording) -> Result<([Option<&Channel>; 3], bool), Recordin
     }
 }
 
-/// m/s² (or the recording's unit) per count.
+/// Acceleration per count, m/s² (in the unit of the recording if that is unknown), for the largest absolute sample `largest`.
 fn count(largest: f64, is_calibrated: bool) -> f64 {
     let needed = largest / FULL_SCALE;
     if needed <= 0.0 {
         return COUNT[0];
     }
     if is_calibrated {
-        // A larger sensor than the device's: scaled by what it measured.
+        // Beyond ±16 g the scale follows the largest sample.
         COUNT.into_iter().find(|&count| count >= needed).unwrap_or(needed)
     } else {
         needed
     }
 }
 
-fn teeth(recording: &Recording, speed: Speed) -> Result<u8, RecordingError> {
+/// Number of teeth: given by the user, else from the sidecar.
+fn teeth(recording: &Recording, speed: SpindleSettings) -> Result<u8, RecordingError> {
     let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
     match (speed.teeth, recorded) {
         (Some(teeth), _) => Ok(teeth),
@@ -173,6 +174,7 @@ fn teeth(recording: &Recording, speed: Speed) -> Result<u8, RecordingError> {
     }
 }
 
+/// Tachometer wheel from the sidecar, one mark by default; `None` if the recording has no channel `tacho`.
 pub(super) fn wheel(recording: &Recording) -> Option<Wheel> {
     recording.channel("tacho")?;
     let said = recording
@@ -187,6 +189,7 @@ pub(super) fn wheel(recording: &Recording) -> Option<Wheel> {
     })
 }
 
+/// Working point from the sidecar; `None` if a parameter of the cut is missing.
 fn working_point(recording: &Recording) -> Option<WorkingPoint> {
     let cut = recording.sidecar.cut?;
     Some(WorkingPoint {
@@ -198,11 +201,12 @@ fn working_point(recording: &Recording) -> Option<WorkingPoint> {
     })
 }
 
-/// Time of a sample on the clock of the device, which starts with the recording.
+/// Time stamp of a sample index (fractions allowed), ns, on the device clock, which starts at 0 with the first sample.
 fn stamp(sample: f64, rate: f64) -> Nanoseconds {
     Nanoseconds((sample / rate * 1e9).round().max(0.0) as u64)
 }
 
+/// Quantizes the acceleration channels (`count` m/s² per count, `rate` samples per second) into blocks.
 fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
     let length = axes
         .iter()
@@ -213,7 +217,7 @@ fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
     let sample = |index: usize| -> Counts {
         axes.map(|channel| {
             let value = channel.map_or(0.0, |channel| channel.samples[index]);
-            // The cast saturates.
+            // The cast saturates at ±full scale, as the sensor does.
             (value / count).round() as i16
         })
     };
@@ -235,7 +239,7 @@ fn blocks(axes: &[Option<&Channel>; 3], count: f64, rate: f64) -> Vec<Block> {
         .collect()
 }
 
-/// The rising edges of the tachometer, in order; none where there is no such channel.
+/// Rising edges of the channel `tacho`, in order; empty without this channel.
 pub(super) fn edges(recording: &Recording) -> Vec<Edge> {
     let Some(tacho) = recording.channel("tacho") else {
         return Vec::new();

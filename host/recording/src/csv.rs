@@ -1,7 +1,7 @@
-//! CSV: a header row with `name [unit]` per column, then numbers.
+//! Reader and writer of CSV recordings: a header row with `name [unit]` per column, then rows of numbers.
 //!
-//! A long record is text of a hundred megabytes, so it is read in pieces, and its numbers go straight to their columns.
-//! Lines that start with `#` are remarks, empty lines are nothing, numbers may stand in quotes.
+//! Files of hundreds of megabytes are read in chunks, without the whole text in memory. Lines that start with `#` are comments. Empty lines
+//! are skipped. Numbers may be quoted.
 
 use std::fs::File;
 use std::io::Read;
@@ -11,13 +11,13 @@ use super::raw::{Raw, RawColumn};
 use super::{Quantity, Recording, RecordingError};
 use crate::file::FileError;
 
-/// Significant digits of written numbers: what a 32-bit float holds, and more than any 16-bit sensor.
+/// Significant digits of written samples: nine digits represent every 32-bit float exactly.
 const DIGITS: usize = 9;
 
-/// Bytes that are read at once.
-const PIECE: usize = 1 << 18;
+/// Chunk size of reading, bytes; a choice.
+const CHUNK: usize = 1 << 18;
 
-/// Reads a file; `finite` refuses NaN and infinity with the line in which they stand.
+/// Reads a CSV file. With `finite`, a NaN or infinite value is an error that names its line.
 pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     };
     let file = File::open(path).map_err(unreadable)?;
     let length = file.metadata().map_err(unreadable)?.len();
-    let columns = columns(path, file, length, PIECE, finite)?;
+    let columns = columns(path, file, length, CHUNK, finite)?;
     if columns.iter().all(|column| column.samples.is_empty()) {
         return Err(RecordingError::Content {
             path: path.into(),
@@ -39,12 +39,12 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     })
 }
 
-/// The columns of a text of `length` bytes, read in pieces of `piece` bytes.
+/// Reads the columns of a text of `length` bytes, in chunks of `chunk` bytes.
 fn columns(
     path: &Path,
     mut text: impl Read,
     length: u64,
-    piece: usize,
+    chunk: usize,
     finite: bool,
 ) -> Result<Vec<RawColumn>, RecordingError> {
     let mut table = Table {
@@ -54,8 +54,8 @@ fn columns(
         bytes: length,
         finite,
     };
-    // What has been read and is not yet a whole line stays at the front.
-    let mut buffer = vec![0; piece.max(1)];
+    // The first `kept` bytes of the buffer hold the incomplete last line of the previous chunk.
+    let mut buffer = vec![0; chunk.max(1)];
     let mut kept = 0;
     loop {
         if kept == buffer.len() {
@@ -94,24 +94,24 @@ fn columns(
     }
 }
 
-/// A table that grows line by line.
+/// Columns of a CSV file while its lines are read.
 struct Table<'a> {
     path: &'a Path,
-    /// Lines so far.
+    /// Number of lines read so far.
     line: u64,
-    /// Empty before the header.
+    /// Columns with their samples; empty until the header is read.
     columns: Vec<RawColumn>,
-    /// Bytes of the whole text.
+    /// Length of the whole file, bytes.
     bytes: u64,
-    /// NaN and infinity are refused.
+    /// True if NaN and infinite values are errors.
     finite: bool,
 }
 
-/// The remedy for a row with NaN or infinity.
-const LEAVE_OUT: &str = "a number is needed; repair the row, or leave it out by --from-s or --until-s";
+/// Message part: remedy for a row with NaN or infinity.
+const LEAVE_OUT: &str = "a number is needed; repair the row, or leave it out with --from-s or --until-s";
 
 impl Table<'_> {
-    /// Takes whole lines; the last one may lack its end.
+    /// Parses complete lines; only the last line of a file may lack its line end.
     fn lines(&mut self, text: &[u8]) -> Result<(), RecordingError> {
         let mut rest = text;
         while !rest.is_empty() {
@@ -135,8 +135,9 @@ impl Table<'_> {
         Ok(())
     }
 
+    /// Parses the header row into columns.
     fn header(&mut self, line: &[u8]) -> Result<(), RecordingError> {
-        // The mark of UTF-8 that some editors write.
+        // Byte order mark of UTF-8, written by some editors.
         let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
         let text = std::str::from_utf8(line).map_err(|error| {
             self.wrong(format!(
@@ -159,7 +160,7 @@ impl Table<'_> {
         Ok(())
     }
 
-    /// A column by its header, `name [unit]` or `name`.
+    /// Parses one column header, `name [unit]` or `name`.
     fn column(&self, title: &str) -> Result<RawColumn, RecordingError> {
         let (name, unit) = match title.strip_suffix(']').and_then(|inner| inner.rsplit_once('[')) {
             Some((name, unit)) => {
@@ -187,7 +188,7 @@ impl Table<'_> {
         })
     }
 
-    /// Takes the numbers of the first line of `text`; what follows that line.
+    /// Parses the numbers of the first line of `text` and returns the text after this line.
     fn row<'t>(&mut self, text: &'t [u8]) -> Result<&'t [u8], RecordingError> {
         let mut rest = text;
         for index in 0..self.columns.len() {
@@ -211,17 +212,16 @@ impl Table<'_> {
         Ok(rest)
     }
 
-    /// Makes room for as many samples as the text has lines as long as the first: growing by doubling would take up
-    /// to twice the memory.
+    /// Reserves memory for all samples, from the file length and the length of the first row. Growth by doubling could take twice the memory.
     fn make_room(&mut self, line: usize) {
         let lines = usize::try_from(self.bytes).unwrap_or(0) / line.max(1);
-        // Later lines are often longer, as time gets more digits: little is lost, memory that is not used costs nothing.
+        // Later rows are often longer, since time gets more digits. The surplus is small, and unused memory is not committed.
         for column in &mut self.columns {
             column.samples.reserve_exact(lines);
         }
     }
 
-    /// What is wrong with the first line of `text`.
+    /// Error that describes the fault in the first line of `text`.
     fn row_error(&self, text: &[u8]) -> RecordingError {
         let end = text.iter().position(|&byte| byte == b'\n').unwrap_or(text.len());
         let line = String::from_utf8_lossy(&text[..end]);
@@ -245,7 +245,7 @@ impl Table<'_> {
             .find(|(field, _)| !is_number(field));
         self.wrong(match wrong {
             Some((field, column)) => {
-                // A damaged file may have a long line without commas.
+                // At most 40 characters: a damaged file may have a very long field.
                 let shown: String = field.chars().take(40).collect();
                 let needed = if parsed(field).is_some() {
                     LEAVE_OUT
@@ -267,20 +267,20 @@ impl Table<'_> {
     }
 }
 
-/// What stands after a number.
+/// Separator after a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum End {
-    /// A comma.
+    /// Comma: another field follows.
     Field,
-    /// The end of the line, or of the text.
+    /// End of the line or of the file.
     Line,
 }
 
-/// The number at the start of `text`, with blanks and quotes around it: its value, the bytes it takes with what ends
-/// it, and what that is.
+/// Parses the number at the start of `text`, with optional blanks and quotes. Returns its value, the number of bytes up to and including the
+/// separator, and the separator.
 #[inline]
 fn number(text: &[u8]) -> Option<(f64, usize, End)> {
-    // What nearly every number is: neither blanks nor quotes around it.
+    // Fast path: a number without blanks and quotes.
     if let Ok((value, length)) = fast_float2::parse_partial::<f64, _>(text) {
         match &text[length..] {
             [b',', ..] => return Some((value, length + 1, End::Field)),
@@ -318,6 +318,7 @@ fn number(text: &[u8]) -> Option<(f64, usize, End)> {
     }
 }
 
+/// Writes a recording as CSV: time in seconds, then one column per channel.
 pub(super) fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
     crate::file::write_with(path, |writer| {
         let mut writer = csv::Writer::from_writer(writer);
@@ -329,7 +330,7 @@ pub(super) fn write(path: &Path, recording: &Recording) -> Result<(), RecordingE
         let mut row: Vec<String> = Vec::with_capacity(recording.channels.len() + 1);
         for sample in 0..recording.len() {
             row.clear();
-            // Time needs all its digits: after an hour nine are not a microsecond.
+            // Time is written with all digits: nine digits resolve only 10 µs after an hour.
             row.push(recording.time_s(sample).to_string());
             row.extend(
                 recording
@@ -344,7 +345,7 @@ pub(super) fn write(path: &Path, recording: &Recording) -> Result<(), RecordingE
     Ok(())
 }
 
-/// A number in the fewest characters that keep [`DIGITS`] digits.
+/// Shortest text of a number with [`DIGITS`] significant digits.
 fn number_text(value: f64) -> String {
     let rounded: f64 = format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value);
     let plain = rounded.to_string();
@@ -362,27 +363,27 @@ mod tests {
 
     use super::*;
 
-    fn parse(text: &[u8], piece: usize) -> Result<Vec<Vec<f64>>, String> {
-        columns(Path::new("a.csv"), text, text.len() as u64, piece, true)
+    fn parse(text: &[u8], chunk: usize) -> Result<Vec<Vec<f64>>, String> {
+        columns(Path::new("a.csv"), text, text.len() as u64, chunk, true)
             .map(|columns| columns.into_iter().map(|column| column.samples).collect())
             .map_err(|error| error.to_string())
     }
 
     #[test]
-    fn blanks_quotes_remarks_and_line_ends_are_read_as_meant() {
+    fn blanks_quotes_comments_and_line_ends_are_accepted() {
         let text = "\u{feff}\n# made by hand\n\"a [N]\", b\r\n 1 ,\"2\"\r\n\r\n# later\n3,\t-4e0  \n+5,6.";
-        // Whatever the pieces are.
-        for piece in [1, 2, 7, 64, 4096] {
+        // The chunk size does not matter.
+        for chunk in [1, 2, 7, 64, 4096] {
             assert_eq!(
-                parse(text.as_bytes(), piece),
+                parse(text.as_bytes(), chunk),
                 Ok(vec![vec![1.0, 3.0, 5.0], vec![2.0, -4.0, 6.0]]),
-                "{piece}"
+                "{chunk}"
             );
         }
     }
 
     #[test]
-    fn a_wrong_row_is_said_with_its_line() {
+    fn a_malformed_row_is_reported_with_its_line() {
         for (row, words) in [
             ("1", "1 values"),
             ("1,2,3", "3 values"),
@@ -401,7 +402,7 @@ mod tests {
     }
 
     proptest! {
-        /// To the last bit as the standard library reads them.
+        /// Numbers are parsed to the same bits as by the standard library.
         #[test]
         fn numbers_are_exact(values in prop::collection::vec(any::<f64>().prop_filter("finite, with fewer digits too", |v| v.abs() < 1e308), 1..20), digits in 0usize..20) {
             let texts: Vec<String> = values.iter().map(|value| format!("{value:.digits$e}")).collect();
@@ -409,9 +410,9 @@ mod tests {
             prop_assert_eq!(parse(format!("a\n{}", texts.join("\n")).as_bytes(), 100), Ok(vec![expected]));
         }
 
-        /// Whatever the bytes, there is an answer.
+        /// Arbitrary bytes give a value or an error, never a panic.
         #[test]
-        fn damage_never_stops_the_program(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn damaged_text_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let _ = parse(&bytes, 16);
             let _ = parse(&[b"a,b\n".as_slice(), &bytes].concat(), 16);
         }

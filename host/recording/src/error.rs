@@ -1,17 +1,17 @@
-//! What can be wrong with a recording.
+//! Errors of recordings.
 
 use std::path::PathBuf;
 
 use super::{Quantity, UnknownUnit};
 use crate::file::FileError;
 
-/// Why a recording could not be read, or does not have what is asked of it.
+/// Error of reading, writing or using a recording; every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The file is not there or cannot be read or written.
+    /// The file does not exist, or cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The ending of the name says a format that is not read.
+    /// The file extension belongs to no format that can be read.
     #[error("{}: \"{found}\" is no format that can be read; csv, uff, wav and mat are", path.display())]
     Format {
         /// The file.
@@ -19,7 +19,7 @@ pub enum RecordingError {
         /// The ending.
         found: String,
     },
-    /// The ending of the name says a format that is not written.
+    /// The file extension belongs to no format that can be written.
     #[error("{}: \"{found}\" is no format that can be written; csv, uff and bunv are", path.display())]
     Written {
         /// The file.
@@ -27,84 +27,84 @@ pub enum RecordingError {
         /// The ending.
         found: String,
     },
-    /// The bytes do not make the format that the name says.
+    /// The content of the file is malformed or contradictory.
     #[error("{}: {what}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What was found, where, and what would be right.
+        /// Fault, its location in the file, and the expected content.
         what: String,
     },
-    /// A line of a text file is wrong.
+    /// A line of a text file is malformed.
     #[error("{}, line {line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// The line, from 1.
+        /// Number of the line, from 1.
         line: u64,
-        /// What was found, and what would be right.
+        /// Fault and the expected content.
         what: String,
     },
-    /// A unit that is not known.
+    /// The unit of a column is unknown.
     #[error("{}, column \"{column}\": {cause}", path.display())]
     Unit {
         /// The file.
         path: PathBuf,
         /// The header of the column.
         column: String,
-        /// The unit.
+        /// The unknown unit.
         cause: UnknownUnit,
     },
-    /// A channel measures something else than its name says.
+    /// The unit of a channel contradicts its name.
     #[error("{}, column \"{column}\": {found} ({}), but a channel of this name is {expected}", path.display(), found.unit())]
     Quantity {
         /// The file.
         path: PathBuf,
         /// The header of the column.
         column: String,
-        /// What the unit says.
+        /// Quantity of the stated unit.
         found: Quantity,
-        /// What the name says.
+        /// Quantity that the channel name requires.
         expected: Quantity,
     },
     /// A sample is NaN or infinite.
     #[error(
         "{}, channel \"{channel}\": sample {sample} at {time_s} s is {value} ({count} such samples, the last at {last_s} s); a number is needed: \
-         repair the channel, or use the part before or after by --until-s or --from-s",
+         repair the channel, or use the segment before or after it with --until-s or --from-s",
         path.display()
     )]
     NotFinite {
         /// The file.
         path: PathBuf,
-        /// The channel.
+        /// Name of the channel.
         channel: String,
-        /// The first such sample, from 1.
+        /// Number of the first such sample, from 1.
         sample: usize,
-        /// Its time, s.
+        /// Time of the first such sample, s.
         time_s: f64,
-        /// Its value.
+        /// Value of the first such sample: NaN or ±∞.
         value: f64,
-        /// Number of such samples.
+        /// Number of NaN or infinite samples.
         count: usize,
-        /// Time of the last one, s.
+        /// Time of the last such sample, s.
         last_s: f64,
     },
-    /// Nothing says how fast it was sampled.
-    #[error("{}: nothing says how fast it was sampled; a column \"t [s]\" or sample_rate_hz in {} is needed", path.display(), sidecar.display())]
+    /// Neither file nor sidecar states the sample rate.
+    #[error("{}: the sample rate is not given; a column \"t [s]\" or sample_rate_hz in {} is needed", path.display(), sidecar.display())]
     NoSampleRate {
         /// The file.
         path: PathBuf,
-        /// The file beside it that would say so.
+        /// Sidecar file that could state the sample rate.
         sidecar: PathBuf,
     },
-    /// A channel that is needed is not there.
+    /// The recording lacks a required channel or setting.
     #[error("{}: it has no {needed}; its channels are {}", path.display(), found.join(", "))]
     NoChannel {
         /// The file.
         path: PathBuf,
-        /// What is needed.
+        /// Description of the required channel or setting.
         needed: String,
-        /// What is there.
+        /// Names and units of the channels of the recording.
         found: Vec<String>,
     },
 }

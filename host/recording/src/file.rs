@@ -1,4 +1,4 @@
-//! Files that are whole or not there: written aside, then renamed.
+//! Reads whole files, and writes files atomically: into a temporary file beside the target, then renamed.
 
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -6,10 +6,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
-/// A file that could not be read or written; the message names it.
+/// Error of reading or writing a file; the message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The file is not there, or may not be read.
+    /// The file does not exist or cannot be read.
     #[error("{}: cannot read it: {cause}", path.display())]
     Read {
         /// The file.
@@ -17,15 +17,15 @@ pub enum FileError {
         /// What the system says.
         cause: io::Error,
     },
-    /// The file is not text.
+    /// The file is not UTF-8 text.
     #[error("{}: byte {offset} is not UTF-8; a text file is needed", path.display())]
     NotText {
         /// The file.
         path: PathBuf,
-        /// The first byte that does not belong.
+        /// Offset of the first byte that is not UTF-8, from 0.
         offset: usize,
     },
-    /// The file cannot be written: no such folder, no right, no space.
+    /// The file cannot be written: missing folder, no permission, disk full.
     #[error("{}: cannot write it: {cause}", path.display())]
     Write {
         /// The file.
@@ -35,7 +35,7 @@ pub enum FileError {
     },
 }
 
-/// The bytes of a file.
+/// Reads all bytes of a file.
 pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
     std::fs::read(path).map_err(|cause| FileError::Read {
         path: path.into(),
@@ -43,7 +43,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
     })
 }
 
-/// The text of a file.
+/// Reads a file as UTF-8 text.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     String::from_utf8(read(path)?).map_err(|error| FileError::NotText {
         path: path.into(),
@@ -51,31 +51,32 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
     })
 }
 
-/// Writes `bytes` to `path`: afterwards the file is there whole, or what was there before still is.
+/// Writes `bytes` to `path` atomically: on an error the previous file stays unchanged.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write_with(path, |writer| writer.write_all(bytes))
 }
 
-/// Files that are being written aside. Who holds it may create, rename and remove such files.
+/// Paths of the temporary files of writes in progress. The holder of the lock may create, rename and remove temporary files.
 static ASIDE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// Locks the list of temporary files of writes in progress.
 fn being_written() -> MutexGuard<'static, Vec<PathBuf>> {
     ASIDE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every file that is being written aside, and keeps all later writes from beginning or ending: for a process that is
-/// about to exit, so that an interrupt leaves no half-written file.
+/// Removes all temporary files and blocks every later write, so that an interrupt leaves no half-written file. Only for a process that is about
+/// to exit.
 pub fn abandon_writing() {
     let mut aside = being_written();
     for path in aside.drain(..) {
-        // Nothing can be done about a file that cannot be removed.
+        // A file that cannot be removed is left; the process exits anyway.
         let _ = std::fs::remove_file(path);
     }
-    // The lock stays taken: a write that is going on waits there until the process has exited.
+    // The lock is never released: a write in progress waits for it until the process exits.
     std::mem::forget(aside);
 }
 
-/// Writes what `fill` writes to `path`: afterwards the file is there whole, or what was there before still is.
+/// Writes `path` atomically with the content that `fill` writes: on an error the previous file stays unchanged.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), FileError> {
     let failed = |cause| FileError::Write {
         path: path.into(),
@@ -97,7 +98,7 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
         .map_err(failed)
 }
 
-/// The file with what `fill` writes, on the disk; removed where that fails.
+/// Writes the content of `fill` to the temporary file and syncs it to the disk; on an error the temporary file is removed.
 fn filled(
     aside: NamedTempFile,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -109,7 +110,7 @@ fn filled(
     Ok(aside)
 }
 
-/// What stands behind the last dot of a file's name, in lower case; empty where there is none.
+/// File extension in lower case, without the dot; empty if there is none.
 pub fn ending(path: &Path) -> String {
     path.extension()
         .unwrap_or_default()
@@ -117,7 +118,7 @@ pub fn ending(path: &Path) -> String {
         .to_lowercase()
 }
 
-/// A new file beside `path`, on the same file system, so that renaming it is atomic.
+/// Creates a temporary file in the folder of `path`: on one file system the later rename is atomic.
 fn aside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -125,7 +126,7 @@ fn aside(path: &Path) -> io::Result<NamedTempFile> {
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".quietcut-");
-    // A temporary file is private to its owner; a result has the rights of any other file.
+    // Temporary files are readable by their owner only; results get the usual permissions.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

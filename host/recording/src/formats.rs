@@ -1,4 +1,4 @@
-//! Reads and writes a recording in the form that the ending of its name says.
+//! Reads and writes recordings; the file extension selects the format.
 
 use std::path::Path;
 
@@ -9,22 +9,23 @@ use super::sidecar::Sidecar;
 use super::uff::UffForm;
 use super::{assemble, csv, mat, uff, wav};
 
-/// Endings of the names of recordings that can be written: CSV, UFF 58 as text, and in binary.
+/// File extensions of the formats that can be written: CSV, UFF 58 as text (uff, unv), UFF 58 binary (bunv).
 pub const WRITTEN: [&str; 4] = ["csv", "uff", "unv", "bunv"];
 
 impl Recording {
-    /// Reads a recording, with the sidecar beside it.
+    /// Reads a recording (CSV, WAV, MAT or UFF 58) and its sidecar.
     ///
     /// # Errors
-    /// Missing or malformed file, unknown or contradicting units, uneven time, no sample rate, a sample that is no finite number.
+    /// The file is missing or malformed; a unit is unknown or contradicts the channel name; time is not evenly spaced; there is no sample
+    /// rate; a sample is NaN or infinite.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         Self::read_segment(path, Segment::default())
     }
 
-    /// Reads a segment of a recording. Samples outside of it may be NaN or infinite.
+    /// Reads a segment of a recording and its sidecar. Samples outside the segment may be NaN or infinite.
     ///
     /// # Errors
-    /// As [`Recording::read`]; a segment that lies outside of the recording.
+    /// As [`Recording::read`]; also if the segment lies outside the recording.
     pub fn read_segment(path: impl AsRef<Path>, segment: Segment) -> Result<Self, RecordingError> {
         let path = path.as_ref();
         let ending = crate::file::ending(path);
@@ -34,7 +35,7 @@ impl Recording {
             "mat" => mat::read(path)?,
             "uff" | "unv" | "bunv" => uff::read(path, segment.is_whole())?,
             _ => {
-                // A file that is not there is the first thing to mend.
+                // A missing file is reported before an unknown extension.
                 crate::file::read(path)?;
                 return Err(RecordingError::Format {
                     path: path.into(),
@@ -45,10 +46,10 @@ impl Recording {
         segment.of(assemble::recording(path, raw, Sidecar::beside(path)?)?)
     }
 
-    /// Writes it to `path`, with its sidecar, in the form that the ending says: both whole, or as they were before.
+    /// Writes the recording and its sidecar to `path` in the format of the file extension. Each file is replaced as a whole or left unchanged.
     ///
     /// # Errors
-    /// Another ending than those of [`WRITTEN`], or a file that cannot be written.
+    /// The extension is not one of [`WRITTEN`], or a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), RecordingError> {
         match crate::file::ending(path).as_str() {
             "csv" => {
@@ -64,7 +65,7 @@ impl Recording {
         }
     }
 
-    /// Writes it to `path` as UFF 58, with its sidecar: both whole, or as they were before.
+    /// Writes the recording to `path` as UFF 58, with its sidecar. Each file is replaced as a whole or left unchanged.
     ///
     /// # Errors
     /// A file cannot be written.

@@ -51,12 +51,12 @@ pub mod uff;
 mod unit;
 mod wav;
 
-pub use blocks::{Sensed, Speed};
+pub use blocks::{Sensed, SpindleSettings};
 pub use error::RecordingError;
 pub use formats::WRITTEN;
 pub use recording::{Channel, Recording};
 pub use segment::Segment;
-pub use sidecar::{Kind, RecordedChannel, RecordedCut, RecordedPosture, Sidecar};
+pub use sidecar::{RecordedChannel, RecordedCut, RecordedPosture, Sidecar, TestKind};
 pub use spindle_angle::SpindleAngle;
 pub use uff::UffForm;
 pub use unit::{Quantity, Sensitivity, Unit, UnknownUnit};

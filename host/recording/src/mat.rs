@@ -1,13 +1,13 @@
-//! MAT-files of level 5, compressed or not: every real numeric vector is a channel.
+//! Reader of MAT-files of level 5, compressed or uncompressed. Every real numeric vector is a channel.
 //!
-//! The longer side of a matrix is time: of a matrix N × 3 the columns are channels, of a matrix 3 × N the rows. The columns of
-//! a square matrix are channels.
+//! The longer dimension of a matrix is time: the columns of an N × 3 matrix are channels, and the rows of a 3 × N matrix. The columns of a
+//! square matrix are channels.
 //!
-//! The format is documented by MathWorks ("MAT-File Format", level 5). Text, structures, objects and sparse arrays
-//! are passed over; level 7.3 is HDF5 and is refused. A vector of which there is one sample is a parameter, no channel.
+//! Format: MathWorks, "MAT-File Format", level 5. Text, structures, objects and sparse arrays are skipped. Level 7.3 (HDF5) is an error. A
+//! scalar is a parameter, not a channel.
 //!
-//! A file is read in pieces and its numbers go straight to their channels: a long record is in memory once. Memory is
-//! bounded by the length of the file, not by the sizes that its headers state.
+//! The file is read in chunks and its values are stored only once. The length of the file bounds the allocated memory, whatever sizes its
+//! headers state.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, copy, sink};
@@ -19,32 +19,36 @@ use super::RecordingError;
 use super::raw::{Raw, RawColumn};
 use crate::file::FileError;
 
-/// Bytes of the file header.
+/// Length of the file header, bytes (MAT-File Format, level 5).
 const HEADER: usize = 128;
 
-/// Bytes that are read at once; a multiple of every number's size.
-const PIECE: usize = 1 << 16;
+/// Chunk size of reading, bytes; a choice. It is a multiple of the size of every number type.
+const CHUNK: usize = 1 << 16;
 
-/// The most that deflate packs into a byte: a compressed element that states more is damaged.
+/// Largest compression factor of the deflate format (1032:1). An element with a larger factor is damaged.
 const INFLATION_MAX: u64 = 1032;
 
-/// Bytes of values that any file may hold: a million samples of eight channels that were not connected, whose zeros are
-/// compressed to nearly nothing.
+/// Memory for values that every file may use, bytes, however short it is: one million samples of eight channels of 8 bytes. Constant
+/// channels of this size compress to almost nothing. The size is a choice.
 const VALUES_MIN: u64 = 64 << 20;
 
-/// Bytes of values that a file may hold for each of its own bytes. Bytes that become 8-byte numbers take a factor of 8; measured
-/// channels are compressed by a factor below 20.
+/// Memory for values per byte of the file, bytes. One-byte integers that become 8-byte numbers need a factor of 8, and measured channels
+/// compress by a factor below 20: together 160.
 const VALUES_PER_BYTE: u64 = 200;
 
-/// Values to make room for before any has been read, where the file is shorter.
+/// Number of values for which memory is reserved before reading, even if the file is shorter. A choice; it bounds what a false header costs.
 const TRUSTED: u64 = 1 << 16;
 
-/// Bytes of an element that holds flags, dimensions or a name. Names have up to 63 characters.
+/// Largest element with flags, dimensions or a name, bytes. Valid names have up to 63 characters; the limit is a choice above that.
 const SMALL_MAX: u64 = 4096;
 
+/// Data type of a compressed element (miCOMPRESSED).
 const COMPRESSED: u32 = 15;
+
+/// Data type of a matrix element (miMATRIX).
 const MATRIX: u32 = 14;
 
+/// Reads the channels of a MAT-file: the numeric vectors and matrices with the largest number of samples.
 pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     let unreadable = |cause| FileError::Read {
         path: path.into(),
@@ -56,7 +60,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
         path: path.into(),
         what,
     };
-    let variables = variables(&mut BufReader::with_capacity(PIECE, file), length).map_err(content)?;
+    let variables = variables(&mut BufReader::with_capacity(CHUNK, file), length).map_err(content)?;
     let longest = variables.iter().map(Variable::samples).max().unwrap_or(0);
     let columns: Vec<RawColumn> = variables
         .into_iter()
@@ -65,7 +69,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
         .collect();
     if columns.is_empty() {
         return Err(content(
-            "it has no numeric vector that could be a channel (text, structures and objects are passed over)"
+            "it has no numeric vector that could be a channel (text, structures and objects are skipped)"
                 .into(),
         ));
     }
@@ -76,19 +80,20 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     })
 }
 
-/// A real numeric matrix: a vector is one column, however it lies.
+/// A real numeric variable, split into channels; a row vector and a column vector are one channel.
 struct Variable {
     name: String,
-    /// The channels, all of one length.
+    /// Samples of each channel; all channels have the same length.
     values: Vec<Vec<f64>>,
 }
 
 impl Variable {
-    /// Samples of each channel: the longer side.
+    /// Number of samples per channel: the longer dimension of the matrix.
     fn samples(&self) -> usize {
         self.values.first().map_or(0, Vec::len)
     }
 
+    /// Channels with their names: the name of the variable, numbered from 1 if there are several.
     fn into_columns(self) -> Vec<RawColumn> {
         let is_one = self.values.len() == 1;
         let name = |index: usize| match is_one {
@@ -107,7 +112,7 @@ impl Variable {
     }
 }
 
-/// All real numeric matrices of a file of `length` bytes.
+/// Reads all real numeric variables of a file of `length` bytes.
 fn variables(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Variable>, String> {
     let mut header = Vec::with_capacity(HEADER);
     reader
@@ -135,10 +140,10 @@ fn variables(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Variable>, Str
     let mut source = Source {
         reader,
         at: HEADER as u64,
-        room: length,
+        available: length,
         big_endian,
     };
-    let mut room = ValueRoom {
+    let mut memory = ValueMemory {
         file: length,
         bytes: length.saturating_mul(VALUES_PER_BYTE).max(VALUES_MIN),
     };
@@ -146,59 +151,63 @@ fn variables(reader: &mut dyn BufRead, length: u64) -> Result<Vec<Variable>, Str
     while !source.is_at_end()? {
         let tag = source.tag()?;
         match tag.kind {
-            COMPRESSED => variables.extend(inflated(&mut source, tag.length, &mut room)?),
-            MATRIX => variables.extend(source.within(&tag, |inner| matrix(inner, &mut room))?),
+            COMPRESSED => variables.extend(inflated(&mut source, tag.length, &mut memory)?),
+            MATRIX => variables.extend(source.within(&tag, |inner| matrix(inner, &mut memory))?),
             _ => source.skip(&tag)?,
         }
     }
     Ok(variables)
 }
 
-/// Memory for the values of a file.
-struct ValueRoom {
-    /// Bytes of the file.
+/// Remaining memory for the values of one file.
+struct ValueMemory {
+    /// Length of the file, bytes.
     file: u64,
-    /// Bytes of values that it may still hold.
+    /// Memory still available for values, bytes.
     bytes: u64,
 }
 
-impl ValueRoom {
-    /// Takes the room of `count` values of a variable.
+impl ValueMemory {
+    /// Reserves the memory of `count` values of variable `name`; an error if it exceeds the budget.
     fn take(&mut self, name: &str, count: u64) -> Result<(), String> {
         let needed = count.saturating_mul(size_of::<f64>() as u64);
         self.bytes = self.bytes.checked_sub(needed).ok_or_else(|| {
             format!(
-                "variable \"{name}\" has {count} values, which inflate a file of {} bytes beyond {} times its length; no \
-                 recording is compressed so far: the file is damaged, or save it without compression (-v6)",
+                "variable \"{name}\" has {count} values, more than a file of {} bytes can hold: {} bytes per byte of the file are \
+                 allowed. The file is damaged, or save it without compression (-v6)",
                 self.file, VALUES_PER_BYTE
             )
         })?;
         Ok(())
     }
 
-    /// Values of a channel to make room for before they are read, where a variable has `channels`.
+    /// Number of values per channel for which memory is reserved before reading a variable with `channels` channels.
     fn trusted(&self, channels: usize) -> usize {
         usize::try_from(self.file.max(TRUSTED) / channels.max(1) as u64 + 1).unwrap_or(usize::MAX)
     }
 }
 
-/// The matrix in a compressed element of `length` bytes.
-fn inflated(source: &mut Source<'_>, length: u64, room: &mut ValueRoom) -> Result<Option<Variable>, String> {
-    if length > source.room {
+/// Decompresses an element of `length` bytes and reads the matrix in it; `None` if it holds no real numeric matrix.
+fn inflated(
+    source: &mut Source<'_>,
+    length: u64,
+    memory: &mut ValueMemory,
+) -> Result<Option<Variable>, String> {
+    if length > source.available {
         return Err(source.cut_off(length));
     }
     let before = source.at + length;
     let inflated_max = length.saturating_mul(INFLATION_MAX);
     let mut packed = (&mut *source.reader).take(length);
-    let mut inflated = BufReader::with_capacity(PIECE, ZlibDecoder::new(&mut packed).take(inflated_max));
+    let mut inflated = BufReader::with_capacity(CHUNK, ZlibDecoder::new(&mut packed).take(inflated_max));
     let mut inner = Source {
         reader: &mut inflated,
         at: 0,
-        room: inflated_max,
+        available: inflated_max,
         big_endian: source.big_endian,
     };
     let found = inner.tag().and_then(|tag| match tag.kind {
-        MATRIX => inner.within(&tag, |inner| matrix(inner, room)),
+        MATRIX => inner.within(&tag, |inner| matrix(inner, memory)),
         _ => Ok(None),
     });
     let found =
@@ -209,15 +218,15 @@ fn inflated(source: &mut Source<'_>, length: u64, room: &mut ValueRoom) -> Resul
     Ok(found)
 }
 
-/// The matrix in the data of a matrix element; `None` where it is none of real numbers.
-fn matrix(source: &mut Source<'_>, room: &mut ValueRoom) -> Result<Option<Variable>, String> {
+/// Reads the data of a matrix element; `None` if the matrix is not two-dimensional, real and numeric.
+fn matrix(source: &mut Source<'_>, memory: &mut ValueMemory) -> Result<Option<Variable>, String> {
     let flags = source.small()?;
     let Some(flags) = flags.get(..4) else {
         return Ok(None);
     };
     let flags = word(flags, source.big_endian);
     let (class, complex, logical) = (flags & 0xff, flags & 0x800 != 0, flags & 0x200 != 0);
-    // Classes 6 to 15 are double, single and the integers.
+    // Array classes 6 to 15: double, single and the integer types.
     if !(6..=15).contains(&class) || complex || logical {
         return Ok(None);
     }
@@ -243,14 +252,14 @@ fn matrix(source: &mut Source<'_>, room: &mut ValueRoom) -> Result<Option<Variab
             "variable \"{name}\" is {rows} by {columns}, but has {count} values"
         ));
     }
-    if tag.length > source.room {
+    if tag.length > source.available {
         return Err(source.cut_off(tag.length));
     }
-    room.take(&name, count as u64)?;
+    memory.take(&name, count as u64)?;
     let (samples, channels) = (rows.max(columns), rows.min(columns));
-    let trusted = samples.min(room.trusted(channels));
+    let trusted = samples.min(memory.trusted(channels));
     let mut values: Vec<Vec<f64>> = Vec::new();
-    // Values come column by column.
+    // Values are stored in column-major order.
     let in_rows = rows < columns;
     let mut index = 0;
     source.numbers(&tag, |value| {
@@ -268,7 +277,7 @@ fn matrix(source: &mut Source<'_>, room: &mut ValueRoom) -> Result<Option<Variab
     Ok(Some(Variable { name, values }))
 }
 
-/// Bytes of a number as it is stored; `None` where a type is no number.
+/// Size of a stored number type, bytes; `None` if the data type is not numeric.
 fn size_of_kind(kind: u32) -> Option<usize> {
     Some(match kind {
         1 | 2 => 1,
@@ -279,7 +288,7 @@ fn size_of_kind(kind: u32) -> Option<usize> {
     })
 }
 
-/// Numbers as they are stored: a matrix of doubles may be stored in a smaller type where that loses nothing.
+/// Decodes numbers of data type `kind` and passes each to `take`. A matrix of doubles may be stored in a smaller integer type without loss.
 fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
     macro_rules! decode {
         ($type:ty) => {
@@ -309,6 +318,7 @@ fn decode(kind: u32, data: &[u8], big_endian: bool, mut take: impl FnMut(f64)) {
     }
 }
 
+/// Decodes a 32-bit unsigned integer from the first four bytes.
 fn word(bytes: &[u8], big_endian: bool) -> u32 {
     let array = [bytes[0], bytes[1], bytes[2], bytes[3]];
     if big_endian {
@@ -318,25 +328,28 @@ fn word(bytes: &[u8], big_endian: bool) -> u32 {
     }
 }
 
-/// What stands before the data of an element.
+/// Tag of a data element: data type and length.
 struct Tag {
+    /// Data type of the element (miINT8 = 1 … miCOMPRESSED = 15).
     kind: u32,
-    /// Bytes of data.
+    /// Length of the data, bytes.
     length: u64,
-    /// The data, where it stands within the tag: up to four bytes do.
+    /// Data of a small element, which are stored inside the tag (up to four bytes).
     inside: Option<[u8; 4]>,
 }
 
-/// Bytes in their order.
+/// Sequential reader of the elements of a file or of a compressed element.
 struct Source<'a> {
     reader: &'a mut dyn BufRead,
+    /// Offset of the next byte.
     at: u64,
-    /// More bytes than this there cannot be.
-    room: u64,
+    /// Upper bound of the bytes available: the length of the file or of the enclosing element.
+    available: u64,
     big_endian: bool,
 }
 
 impl Source<'_> {
+    /// True if no byte is left.
     fn is_at_end(&mut self) -> Result<bool, String> {
         self.reader
             .fill_buf()
@@ -344,6 +357,7 @@ impl Source<'_> {
             .map_err(|error| error.to_string())
     }
 
+    /// Reads exactly as many bytes as `bytes` holds.
     fn fill(&mut self, bytes: &mut [u8]) -> Result<(), String> {
         self.reader
             .read_exact(bytes)
@@ -355,6 +369,7 @@ impl Source<'_> {
         Ok(())
     }
 
+    /// Message for a file that ends within an element of `length` bytes.
     fn cut_off(&self, length: u64) -> String {
         format!(
             "it ends within an element of {length} bytes at byte {}: it is cut off",
@@ -362,7 +377,7 @@ impl Source<'_> {
         )
     }
 
-    /// The next tag.
+    /// Reads the next tag.
     fn tag(&mut self) -> Result<Tag, String> {
         let mut bytes = [0; 4];
         self.fill(&mut bytes)?;
@@ -390,7 +405,7 @@ impl Source<'_> {
         })
     }
 
-    /// The data of the next element, which is a few bytes.
+    /// Reads the next element, which holds flags, dimensions or a name: at most [`SMALL_MAX`] bytes.
     fn small(&mut self) -> Result<Vec<u8>, String> {
         let tag = self.tag()?;
         if tag.length > SMALL_MAX {
@@ -400,37 +415,37 @@ impl Source<'_> {
             ));
         }
         let mut data = Vec::new();
-        self.pieces(&tag, |piece| data.extend_from_slice(piece))?;
+        self.chunks(&tag, |chunk| data.extend_from_slice(chunk))?;
         Ok(data)
     }
 
-    /// The numbers of an element.
+    /// Reads the numbers of an element and passes each to `take`.
     fn numbers(&mut self, tag: &Tag, mut take: impl FnMut(f64)) -> Result<(), String> {
         let big_endian = self.big_endian;
-        self.pieces(tag, |piece| decode(tag.kind, piece, big_endian, &mut take))
+        self.chunks(tag, |chunk| decode(tag.kind, chunk, big_endian, &mut take))
     }
 
-    /// The data of an element piece by piece, and what pads it to 8 bytes.
-    fn pieces(&mut self, tag: &Tag, mut take: impl FnMut(&[u8])) -> Result<(), String> {
+    /// Reads the data of an element in chunks, and its padding to a multiple of 8 bytes.
+    fn chunks(&mut self, tag: &Tag, mut take: impl FnMut(&[u8])) -> Result<(), String> {
         if let Some(inside) = &tag.inside {
             take(&inside[..tag.length as usize]);
             return Ok(());
         }
-        if tag.length > self.room {
+        if tag.length > self.available {
             return Err(self.cut_off(tag.length));
         }
-        let mut piece = vec![0; PIECE.min(tag.length as usize)];
+        let mut chunk = vec![0; CHUNK.min(tag.length as usize)];
         let mut left = tag.length as usize;
         while left > 0 {
-            let length = left.min(PIECE);
-            self.fill(&mut piece[..length])?;
-            take(&piece[..length]);
+            let length = left.min(CHUNK);
+            self.fill(&mut chunk[..length])?;
+            take(&chunk[..length]);
             left -= length;
         }
         self.pad(tag.length)
     }
 
-    /// Reads over the padding; that of the last element may be missing.
+    /// Skips the padding after `length` bytes; the padding of the last element may be missing.
     fn pad(&mut self, length: u64) -> Result<(), String> {
         let padding = length.next_multiple_of(8) - length;
         let read = copy(&mut (&mut *self.reader).take(padding), &mut sink());
@@ -438,13 +453,13 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// What `read` finds in the data of an element, and nothing behind it.
+    /// Applies `read` to the data of an element, limited to that element, and skips data that `read` leaves.
     fn within<T>(
         &mut self,
         tag: &Tag,
         read: impl FnOnce(&mut Source<'_>) -> Result<T, String>,
     ) -> Result<T, String> {
-        if tag.length > self.room {
+        if tag.length > self.available {
             return Err(self.cut_off(tag.length));
         }
         let end = self.at + tag.length;
@@ -452,7 +467,7 @@ impl Source<'_> {
         let found = read(&mut Source {
             reader: &mut data,
             at: self.at,
-            room: tag.length,
+            available: tag.length,
             big_endian: self.big_endian,
         })?;
         copy(&mut data, &mut sink()).map_err(|error| error.to_string())?;
@@ -464,7 +479,7 @@ impl Source<'_> {
         Ok(found)
     }
 
-    /// Passes an element over.
+    /// Skips an element.
     fn skip(&mut self, tag: &Tag) -> Result<(), String> {
         if tag.inside.is_some() {
             return Ok(());

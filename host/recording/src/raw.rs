@@ -1,20 +1,20 @@
-//! The columns of a file before its sidecar is consulted.
+//! Content of a file before the sidecar is applied.
 
 use super::unit::Unit;
 
-/// What a file says before the sidecar is consulted.
+/// Columns, sample rate and start time of a file, before the sidecar is applied.
 pub(super) struct Raw {
     pub(super) columns: Vec<RawColumn>,
-    /// Samples per second, where the format carries it.
+    /// Sample rate, samples per second; `None` if the format does not state it.
     pub(super) sample_rate_hz: Option<f64>,
-    /// Time of the first sample, s, where no column says so.
+    /// Time of the first sample, s; a time column replaces it.
     pub(super) start_s: f64,
 }
 
-/// A column of a file.
+/// One column of a file: name, unit and samples in that unit.
 pub(super) struct RawColumn {
     pub(super) name: String,
-    /// `None` where the file does not say.
+    /// Unit of the samples; `None` if the file does not state it.
     pub(super) unit: Option<Unit>,
     pub(super) samples: Vec<f64>,
 }

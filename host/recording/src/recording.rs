@@ -7,37 +7,37 @@ use super::error::RecordingError;
 use super::sidecar::Sidecar;
 use super::unit::Quantity;
 
-/// Channels that were sampled together, evenly.
+/// A recording: channels sampled simultaneously at one constant sample rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Where it was read from, or will be written to.
+    /// File that the recording was read from or is written to.
     pub path: PathBuf,
-    /// Samples per second.
+    /// Sample rate, samples per second.
     pub sample_rate_hz: f64,
     /// Time of the first sample, s.
     pub start_s: f64,
-    /// How long after the beginning of the recording of which it is a part it begins, s: what grows or swings with time counts from
-    /// there. 0 where it is whole.
+    /// Time from the start of the whole recording to the first sample of this segment, s; 0 for a whole recording. Effects that depend on
+    /// time, such as drift, count their time from the start of the whole recording.
     pub since_s: f64,
-    /// The channels, all of one length. Time is not among them.
+    /// Channels, all with the same number of samples. The time column is not a channel.
     pub channels: Vec<Channel>,
-    /// What the file beside it says.
+    /// Sidecar file: kind of test, cut, posture and channel descriptions.
     pub sidecar: Sidecar,
 }
 
-/// One channel.
+/// One channel of a recording: name, measured quantity and samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Its name: `fx`, `x`, `vx`, `ax`, `tacho` …
+    /// Name of the channel: `fx`, `x`, `vx`, `ax`, `tacho` …
     pub name: String,
-    /// What it measures; samples are in the SI unit of it.
+    /// Measured quantity; samples are in its SI unit.
     pub quantity: Quantity,
-    /// The samples.
+    /// Samples, in the SI unit of `quantity`.
     pub samples: Vec<f64>,
 }
 
 impl Recording {
-    /// The channel of a name.
+    /// The channel called `name`; `None` if the recording has no such channel.
     pub fn channel(&self, name: &str) -> Option<&Channel> {
         self.channels.iter().find(|channel| channel.name == name)
     }
@@ -47,20 +47,20 @@ impl Recording {
         self.channels.first().map_or(0, |channel| channel.samples.len())
     }
 
-    /// True where there are no samples.
+    /// True if the recording has no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Time of a sample, s.
+    /// Time of the sample with index `sample`, s: t = `start_s` + sample / `sample_rate_hz`.
     pub fn time_s(&self, sample: usize) -> f64 {
         self.start_s + sample as f64 / self.sample_rate_hz
     }
 
-    /// A part of it, of these samples.
+    /// The segment of the recording that holds the samples of `range`, with its start times.
     ///
     /// # Panics
-    /// Where it has fewer samples.
+    /// The recording has fewer samples than `range` requires.
     #[must_use]
     pub fn part(&self, range: Range<usize>) -> Self {
         let channels = self.channels.iter().map(|channel| Channel {
@@ -77,7 +77,7 @@ impl Recording {
         }
     }
 
-    /// The error that it has no channel that is needed.
+    /// The error for a recording without the channel described by `needed`; the message lists the channels that it has.
     pub fn lacks(&self, needed: impl Into<String>) -> RecordingError {
         RecordingError::NoChannel {
             path: self.path.clone(),

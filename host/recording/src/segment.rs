@@ -1,27 +1,27 @@
-//! The part of a recording that is used, chosen by time.
+//! A segment of a recording, selected by start and end time (options `--from-s`, `--until-s`).
 
 use super::{Recording, RecordingError};
 
-/// A segment of a recording: the samples from one time up to another.
+/// A segment of a recording: all samples with `from_s` ≤ t < `until_s`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Segment {
     /// Time of the first sample, s, on the time axis of the file; `None` for the start of the recording.
     pub from_s: Option<f64>,
-    /// Time before which the last sample lies, s; `None` for the end of the recording.
+    /// End time, s, exclusive; `None` for the end of the recording.
     pub until_s: Option<f64>,
 }
 
-/// Share of a sample interval by which a stated time may differ from the time of a sample and still mean it: times are
-/// printed with few digits.
+/// Tolerance when a start or end time selects a sample, in sample intervals. It absorbs the rounding of printed times. The value is a
+/// choice, far below one interval.
 const SAME_SAMPLE: f64 = 1e-3;
 
 impl Segment {
-    /// True where it is the whole recording.
+    /// True if the segment is the whole recording.
     pub fn is_whole(self) -> bool {
         self.from_s.is_none() && self.until_s.is_none()
     }
 
-    /// The segment of a recording; every sample in it is a finite number.
+    /// Cuts the segment out of `recording`; a sample of it that is NaN or infinite is an error.
     pub(super) fn of(self, recording: Recording) -> Result<Recording, RecordingError> {
         let (count, rate) = (recording.len(), recording.sample_rate_hz);
         let content = |what: String| RecordingError::Content {
@@ -84,7 +84,7 @@ mod tests {
     use super::super::{Channel, Quantity, Sidecar};
     use super::*;
 
-    /// Samples 0 to 9 at 10 Hz from 2 s on; the third and the fifth are no numbers.
+    /// A recording of ten samples at 10 Hz that starts at 2 s; its third sample is NaN, its fifth is −∞.
     fn recording() -> Recording {
         let mut samples: Vec<f64> = (0..10).map(f64::from).collect();
         samples[2] = f64::NAN;
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_that_is_no_number_is_named_with_channel_and_time() {
+    fn a_nan_sample_is_reported_with_channel_and_time() {
         let said = segment(None, None).unwrap_err();
         for words in [
             "a.mat",
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn the_segment_without_it_is_read_with_its_times() {
+    fn a_segment_without_nan_keeps_its_times() {
         let after = segment(Some(2.5), None).unwrap();
         assert_eq!(after.channels[0].samples, [5.0, 6.0, 7.0, 8.0, 9.0]);
         assert_eq!((after.start_s, after.since_s), (2.5, 0.5));
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_segment_outside_the_recording_is_refused_with_its_times() {
+    fn a_segment_outside_the_recording_is_refused_with_the_recorded_times() {
         for (from_s, until_s) in [(Some(5.0), None), (None, Some(1.0)), (Some(2.7), Some(2.6))] {
             let said = segment(from_s, until_s).unwrap_err();
             assert!(said.contains("from 2 to 2.9 s"), "{said}");

@@ -1,4 +1,4 @@
-//! What the columns of a recording cannot say: the file `NAME.toml` beside `NAME.csv`.
+//! The sidecar of a recording: `NAME.toml` beside `NAME.csv` holds the kind of test, the cut, the posture and the channel descriptions.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,119 +7,119 @@ use serde::{Deserialize, Serialize};
 
 use super::RecordingError;
 
-/// What kind of test was recorded.
+/// TestKind of test that was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// A shaker at constant force.
+pub enum TestKind {
+    /// Shaker test with steady excitation: random, or one or several tones.
     Shaker,
-    /// A shaker, one frequency after the other.
+    /// Step-sine test: a shaker dwells at one frequency after the other.
     StepSine,
-    /// A shaker whose frequency glides.
+    /// Swept-sine test: the shaker frequency changes continuously.
     Sweep,
-    /// Blows of a hammer.
+    /// Impact test with a hammer.
     Hammer,
-    /// A structure that was let go.
+    /// Free decay after the structure is released.
     FreeDecay,
-    /// A cut.
+    /// Milling cut.
     Cutting,
-    /// The spindle runs, nothing is cut.
+    /// Spindle running without a cut (air cut).
     Idle,
 }
 
-/// The file beside a recording.
+/// The sidecar file of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sidecar {
-    /// What kind of test it is.
+    /// TestKind of test.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub kind: Option<Kind>,
-    /// The driven channels; the forces where it is not given.
+    pub kind: Option<TestKind>,
+    /// Names of the input (excitation) channels; `None` means all force channels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<Vec<String>>,
-    /// Samples per second, where no time column says so.
+    /// Sample rate, samples per second; required if the file has neither a time column nor a rate of its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample_rate_hz: Option<f64>,
-    /// The cut.
+    /// Parameters of the recorded cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cut: Option<RecordedCut>,
-    /// Where the robot stood.
+    /// Posture of the robot during the recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub posture: Option<RecordedPosture>,
-    /// The channels by name.
+    /// Descriptions of channels, by the name of the channel in the file.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub channels: BTreeMap<String, RecordedChannel>,
 }
 
-/// The posture at which it was recorded.
+/// Posture of the robot during a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedPosture {
-    /// Joint angles from the base on, degrees.
+    /// Joint angles, degrees, starting at the base.
     pub joints_deg: Vec<f64>,
 }
 
-/// The cut that was recorded, as far as it is known.
+/// Parameters of a recorded cut; a parameter that is not given is `None`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedCut {
     /// Spindle speed, rev/min.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_rpm: Option<f64>,
-    /// The speed to which it glides by the end of the record, rev/min; not there where it stays.
+    /// Spindle speed at the end of a recording with a speed ramp, rev/min; `None` for constant speed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_rpm: Option<f64>,
-    /// Axial depth, mm.
+    /// Axial depth of cut, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axial_depth_mm: Option<f64>,
-    /// Immersion angle of entry, degrees.
+    /// Entry angle (immersion angle at which a tooth enters the workpiece), degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start_deg: Option<f64>,
-    /// Immersion angle of exit, degrees.
+    /// Exit angle (immersion angle at which a tooth leaves the workpiece), degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exit_deg: Option<f64>,
     /// Feed per tooth, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feed_per_tooth_mm: Option<f64>,
-    /// Number of teeth.
+    /// Number of teeth of the tool.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub teeth: Option<u32>,
 }
 
-/// What is known of a channel.
+/// Description of one channel in the sidecar.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedChannel {
-    /// Where the sensor sits, such as spindle-housing.
+    /// Mounting position of the sensor, such as `spindle-housing`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at: Option<String>,
-    /// The name by the conventions of recordings, where the file calls the channel something else.
+    /// Standard name of the channel (`fx`, `ax`, `tacho` …) if the file uses another name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// The unit, where the file does not say.
+    /// Unit of the channel, such as `m/s^2`; it overrides the unit in the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// What a volt means, such as "10.2 mV/g".
+    /// Sensitivity of the sensor, voltage per measured unit, such as "10.2 mV/g"; only for a channel in volts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<String>,
-    /// Of a tachometer: positions on the wheel; one where it is not given.
+    /// Number of mark positions on the tachometer wheel, missing marks included; default 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pulses_per_rev: Option<u16>,
-    /// Of a tachometer: this many positions in a row are missing.
+    /// Number of adjacent missing marks on the tachometer wheel (the gap that marks angle 0); default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u16>,
 }
 
 impl Sidecar {
-    /// Where the sidecar of a recording is.
+    /// Path of the sidecar of `recording`: the same name with the extension `.toml`.
     pub fn path_of(recording: &Path) -> PathBuf {
         recording.with_extension("toml")
     }
 
-    /// The sidecar of a recording; an empty one where there is none.
+    /// Reads the sidecar of `recording`; the default (empty) sidecar if the file does not exist.
     ///
     /// # Errors
-    /// It is there and cannot be read, has a key that does not belong, or a value that cannot be.
+    /// The file exists but cannot be read, has an unknown key, or a value out of bounds.
     pub fn beside(recording: &Path) -> Result<Self, RecordingError> {
         let path = Self::path_of(recording);
         if !path.exists() {
@@ -138,7 +138,7 @@ impl Sidecar {
         Ok(sidecar)
     }
 
-    /// Refuses values that no recording can have.
+    /// Checks the bounds of all values: positive rate, speed and teeth, non-negative depth and feed, ascending angles, possible wheels.
     fn check(&self, path: &Path) -> Result<(), RecordingError> {
         let cut = self.cut.unwrap_or_default();
         let positive = [
@@ -191,7 +191,7 @@ impl Sidecar {
                 return Err(wrong(
                     &format!("channels.{name}.pulses_per_rev"),
                     0.0,
-                    "at least one pulse per turn",
+                    "at least one pulse per revolution",
                 ));
             }
             if channel.missing.unwrap_or(0) >= positions {
@@ -206,7 +206,7 @@ impl Sidecar {
         Ok(())
     }
 
-    /// Writes the sidecar of a recording.
+    /// Writes the sidecar of `recording`, beside it.
     ///
     /// # Errors
     /// The file cannot be written.

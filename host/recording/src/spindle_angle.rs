@@ -1,4 +1,4 @@
-//! The angle of the spindle at every sample, from the tachometer.
+//! Spindle angle at every sample, interpolated between the tachometer edges.
 
 use std::f64::consts::TAU;
 
@@ -6,26 +6,26 @@ use quietcut_core::tachometer::Wheel;
 
 use super::{Recording, RecordingError, blocks};
 
-/// The angle of the spindle, rad, between the first edge of the tachometer and the last.
+/// Spindle angle φ, rad, of all samples between the first and the last tachometer edge.
 ///
-/// It is 0 at immersion angle 0 of tooth 1, grows by 2π per turn, and runs straight from edge to edge.
+/// φ = 0 at immersion angle 0 of tooth 1. φ grows by 2π per revolution and is linear in time between edges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpindleAngle {
-    /// The first sample that has an angle.
+    /// Index of the first sample with an angle.
     pub first: usize,
-    /// The angle of that sample and of all that follow.
+    /// Spindle angle, rad, of sample `first` and of the samples after it.
     pub rad: Vec<f64>,
 }
 
 impl SpindleAngle {
-    /// From the channel `tacho` of a recording; `teeth` stand evenly on the tool.
+    /// Computes the spindle angle from the channel `tacho`; `teeth` is the number of evenly spaced teeth.
     ///
     /// # Errors
-    /// No tachometer, fewer than two edges, edges that do not fit the wheel of the sidecar, or a wheel without a gap of which
-    /// not every edge finds a tooth at immersion angle 0.
+    /// There is no tachometer; there are fewer than two edges; the edges do not match the wheel described in the sidecar; or the wheel
+    /// has no gap and its number of positions does not divide the number of teeth, so that the edges do not define the tooth angle.
     pub fn new(recording: &Recording, teeth: u32) -> Result<Self, RecordingError> {
         let Some(wheel) = blocks::wheel(recording) else {
-            return Err(recording.lacks("tacho channel, which says where the teeth are"));
+            return Err(recording.lacks("tacho channel, which defines the angle of the teeth"));
         };
         let content = |what: String| RecordingError::Content {
             path: recording.path.clone(),
@@ -43,7 +43,7 @@ impl SpindleAngle {
         }
         if wheel.missing == 0 && !teeth.is_multiple_of(u32::from(wheel.positions)) {
             return Err(content(format!(
-                "a tachometer with {} pulses per turn and no gap does not say where {teeth} teeth are; one pulse per turn, a wheel with a gap (missing), or one pulse per tooth is needed",
+                "a tachometer with {} pulses per revolution and no gap does not define the angle of {teeth} teeth; one pulse per revolution, a wheel with a gap (missing), or one pulse per tooth is needed",
                 wheel.positions
             )));
         }
@@ -65,7 +65,7 @@ impl SpindleAngle {
     }
 }
 
-/// The angle of every edge, rad.
+/// Spindle angle of every tachometer edge, rad, for edge times in s.
 fn angles(edges_s: &[f64], wheel: Wheel) -> Result<Vec<f64>, String> {
     let positions = f64::from(wheel.positions);
     if wheel.missing == 0 {
@@ -75,7 +75,8 @@ fn angles(edges_s: &[f64], wheel: Wheel) -> Result<Vec<f64>, String> {
     }
     let missing = f64::from(wheel.missing);
     let intervals: Vec<f64> = edges_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    // The speed changes little from one edge to the next: an interval is a gap where a neighbour is shorter by half the gap.
+    // The speed changes little between adjacent edges. So an interval is the gap if it exceeds its shorter neighbour by a factor of
+    // 1 + missing/2, halfway between the ratio 1 of equal intervals and the ratio 1 + missing of the gap.
     let is_gap = |interval: usize| {
         let neighbours = [
             interval.checked_sub(1),
@@ -88,28 +89,28 @@ fn angles(edges_s: &[f64], wheel: Wheel) -> Result<Vec<f64>, String> {
             .fold(f64::INFINITY, f64::min);
         intervals[interval] > (1.0 + 0.5 * missing) * shortest
     };
-    // With one edge per turn every interval is a gap and none is longer than its neighbours.
+    // With one edge per revolution every interval contains the gap, and no interval is longer than its neighbours.
     let lone = wheel.positions - wheel.missing == 1;
     let gaps: Vec<usize> = (0..intervals.len())
         .filter(|&interval| lone || is_gap(interval))
         .collect();
     let Some(&first) = gaps.first() else {
         return Err(format!(
-            "tacho has no gap, but missing = {} of {} positions are said to be; does the sidecar belong to this wheel?",
+            "tacho has no gap, but the sidecar sets missing = {} of {} positions; does the sidecar belong to this wheel?",
             wheel.missing, wheel.positions
         ));
     };
     let expected = usize::from(wheel.positions - wheel.missing);
     if let Some(pair) = gaps.windows(2).find(|pair| pair[1] - pair[0] != expected) {
         return Err(format!(
-            "tacho has {} edges in the turn that begins at {:.4} s; {expected} are expected of a wheel with {} positions of which {} are missing",
+            "tacho has {} edges in the revolution that begins at {:.4} s; {expected} are expected of a wheel with {} positions of which {} are missing",
             pair[1] - pair[0],
             edges_s[pair[0] + 1],
             wheel.positions,
             wheel.missing
         ));
     }
-    // The edge after the first gap stands at 0; the ones before it at negative angles.
+    // The edge after the first gap has the angle 0; earlier edges have negative angles.
     let mut position = -(first as f64 + 1.0 + missing);
     let mut angles = vec![TAU * position / positions];
     for interval in 0..intervals.len() {
@@ -125,7 +126,7 @@ mod tests {
     use super::super::{Channel, Quantity, RecordedChannel, Sidecar};
     use super::*;
 
-    /// A level of a spindle at 7 turns per second, sampled at 10 kHz, whose first edge of position 0 comes at 0.05 s.
+    /// Tachometer level of a spindle at 7 rev/s, sampled at 10 kHz; the first edge of position 0 comes at 0.05 s.
     fn recording(positions: u16, missing: u16) -> Recording {
         let there = positions - missing;
         let level = |sample: usize| {
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn the_angle_is_that_of_the_spindle_for_every_wheel() {
+    fn the_angle_equals_that_of_the_spindle_for_every_wheel() {
         for (positions, missing) in [(1, 0), (4, 3), (12, 2), (36, 1)] {
             let recording = recording(positions, missing);
             let angle = SpindleAngle::new(&recording, 3).unwrap();
@@ -163,16 +164,16 @@ mod tests {
             for (index, rad) in angle.rad.iter().enumerate() {
                 let turns = 7.0 * ((index + angle.first) as f64 * 1e-4 - 0.05);
                 let off = (rad / TAU - turns + 0.5).rem_euclid(1.0) - 0.5;
-                // An edge is known to a sample: 7e-4 of a turn.
+                // An edge is located to one sample: 7e-4 of a revolution.
                 assert!(off.abs() < 1e-3, "{positions} {missing} {index}: {off}");
             }
         }
     }
 
     #[test]
-    fn wheels_that_do_not_say_where_the_teeth_are_are_refused() {
+    fn wheels_that_do_not_define_the_tooth_angle_are_refused() {
         let error = SpindleAngle::new(&recording(4, 0), 3).unwrap_err().to_string();
-        assert!(error.contains("4 pulses per turn and no gap"), "{error}");
+        assert!(error.contains("4 pulses per revolution and no gap"), "{error}");
         assert!(SpindleAngle::new(&recording(3, 0), 3).is_ok());
         let mut other = recording(12, 2);
         if let Some(tacho) = other.sidecar.channels.get_mut("tacho") {

@@ -93,7 +93,7 @@ fn the_sidecar_names_and_scales_channels() {
     assert_eq!(channel.quantity, Quantity::Acceleration);
     // 20 mV at 10 mV/g; a few roundings.
     assert!((channel.samples[0] - 2.0 * 9.806_65).abs() < 1e-12);
-    assert_eq!(recording.sidecar.kind, Some(Kind::Cutting));
+    assert_eq!(recording.sidecar.kind, Some(TestKind::Cutting));
 
     for (text, words) in [
         ("sample_rate = 3.0\n", vec!["line 1", "sample_rate"]),
@@ -164,14 +164,14 @@ fn blocks_and_edges_are_those_of_the_recording() {
     }
     let recording = Recording::read(folder.file("a.csv", &text)).unwrap();
     assert!(
-        Sensed::new(&recording, Speed::default())
+        Sensed::new(&recording, SpindleSettings::default())
             .unwrap_err()
             .to_string()
             .contains("teeth")
     );
     let sensed = Sensed::new(
         &recording,
-        Speed {
+        SpindleSettings {
             rpm: None,
             teeth: Some(2),
         },
@@ -205,7 +205,7 @@ fn a_stated_speed_goes_before_the_tachometer() {
         text += &format!("{},1,{}\n", f64::from(index) * 1e-3, u8::from(index % 100 < 20));
     }
     let recording = Recording::read(folder.file("a.csv", &text)).unwrap();
-    let sensed = |rpm| Sensed::new(&recording, Speed { rpm, teeth: Some(2) }).unwrap();
+    let sensed = |rpm| Sensed::new(&recording, SpindleSettings { rpm, teeth: Some(2) }).unwrap();
     let stated = sensed(Some(900.0));
     assert_eq!(stated.settings.assumed_speed.map(|speed| speed.0), Some(900.0));
     assert!(stated.settings.wheel.is_none() && stated.edges.is_empty());
@@ -268,7 +268,7 @@ proptest! {
             start_s: 0.25,
             since_s: 0.0,
             channels: vec![Channel { name: "fx".into(), quantity: Quantity::Force, samples }],
-            sidecar: Sidecar { kind: Some(Kind::Sweep), ..Sidecar::default() },
+            sidecar: Sidecar { kind: Some(TestKind::Sweep), ..Sidecar::default() },
         };
         recording.write(&path).unwrap();
         let back = Recording::read(&path).unwrap();

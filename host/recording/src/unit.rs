@@ -1,12 +1,12 @@
-//! Units in the headers of recordings, and what they measure.
+//! Units in column headers, and the physical quantity of each unit.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Standard gravity, m/s².
+/// Standard gravity, m/s² (ISO 80000-3); converts `g` and kilogram-force.
 const G: f64 = 9.806_65;
 
-/// What a channel measures. Samples of a recording are in the SI unit of it.
+/// Physical quantity measured by a channel. Samples are in its SI unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Time, s.
@@ -23,16 +23,16 @@ pub enum Quantity {
     Angle,
     /// Pressure, Pa.
     Pressure,
-    /// Electric potential, V: not yet what the sensor measured; the channel's sensitivity says how to convert.
+    /// Voltage of a sensor, V; the sensitivity of the channel converts it to the measured quantity.
     Voltage,
-    /// A number without a unit, such as the level of a tachometer.
+    /// Dimensionless number, such as the level of a tachometer signal.
     Level,
-    /// The file does not say.
+    /// Unknown quantity: neither file nor sidecar states a unit.
     Unknown,
 }
 
 impl Quantity {
-    /// The SI unit that samples are in.
+    /// SI unit of the samples, as it stands in column headers.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Time => "s",
@@ -48,7 +48,7 @@ impl Quantity {
         }
     }
 
-    /// What a channel of this name measures, by the conventions of recordings: `fx`, `x`, `vx`, `ax`, `tacho`.
+    /// Quantity of a channel with a standard name (`t`; `fx`; `x`; `vx`; `ax`, and the same for y and z); `None` for other names.
     pub fn of_name(name: &str) -> Option<Self> {
         match name {
             "t" => Some(Self::Time),
@@ -78,16 +78,16 @@ impl fmt::Display for Quantity {
     }
 }
 
-/// A unit: what it measures, and how much of the SI unit it is.
+/// A unit: its quantity and its conversion factor to SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
-    /// What it measures.
+    /// Quantity that the unit measures.
     pub quantity: Quantity,
-    /// SI units in one of it.
+    /// Conversion factor: value in SI units = `factor` · value in this unit.
     pub factor: f64,
 }
 
-/// All units that are known, with their names. The first of a quantity is the SI unit.
+/// Table of all units that are read: name, quantity, factor to SI. The first unit of each quantity is the SI unit.
 const UNITS: &[(&str, Quantity, f64)] = &[
     ("s", Quantity::Time, 1.0),
     ("ms", Quantity::Time, 1e-3),
@@ -124,11 +124,11 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("", Quantity::Level, 1.0),
 ];
 
-/// A unit that is not known.
+/// Error for a unit that is not in the table; the message lists the known units.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unit \"{found}\"; known are {}", known())]
 pub struct UnknownUnit {
-    /// The text.
+    /// Unit as it stands in the file.
     pub found: String,
 }
 
@@ -144,7 +144,7 @@ fn known() -> String {
 impl FromStr for Unit {
     type Err = UnknownUnit;
 
-    /// Reads a unit as it stands in a header. Superscripts and the two letters for micro are read as they are meant.
+    /// Parses a unit from a column header. `²`, `**` and both Unicode letters for micro (µ, μ) are accepted.
     fn from_str(text: &str) -> Result<Self, UnknownUnit> {
         let plain = text
             .trim()
@@ -159,12 +159,12 @@ impl FromStr for Unit {
     }
 }
 
-/// Volts per unit of what a sensor measures, such as "10.2 mV/g".
+/// Sensitivity of a sensor: voltage per measured unit, such as "10.2 mV/g".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensitivity {
-    /// What is measured.
+    /// Quantity measured by the sensor.
     pub quantity: Quantity,
-    /// V per SI unit of it.
+    /// Sensitivity, V per SI unit of `quantity`.
     pub volts_per_unit: f64,
 }
 
@@ -177,7 +177,7 @@ impl FromStr for Sensitivity {
         let number: f64 = number.parse().map_err(|_| wrong())?;
         let (volts, measured) = units.trim().split_once('/').ok_or_else(wrong)?;
         let volts: Unit = volts.parse().map_err(|_| wrong())?;
-        // "mV/(m/s^2)" has a slash of its own.
+        // Parentheses are allowed around a unit with a slash: "mV/(m/s^2)".
         let measured = measured
             .trim()
             .strip_prefix('(')
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn sensitivities_have_two_units() {
+    fn sensitivities_need_a_voltage_and_a_measured_unit() {
         let sensitivity: Sensitivity = "10.2 mV/g".parse().unwrap();
         assert_eq!(sensitivity.quantity, Quantity::Acceleration);
         assert!((sensitivity.volts_per_unit - 10.2e-3 / 9.806_65).abs() < 1e-15);

@@ -1,6 +1,6 @@
-//! WAV: every channel is called ch1, ch2 …; the sidecar gives names and units. Full scale is 1.
+//! Reader of WAV files. Channels are called ch1, ch2 …; the sidecar gives names and units. Full scale is 1.
 //!
-//! Memory is bounded by the length of the file, not by the sizes that its header states.
+//! The length of the file bounds the allocated memory, whatever sizes its header states.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -10,6 +10,7 @@ use super::RecordingError;
 use super::raw::{Raw, RawColumn};
 use crate::file::FileError;
 
+/// Reads all channels of a WAV file with its sample rate.
 pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     let file = File::open(path).map_err(|cause| FileError::Read {
         path: path.into(),
@@ -59,7 +60,7 @@ pub(super) fn read(path: &Path) -> Result<Raw, RecordingError> {
     })
 }
 
-/// The channels, whose samples are parts of `full_scale`; the file has room for `samples_max` in all.
+/// De-interleaves the samples into channels, divided by `full_scale`; the length of the file allows at most `samples_max` samples in total.
 fn columns<S: hound::Sample + Into<f64>>(
     reader: &mut hound::WavReader<impl Read>,
     samples_max: u64,

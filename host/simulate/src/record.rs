@@ -11,7 +11,7 @@ use super::sensor::{Accelerometer, Sampler, TachometerModel};
 use super::{Model, Reading, Segment, Settings, Spindle, Statistics, VirtualCut, VirtualCutError};
 use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;
-use quietcut_recording::{Channel, Kind, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar};
+use quietcut_recording::{Channel, Quantity, RecordedChannel, RecordedCut, Recording, Sidecar, TestKind};
 
 /// Model of the data acquisition that records the motion of the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +152,7 @@ impl VirtualCut {
     fn sidecar(&self, case: &Case, wheel: Wheel) -> Result<Sidecar, VirtualCutError> {
         let cut = case.cut()?;
         let mut sidecar = Sidecar {
-            kind: Some(Kind::Cutting),
+            kind: Some(TestKind::Cutting),
             cut: Some(RecordedCut {
                 spindle_rpm: Some(self.spindle_rpm),
                 last_rpm: self.last_rpm,

@@ -88,7 +88,7 @@ pub(super) struct Common<'a> {
 #[derive(Debug, Serialize)]
 struct ExperimentOutput {
     recording: PathBuf,
-    kind: crate::recording::Kind,
+    kind: crate::recording::TestKind,
     direction: &'static str,
     sample_rate_hz: f64,
     samples: usize,

@@ -12,7 +12,7 @@ use quietcut_core::units::Degrees;
 use super::segment::RecordedSegment;
 use super::{Error, Output, angle, count, positive};
 use crate::device::{self, Client, Event};
-use crate::recording::{RecordingError, Sensed, Speed};
+use crate::recording::{RecordingError, Sensed, SpindleSettings};
 use crate::report::answer::VerdictLog;
 use crate::report::words;
 
@@ -58,7 +58,7 @@ pub fn run(args: Args) -> Result<(), Error> {
     let [recording] = recordings.as_slice() else {
         return Err(Error::input("a recording is needed"));
     };
-    let speed = Speed {
+    let speed = SpindleSettings {
         rpm: args.rpm,
         teeth: args.teeth.map(NonZeroU8::get),
     };

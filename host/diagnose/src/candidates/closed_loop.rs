@@ -10,7 +10,7 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use crate::signal::grid::{Grid, catmull_rom};
 use quietcut_model::structure::FirstOrder;
-use quietcut_recording::Kind;
+use quietcut_recording::TestKind;
 use quietcut_simulate::{At, Drive, Dynamics, Effects, Model, Reading, Settings};
 
 /// Instants between two samples at which a force is interpolated without changing its band; between these by cubics.
@@ -95,14 +95,14 @@ pub(crate) struct ClosedLoop {
 
 /// True of a record whose start nobody knows: a structure that is let go.
 pub(crate) fn starts_anywhere(record: &Record) -> bool {
-    record.kind == Some(Kind::FreeDecay)
+    record.kind == Some(TestKind::FreeDecay)
 }
 
 /// True where a record can be simulated: driven by its forces from rest, or let go.
 fn can(record: &Record) -> bool {
     let driven = record.force_n.iter().any(|force| !force.is_empty());
     record.domain == Domain::Response
-        && !matches!(record.kind, Some(Kind::Cutting | Kind::Idle))
+        && !matches!(record.kind, Some(TestKind::Cutting | TestKind::Idle))
         && (driven || starts_anywhere(record))
 }
 

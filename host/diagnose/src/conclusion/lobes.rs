@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::conclusion::recorded_cuts::recorded_cuts;
 use quietcut_model::case::Case;
 use quietcut_model::effects::Treatment;
-use quietcut_recording::{Kind as RecordKind, Recording};
+use quietcut_recording::{Recording, TestKind};
 use quietcut_stability::orbit::{ForcedProblem, collocation_of};
 use quietcut_stability::trial_cuts::{Call, Calls, TestCut, call, calls};
 use quietcut_stability::{
@@ -219,7 +219,7 @@ impl<'a> Cuts<'a> {
             recorded: recorded_cuts(case, recordings),
             recorded_rpm: recordings
                 .iter()
-                .filter(|recording| recording.sidecar.kind == Some(RecordKind::Cutting))
+                .filter(|recording| recording.sidecar.kind == Some(TestKind::Cutting))
                 .filter_map(|recording| recording.sidecar.cut?.spindle_rpm)
                 .collect(),
         }

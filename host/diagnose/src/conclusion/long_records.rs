@@ -12,7 +12,7 @@ use crate::fit::regression::{Regression, Subset};
 use crate::progress::{Options, Stage};
 use crate::records::study::Study;
 use quietcut_model::case::Case;
-use quietcut_recording::{Kind, Recording};
+use quietcut_recording::{Recording, TestKind};
 
 /// Number of samples of all records together that are searched.
 const SEARCHED: usize = 32_768;
@@ -47,8 +47,10 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
 /// Least duration of the beginning of a cut, s; zero for shaker and hammer; `None` for tests that are not shortened.
 fn turns_s(recording: &Recording) -> Option<f64> {
     match (recording.sidecar.kind, &recording.sidecar.cut) {
-        (Some(Kind::Shaker | Kind::Hammer), _) => Some(0.0),
-        (Some(Kind::Cutting), Some(cut)) if cut.last_rpm.is_none() => Some(60.0 * TURNS / cut.spindle_rpm?),
+        (Some(TestKind::Shaker | TestKind::Hammer), _) => Some(0.0),
+        (Some(TestKind::Cutting), Some(cut)) if cut.last_rpm.is_none() => {
+            Some(60.0 * TURNS / cut.spindle_rpm?)
+        }
         _ => None,
     }
 }

@@ -5,14 +5,14 @@ use quietcut_core::detector::Verdict;
 use quietcut_core::monitor::{Monitor, State};
 
 use quietcut_model::case::Case;
-use quietcut_recording::{Kind, RecordedCut, Recording, Sensed, Speed};
+use quietcut_recording::{RecordedCut, Recording, Sensed, SpindleSettings, TestKind};
 use quietcut_stability::trial_cuts::{Outcome, TestCut};
 
 /// The recorded cuts that belong to the chart of a case: its immersion and feed, and one given speed and depth.
 pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TestCut> {
     recordings
         .iter()
-        .filter(|recording| recording.sidecar.kind == Some(Kind::Cutting))
+        .filter(|recording| recording.sidecar.kind == Some(TestKind::Cutting))
         .filter_map(|recording| {
             let given = recording.sidecar.cut?;
             Some(TestCut {
@@ -43,7 +43,7 @@ fn is_on_chart(case: &Case, given: &RecordedCut) -> bool {
 /// recording has no channel that it uses.
 fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
     let recorded = recording.sidecar.cut.and_then(|cut| cut.teeth);
-    let speed = Speed {
+    let speed = SpindleSettings {
         rpm: None,
         teeth: teeth
             .filter(|_| recorded.is_none())

@@ -10,7 +10,7 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use crate::signal::dot::dot;
 use crate::signal::grid::SegmentTransform;
-use quietcut_recording::Kind;
+use quietcut_recording::TestKind;
 
 /// A segment of a record.
 pub(crate) struct Segment {
@@ -63,7 +63,7 @@ pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) ->
             let Range { start: from, end } = record.compared.clone();
             let count = end - from;
             let mut ranges = vec![(from..end, Subset::Whole)];
-            if several && record.kind == Some(Kind::FreeDecay) {
+            if several && record.kind == Some(TestKind::FreeDecay) {
                 let subset = if index == last {
                     Subset::HeldOut
                 } else {

@@ -12,7 +12,7 @@ use crate::criteria::ASSUMED_NOISE;
 use crate::signal::noise::rms;
 use quietcut_model::case::Case;
 use quietcut_model::milling::Cut;
-use quietcut_recording::{Channel, Kind, Quantity, Recording};
+use quietcut_recording::{Channel, Quantity, Recording, TestKind};
 
 /// Largest number of samples of a simulated test.
 const SAMPLES: f64 = 8192.0;
@@ -150,7 +150,7 @@ fn is_motion(quantity: Quantity) -> bool {
 }
 
 fn is_cut(recording: &Recording) -> bool {
-    recording.sidecar.kind == Some(Kind::Cutting)
+    recording.sidecar.kind == Some(TestKind::Cutting)
 }
 
 fn channels_of<'r>(recordings: impl Iterator<Item = &'r Recording>) -> impl Iterator<Item = &'r Channel> {

@@ -2,7 +2,7 @@
 
 use crate::baseline::Baseline;
 use crate::error::DiagnoseError;
-use quietcut_recording::{Kind, Quantity, Recording};
+use quietcut_recording::{Quantity, Recording, TestKind};
 
 /// The quantity in which a record is compared with the baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,14 +41,14 @@ impl Domain {
                 .into());
         }
         let kind = recording.sidecar.kind;
-        if kind == Some(Kind::Cutting) {
+        if kind == Some(TestKind::Cutting) {
             return Ok(Self::Response);
         }
         let driven_by_motion = input
             .iter()
             .filter_map(|name| recording.channel(name))
             .any(|channel| motion.contains(&channel.quantity));
-        if driven_by_motion || (baseline.is_free() && kind != Some(Kind::FreeDecay)) {
+        if driven_by_motion || (baseline.is_free() && kind != Some(TestKind::FreeDecay)) {
             if !has(Quantity::Force) {
                 return Err(recording
                     .lacks(
@@ -59,12 +59,12 @@ impl Domain {
             return Ok(Self::Force);
         }
         match kind {
-            Some(Kind::Idle) => Err(DiagnoseError::record(
+            Some(TestKind::Idle) => Err(DiagnoseError::record(
                 &recording.path,
                 "an idle record has nothing that drives the structure as far as the case knows: shaker, step-sine, sweep, \
              hammer, free-decay and cutting are diagnosed",
             )),
-            Some(Kind::FreeDecay) => Ok(Self::Response),
+            Some(TestKind::FreeDecay) => Ok(Self::Response),
             _ if has(Quantity::Force) => Ok(Self::Response),
             _ => Err(recording
                 .lacks(

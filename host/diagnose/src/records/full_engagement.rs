@@ -23,7 +23,7 @@ use crate::motion::recorded_cut::cut_of;
 use crate::motion::spindle_motion::SpindleMotion;
 use crate::signal::noise::{floor_between_lines, median, rms};
 use quietcut_model::case::Case;
-use quietcut_recording::{Kind, Quantity, Recording};
+use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::effect::Pickup;
 use quietcut_simulate::{Cutter, Passage, Spindle};
 
@@ -70,7 +70,7 @@ pub(crate) fn in_full_engagement<'a>(
 }
 
 fn is_of_a_cut(recording: &Recording) -> bool {
-    recording.sidecar.kind == Some(Kind::Cutting)
+    recording.sidecar.kind == Some(TestKind::Cutting)
 }
 
 /// The samples of a recorded cut with full engagement; `None` if it contains no air, or if no channel shows air.

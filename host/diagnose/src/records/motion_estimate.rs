@@ -9,7 +9,7 @@ use crate::motion::mean_slopes::MeanSlopes;
 use crate::records::channel::{Observed, main_axis};
 use crate::records::record::Record;
 use crate::signal::noise::{rms, white_floor};
-use quietcut_recording::{Kind, Quantity, Recording};
+use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::path::{Motion, restoring_along};
 
 /// Bins over which power is averaged before it is compared with the noise, to either side.
@@ -85,7 +85,7 @@ pub(crate) fn learn(
         let coarse: Vec<f64> = motion.x[axis].iter().copied().step_by(grid.finer()).collect();
         displacement[axis] = grid.continued_spectrum(&coarse);
     }
-    if record.kind == Some(Kind::Cutting) {
+    if record.kind == Some(TestKind::Cutting) {
         let read = |corrections: &[Vec<Complex64>; 3]| -> Vec<Vec<f64>> {
             (0..record.channels.len())
                 .map(|channel| reading(record, channel, corrections))

@@ -17,7 +17,7 @@ use crate::records::record::{Known, Record};
 use crate::records::{checks, cut_prediction, motion_estimate, response_prediction};
 use crate::signal::grid::Grid;
 use crate::signal::noise::{BANDS, quiet_floor, rms, white_floor};
-use quietcut_recording::{Kind, Quantity, Recording};
+use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::path::Motion;
 
 /// Least number of finer samples per sample of a cut: its force jumps where teeth enter and leave.
@@ -49,13 +49,13 @@ pub(super) fn prepare(
 }
 
 fn is_cut(recording: &Recording) -> bool {
-    recording.sidecar.kind == Some(Kind::Cutting)
+    recording.sidecar.kind == Some(TestKind::Cutting)
 }
 
 /// A record without prediction: its channels, transforms and transfer functions.
 fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Result<Record, DiagnoseError> {
     let domain = Domain::of(baseline, recording)?;
-    let is_cut = recording.sidecar.kind == Some(Kind::Cutting);
+    let is_cut = recording.sidecar.kind == Some(TestKind::Cutting);
     // The cut model supplies the force of a cut; measured forces are compared with it.
     let force_n = if is_cut {
         std::array::from_fn(|_| Vec::new())
@@ -131,7 +131,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
 /// The record, unless the size of a channel cannot be that of the baseline. Of a cut only channels of motion are checked here; its
 /// forces were checked before the motion was known.
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
-    let is_cut = record.kind == Some(Kind::Cutting);
+    let is_cut = record.kind == Some(TestKind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
         // Along an axis without force, a small cross-sensitivity exceeds the prediction.
         let axis = main_axis(channel)?;
@@ -172,9 +172,9 @@ fn forces(baseline: &Baseline<'_>, recording: &Recording) -> [Vec<f64>; 3] {
     })
 }
 
-fn floor_n(force_n: &[f64], kind: Option<Kind>) -> f64 {
+fn floor_n(force_n: &[f64], kind: Option<TestKind>) -> f64 {
     let size = rms(force_n);
-    let quiet_n = if kind == Some(Kind::Hammer) {
+    let quiet_n = if kind == Some(TestKind::Hammer) {
         quiet_floor(force_n)
     } else {
         f64::INFINITY
@@ -216,7 +216,7 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             let is_force = pickup.quantity == Quantity::Force;
             // The force of a cut is an output as well.
             let compared =
-                is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(Kind::Cutting);
+                is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(TestKind::Cutting);
             let is_mean = baseline.velocity_jumps && pickup.quantity == Quantity::Acceleration;
             (axes_known && compared).then(|| Observed {
                 mean_s: if is_mean {

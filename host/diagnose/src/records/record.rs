@@ -16,7 +16,7 @@ use crate::records::cutting::Cutting;
 use crate::records::domain::Domain;
 use crate::signal::grid::Grid;
 use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
-use quietcut_recording::{Kind, Quantity};
+use quietcut_recording::{Quantity, TestKind};
 use quietcut_simulate::path::{Motion, restoring_along};
 
 /// By axis of force: response of a channel per newton at the bins of the finer samples; empty for an axis without response.
@@ -35,8 +35,8 @@ pub(crate) struct Clean {
 pub(crate) struct Record {
     /// File of the recording.
     pub path: PathBuf,
-    /// Kind of the test.
-    pub kind: Option<Kind>,
+    /// TestKind of the test.
+    pub kind: Option<TestKind>,
     /// Quantity in which it is compared.
     pub domain: Domain,
     /// Channels whose sensors are not at the tool tip.
@@ -160,7 +160,7 @@ impl Record {
     /// channel are without it.
     fn step_delay_s(&self, channel: &Observed) -> f64 {
         let reads_steps =
-            self.kind == Some(Kind::Cutting) && channel.pickup.quantity == Quantity::Acceleration;
+            self.kind == Some(TestKind::Cutting) && channel.pickup.quantity == Quantity::Acceleration;
         if reads_steps { channel.pickup.delay_s } else { 0.0 }
     }
 
@@ -259,7 +259,7 @@ impl Record {
             let (residual, size) = (channel.residual(), rms(&channel.measured));
             channel.deviation = match &self.clean {
                 Some(clean) => clean.deviations[index],
-                None if self.kind == Some(Kind::Cutting) => {
+                None if self.kind == Some(TestKind::Cutting) => {
                     floor_between_lines(&residual, size).hypot(RELATIVE_ERROR_OF_CUTS * size)
                 }
                 None => white_floor_beside(&residual, size, &of_forces[index]),

@@ -6,7 +6,7 @@ use crate::conclusion::answer::Outcome;
 use crate::{DiagnoseError, Diagnosis, Options, diagnose};
 use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;
-use quietcut_recording::{Channel, Kind, Quantity, Recording};
+use quietcut_recording::{Channel, Quantity, Recording, TestKind};
 use quietcut_simulate::Effects;
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 
@@ -374,7 +374,7 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
         channel("x", Quantity::Displacement, moved),
         channel("fx", Quantity::Force, force),
     ];
-    record.sidecar.kind = Some(Kind::Shaker);
+    record.sidecar.kind = Some(TestKind::Shaker);
     record.sidecar.input = Some(vec!["x".into()]);
     record
 }
@@ -518,7 +518,7 @@ fn long_records(effects: &[&str]) -> Vec<Recording> {
             seconds: 60.0,
         };
         let mut recording = recorded(signal, 2000.0, effects, u64::from(11 + index));
-        recording.sidecar.kind = Some(Kind::Shaker);
+        recording.sidecar.kind = Some(TestKind::Shaker);
         recording
     };
     [(0, 4.0), (1, 8.0), (2, 12.0), (3, 16.0)].map(tones).into()

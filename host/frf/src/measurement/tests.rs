@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::{HammerWindows, Window, true_damping};
-use quietcut_recording::{Channel, Kind, Quantity, Sidecar};
+use quietcut_recording::{Channel, Quantity, Sidecar, TestKind};
 
 const RATE: f64 = 512.0;
 
@@ -111,7 +111,7 @@ fn with_noise(signal: &[f64], part: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
 }
 
 /// A recording of forces, and displacements with noise; forces that rest have no column.
-fn record(kind: Kind, forces: [Vec<f64>; 3], noise: f64, random: &mut ChaCha8Rng) -> Recording {
+fn record(kind: TestKind, forces: [Vec<f64>; 3], noise: f64, random: &mut ChaCha8Rng) -> Recording {
     let moved = displacements(&forces);
     let channel = |name: &str, quantity, samples| Channel {
         name: name.into(),
@@ -183,7 +183,7 @@ fn error(measurement: &Measurement, name: &str) -> f64 {
 fn welch_finds_the_receptances_of_one_force() {
     let mut random = random(1);
     let forces = along_y(force_noise(&mut random, (600.0 * RATE) as usize, 10.0));
-    let recording = record(Kind::Shaker, forces, 0.01, &mut random);
+    let recording = record(TestKind::Shaker, forces, 0.01, &mut random);
     let settings = MeasurementSettings {
         resolution_hz: Some(0.05),
         ..in_band()
@@ -204,7 +204,7 @@ fn welch_finds_the_receptances_of_one_force() {
 fn estimators_differ_by_where_the_noise_is_and_coherence_is_their_ratio() {
     let mut random = random(2);
     let force = force_noise(&mut random, (1200.0 * RATE) as usize, 10.0);
-    let clean = record(Kind::Shaker, along_y(force.clone()), 0.0, &mut random);
+    let clean = record(TestKind::Shaker, along_y(force.clone()), 0.0, &mut random);
     let mut noisy_force = clean.clone();
     let force_with_noise = with_noise(&force, 0.3, &mut random);
     noisy_force.channels[0].samples = force_with_noise;
@@ -266,7 +266,7 @@ fn one_force_agrees_with_scipy() {
     let x: Vec<f64> = (0..400)
         .map(|k| f(k - 1) - 0.5 * f(k - 3) + (0.7 * f64::from(k)).cos())
         .collect();
-    let mut recording = record(Kind::Shaker, along_y(force), 0.0, &mut random(3));
+    let mut recording = record(TestKind::Shaker, along_y(force), 0.0, &mut random(3));
     recording.channels = vec![
         recording.channels[0].clone(),
         Channel {
@@ -341,7 +341,7 @@ fn three_forces_at_once_give_nine_receptances_and_intervals_that_cover() {
                 .map(|(a, b)| a + [1.0, -1.0, 0.5][q] * b)
                 .collect()
         });
-        let recording = record(Kind::Cutting, forces, 0.1, &mut random);
+        let recording = record(TestKind::Cutting, forces, 0.1, &mut random);
         let settings = MeasurementSettings {
             resolution_hz: Some(0.05),
             ..in_band()
@@ -376,7 +376,7 @@ fn dependent_forces_are_refused_and_further_tests_make_them_independent() {
         .map(|proportion: &[f64; 3]| {
             let common = force_noise(&mut random, samples, 10.0);
             let forces = proportion.map(|part| common.iter().map(|f| part * f).collect());
-            record(Kind::Cutting, forces, 0.002, &mut random)
+            record(TestKind::Cutting, forces, 0.002, &mut random)
         })
         .collect();
     let settings = |estimator| MeasurementSettings {
@@ -444,7 +444,7 @@ fn hammer_blows_are_cut_out_and_double_ones_left_out() {
         blow(&mut force, at_s, 200.0 + 30.0 * index as f64);
     }
     blow(&mut force, 25.3 + 0.11, 40.0);
-    let mut recording = record(Kind::Hammer, along_y(force), 0.002, &mut random);
+    let mut recording = record(TestKind::Hammer, along_y(force), 0.002, &mut random);
     recording.channels[0].samples = with_noise(&recording.channels[0].samples, 0.002, &mut random);
     let measurement = measure(std::slice::from_ref(&recording), &in_band()).unwrap();
     let (used, double) = measurement.parts[0].blows.clone().unwrap();
@@ -467,7 +467,7 @@ fn an_exponential_window_moves_the_poles_by_its_decay_and_nothing_else() {
     for at_s in [1.0, 5.1, 9.3, 13.2, 17.4, 21.5] {
         blow(&mut force, at_s, 200.0);
     }
-    let recording = record(Kind::Hammer, along_y(force), 0.0, &mut random);
+    let recording = record(TestKind::Hammer, along_y(force), 0.0, &mut random);
     let tau = 0.8;
     let settings = MeasurementSettings {
         hammer: HammerWindows {
@@ -529,7 +529,7 @@ fn a_slow_sweep_gives_the_band_that_it_drove() {
             14.0 * (TAU * (8.0 * t + 0.5 * (30.0 - 8.0) / seconds * t * t)).sin()
         })
         .collect();
-    let recording = record(Kind::Sweep, along_y(force), 0.01, &mut random);
+    let recording = record(TestKind::Sweep, along_y(force), 0.01, &mut random);
     let measurement = measure(std::slice::from_ref(&recording), &MeasurementSettings::default()).unwrap();
     let frequency_hz = measurement.table.frequency_hz();
     let (first, last) = (frequency_hz[0], frequency_hz[frequency_hz.len() - 1]);
@@ -567,7 +567,7 @@ fn step_sine_is_demodulated_through_drift_and_says_what_had_not_settled() {
         }
         force.extend(vec![0.0; (pause_s * RATE) as usize]);
     }
-    let mut recording = record(Kind::StepSine, along_y(force), 0.0, &mut random);
+    let mut recording = record(TestKind::StepSine, along_y(force), 0.0, &mut random);
     let rms = |samples: &[f64]| (samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64).sqrt();
     let drift = 5.0 * rms(&recording.channels[2].samples);
     for (k, sample) in recording.channels[2].samples.iter_mut().enumerate() {
@@ -622,7 +622,7 @@ fn step_sine_is_demodulated_through_drift_and_says_what_had_not_settled() {
 fn records_that_cannot_be_measured_are_refused_with_the_reason() {
     let mut random = random(60);
     let noise = force_noise(&mut random, 4096, 1.0);
-    let good = record(Kind::Shaker, along_y(noise), 0.0, &mut random);
+    let good = record(TestKind::Shaker, along_y(noise), 0.0, &mut random);
     let said = |change: &dyn Fn(&mut Recording), settings: &MeasurementSettings| {
         let mut recording = good.clone();
         change(&mut recording);

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::ambient::Ambient;
 use crate::ambient::subspace::{AmbientError, modes};
 use crate::student::NINETY_PERCENT;
-use quietcut_recording::{Channel, Kind, Quantity, RecordedCut, Recording, Sidecar};
+use quietcut_recording::{Channel, Quantity, RecordedCut, Recording, Sidecar, TestKind};
 
 /// Natural frequencies, Hz, damping ratios and shapes in x and y of a robot-like structure of unit modal masses.
 const MODES: [(f64, f64, [f64; 2]); 3] = [
@@ -84,7 +84,7 @@ fn recording(seconds: f64, seed: u64) -> Recording {
         since_s: 0.0,
         channels: vec![channel("x", x), channel("y", y)],
         sidecar: Sidecar {
-            kind: Some(Kind::Idle),
+            kind: Some(TestKind::Idle),
             cut: Some(RecordedCut {
                 spindle_rpm: Some(RPM),
                 ..RecordedCut::default()

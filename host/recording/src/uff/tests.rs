@@ -6,7 +6,7 @@ use num_complex::Complex;
 use proptest::prelude::*;
 
 use super::*;
-use crate::{Channel, Kind, Sidecar};
+use crate::{Channel, Sidecar, TestKind};
 
 /// A data set 58 of three samples: lines 1 to 15, the data in line 14.
 const TEXT: &str = "    -1
@@ -502,7 +502,7 @@ fn recording(samples: Vec<f64>) -> Recording {
             channel("a_name_of_many_letters", Quantity::Unknown),
         ],
         sidecar: Sidecar {
-            kind: Some(Kind::Sweep),
+            kind: Some(TestKind::Sweep),
             ..Sidecar::default()
         },
     }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::{Entry, tests::case};
-use quietcut_recording::{Sensed, Speed};
+use quietcut_recording::{Sensed, SpindleSettings};
 
 fn cut(rpm: f64, seconds: f64) -> VirtualCut {
     VirtualCut {
@@ -40,7 +40,7 @@ fn what_is_recorded_replays_as_what_was_heard() {
         names,
         ["fx", "fy", "fz", "x", "y", "z", "ax", "ay", "az", "tacho"]
     );
-    let sensed = Sensed::new(&recording, Speed::default()).unwrap();
+    let sensed = Sensed::new(&recording, SpindleSettings::default()).unwrap();
     assert_eq!(sensed.settings.tool.teeth, 2);
     assert_eq!(sensed.working_point.unwrap().axial_depth.0, 1.0);
     // The recording is scaled anew: samples agree to a count of the coarser of the two.

@@ -14,7 +14,7 @@ pub use signal::{Impact, Signal, Step};
 use super::effect::{Effects, Pickup};
 use super::{Drive, Model, Reading, Settings, SimulateError, Statistics};
 use quietcut_model::structure::{Direction, Structure};
-use quietcut_recording::{Channel, Kind, Quantity, Recording, Sidecar};
+use quietcut_recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 
 /// A modal test of a structure: excitation force in one direction and measured responses.
 #[derive(Clone, Debug)]
@@ -167,13 +167,13 @@ fn channels(readings: Vec<Reading>) -> Vec<Channel> {
 
 impl Signal {
     /// The kind of recording that this excitation produces.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> TestKind {
         match self {
-            Self::Tones { .. } => Kind::Shaker,
-            Self::StepSine { .. } => Kind::StepSine,
-            Self::Sweep { .. } => Kind::Sweep,
-            Self::Impacts { .. } => Kind::Hammer,
-            Self::Release { .. } => Kind::FreeDecay,
+            Self::Tones { .. } => TestKind::Shaker,
+            Self::StepSine { .. } => TestKind::StepSine,
+            Self::Sweep { .. } => TestKind::Sweep,
+            Self::Impacts { .. } => TestKind::Hammer,
+            Self::Release { .. } => TestKind::FreeDecay,
         }
     }
 }

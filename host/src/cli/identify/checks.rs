@@ -13,7 +13,7 @@ use crate::identify::linearity::judge;
 use crate::identify::reciprocity;
 use crate::identify::steady::{steady, windows};
 use crate::identify::sweep::{Spectra, compare};
-use crate::recording::{Kind, Quantity, Recording};
+use crate::recording::{Quantity, Recording, TestKind};
 use crate::structure::Direction;
 
 /// Tests steady sine responses (levels, harmonics, homogeneity, reciprocity) and compares pairs of sweeps.
@@ -26,14 +26,14 @@ pub(super) fn linearity(args: &Args, recordings: &[Recording]) -> Result<Identif
     };
     let steps: Vec<Recording> = recordings
         .iter()
-        .filter(|recording| !matches!(recording.sidecar.kind, Some(Kind::Shaker | Kind::Sweep)))
+        .filter(|recording| !matches!(recording.sidecar.kind, Some(TestKind::Shaker | TestKind::Sweep)))
         .cloned()
         .collect();
     let taken = steady(&steps, harmonics, settling(args));
-    let rising: Vec<Dwell> = of_kind(Kind::Shaker)
+    let rising: Vec<Dwell> = of_kind(TestKind::Shaker)
         .flat_map(|tone| windows(tone, harmonics, PERIODS))
         .collect();
-    let sweeps: Vec<&Recording> = of_kind(Kind::Sweep).collect();
+    let sweeps: Vec<&Recording> = of_kind(TestKind::Sweep).collect();
     let mut found = Linearity {
         sweeps: compare_sweeps(&sweeps)?,
         ..Linearity::default()

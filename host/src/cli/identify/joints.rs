@@ -17,7 +17,7 @@ use crate::identify::joints::{self, JointParameter, PostureFrf};
 use crate::identify::law::Extra;
 use crate::identify::steady::{Settling, steady};
 use crate::identify::student::NINETY_PERCENT;
-use crate::recording::{Kind, Recording};
+use crate::recording::{Recording, TestKind};
 use crate::structure::{Direction, Form, Robot, Structure};
 
 /// Largest difference of joint angles, in degrees, between recordings of the same posture: a choice.
@@ -54,7 +54,7 @@ pub(super) fn joints(args: &Args, recordings: &[Recording]) -> Result<IdentifyOu
     let postures = postures(recordings)?;
     let all_steps = recordings
         .iter()
-        .all(|recording| recording.sidecar.kind == Some(Kind::StepSine));
+        .all(|recording| recording.sidecar.kind == Some(TestKind::StepSine));
     let tones = if all_steps {
         dwells(args, &postures, settling(args))
     } else {

@@ -8,7 +8,7 @@ use crate::identify::ambient::Ambient;
 use crate::identify::inverse_stability::{Before, Errors, InverseMode, Spread, identified_modes, modes};
 use crate::identify::observed_cut::ObservedCut;
 use crate::identify::{case_file, subspace};
-use crate::recording::{Kind, Recording, cut_table};
+use crate::recording::{Recording, TestKind, cut_table};
 use crate::stability::{CubicTerms, Problem};
 
 /// Identifies modes from a recording of motion under unmeasured excitation.
@@ -48,7 +48,7 @@ pub(super) fn output_only(args: &Args, recordings: &[Recording]) -> Result<Ident
             }
         ));
     }
-    if recording.sidecar.kind == Some(Kind::Cutting) {
+    if recording.sidecar.kind == Some(TestKind::Cutting) {
         warnings.push(
             "this recording was made in a cut: the modes include the stiffness and damping of the cutting process"
                 .into(),

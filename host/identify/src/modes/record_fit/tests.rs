@@ -12,7 +12,7 @@ use crate::modes::{Options, Receptances, identify};
 use quietcut_frf::{Estimator, MeasurementSettings, measure, record_spectra};
 use quietcut_model::structure::{Form, Mode};
 use quietcut_numerics::statistics::binomial_interval;
-use quietcut_recording::{Channel, Kind, Quantity, Recording, Sidecar};
+use quietcut_recording::{Channel, Quantity, Recording, Sidecar, TestKind};
 use quietcut_simulate::rig::Noise;
 use quietcut_simulate::{Entry, Pores, Recorder, TachometerModel, VirtualCut};
 use quietcut_testkit::case;
@@ -113,7 +113,7 @@ fn record(modes: &[Mode], seconds: f64, seed: u64, unmeasured: f64) -> Recording
             .chain(moved.map(|(name, moved)| channel(name, Quantity::Displacement, moved)))
             .collect(),
         sidecar: Sidecar {
-            kind: Some(Kind::Cutting),
+            kind: Some(TestKind::Cutting),
             ..Sidecar::default()
         },
     }
@@ -296,7 +296,7 @@ fn records_that_do_not_fit_the_receptances_are_refused() {
     let refused = refine_by_records(&two, &records).unwrap_err().to_string();
     assert!(refused.contains("other directions"), "{refused}");
     let mut blows = clean;
-    blows.sidecar.kind = Some(Kind::Hammer);
+    blows.sidecar.kind = Some(TestKind::Hammer);
     assert!(spectra(&blows, BAND_HZ).is_none());
 }
 
