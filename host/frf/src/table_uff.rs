@@ -8,8 +8,8 @@ use num_complex::Complex64;
 use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 use quietcut_recording::uff::{
-    Axis, DataSet, Freedom, Function, Header, Ordinate, OrdinateType, UffForm, Values, axis_of, data_sets,
-    unit, write_set, write_units,
+    Axis, DataSet, DegreeOfFreedom, Function, Header, Ordinate, OrdinateType, UffForm, Values, axis_of,
+    data_sets, unit, write_set, write_units,
 };
 use quietcut_recording::{Quantity, RecordingError, Unit};
 
@@ -114,19 +114,19 @@ fn receptance(set: &DataSet, frequency_hz: &[f64]) -> Result<Frf, String> {
     })
 }
 
-fn direction(freedom: &Freedom, what: &str) -> Result<(Direction, f64), String> {
-    let axis = match freedom.direction.abs() {
+fn direction(dof: &DegreeOfFreedom, what: &str) -> Result<(Direction, f64), String> {
+    let axis = match dof.direction.abs() {
         1 => Direction::X,
         2 => Direction::Y,
         3 => Direction::Z,
         _ => {
             return Err(format!(
                 "{what} direction {}; 1, 2 or 3 (x, y, z), with sign, is needed",
-                freedom.direction
+                dof.direction
             ));
         }
     };
-    Ok((axis, freedom.direction.signum() as f64))
+    Ok((axis, dof.direction.signum() as f64))
 }
 
 /// SI units in one, and how often displacement was differentiated: 0 receptance, 1 mobility, 2 accelerance.
@@ -240,7 +240,7 @@ impl FrfTable {
 }
 
 fn header(entry: &Frf, even: Option<(f64, f64)>) -> Header {
-    let freedom = |direction: Direction| Freedom {
+    let dof = |direction: Direction| DegreeOfFreedom {
         entity: String::new(),
         node: 1,
         direction: direction.axis().map_or(0, |axis| axis as i64 + 1),
@@ -254,8 +254,8 @@ fn header(entry: &Frf, even: Option<(f64, f64)>) -> Header {
             String::new(),
         ],
         function: Function::FrequencyResponse,
-        response: freedom(entry.response),
-        reference: freedom(entry.force),
+        response: dof(entry.response),
+        reference: dof(entry.force),
         ordinate_type: OrdinateType {
             is_double: true,
             is_complex: true,

@@ -39,7 +39,7 @@ fn units_are_converted_and_time_gives_the_rate() {
 }
 
 #[test]
-fn what_is_wrong_is_said_with_file_line_and_remedy() {
+fn errors_name_file_line_and_remedy() {
     let folder = Folder::new();
     let good = "t [s],ax [m/s^2]\n0,1\n0.1,2\n";
     for (bytes, words) in [
@@ -91,7 +91,7 @@ fn the_sidecar_names_and_scales_channels() {
     assert_eq!(recording.sample_rate_hz, 1000.0);
     let channel = recording.channel("ay").unwrap();
     assert_eq!(channel.quantity, Quantity::Acceleration);
-    // 20 mV at 10 mV/g; a few roundings.
+    // 20 mV at 10 mV/g is 2 g; the tolerance covers rounding.
     assert!((channel.samples[0] - 2.0 * 9.806_65).abs() < 1e-12);
     assert_eq!(recording.sidecar.kind, Some(TestKind::Cutting));
 
@@ -150,7 +150,7 @@ fn wav_has_its_rate_and_full_scale_one() {
 }
 
 #[test]
-fn blocks_and_edges_are_those_of_the_recording() {
+fn blocks_and_edges_match_the_recording() {
     let folder = Folder::new();
     let mut text = String::from("t [s],ax [m/s^2],az [g],tacho [1]\n");
     for index in 0..1000 {
@@ -180,14 +180,14 @@ fn blocks_and_edges_are_those_of_the_recording() {
     assert_eq!(sensed.blocks.len(), 16);
     assert_eq!(sensed.blocks[15].counts.len(), 1000 - 15 * 64);
     let scale = f64::from(sensed.settings.sensor.meters_per_second2_per_count);
-    // 10 m/s² fit into ±2 g; half a count of rounding.
+    // 10 m/s² fits into the range ±2 g; tolerance: half a count of rounding.
     assert!((scale / COUNT_2G - 1.0).abs() < 1e-6);
     assert!((f64::from(sensed.blocks[0].counts[5][0]) * scale - 10.0 * 1.5_f64.sin()).abs() <= 0.51 * scale);
-    // The first pulse has no rise; nine more follow 0.1 s apart, found between the samples 99 and 100.
+    // The first pulse has no rising edge. Nine pulses follow at intervals of 0.1 s; each edge lies between two samples.
     assert_eq!(sensed.edges.len(), 9);
-    // The first edge is taken before the usual swing is known, up to a sample early.
+    // The first edge is detected before the usual level change is known, up to one sample early.
     for pair in sensed.edges[1..].windows(2) {
-        // Stamps are whole nanoseconds.
+        // Time stamps are integer nanoseconds.
         assert!(
             (pair[1].time.0 - pair[0].time.0).abs_diff(100_000_000) <= 2,
             "{pair:?}"
@@ -198,7 +198,7 @@ fn blocks_and_edges_are_those_of_the_recording() {
 }
 
 #[test]
-fn a_stated_speed_goes_before_the_tachometer() {
+fn a_given_speed_replaces_the_tachometer() {
     let folder = Folder::new();
     let mut text = String::from("t [s],ax [m/s^2],tacho [1]\n");
     for index in 0..1000 {
@@ -214,7 +214,7 @@ fn a_stated_speed_goes_before_the_tachometer() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused_with_channel_and_time_or_left_out() {
+fn nan_samples_are_refused_with_channel_and_time_or_left_out() {
     let folder = Folder::new();
     let path = folder.0.path().join("a.wav");
     let spec = hound::WavSpec {
@@ -249,17 +249,17 @@ fn numbers_that_are_none_are_refused_with_channel_and_time_or_left_out() {
         let said = Recording::read_segment(path, whole).unwrap_err().to_string();
         assert!(said.contains("sample 3"), "{said}");
     }
-    // Stamps that are no numbers say nothing of the rate.
+    // The sample rate cannot be computed from NaN time stamps.
     let said = folder.refusal("c.csv", "t [s],ax [m/s^2]\n0,1\n0.1,2\nnan,3\n0.3,4\n");
     assert!(said.contains("line 4"), "{said}");
 }
 
-/// m/s² per count at ±2 g.
+/// Acceleration per count in the range ±2 g, m/s².
 const COUNT_2G: f64 = 0.061e-3 * 9.806_65;
 
 proptest! {
     #[test]
-    fn what_is_written_is_read_back(samples in prop::collection::vec(-1e6..1e6f64, 2..50), rate in 1.0..1e5f64) {
+    fn a_written_recording_reads_back_unchanged(samples in prop::collection::vec(-1e6..1e6f64, 2..50), rate in 1.0..1e5f64) {
         let folder = Folder::new();
         let path = folder.0.path().join("a.csv");
         let recording = Recording {
@@ -273,7 +273,7 @@ proptest! {
         recording.write(&path).unwrap();
         let back = Recording::read(&path).unwrap();
         prop_assert_eq!(&back.sidecar, &recording.sidecar);
-        // Rounding of the time stamps, and nine digits of the samples.
+        // Tolerances: rounding of the time stamps, and nine digits of the samples.
         prop_assert!((back.sample_rate_hz / rate - 1.0).abs() < 1e-9);
         for (a, b) in back.channels[0].samples.iter().zip(&recording.channels[0].samples) {
             prop_assert!((a - b).abs() <= 1e-8 * b.abs());

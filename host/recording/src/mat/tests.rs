@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// An element of the format, padded.
+/// A data element of type `kind`, padded to a multiple of 8 bytes.
 fn element(kind: u32, data: &[u8]) -> Vec<u8> {
     let mut bytes = kind.to_le_bytes().to_vec();
     bytes.extend((data.len() as u32).to_le_bytes());
@@ -53,10 +53,10 @@ fn of(mut bytes: &[u8]) -> Result<Vec<Variable>, String> {
 fn vectors_plain_and_compressed_and_stored_small_are_read() {
     let bytes = file(&[
         matrix_element("ax", 6, 3, 1, 9, &doubles(&[1.0, -2.5, 3.0])),
-        // A matrix of doubles whose values fit into one byte each, in the tag.
+        // A small element: three one-byte values of a double matrix, stored inside the tag.
         compressed(&matrix_element("small", 6, 1, 3, 2, &[7, 8, 9])),
         matrix_element("both", 6, 3, 2, 9, &doubles(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
-        // Text (class 4) is passed over.
+        // Text (class 4) is skipped.
         matrix_element("text", 4, 1, 3, 4, &[b'a', 0, b'b', 0, b'c', 0]),
     ]);
     let read: Vec<(String, Vec<f64>)> = of(&bytes)
@@ -77,7 +77,7 @@ fn vectors_plain_and_compressed_and_stored_small_are_read() {
 }
 
 #[test]
-fn what_is_no_such_file_is_refused_with_the_reason() {
+fn invalid_mat_files_are_refused_with_the_reason() {
     let whole = file(&[matrix_element("ax", 6, 3, 1, 9, &doubles(&[1.0, 2.0, 3.0]))]);
     let said = |bytes: &[u8]| of(bytes).map(|_| ()).unwrap_err();
     assert!(said(b"hello").contains("5 bytes"));
@@ -106,7 +106,7 @@ fn the_longer_side_of_a_matrix_is_time() {
             .collect::<Vec<_>>()
     };
     let named = |name: &str, samples: [f64; 4]| (name.to_owned(), samples.to_vec());
-    // Values are stored column by column.
+    // Values are stored in column-major order.
     assert_eq!(
         channels(3, 4, 12),
         [
@@ -127,7 +127,7 @@ fn the_longer_side_of_a_matrix_is_time() {
 }
 
 #[test]
-fn channels_in_rows_stand_beside_a_vector_of_time() {
+fn channels_in_rows_match_a_time_vector() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mat");
     let bytes = file(&[
@@ -149,7 +149,7 @@ fn channels_in_rows_stand_beside_a_vector_of_time() {
 }
 
 #[test]
-fn a_dead_channel_may_be_compressed_and_a_bomb_may_not() {
+fn a_constant_channel_is_read_and_a_decompression_bomb_refused() {
     let zeros = |count: usize| {
         let matrix = matrix_element("a", 6, 1, count as i32, 2, &vec![0; count]);
         of(&file(&[compressed(&matrix)]))
@@ -157,15 +157,15 @@ fn a_dead_channel_may_be_compressed_and_a_bomb_may_not() {
     assert_eq!(zeros(1 << 20).unwrap()[0].samples(), 1 << 20);
     let said = zeros(1 << 24).map(|_| ()).unwrap_err();
     assert!(
-        said.contains("16777216 values") && said.contains("200 times"),
+        said.contains("16777216 values") && said.contains("200 bytes per byte"),
         "{said}"
     );
 }
 
 proptest! {
-    /// Whatever the bytes, there is an answer.
+    /// Arbitrary damage gives a value or an error, never a panic.
     #[test]
-    fn damaged_files_never_stop_the_program(flips in prop::collection::vec((0usize..400, any::<u8>()), 1..8), cut in 0usize..400) {
+    fn damaged_files_never_panic(flips in prop::collection::vec((0usize..400, any::<u8>()), 1..8), cut in 0usize..400) {
         let mut bytes = file(&[
             matrix_element("ax", 6, 3, 1, 9, &doubles(&[1.0, 2.0, 3.0])),
             compressed(&matrix_element("ay", 6, 3, 1, 9, &doubles(&[1.0, 2.0, 3.0]))),

@@ -1,4 +1,4 @@
-//! The values of a data set 58, as text or binary.
+//! Reader of the data of a data set 58, as text or binary.
 
 use std::io::BufRead;
 
@@ -9,18 +9,18 @@ use super::header::{Binary, Header};
 use super::number;
 use super::source::{Source, SourceError};
 
-/// Values to make room for before any has been read: what a damaged count may cost at most.
+/// Largest number of values for which memory is reserved before reading. A choice; it bounds what a false count in the header costs.
 const TRUSTED: usize = 1 << 16;
 
-/// Values per piece of binary data.
-const PIECE: usize = 1 << 13;
+/// Values per chunk when reading binary data; a choice.
+const CHUNK: usize = 1 << 13;
 
-/// The values of a function.
+/// Ordinate values of a function.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ordinate {
-    /// Real ones.
+    /// Real values.
     Real(Vec<f64>),
-    /// Complex ones.
+    /// Complex values.
     Complex(Vec<Complex<f64>>),
 }
 
@@ -33,23 +33,24 @@ impl Ordinate {
         }
     }
 
-    /// True where there are no values.
+    /// True if there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// Abscissa, where it is uneven, and ordinate.
+/// Data of a function: the ordinate, and the abscissa if it is unevenly spaced.
 pub(super) struct Data {
     pub(super) uneven: Option<Vec<f64>>,
     pub(super) ordinate: Ordinate,
 }
 
-/// Takes the numbers of a function one after the other and sorts them.
+/// Assigns the sequence of numbers in the file to abscissa, real part and imaginary part.
 struct Sorter {
     data: Data,
-    /// Where the next number belongs: 0 abscissa, 1 real part, 2 imaginary part.
+    /// Role of the next number: 0 abscissa, 1 real part, 2 imaginary part.
     next: u8,
+    /// Real part of a complex value whose imaginary part is still to come.
     real: f64,
 }
 
@@ -69,6 +70,7 @@ impl Sorter {
         }
     }
 
+    /// Stores the next number in its role.
     fn take(&mut self, value: f64) {
         let first = u8::from(self.data.uneven.is_none());
         match (self.next, &mut self.data.ordinate, &mut self.data.uneven) {
@@ -92,14 +94,14 @@ impl Sorter {
     }
 }
 
-/// Numbers for each value of the function.
+/// Stored numbers per function value: 1 (real), plus 1 if complex, plus 1 if the abscissa is stored.
 fn per_value(header: &Header) -> usize {
     1 + usize::from(header.ordinate_type.is_complex) + usize::from(header.even.is_none())
 }
 
-/// Reads text up to and with the mark that ends the data set.
+/// Reads text data up to and including the final delimiter of the data set.
 ///
-/// A line `-1` is a number as long as numbers are missing and something follows that no data set begins with.
+/// A line `-1` is read as a number if values are still missing and the lines after it do not begin a data set.
 pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> Result<Data, Fault> {
     let missing = |found: usize, line: u64| {
         let per = per_value(header);
@@ -117,7 +119,7 @@ pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> 
             continue;
         }
         let is_complete = Some(found) == expected;
-        if line.is_mark() {
+        if line.is_delimiter() {
             if is_complete {
                 return Ok(sorter.data);
             }
@@ -141,12 +143,15 @@ pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> 
         if expected.is_some_and(|expected| found > expected) {
             return Err(fault(
                 line.number,
-                format!("more numbers than the {} values that record 7 says", header.count),
+                format!(
+                    "more numbers than the {} values that record 7 states",
+                    header.count
+                ),
             ));
         }
         numbers.iter().for_each(|&value| sorter.take(value));
     }
-    // The last mark of a file may be missing.
+    // The last delimiter of a file may be missing.
     if Some(found) == expected {
         Ok(sorter.data)
     } else {
@@ -154,23 +159,23 @@ pub(super) fn read_text<R: BufRead>(source: &mut Source<R>, header: &Header) -> 
     }
 }
 
-/// Whether a line `-1` ends the data, although numbers are missing; `is_last` says that it is only one.
+/// True if a line `-1` is the final delimiter although numbers are missing; `is_last` if exactly one number is missing.
 fn ends_here<R: BufRead>(source: &mut Source<R>, is_last: bool) -> Result<bool, SourceError> {
     match source.peek_filled(0)? {
         None => return Ok(true),
-        Some(next) if !next.is_mark() => return Ok(false),
+        Some(next) if !next.is_delimiter() => return Ok(false),
         Some(_) => {}
     }
     Ok(match source.peek_filled(1)? {
         None => !is_last,
-        // The number of a data set ends in column six; a number among data is seldom written so.
+        // A data set number ends in column six; data values are rarely written in this column.
         Some(second) => {
             second.bytes.get(5).is_some_and(u8::is_ascii_digit) && second.number_of_set().is_some()
         }
     })
 }
 
-/// Reads binary data, up to and with the mark that ends the data set.
+/// Reads binary data up to and including the final delimiter of the data set.
 pub(super) fn read_binary<R: BufRead>(
     source: &mut Source<R>,
     header: &Header,
@@ -180,10 +185,10 @@ pub(super) fn read_binary<R: BufRead>(
     let widths = widths(header, binary).map_err(|what| fault(line, what))?;
     let stride: usize = widths.iter().sum();
     let mut sorter = Sorter::new(header);
-    let mut buffer = vec![0; stride * PIECE.min(header.count.max(1))];
+    let mut buffer = vec![0; stride * CHUNK.min(header.count.max(1))];
     let mut rest = header.count;
     while rest > 0 {
-        let values = rest.min(PIECE);
+        let values = rest.min(CHUNK);
         let bytes = &mut buffer[..values * stride];
         source.fill(bytes).map_err(|error| match error {
             SourceError::Io(error) => Fault::Io(error),
@@ -211,9 +216,10 @@ pub(super) fn read_binary<R: BufRead>(
     Ok(sorter.data)
 }
 
-/// Bytes of the numbers of one value, in order.
+/// Sizes, bytes, of the stored numbers of one function value, in order.
 ///
-/// The abscissa of doubles is single by the standard, but some writers make it double: the number of bytes tells.
+/// The standard stores the abscissa of double-precision ordinates in single precision. Some writers store it in double precision; the byte
+/// count in the header distinguishes the two.
 fn widths(header: &Header, binary: Binary) -> Result<Vec<usize>, String> {
     let width = if header.ordinate_type.is_double { 8 } else { 4 };
     let mut widths = vec![width; per_value(header)];
@@ -222,7 +228,7 @@ fn widths(header: &Header, binary: Binary) -> Result<Vec<usize>, String> {
         widths[0] = 4;
     }
     let needed = bytes(&widths);
-    // Padding to a whole record is read over; less than the values need is a contradiction.
+    // More bytes than needed are padding. Fewer bytes contradict the header.
     if binary.bytes != 0 && binary.bytes < needed {
         return Err(format!(
             "{} bytes of data, but {} values of this type need {needed}",
@@ -232,6 +238,7 @@ fn widths(header: &Header, binary: Binary) -> Result<Vec<usize>, String> {
     Ok(widths)
 }
 
+/// Decodes an IEEE 754 number of 4 or 8 bytes.
 fn decode(bytes: &[u8], is_big_endian: bool) -> f64 {
     macro_rules! number {
         ($type:ty) => {{
@@ -251,11 +258,11 @@ fn decode(bytes: &[u8], is_big_endian: bool) -> f64 {
     }
 }
 
-/// Takes the mark after binary data: on the same line, or after any number of empty ones.
+/// Reads the delimiter after binary data: on the same line or after empty lines.
 fn end_of_binary<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
     match source.peek_filled(0)? {
         None => return Ok(()),
-        Some(line) if line.is_mark() => {}
+        Some(line) if line.is_delimiter() => {}
         Some(line) => {
             let shown: String = line.text().chars().take(40).collect();
             return Err(fault(
@@ -268,7 +275,7 @@ fn end_of_binary<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
         }
     }
     while let Some(line) = source.next()? {
-        if line.is_mark() {
+        if line.is_delimiter() {
             break;
         }
     }

@@ -1,4 +1,4 @@
-//! What is wrong with a file.
+//! Errors within a UFF file.
 
 use std::path::Path;
 
@@ -6,13 +6,14 @@ use super::source::SourceError;
 use crate::RecordingError;
 use crate::file::FileError;
 
-/// What is wrong with a file.
+/// Error within a UFF file, before its path is added: a read error, or a fault in one line.
 #[derive(Debug)]
 pub(super) enum Fault {
     Io(std::io::Error),
     Line { line: u64, what: String },
 }
 
+/// A fault in line `line`; `what` describes the fault and the expected content.
 pub(super) fn fault(line: u64, what: String) -> Fault {
     Fault::Line { line, what }
 }
@@ -30,6 +31,7 @@ impl From<SourceError> for Fault {
 }
 
 impl Fault {
+    /// Adds the path of the file to the error.
     pub(super) fn of_file(self, path: &Path) -> RecordingError {
         match self {
             Self::Io(cause) => RecordingError::File(FileError::Read {

@@ -1,30 +1,31 @@
-//! The eleven records before the data of a data set 58, and the first line of its binary form.
+//! Header of a data set 58: its eleven records, and the first line of the binary form 58b.
 
-/// Type of the numbers of the ordinate, record 7.
+/// Number type of the ordinate (record 7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OrdinateType {
-    /// 8 bytes each instead of 4.
+    /// True for double precision (8 bytes), false for single precision (4 bytes).
     pub is_double: bool,
-    /// Real and imaginary part.
+    /// True for complex values.
     pub is_complex: bool,
 }
 
-/// What a function is, record 6. Only those that are used have a name.
+/// Function type (record 6); only the types used here have a variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
-    /// 0: general or unknown.
+    /// Type 0: general or unknown.
     General,
-    /// 1: a record over time.
+    /// Type 1: time history.
     Time,
-    /// 4: frequency response function.
+    /// Type 4: frequency response function.
     FrequencyResponse,
-    /// 6: coherence.
+    /// Type 6: coherence.
     Coherence,
-    /// Any other.
+    /// Any other type, with its code.
     Other(i64),
 }
 
 impl Function {
+    /// Function type of a code in record 6.
     pub(super) fn of_code(code: i64) -> Self {
         match code {
             0 => Self::General,
@@ -35,7 +36,7 @@ impl Function {
         }
     }
 
-    /// The number by which a file names it.
+    /// Code of the function type in record 6.
     pub fn code(self) -> i64 {
         match self {
             Self::General => 0,
@@ -47,61 +48,61 @@ impl Function {
     }
 }
 
-/// A degree of freedom, record 6.
+/// Degree of freedom of response or reference (record 6): node and direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Freedom {
-    /// Name of the entity, up to ten characters; empty for none.
+pub struct DegreeOfFreedom {
+    /// Entity name, up to ten characters; empty if there is none.
     pub entity: String,
-    /// Number of the node.
+    /// Node number.
     pub node: i64,
-    /// 0 scalar; ±1, ±2, ±3 along x, y, z; ±4, ±5, ±6 about them.
+    /// Direction: 0 scalar; ±1, ±2, ±3 translation along ±x, ±y, ±z; ±4, ±5, ±6 rotation about them.
     pub direction: i64,
 }
 
-/// What an axis shows, records 8 to 11.
+/// Quantity and unit of an axis (records 8 to 11).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Axis {
-    /// Specific data type: 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 17 time …
+    /// Specific data type: 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 17 time, 18 frequency …
     pub kind: i64,
-    /// Exponents of the units of length and force.
+    /// Exponents of the units of length and of force.
     pub exponents: [i64; 2],
-    /// The unit in words; empty for none.
+    /// Unit label; empty if there is none.
     pub unit: String,
 }
 
-/// The records before the data.
+/// Header of a data set 58 (records 1 to 11).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Five lines of words.
+    /// Five lines of free text (records 1 to 5).
     pub words: [String; 5],
-    /// Which function of the two ends it holds.
+    /// Function type, such as time history or frequency response.
     pub function: Function,
-    /// Where and along which axis the response was measured.
-    pub response: Freedom,
-    /// Where and along which axis the reference was measured.
-    pub reference: Freedom,
+    /// Degree of freedom of the response.
+    pub response: DegreeOfFreedom,
+    /// Degree of freedom of the reference (of an FRF, the force).
+    pub reference: DegreeOfFreedom,
     /// Precision of the values, and whether they are complex.
     pub ordinate_type: OrdinateType,
     /// Number of values.
     pub count: usize,
-    /// First abscissa and step, where it is even.
+    /// First value and step of an evenly spaced abscissa; `None` if it is uneven.
     pub even: Option<(f64, f64)>,
-    /// The quantity along the abscissa.
+    /// Abscissa: quantity and unit.
     pub abscissa: Axis,
-    /// The quantity along the ordinate; of a ratio, its numerator.
+    /// Ordinate: quantity and unit; the numerator of a ratio.
     pub ordinate: Axis,
-    /// The denominator of a ratio.
+    /// Denominator of a ratio: quantity and unit.
     pub denominator: Axis,
 }
 
-/// Number of records of text.
+/// Number of header records of a data set 58 (UFF standard).
 pub(super) const RECORDS: usize = 11;
 
 impl Header {
-    /// Reads the eleven records.
+    /// Parses the eleven header records.
     ///
     /// # Errors
-    /// The index of the record, from 0, and what is wrong with it.
+    /// Index of the faulty record, from 0, and a description of the fault.
     pub(super) fn parse(records: &[String; RECORDS]) -> Result<Self, (usize, String)> {
         let words = std::array::from_fn(|index| named(&records[index]));
         let (function, response, reference) = degrees_of_freedom(&records[5]).map_err(|what| (5, what))?;
@@ -122,54 +123,54 @@ impl Header {
     }
 }
 
-/// Record 6: `2(I5,I10), 2(1X,A10,I10,I4)`.
-fn degrees_of_freedom(record: &str) -> Result<(Function, Freedom, Freedom), String> {
+/// Parses record 6, Fortran format `2(I5,I10), 2(1X,A10,I10,I4)`: function type, response and reference.
+fn degrees_of_freedom(record: &str) -> Result<(Function, DegreeOfFreedom, DegreeOfFreedom), String> {
     let function = match field(record, 0, 5) {
-        // Some writers do not keep to the columns.
+        // Some writers ignore the column positions; then the first word is the type.
         text if text.contains(' ') => record.split_whitespace().next().unwrap_or_default(),
         text => text,
     };
     let function: i64 = function.parse().map_err(|_| {
         format!("function type \"{function}\"; a number, such as 1 for time or 4 for an FRF, is needed")
     })?;
-    let freedom = |at: usize| -> Result<Freedom, String> {
-        Ok(Freedom {
+    let dof = |at: usize| -> Result<DegreeOfFreedom, String> {
+        Ok(DegreeOfFreedom {
             entity: named(field(record, at + 1, 10)),
             node: whole(field(record, at + 11, 10), "node")?,
             direction: whole(field(record, at + 21, 4), "direction")?,
         })
     };
-    // Without columns there are ten words.
-    let in_columns = freedom(30).and_then(|response| Ok((response, freedom(55)?)));
+    // A record that ignores the column positions has ten words.
+    let in_columns = dof(30).and_then(|response| Ok((response, dof(55)?)));
     let (response, reference) = match (
         in_columns,
         record.split_whitespace().collect::<Vec<_>>().as_slice(),
     ) {
         (Ok(both), _) => both,
         (Err(_), &[_, _, _, _, a, b, c, d, e, f]) => {
-            let freedom = |entity: &str, node, direction| -> Result<Freedom, String> {
-                Ok(Freedom {
+            let dof = |entity: &str, node, direction| -> Result<DegreeOfFreedom, String> {
+                Ok(DegreeOfFreedom {
                     entity: named(entity),
                     node: whole(node, "node")?,
                     direction: whole(direction, "direction")?,
                 })
             };
-            (freedom(a, b, c)?, freedom(d, e, f)?)
+            (dof(a, b, c)?, dof(d, e, f)?)
         }
         (Err(what), _) => return Err(what),
     };
-    for freedom in [&response, &reference] {
-        if !(-6..=6).contains(&freedom.direction) {
-            return Err(format!("direction {}; -6 to 6 is possible", freedom.direction));
+    for dof in [&response, &reference] {
+        if !(-6..=6).contains(&dof.direction) {
+            return Err(format!("direction {}; -6 to 6 is possible", dof.direction));
         }
     }
     Ok((Function::of_code(function), response, reference))
 }
 
-/// Type, number of values, and the even abscissa.
+/// Content of record 7: number type, number of values, first value and step of an even abscissa.
 type DataForm = (OrdinateType, usize, Option<(f64, f64)>);
 
-/// Record 7: `3I10, 3E13.5`.
+/// Parses record 7, Fortran format `3I10, 3E13.5`.
 fn data_form(record: &str) -> Result<DataForm, String> {
     let fields = [
         field(record, 0, 10),
@@ -178,7 +179,7 @@ fn data_form(record: &str) -> Result<DataForm, String> {
         field(record, 30, 13),
         field(record, 43, 13),
     ];
-    // Words instead of columns, where a writer did not keep to them.
+    // If the columns cannot be parsed, the words of the record are.
     let words: Vec<&str> = record.split_whitespace().collect();
     parse_data_form(fields).or_else(|what| match words.as_slice() {
         &[a, b, c, d, e, ..] => parse_data_form([a, b, c, d, e]),
@@ -198,7 +199,7 @@ fn parse_data_form([kind, count, spacing, first, step]: [&str; 5]) -> Result<Dat
             ));
         }
     };
-    // Ten columns hold no more.
+    // The count is written in ten columns, so it has at most ten digits.
     let count = match count.parse::<usize>() {
         Ok(count) if count < 10_000_000_000 => count,
         _ => {
@@ -233,7 +234,7 @@ fn parse_data_form([kind, count, spacing, first, step]: [&str; 5]) -> Result<Dat
     ))
 }
 
-/// Records 8 to 11: `I10, 3I5, 2(1X,A20)`.
+/// Parses a record of 8 to 11, Fortran format `I10, 3I5, 2(1X,A20)`: quantity and unit of an axis.
 fn axis(record: &str) -> Result<Axis, String> {
     Ok(Axis {
         kind: whole(field(record, 0, 10), "specific data type")?,
@@ -245,18 +246,18 @@ fn axis(record: &str) -> Result<Axis, String> {
     })
 }
 
-/// The first line of a binary data set: `I6, A1, I6, I6, I12, I12, …`.
+/// First line of a binary data set, Fortran format `I6, A1, I6, I6, I12, I12, …`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Binary {
     pub(super) is_big_endian: bool,
-    /// Lines of text that follow.
+    /// Number of header lines that follow.
     pub(super) lines: usize,
-    /// Bytes of data that follow them; 0 where the writer did not know.
+    /// Length of the binary data, bytes; 0 if the writer did not state it.
     pub(super) bytes: u64,
 }
 
 impl Binary {
-    /// Reads what stands after `58b`.
+    /// Parses the text after `58b`.
     pub(super) fn parse(rest: &str) -> Result<Self, String> {
         let words: Vec<&str> = rest.split_whitespace().collect();
         let &[order, format, lines, bytes, ..] = words.as_slice() else {
@@ -288,7 +289,7 @@ impl Binary {
     }
 }
 
-/// Characters `from .. from + length` of a record, without blanks around; empty where the record is shorter.
+/// Columns `from .. from + length` of a record, trimmed; empty if the record is shorter.
 fn field(record: &str, from: usize, length: usize) -> &str {
     let at = |index: usize| {
         record
@@ -299,7 +300,7 @@ fn field(record: &str, from: usize, length: usize) -> &str {
     record[at(from)..at(from + length)].trim()
 }
 
-/// A name; `NONE` is none.
+/// Trimmed text; `NONE` becomes the empty string.
 fn named(text: &str) -> String {
     let text = text.trim();
     if text.eq_ignore_ascii_case("none") {
@@ -309,7 +310,7 @@ fn named(text: &str) -> String {
     }
 }
 
-/// A whole number; an empty field is 0, as Fortran reads it.
+/// Parses an integer; an empty field is 0, as in Fortran.
 fn whole(text: &str, what: &str) -> Result<i64, String> {
     if text.is_empty() {
         return Ok(0);
@@ -318,7 +319,7 @@ fn whole(text: &str, what: &str) -> Result<i64, String> {
         .map_err(|_| format!("{what} \"{text}\"; a whole number is needed"))
 }
 
-/// A number; an empty field is 0, as Fortran reads it.
+/// Parses a finite real number; an empty field is 0, as in Fortran.
 fn real(text: &str, what: &str) -> Result<f64, String> {
     let mut values = Vec::new();
     if text.is_empty() {

@@ -1,8 +1,8 @@
-//! UFF (universal file format), data sets 58: functions at nodal degrees of freedom, as text and binary (58b).
+//! Universal file format (UFF), data set 58: functions at nodal degrees of freedom, as text and binary (58b).
 //!
-//! The format is documented by the Structural Dynamics Research Laboratory of the University of Cincinnati. Read as
-//! meant: empty lines anywhere between data sets, `D` exponents, both byte orders, data that look like the mark `-1`,
-//! several data sets in a file, units by data set 164, a missing last mark. Other data sets are passed over.
+//! Format: Structural Dynamics Research Laboratory, University of Cincinnati. Each data set begins and ends with a delimiter line `-1`. The
+//! reader accepts empty lines between data sets, `D` exponents, both byte orders, data that look like the delimiter, several data sets per
+//! file, units from data set 164, and a missing last delimiter. It skips other data sets.
 
 mod data;
 mod fault;
@@ -17,7 +17,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 pub use data::Ordinate;
-pub use header::{Axis, Freedom, Function, Header, OrdinateType};
+pub use header::{Axis, DegreeOfFreedom, Function, Header, OrdinateType};
 pub use units::unit;
 pub use write::UffForm;
 pub use write::{Values, axis_of, write_set, write_units};
@@ -32,25 +32,25 @@ use super::raw::{Raw, RawColumn};
 use super::{Quantity, Recording, RecordingError};
 use crate::file::FileError;
 
-/// A data set 58.
+/// One data set 58: a function with its header and values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataSet {
-    /// The line with its number, from 1.
+    /// Number of the line with the data set number, from 1.
     pub line: u64,
-    /// The records before the data.
+    /// Header: the eleven records before the data.
     pub header: Header,
-    /// The abscissa where it is uneven.
+    /// Abscissa values of an unevenly spaced function; `None` if the spacing is even.
     pub uneven: Option<Vec<f64>>,
-    /// The values.
+    /// Ordinate values.
     pub ordinate: Ordinate,
-    /// The units of the file.
+    /// Units of the file (data set 164), SI by default.
     pub units: FileUnits,
 }
 
-/// All data sets 58 of a file, in order; there is at least one.
+/// Reads all data sets 58 of a file, in order; there is at least one.
 ///
 /// # Errors
-/// The file is not there, is no UFF file, or a data set is damaged: which line, and what would be right.
+/// The file cannot be read, is not a UFF file, or a data set is damaged; the message names the line and the expected content.
 pub fn data_sets(path: &Path) -> Result<Vec<DataSet>, RecordingError> {
     let file = File::open(path).map_err(|cause| FileError::Read {
         path: path.into(),
@@ -64,25 +64,25 @@ fn parse(reader: impl BufRead) -> Result<Vec<DataSet>, Fault> {
     let mut sets = Vec::new();
     let mut units: Option<FileUnits> = None;
     let mut others: Vec<u32> = Vec::new();
-    while let Some(line) = next_mark(&mut source)? {
+    while let Some(line) = next_delimiter(&mut source)? {
         let Some(mut first) = next_filled(&mut source)? else {
             break;
         };
-        // A mark too many.
-        while first.is_mark() {
+        // An extra delimiter is skipped.
+        while first.is_delimiter() {
             match next_filled(&mut source)? {
                 Some(next) => first = next,
                 None => break,
             }
         }
-        if first.is_mark() {
+        if first.is_delimiter() {
             break;
         }
         match first.number_of_set() {
             Some((58, rest)) => sets.push(data_set(&mut source, first.number, &rest)?),
             Some((164, _)) => {
                 let found = file_units(&mut source)?;
-                // Units stand at the start; those that come later say the same of what came before.
+                // The first data set 164 also applies to the data sets before it.
                 sets.iter_mut()
                     .filter(|_| units.is_none())
                     .for_each(|set: &mut DataSet| set.units = found);
@@ -122,17 +122,17 @@ fn parse(reader: impl BufRead) -> Result<Vec<DataSet>, Fault> {
     Ok(sets)
 }
 
-/// Passes over lines up to and with the next mark; its number, or `None` at the end.
-fn next_mark<R: BufRead>(source: &mut Source<R>) -> Result<Option<u64>, Fault> {
+/// Skips lines up to and including the next delimiter. Returns its line number, or `None` at the end of the file.
+fn next_delimiter<R: BufRead>(source: &mut Source<R>) -> Result<Option<u64>, Fault> {
     while let Some(line) = source.next()? {
-        if line.is_mark() {
+        if line.is_delimiter() {
             return Ok(Some(line.number));
         }
     }
     Ok(None)
 }
 
-/// The next line that is not blank.
+/// Reads the next line that is not blank; `None` at the end of the file.
 fn next_filled<R: BufRead>(source: &mut Source<R>) -> Result<Option<Line>, Fault> {
     while let Some(line) = source.next()? {
         if !line.is_blank() {
@@ -142,21 +142,22 @@ fn next_filled<R: BufRead>(source: &mut Source<R>) -> Result<Option<Line>, Fault
     Ok(None)
 }
 
-/// Passes over a data set, with its last mark.
+/// Skips the rest of a data set, including its final delimiter.
 fn skip<R: BufRead>(source: &mut Source<R>) -> Result<(), Fault> {
     while let Some(line) = source.next()? {
-        if line.is_mark() {
+        if line.is_delimiter() {
             break;
         }
     }
     Ok(())
 }
 
+/// Reads the units of the file from data set 164.
 fn file_units<R: BufRead>(source: &mut Source<R>) -> Result<FileUnits, Fault> {
     let mut lines = Vec::new();
     let mut first = source.line() + 1;
     while let Some(line) = source.next()? {
-        if line.is_mark() {
+        if line.is_delimiter() {
             break;
         }
         if lines.is_empty() {
@@ -167,6 +168,7 @@ fn file_units<R: BufRead>(source: &mut Source<R>) -> Result<FileUnits, Fault> {
     FileUnits::parse(&lines).map_err(|(index, what)| fault(first + index as u64, what))
 }
 
+/// Reads a data set 58 after its first line; `rest` is the text after `58` in that line.
 fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result<DataSet, Fault> {
     let binary = match rest.strip_prefix(['b', 'B']) {
         Some(rest) => Some(Binary::parse(rest).map_err(|what| fault(line, what))?),
@@ -182,8 +184,8 @@ fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result
                 format!("the file ends within the {RECORDS} lines before the data"),
             ));
         };
-        // Words may be anything; of the numbers none is a mark.
-        if record.is_mark() && index >= 5 {
+        // The five lines of text may contain -1; in the records of numbers -1 alone is a delimiter.
+        if record.is_delimiter() && index >= 5 {
             return Err(fault(
                 record.number,
                 format!("-1 in line {} of the {RECORDS} lines before the data", index + 1),
@@ -208,7 +210,7 @@ fn data_set<R: BufRead>(source: &mut Source<R>, line: u64, rest: &str) -> Result
     })
 }
 
-/// Reads the records over time of a file; `finite` refuses NaN and infinity with the line of their data set.
+/// Reads the time histories of a file as columns. With `finite`, a NaN or infinite sample is an error that names the line of its data set.
 pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     let mut sets = data_sets(path)?;
     let functions: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
@@ -256,13 +258,13 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
                 (None, times) => times.as_ref().map_or(f64::NAN, |times| times[at]),
             };
             return Err(wrong(format!(
-                "sample {} is {} at {time_s} s; a number is needed: repair the channel, or use the part before or after by \
+                "sample {} is {} at {time_s} s; a number is needed: repair the channel, or use the segment before or after it with \
                  --until-s or --from-s",
                 at + 1,
                 samples[at]
             )));
         }
-        // Along an axis, against its direction.
+        // A negative direction measures against the axis, so the sign is reversed.
         if (-3..0).contains(&set.header.response.direction) {
             samples.iter_mut().for_each(|sample| *sample = -*sample);
         }
@@ -275,7 +277,8 @@ pub(super) fn read(path: &Path, finite: bool) -> Result<Raw, RecordingError> {
     })
 }
 
-/// The rate of a step of time, of which the format keeps six digits: a whole number of hertz, where one has this step.
+/// Sample rate, Hz, from a time step that the format rounds to six digits: the integer rate with the same rounded step, if there is one,
+/// else 1/step.
 fn rate_hz(step_s: f64) -> f64 {
     let whole = (1.0 / step_s).round();
     let six_digits = |step: f64| exponential(step, 5, 0);
@@ -287,7 +290,7 @@ fn rate_hz(step_s: f64) -> f64 {
 }
 
 impl DataSet {
-    /// True of a record over time; also where the type is not said but the abscissa is time.
+    /// True for a time history: function type 1, or type 0 (general) with time as abscissa.
     fn is_over_time(&self) -> bool {
         match self.header.function {
             Function::Time => true,
@@ -296,7 +299,7 @@ impl DataSet {
         }
     }
 
-    /// Name by convention: `az` for an acceleration along ±z; else the name of the entity.
+    /// Standard channel name, such as `az` for an acceleration along ±z; else the entity name, else the first line of text.
     fn name(&self) -> String {
         let header = &self.header;
         let axis = match header.response.direction.abs() {
@@ -320,7 +323,7 @@ impl DataSet {
         }
         let entity = &header.response.entity;
         let words = &header.words[0];
-        // A name that fills its ten columns has lost its end.
+        // An entity name of ten characters may be truncated; the first line of text then holds the full name.
         if entity.is_empty() || (entity.len() == 10 && words.starts_with(entity.as_str())) {
             if words.is_empty() {
                 "channel".into()
@@ -333,7 +336,7 @@ impl DataSet {
     }
 }
 
-/// Names of the channels; those that would be the same get the number of their node, then of their place.
+/// Unique channel names: equal names get the node number as suffix, then their position in the file.
 fn names(sets: &[DataSet]) -> Vec<String> {
     let plain: Vec<String> = sets.iter().map(DataSet::name).collect();
     let is_twice = |names: &[String], name: &String| names.iter().filter(|other| *other == name).count() > 1;
@@ -361,7 +364,7 @@ fn names(sets: &[DataSet]) -> Vec<String> {
         .collect()
 }
 
-/// Writes a recording: one data set 58 per channel, after the units (SI) in a data set 164.
+/// Writes a recording as UFF: data set 164 with SI units, then one data set 58 per channel.
 pub(super) fn write(path: &Path, recording: &Recording, form: UffForm) -> Result<(), RecordingError> {
     Ok(crate::file::write_with(path, |out| {
         write_units(out)?;

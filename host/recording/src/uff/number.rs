@@ -1,12 +1,12 @@
-//! Numbers as Fortran writes them: exponents with E, D or no letter, fields that touch.
+//! Parser for numbers in Fortran notation: exponents with E, D or without letter, adjacent fields without blank.
 
-/// Appends the numbers of a line to `values`.
+/// Parses all numbers of a line and appends them to `values`.
 ///
-/// Read as meant: `1.5D+02`, `1.5-102` (an exponent of three digits has no room for its letter),
-/// `-1.0E+00-2.0E+00` (fields that touch), commas between numbers. `NaN` and infinities are numbers here.
+/// Accepted forms: `1.5D+02`, `1.5-102` (Fortran drops the letter of a three-digit exponent), `-1.0E+00-2.0E+00` (adjacent fields), commas
+/// between numbers, `NaN` and infinities.
 ///
 /// # Errors
-/// The text that is no number.
+/// A message with the text that is not a number.
 pub(super) fn append(line: &[u8], values: &mut Vec<f64>) -> Result<(), String> {
     let mut rest = line;
     loop {
@@ -22,7 +22,7 @@ pub(super) fn append(line: &[u8], values: &mut Vec<f64>) -> Result<(), String> {
                 .iter()
                 .position(|&byte| byte.is_ascii_whitespace() || byte == b',')
                 .unwrap_or(rest.len());
-            // A damaged file may have a long line without blanks.
+            // At most 40 bytes: a damaged file may have a long line without blanks.
             format!(
                 "\"{}\"; a number is needed",
                 String::from_utf8_lossy(&rest[..end.min(40)])
@@ -33,7 +33,7 @@ pub(super) fn append(line: &[u8], values: &mut Vec<f64>) -> Result<(), String> {
     }
 }
 
-/// The number at the start of `text`, and how many bytes it takes.
+/// Parses the number at the start of `text`. Returns its value and its length in bytes.
 fn number(text: &[u8]) -> Option<(f64, usize)> {
     let (value, length) = fast_float2::parse_partial::<f64, _>(text).ok()?;
     let rest = &text[length..];
@@ -42,7 +42,7 @@ fn number(text: &[u8]) -> Option<(f64, usize)> {
         [] => return Some((value, length)),
         [first, ..] if first.is_ascii_whitespace() || *first == b',' => return Some((value, length)),
         [b'D' | b'd' | b'Q' | b'q', after @ ..] if !has_exponent => (after, 1),
-        // Three digits after a sign, and no digit or point after them: an exponent without its letter.
+        // A sign and three digits, without a digit or point after them, are an exponent without its letter.
         [b'+' | b'-', ..] if !has_exponent && is_bare_exponent(rest) => (rest, 0),
         [b'+' | b'-', ..] => return Some((value, length)),
         _ => return None,
@@ -58,11 +58,12 @@ fn number(text: &[u8]) -> Option<(f64, usize)> {
     Some((value, length + skipped + digits))
 }
 
+/// True if `text` begins with an exponent without letter: a sign and exactly three digits, no decimal point.
 fn is_bare_exponent(text: &[u8]) -> bool {
     exponent_length(text) == 4 && text.get(4) != Some(&b'.')
 }
 
-/// Bytes of a sign, if any, and the digits after it; 0 where there are no digits.
+/// Length in bytes of an optional sign and the digits after it; 0 if there are no digits.
 fn exponent_length(text: &[u8]) -> usize {
     let sign = usize::from(matches!(text, [b'+' | b'-', ..]));
     let digits = text[sign..]
@@ -82,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn fortran_numbers_are_read_as_meant() {
+    fn fortran_numbers_are_parsed() {
         for (text, values) in [
             ("  1.5D+02 -2.5d0", vec![150.0, -2.5]),
             ("1.5-102 2.5+100", vec![1.5e-102, 2.5e100]),

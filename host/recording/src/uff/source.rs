@@ -1,34 +1,34 @@
-//! A file as lines and bytes by turns, read as it goes: a long record is never held twice.
+//! Sequential reader of text lines and binary data from one file; a long record is in memory only once.
 
 use std::collections::VecDeque;
 use std::io::BufRead;
 
-/// One line, without its end.
+/// One line of the file, without its line end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Line {
-    /// From 1. Line ends within binary data count as well.
+    /// Line number, from 1; line feeds within binary data count, too.
     pub(super) number: u64,
-    /// What stands in it.
+    /// Content of the line.
     pub(super) bytes: Vec<u8>,
 }
 
 impl Line {
-    /// The text; bytes that are none become replacement characters.
+    /// Content as text; bytes that are not UTF-8 become replacement characters.
     pub(super) fn text(&self) -> String {
         String::from_utf8_lossy(&self.bytes).into_owned()
     }
 
-    /// Nothing but blanks.
+    /// True if the line holds only blanks.
     pub(super) fn is_blank(&self) -> bool {
         self.bytes.iter().all(u8::is_ascii_whitespace)
     }
 
-    /// The mark that begins and ends a data set: `-1` and nothing else.
-    pub(super) fn is_mark(&self) -> bool {
+    /// True for the delimiter that begins and ends a data set: `-1` alone.
+    pub(super) fn is_delimiter(&self) -> bool {
         self.bytes.trim_ascii() == b"-1"
     }
 
-    /// The number of a data set, and what stands after it; `None` where the line is no first line of one.
+    /// Data set number and the text after it; `None` if the line is not the first line of a data set.
     pub(super) fn number_of_set(&self) -> Option<(u32, String)> {
         let text = self.text();
         let text = text.trim();
@@ -43,24 +43,24 @@ impl Line {
     }
 }
 
-/// What can go wrong with lines and bytes.
+/// Error of reading lines or bytes.
 #[derive(Debug)]
 pub(super) enum SourceError {
-    /// The system says so.
+    /// Error of the operating system.
     Io(std::io::Error),
-    /// The file ends where more bytes are needed.
+    /// The file ends before all required bytes are read.
     Ends {
-        /// Bytes that were there.
+        /// Number of bytes that were read.
         found: usize,
     },
 }
 
-/// A reader of lines and bytes.
+/// Reader of lines and bytes with look-ahead of lines.
 pub(super) struct Source<R> {
     reader: R,
-    /// Lines that were looked at and not taken.
+    /// Lines that were peeked at but not yet returned.
     ahead: VecDeque<Line>,
-    /// Number of the last line that was read from the file.
+    /// Number of the last line read from the file, peeked lines included.
     line: u64,
 }
 
@@ -73,12 +73,12 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// Number of the line that was taken last.
+    /// Number of the last line that was returned.
     pub(super) fn line(&self) -> u64 {
         self.ahead.front().map_or(self.line, |line| line.number - 1)
     }
 
-    /// The next line; `None` at the end of the file.
+    /// Returns the next line; `None` at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<Line>, SourceError> {
         match self.ahead.pop_front() {
             Some(line) => Ok(Some(line)),
@@ -86,7 +86,7 @@ impl<R: BufRead> Source<R> {
         }
     }
 
-    /// The line that is not blank and has `before` such lines before it; all of them stay to be taken.
+    /// Peeks at the non-blank line after `before` other non-blank lines, without consuming any line.
     pub(super) fn peek_filled(&mut self, before: usize) -> Result<Option<&Line>, SourceError> {
         let mut filled = self.ahead.iter().filter(|line| !line.is_blank()).count();
         while filled <= before {
@@ -99,6 +99,7 @@ impl<R: BufRead> Source<R> {
         Ok(self.ahead.iter().filter(|line| !line.is_blank()).nth(before))
     }
 
+    /// Reads the next line from the file.
     fn fetch(&mut self) -> Result<Option<Line>, SourceError> {
         let mut bytes = Vec::new();
         let read = self
@@ -121,7 +122,7 @@ impl<R: BufRead> Source<R> {
         }))
     }
 
-    /// The next bytes, which fill `buffer`. No line may have been looked at.
+    /// Reads bytes until `buffer` is full. No peeked line may be pending.
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<(), SourceError> {
         debug_assert!(self.ahead.is_empty());
         let mut found = 0;
@@ -137,7 +138,7 @@ impl<R: BufRead> Source<R> {
         Ok(())
     }
 
-    /// Passes over so many bytes.
+    /// Skips `bytes` bytes.
     pub(super) fn skip(&mut self, bytes: u64) -> Result<(), SourceError> {
         let mut rest = bytes;
         let mut buffer = [0; 4096];

@@ -1,4 +1,4 @@
-//! Files as they are found: in other forms than the format asks for, damaged, cut off.
+//! Tests of the reader with unusual, damaged and truncated files.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::{Channel, Sidecar, TestKind};
 
-/// A data set 58 of three samples: lines 1 to 15, the data in line 14.
+/// A valid data set 58 of three samples: lines 1 to 15, data in line 14.
 const TEXT: &str = "    -1
     58
 az
@@ -28,7 +28,7 @@ NONE
 
 const SAMPLES: [f64; 3] = [1.0, -2.5, 3.0];
 
-/// The header of a binary form of it.
+/// The data set [`TEXT`] in binary form, with the given header fields and data.
 fn binary(order: u8, format: u8, lines: u8, bytes: usize, data: &[u8]) -> Vec<u8> {
     let first = format!("    58b{order:6}{format:6}{lines:12}{bytes:12}     0     0           0           0");
     let head = TEXT.replacen("    58", &first, 1);
@@ -50,11 +50,11 @@ fn joined(parts: &[&[u8]]) -> Vec<u8> {
     parts.concat()
 }
 
-/// What must come out of a file.
+/// Expected result of reading a file.
 enum Outcome {
-    /// These samples, and channels of these names.
+    /// Success with these samples in each of the named channels.
     Read(Vec<f64>, &'static [&'static str]),
-    /// A refusal in this line that holds these words.
+    /// Error in this line (0: without line) whose message contains these words.
     Refused(u64, &'static str),
 }
 
@@ -64,12 +64,12 @@ fn fine() -> Outcome {
     Read(SAMPLES.to_vec(), &["az"])
 }
 
-/// Text with one change.
+/// [`TEXT`] with one replacement.
 fn changed(from: &str, to: &str) -> Vec<u8> {
     changed_all(&[(from, to)])
 }
 
-/// Text with several changes.
+/// [`TEXT`] with several replacements.
 fn changed_all(changes: &[(&str, &str)]) -> Vec<u8> {
     let mut text = String::from(TEXT);
     for (from, to) in changes {
@@ -79,12 +79,12 @@ fn changed_all(changes: &[(&str, &str)]) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The data in one line.
+/// Data line of [`TEXT`].
 const DATA: &str = "  1.000000000000E+00 -2.500000000000E+00  3.000000000000E+00";
-/// The start of record 7.
+/// Start of record 7 of [`TEXT`]: number type, count, spacing, first abscissa and step.
 const FORM: &str = "         4         3         1  1.00000E+00  1.00000E-03";
 
-/// Forms that are read as they are meant.
+/// Unusual files that must be read.
 fn odd_but_clear() -> Vec<(&'static str, Vec<u8>, Outcome)> {
     let four = |data: &str| changed_all(&[("         4         3", "         2         4"), (DATA, data)]);
     vec![
@@ -146,7 +146,7 @@ fn odd_but_clear() -> Vec<(&'static str, Vec<u8>, Outcome)> {
     ]
 }
 
-/// Files that cannot be read, and the line that is to blame.
+/// Damaged files with the line and the message of the expected error.
 fn damaged() -> Vec<(&'static str, Vec<u8>, Outcome)> {
     let cut = |line: usize| {
         let lines: Vec<&str> = TEXT.lines().take(line).collect();
@@ -359,7 +359,7 @@ fn check(name: &str, bytes: &[u8], outcome: &Outcome) {
             assert_eq!(found, *names, "{name}");
             for channel in &recording.channels {
                 for (sample, expected) in channel.samples.iter().zip(samples) {
-                    // Units multiply with one rounding.
+                    // Unit conversion causes one rounding.
                     assert!(
                         (sample - expected).abs() <= 1e-15 * expected.abs(),
                         "{name}: {sample}"
@@ -384,7 +384,7 @@ fn check(name: &str, bytes: &[u8], outcome: &Outcome) {
 }
 
 #[test]
-fn odd_files_are_read_as_meant() {
+fn unusual_files_are_read() {
     for (name, bytes, outcome) in &odd_but_clear() {
         check(name, bytes, outcome);
     }
@@ -432,7 +432,7 @@ fn single_precision_and_complex_uneven_values_are_sorted() {
         (single.uneven, &single.ordinate),
         (Some(vec![1.0, 3.0]), &complex)
     );
-    // The abscissa of doubles may be single, as the standard has it, or double, as some write it.
+    // The abscissa of double-precision ordinates: single precision (standard) or double precision (some writers).
     let values = [0.5_f64, -1.5, 2.0, 4.0];
     let mixed: Vec<u8> = [(1.0_f32, 0), (3.0, 2)]
         .iter()
@@ -461,7 +461,7 @@ fn single_precision_and_complex_uneven_values_are_sorted() {
     );
 }
 
-/// The two samples of the same record, as text and binary, of which one has six digits.
+/// Two files of one measurement, as text with six digits and as binary, must agree.
 #[test]
 #[ignore = "measured records: QUIETCUT_DATA names their folder"]
 fn both_measured_samples_read_to_the_same_signal() {
@@ -477,7 +477,7 @@ fn both_measured_samples_read_to_the_same_signal() {
     );
     assert_eq!((&text.name, text.quantity), (&binary.name, binary.quantity));
     for (a, b) in text.samples.iter().zip(&binary.samples) {
-        // Half of the sixth digit, and the rounding of the single-precision one.
+        // Half a unit of the sixth digit, plus the rounding to single precision.
         assert!((a - b).abs() <= 5.1e-6 * b.abs(), "{a} {b}");
     }
     let other = Recording::read(folder.join("uff/heat_engine_housing.uff")).unwrap_err();
@@ -510,7 +510,7 @@ fn recording(samples: Vec<f64>) -> Recording {
 
 proptest! {
     #[test]
-    fn what_is_written_is_read_back(samples in prop::collection::vec(-1e6..1e6f64, 2..50)) {
+    fn a_written_recording_reads_back_unchanged(samples in prop::collection::vec(-1e6..1e6f64, 2..50)) {
         let folder = tempfile::tempdir().unwrap();
         for form in [UffForm::Text, UffForm::Binary] {
             let path = folder.path().join("a.uff");
@@ -523,7 +523,7 @@ proptest! {
                 prop_assert_eq!(&a.name, &b.name);
                 prop_assert!(a.quantity == b.quantity || b.quantity == Quantity::Level);
                 for (a, b) in a.samples.iter().zip(&b.samples) {
-                    // Thirteen digits as text, all as binary.
+                    // Text keeps thirteen digits, binary all.
                     let tolerance = if form == UffForm::Text { 1e-12 * b.abs() } else { 0.0 };
                     prop_assert!((a - b).abs() <= tolerance);
                 }
@@ -531,9 +531,9 @@ proptest! {
         }
     }
 
-    /// Whatever the bytes, there is an answer.
+    /// Arbitrary damage gives a value or an error, never a panic.
     #[test]
-    fn damage_never_stops_the_program(
+    fn damaged_files_never_panic(
         flips in prop::collection::vec((0usize..2000, any::<u8>()), 1..8),
         cut in 0usize..2000,
         which in any::<prop::sample::Index>(),

@@ -1,29 +1,29 @@
-//! Units of a UFF file: data set 164 for the whole file; label and specific data type for each function.
+//! Units of a UFF file: data set 164 for the whole file; unit label and specific data type for each axis.
 
 use super::header::Axis;
 use super::number;
 use crate::{Quantity, Unit, UnknownUnit};
 
-/// The units of a file, data set 164: a value divided by these factors is in SI units.
+/// Units of a file (data set 164): value in SI units = value in the file / factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FileUnits {
-    /// Units of length in a metre.
+    /// Units of length per metre.
     pub(crate) length: f64,
-    /// Units of force in a newton.
+    /// Units of force per newton.
     pub(crate) force: f64,
 }
 
 impl FileUnits {
-    /// Metre and newton.
+    /// SI units: metre and newton.
     pub(crate) const SI: Self = Self {
         length: 1.0,
         force: 1.0,
     };
 
-    /// Reads the lines of a data set 164.
+    /// Parses the lines of a data set 164: its conversion factors, or else its units code.
     ///
     /// # Errors
-    /// The index of the line, from 0, and what is wrong with it.
+    /// Index of the faulty line, from 0, and a description of the fault.
     pub(super) fn parse(lines: &[String]) -> Result<Self, (usize, String)> {
         let mut factors = Vec::new();
         for (index, line) in lines.iter().enumerate().skip(1) {
@@ -66,14 +66,14 @@ impl FileUnits {
     }
 }
 
-/// Feet in a metre.
+/// Feet per metre (1 ft = 0.3048 m exactly).
 const FEET: f64 = 1.0 / 0.3048;
-/// Pounds of force in a newton.
+/// Pounds-force per newton (1 lbf = 4.448 221 615 260 5 N exactly).
 const POUNDS: f64 = 1.0 / 4.448_221_615_260_5;
-/// Kilograms of force in a newton.
+/// Kilograms-force per newton (1 kgf = 9.806 65 N exactly).
 const KILOGRAMS: f64 = 1.0 / 9.806_65;
 
-/// What a specific data type measures.
+/// Quantity of a specific data type; `None` for types that are not used here.
 fn quantity(kind: i64) -> Option<Quantity> {
     Some(match kind {
         8 => Quantity::Displacement,
@@ -86,7 +86,7 @@ fn quantity(kind: i64) -> Option<Quantity> {
     })
 }
 
-/// The specific data type of a quantity.
+/// Specific data type of a quantity, as it is written.
 pub(super) fn kind(quantity: Quantity) -> i64 {
     match quantity {
         Quantity::Displacement => 8,
@@ -100,12 +100,12 @@ pub(super) fn kind(quantity: Quantity) -> i64 {
     }
 }
 
-/// The unit of an axis; `None` where the file does not say.
+/// Unit of an axis; `None` if the file does not state it.
 ///
-/// The label is nearer to the data than the file's units, so it goes before them.
+/// The unit label of the axis takes precedence over the units of the file.
 ///
 /// # Errors
-/// The label is no known unit of a quantity that must have one, or contradicts the specific data type.
+/// The label is unknown although the specific data type is a supported quantity, or it contradicts the specific data type.
 pub fn unit(axis: &Axis, file: FileUnits) -> Result<Option<Unit>, String> {
     let stated = quantity(axis.kind);
     if axis.unit.is_empty() {
@@ -123,12 +123,12 @@ pub fn unit(axis: &Axis, file: FileUnits) -> Result<Option<Unit>, String> {
         }
         (Ok(unit), _) => Ok(Some(unit)),
         (Err(error), Some(_)) => Err(error.to_string()),
-        // Of something that the tool has no use for.
+        // Unknown label of a quantity that is not used here.
         (Err(_), None) => Ok(None),
     }
 }
 
-/// SI units in one, by the units of the file and the exponents of the axis.
+/// Conversion factor to SI from the units of the file and the exponents of the axis.
 fn factor(axis: &Axis, quantity: Quantity, file: FileUnits) -> f64 {
     let usual = match quantity {
         Quantity::Displacement | Quantity::Velocity | Quantity::Acceleration => [1, 0],
@@ -136,7 +136,7 @@ fn factor(axis: &Axis, quantity: Quantity, file: FileUnits) -> f64 {
         Quantity::Pressure => [-2, 1],
         _ => [0, 0],
     };
-    // Many writers leave the exponents at 0.
+    // Many writers leave both exponents at 0; then those of the quantity apply.
     let [length, force] = if axis.exponents == [0, 0] {
         usual
     } else {
@@ -146,7 +146,7 @@ fn factor(axis: &Axis, quantity: Quantity, file: FileUnits) -> f64 {
     1.0 / (power(file.length, length) * power(file.force, force))
 }
 
-/// A unit as writers label it: also in capitals, with `sec` for s.
+/// Parses a unit label, also in capitals and with `sec` for s.
 fn label(text: &str) -> Result<Unit, UnknownUnit> {
     let exact = text.parse::<Unit>();
     if exact.is_ok() {
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_go_before_the_units_of_the_file() {
+    fn labels_take_precedence_over_the_units_of_the_file() {
         let millimetres = FileUnits {
             length: 1e3,
             force: 1e3,

@@ -1,29 +1,29 @@
-//! Writes data sets 58, as text or binary. Numbers are double.
+//! Writer of data sets 58, as text or binary, in double precision.
 
 use std::io::{self, Write};
 
 use num_complex::Complex;
 
-use super::header::{Axis, Freedom, Function, Header, OrdinateType, RECORDS};
+use super::header::{Axis, DegreeOfFreedom, Function, Header, OrdinateType, RECORDS};
 use super::units::kind;
 use crate::{Channel, Quantity, Recording};
 
-/// How the data of a UFF file are written.
+/// Form of the data in a written UFF file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UffForm {
-    /// As text.
+    /// Text.
     #[default]
     Text,
-    /// As little-endian IEEE doubles (58b).
+    /// Binary, little-endian IEEE 754 doubles (58b).
     Binary,
 }
 
-/// Values to write.
+/// Ordinate values to write.
 #[derive(Clone, Copy, Debug)]
 pub enum Values<'a> {
-    /// Real ones.
+    /// Real values.
     Real(&'a [f64]),
-    /// Complex ones.
+    /// Complex values.
     Complex(&'a [Complex<f64>]),
 }
 
@@ -36,7 +36,7 @@ impl Values<'_> {
     }
 }
 
-/// Data set 164: everything that follows is in SI units.
+/// Writes data set 164: the data sets after it are in SI units.
 pub fn write_units(out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "    -1\n   164")?;
     writeln!(out, "{:10}{:<20}{:10}", 1, "SI: Meter (newton)", 2)?;
@@ -44,7 +44,7 @@ pub fn write_units(out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "{one}{one}{one}\n{}\n    -1", exponential(273.15, 17, 25))
 }
 
-/// What stands before the samples of a channel of a recording.
+/// Header for a channel of a recording.
 pub(super) fn header_of(recording: &Recording, channel: &Channel) -> Header {
     let direction = match channel.name.as_bytes() {
         [.., b'x'] => 1,
@@ -52,7 +52,7 @@ pub(super) fn header_of(recording: &Recording, channel: &Channel) -> Header {
         [.., b'z'] => 3,
         _ => 0,
     };
-    // Only the names of recordings say a direction: "matrix" is no channel along x.
+    // Only standard channel names define a direction: the x in "matrix" does not.
     let is_by_convention = Quantity::of_name(&channel.name) == Some(channel.quantity);
     let sensor = recording
         .sidecar
@@ -68,12 +68,12 @@ pub(super) fn header_of(recording: &Recording, channel: &Channel) -> Header {
             String::new(),
         ],
         function: Function::Time,
-        response: Freedom {
+        response: DegreeOfFreedom {
             entity: channel.name.clone(),
             node: 1,
             direction: if is_by_convention { direction } else { 0 },
         },
-        reference: Freedom::default(),
+        reference: DegreeOfFreedom::default(),
         ordinate_type: OrdinateType {
             is_double: true,
             is_complex: false,
@@ -86,7 +86,7 @@ pub(super) fn header_of(recording: &Recording, channel: &Channel) -> Header {
     }
 }
 
-/// An axis in SI units.
+/// Axis of a quantity, in SI units.
 pub fn axis_of(quantity: Quantity) -> Axis {
     Axis {
         kind: kind(quantity),
@@ -103,7 +103,7 @@ pub fn axis_of(quantity: Quantity) -> Axis {
     }
 }
 
-/// Writes a data set 58. `uneven` is the abscissa where the header has no even one.
+/// Writes a data set 58; `uneven` is the abscissa if the header has no even spacing.
 pub fn write_set(
     out: &mut dyn Write,
     header: &Header,
@@ -132,14 +132,15 @@ pub fn write_set(
     writeln!(out, "    -1")
 }
 
+/// Writes the eleven header records.
 fn write_header(out: &mut dyn Write, header: &Header, count: usize) -> io::Result<()> {
     for words in &header.words {
         writeln!(out, "{:<80}", cut(none(words), 80))?;
     }
     write!(out, "{:5}{:10}{:5}{:10}", header.function.code(), 0, 0, 0)?;
-    for freedom in [&header.response, &header.reference] {
-        let entity = cut(none(&freedom.entity), 10);
-        write!(out, " {entity:<10}{:10}{:4}", freedom.node, freedom.direction)?;
+    for dof in [&header.response, &header.reference] {
+        let entity = cut(none(&dof.entity), 10);
+        write!(out, " {entity:<10}{:10}{:4}", dof.node, dof.direction)?;
     }
     let OrdinateType { is_complex, .. } = header.ordinate_type;
     let (first, step) = header.even.unwrap_or((0.0, 0.0));
@@ -148,7 +149,7 @@ fn write_header(out: &mut dyn Write, header: &Header, count: usize) -> io::Resul
         "\n{:10}{count:10}{:10}{}{}{}",
         if is_complex { 6 } else { 4 },
         u8::from(header.even.is_some()),
-        // Thirteen columns hold a digit more than the format asks for.
+        // The field width of 13 columns has space for one digit more than the standard format E13.5.
         exponential(first, 6, 13),
         exponential(step, 6, 13),
         exponential(0.0, 6, 13),
@@ -173,6 +174,7 @@ fn write_header(out: &mut dyn Write, header: &Header, count: usize) -> io::Resul
     Ok(())
 }
 
+/// Writes the data as text.
 fn write_text(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>) -> io::Result<()> {
     let value = |index: usize| match values {
         Values::Real(values) => exponential(values[index], 12, 20),
@@ -180,7 +182,7 @@ fn write_text(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>) -
             exponential(values[index].re, 12, 20) + &exponential(values[index].im, 12, 20)
         }
     };
-    // Values per line: 4E20.12, 2(E13.5,E20.12), E13.5,2E20.12.
+    // Values per line follow the standard formats 4E20.12; 2(E13.5,E20.12); E13.5,2E20.12.
     let per_line = match (values, uneven) {
         (Values::Real(_), None) => 4,
         (Values::Real(_), Some(_)) | (Values::Complex(_), None) => 2,
@@ -198,6 +200,7 @@ fn write_text(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>) -
     Ok(())
 }
 
+/// Writes the data as little-endian doubles.
 fn write_binary(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>) -> io::Result<()> {
     for index in 0..values.len() {
         if let Some(abscissa) = uneven {
@@ -214,7 +217,7 @@ fn write_binary(out: &mut dyn Write, uneven: Option<&[f64]>, values: Values<'_>)
     writeln!(out)
 }
 
-/// A number as Fortran's `Ewidth.digits` with one digit before the point: the exponent has two digits at least.
+/// Formats a number like Fortran `Ewidth.digits`, with one digit before the point and at least two exponent digits.
 pub(super) fn exponential(value: f64, digits: usize, width: usize) -> String {
     let text = format!("{value:.digits$E}");
     let text = match text.split_once('E') {
@@ -229,11 +232,12 @@ pub(super) fn exponential(value: f64, digits: usize, width: usize) -> String {
     format!("{text:>width$}")
 }
 
+/// `NONE` for an empty text.
 fn none(text: &str) -> &str {
     if text.is_empty() { "NONE" } else { text }
 }
 
-/// As many characters as fit, on one line.
+/// Truncates to `length` characters; control characters become blanks.
 fn cut(text: &str, length: usize) -> String {
     text.chars()
         .map(|letter| if letter.is_control() { ' ' } else { letter })
