@@ -1,4 +1,4 @@
-//! Power and cross spectra of channels that were sampled together.
+//! Auto- and cross-spectra of channels that were sampled simultaneously.
 
 use num_complex::Complex64;
 use realfft::{RealFftPlanner, RealToComplex};
@@ -7,29 +7,29 @@ use std::sync::Arc;
 
 use super::window::effective_averages;
 
-/// Segments whose transforms are multiplied in one go: each pass over the sums costs memory traffic.
+/// Number of segments whose transforms are multiplied in one pass over the sums. A choice that reduces memory traffic.
 const BATCH: usize = 4;
 
-/// Frequency lines that are multiplied in one go: what the fast memory of a core holds of all channels.
+/// Number of frequency lines multiplied in one pass. A choice: the lines of all channels then fit into the cache of a core.
 const LINES: usize = 256;
 
-/// S_ab(f) = E[A(f) B*(f)] of every pair of channels, so that X = H F gives S_xf = H S_ff.
+/// Cross-spectra S_ab(f) = E[A(f) B*(f)] of all pairs of channels; X = H F then gives S_xf = H S_ff.
 ///
-/// The scale is arbitrary and the same for all pairs: ratios are what matters here.
+/// The scale is arbitrary but equal for all pairs, since FRFs are ratios of spectra.
 #[derive(Clone, Debug)]
 pub(super) struct CrossSpectra {
     /// Frequencies of the lines, Hz.
     pub(super) frequency_hz: Vec<f64>,
     /// Number of channels.
     channels: usize,
-    /// S_ab of a ≤ b: aa, ab, …, bb, …
+    /// S_ab at all lines for pairs a ≤ b, in the order aa, ab, …, bb, …
     pairs: Vec<Vec<Complex64>>,
-    /// Independent averages behind each value.
+    /// Effective number of independent averages.
     pub(super) averages: f64,
 }
 
 impl CrossSpectra {
-    /// S_ab at a line.
+    /// S_ab of channels `a` and `b` at a line.
     pub(super) fn at(&self, line: usize, a: usize, b: usize) -> Complex64 {
         if a <= b {
             self.pairs[self.index(a, b)][line]
@@ -43,21 +43,21 @@ impl CrossSpectra {
     }
 }
 
-/// How a record is cut into segments.
+/// Segments of a record for averaged spectra.
 #[derive(Clone, Debug)]
 pub(super) struct Segments {
-    /// Weights of a segment's samples; their number is its length.
+    /// Window weights; their number is the segment length.
     pub(super) weights: Vec<f64>,
-    /// First samples of the segments.
+    /// Index of the first sample of each segment.
     pub(super) starts: Vec<usize>,
-    /// Whether the mean of each segment is taken out first.
+    /// True if the mean of each segment is removed first.
     pub(super) without_mean: bool,
-    /// Independent averages that they are worth.
+    /// Effective number of independent averages of the segments.
     pub(super) averages: f64,
 }
 
 impl Segments {
-    /// Segments as long as `weights` that overlap by a part of their length (Welch's method).
+    /// Overlapping segments of the length of `weights`; `overlap` is the overlapping fraction (Welch's method).
     pub(super) fn overlapping(weights: Vec<f64>, overlap: f64, samples: usize) -> Self {
         let length = weights.len();
         let shift = ((length as f64 * (1.0 - overlap)).round() as usize).clamp(1, length.max(1));
@@ -73,7 +73,7 @@ impl Segments {
     }
 }
 
-/// Averages the spectra over segments of `signals`, which are of one length, at the lines `lines` of the transform.
+/// Spectra averaged over the segments of `signals` (all of one length), at the transform lines `lines`.
 pub(super) fn averaged(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -112,7 +112,7 @@ pub(super) fn averaged(
     spectra
 }
 
-/// Averages the spectrum of whole signals, tapered over a part of both ends, over `width` neighbouring lines.
+/// Spectra of whole signals, averaged over `width` neighbouring lines; both ends are tapered over the fraction `taper` of the length.
 pub(super) fn smoothed(
     signals: &[&[f64]],
     sample_rate_hz: f64,
@@ -151,12 +151,12 @@ pub(super) fn smoothed(
             .collect(),
         channels,
         pairs,
-        // Padding brings lines, but nothing new.
+        // Zero padding adds lines, but no independent information.
         averages: width as f64 * samples as f64 / length as f64,
     }
 }
 
-/// 1 in the middle, half a cosine over the part `taper` at both ends.
+/// Tukey window: 1 in the middle, half-cosine tapers over the fraction `taper` of the length at both ends.
 fn tukey(length: usize, taper: f64) -> Vec<f64> {
     let ramp = (taper * length as f64).max(1.0);
     (0..length)
@@ -171,7 +171,7 @@ fn tukey(length: usize, taper: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Adds A B* of every pair, summed over the segments of a batch.
+/// Adds A B* of every pair of channels, for all segments of a batch, to the sums.
 fn multiply(
     pairs: &mut [Vec<Complex64>],
     batch: &[Complex64],
@@ -201,7 +201,7 @@ fn multiply(
     }
 }
 
-/// The transform of a segment, with room for it.
+/// Real Fourier transform of a segment, with its buffers.
 struct Transform {
     plan: Arc<dyn RealToComplex<f64>>,
     time: Vec<f64>,
@@ -220,7 +220,7 @@ impl Transform {
         }
     }
 
-    /// The lines of samples times weights, with zeros behind where they are shorter than the transform.
+    /// Transform of the weighted samples, padded with zeros to the transform length.
     fn of(&mut self, samples: &[f64], weights: &[f64], without_mean: bool) -> &[Complex64] {
         let mean = if without_mean {
             samples.iter().sum::<f64>() / samples.len().max(1) as f64
@@ -231,7 +231,7 @@ impl Transform {
         for ((time, sample), weight) in self.time.iter_mut().zip(samples).zip(weights) {
             *time = (sample - mean) * weight;
         }
-        // Only buffers of other lengths than planned are refused.
+        // The transform fails only for buffers of the wrong length.
         let done = self
             .plan
             .process_with_scratch(&mut self.time, &mut self.lines, &mut self.scratch);
@@ -251,7 +251,7 @@ mod tests {
         (0..length).map(|_| random.random_range(-1.0..1.0)).collect()
     }
 
-    /// The sum by the definition.
+    /// Cross-spectrum sum at one line, computed from the definition of the transform.
     fn by_hand(a: &[f64], b: &[f64], weights: &[f64], starts: &[usize], line: usize) -> Complex64 {
         let length = weights.len();
         let transform = |signal: &[f64], start: usize| -> Complex64 {
@@ -273,23 +273,23 @@ mod tests {
     }
 
     #[test]
-    fn sums_are_those_of_the_definition() {
+    fn averaged_spectra_agree_with_the_definition() {
         let (a, b, c) = (noise(1, 500), noise(2, 500), noise(3, 500));
         let weights = Window::Hann.weights(60);
         let segments = Segments::overlapping(weights.clone(), 0.5, 500);
-        // 500 samples hold 15 segments of 60 that start 30 apart: also an incomplete batch.
+        // 500 samples contain 15 segments of 60 samples at a spacing of 30; the last batch is incomplete.
         assert_eq!(segments.starts.len(), 15);
         let spectra = averaged(&[&a, &b, &c], 1000.0, &segments, 1..31);
         assert_eq!(spectra.frequency_hz[0], 1000.0 / 60.0);
         for (i, j, x, y) in [(0, 0, &a, &a), (0, 2, &a, &c), (2, 1, &c, &b)] {
             let expected = by_hand(x, y, &weights, &segments.starts, 8);
-            // Some hundred roundings of numbers near 1.
+            // Tolerance: a few hundred roundings of numbers near 1.
             assert!((spectra.at(7, i, j) - expected).norm() < 1e-11, "{i}{j}");
         }
     }
 
     #[test]
-    fn whole_records_are_smoothed_over_lines() {
+    fn spectra_of_whole_records_are_averaged_over_lines() {
         let (a, b) = (noise(4, 512), noise(5, 512));
         let spectra = smoothed(&[&a, &b], 512.0, 0.1, 4, 8..41);
         assert_eq!(spectra.frequency_hz.len(), 8);

@@ -1,40 +1,40 @@
-//! Which channels of a recording are the forces and which the responses.
+//! Selection of the force and response channels of a recording.
 
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Channel, Quantity, Recording, RecordingError};
 
 use super::FrfError;
 
-/// The channels of a recording that a frequency response function relates.
+/// Force and response channels of one recording, for the measurement of FRFs.
 #[derive(Clone, Debug)]
 pub(super) struct Driven<'a> {
     /// The recording.
     pub(super) recording: &'a Recording,
-    /// Forces, in the order x, y, z.
+    /// Force channels with directions, in the order x, y, z.
     pub(super) forces: Vec<(Direction, &'a Channel)>,
-    /// Responses, in the order x, y, z.
+    /// Response channels, in the order x, y, z.
     pub(super) responses: Vec<Response<'a>>,
-    /// What was chosen for the user.
+    /// Notes on channels that were selected among several.
     pub(super) warnings: Vec<String>,
 }
 
-/// A response.
+/// One response channel with its direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Response<'a> {
     pub(super) direction: Direction,
     pub(super) channel: &'a Channel,
-    /// How often displacement was differentiated: 0, 1 for a velocity, 2 for an acceleration.
+    /// Order of the time derivative of displacement: 0 displacement, 1 velocity, 2 acceleration.
     pub(super) derivatives: i32,
 }
 
 impl<'a> Driven<'a> {
-    /// The forces and responses of a recording; `chosen` are names of channels where not all are meant.
+    /// Selects forces and responses; `chosen` restricts them to the named channels.
     ///
-    /// Forces are those that the sidecar calls input, else all that do not rest. Of several sensors of a direction the
-    /// displacement is taken, else the velocity.
+    /// Forces are the inputs of the sidecar, else all force channels that are not constant. Of several response channels in one direction,
+    /// displacement takes precedence over velocity, and velocity over acceleration.
     ///
     /// # Errors
-    /// No force, no response, a chosen channel that is not there, an input that is no force.
+    /// There is no force or no response; a chosen channel does not exist; an input is not a force.
     pub(super) fn of(recording: &'a Recording, chosen: &[String]) -> Result<Self, FrfError> {
         let refused = |error: RecordingError| FrfError::Recording(error);
         for name in chosen {
@@ -72,7 +72,7 @@ impl<'a> Driven<'a> {
         self.forces.iter().map(|(direction, _)| *direction).collect()
     }
 
-    /// Directions and derivatives of the responses.
+    /// Direction and derivative order of each response.
     pub(super) fn response_kinds(&self) -> Vec<(Direction, i32)> {
         self.responses
             .iter()
@@ -80,7 +80,7 @@ impl<'a> Driven<'a> {
             .collect()
     }
 
-    /// The samples: forces, then responses.
+    /// Samples of all channels: forces, then responses.
     pub(super) fn signals(&self) -> Vec<&'a [f64]> {
         let forces = self.forces.iter().map(|(_, channel)| channel.samples.as_slice());
         let responses = self
@@ -90,10 +90,10 @@ impl<'a> Driven<'a> {
         forces.chain(responses).collect()
     }
 
-    /// The only force.
+    /// The single force channel.
     ///
     /// # Errors
-    /// There are several; `needed` says what needs one.
+    /// There are several forces; `needed` names the kind of test that requires one.
     pub(super) fn only_force(&self, needed: &str) -> Result<&'a Channel, FrfError> {
         match self.forces.as_slice() {
             [(_, channel)] => Ok(channel),

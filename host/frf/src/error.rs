@@ -1,30 +1,30 @@
-//! What can be wrong with a table of frequency response functions.
+//! Errors of FRF tables and of FRF measurements.
 
 use std::path::PathBuf;
 
 use quietcut_recording::RecordingError;
 use quietcut_recording::file::FileError;
 
-/// Why a table of frequency response functions cannot be read, or is none.
+/// Error of reading an FRF table or of measuring FRFs; every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum FrfError {
-    /// The file is not there or cannot be read or written.
+    /// The file does not exist, or cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A recording is wrong, or does not have what is asked of it.
+    /// A recording cannot be read, or lacks a required channel.
     #[error(transparent)]
     Recording(RecordingError),
-    /// A line of the file is wrong.
+    /// A line of the file is malformed.
     #[error("{}, line {line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// The line, from 1.
+        /// Number of the line, from 1.
         line: u64,
         /// What was found, and what would be right.
         what: String,
     },
-    /// A column of the file is wrong.
+    /// A column of the file has an unknown name or unit.
     #[error("{}, column \"{column}\": {what}", path.display())]
     Column {
         /// The file.
@@ -34,10 +34,10 @@ pub enum FrfError {
         /// What was found, and what would be right.
         what: String,
     },
-    /// The file or the values do not make a table.
+    /// The content of the file or the given values are not a valid table.
     #[error("{}: {what}", path.display())]
     Content {
-        /// The file, or where the values came from.
+        /// The file, or the origin of the values.
         path: PathBuf,
         /// What was found, and what would be right.
         what: String,

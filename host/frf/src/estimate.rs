@@ -1,61 +1,58 @@
-//! From power and cross spectra to frequency response functions, with what is known of their quality.
+//! FRF estimators from auto- and cross-spectra, with coherence and random error.
 
 use super::cross_spectra::CrossSpectra;
 use super::small_matrix::{
     Matrix, ZERO, adjoint, extreme_eigenvalues, inverse, product, product_adjoint, scaled, sum,
 };
 
-/// How spectra become a frequency response function. The names are the standard ones: equations (4.1) and (4.2) of
-/// the thesis call them the other way round.
+/// Estimator of a frequency response function. The names H1 and H2 follow the standard use (Bendat and Piersol).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimator {
-    /// H1 = S_xf S_ff⁻¹: noise of the responses averages out.
+    /// H1 = S_xf S_ff⁻¹: unbiased with noise in the responses only.
     #[default]
     H1,
-    /// H2 = S_xx S_fx⁻¹: noise of the forces averages out.
+    /// H2 = S_xx S_fx⁻¹: unbiased with noise in the forces only.
     H2,
-    /// ½ (H1 + H2), equation (4.4).
+    /// Mean ½ (H1 + H2).
     Mean,
-    /// H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests, equation (7.12): the forces of each may be
-    /// dependent, as long as those of all are not.
+    /// Pseudo-inverse H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests. The forces of one test may be dependent if those of all
+    /// tests together are independent.
     PseudoInverse,
 }
 
-/// The smallest singular value of the forces, divided by their root mean squares, below which they count as dependent:
-/// noise of a hundredth of a force then makes errors as large as the FRF.
+/// Smallest singular value of the forces, each divided by its root mean square, for independent forces. Below it, noise of 1 % of a force
+/// causes errors as large as the FRF.
 pub(super) const DEPENDENT: f64 = 1e-2;
 
-/// One frequency of an estimate.
+/// FRF estimate at one frequency line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
     pub(super) frequency_hz: f64,
-    /// Responses by forces, as they were measured: not yet displacements.
+    /// FRF matrix, rows responses, columns forces; responses as measured, before integration to displacement.
     pub(super) h: Matrix,
-    /// Multiple coherence of each response, equation (7.10): the part of its power that the forces explain.
+    /// Multiple coherence of each response: fraction of its power that is linearly related to the forces.
     pub(super) coherence: [f64; 3],
-    /// Standard deviation of |H|.
+    /// Standard deviation of |H| for each response and force (random error).
     pub(super) deviation: [[f64; 3]; 3],
-    /// Smallest and largest singular value of the forces, each divided by its root mean square.
+    /// Smallest and largest singular value of the forces, each force divided by its root mean square.
     pub(super) singular: (f64, f64),
 }
 
-/// What an estimate needs to know.
+/// Number of force and response channels; the forces come first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
-    /// The first channels are forces,
+    /// Number of forces.
     pub(super) forces: usize,
-    /// and these many after them responses.
+    /// Number of responses.
     pub(super) responses: usize,
 }
 
-/// The estimate at each line where it can be made.
+/// FRF estimate at every frequency line; lines with a singular force matrix are left out.
 ///
-/// `tests` have the same lines. H2 and the mean of several forces need as many responses as forces; the caller has
-/// seen to it.
+/// All `tests` have the same lines. For several forces, H2 and the mean require equal numbers of responses and forces; the caller checks it.
 ///
-/// The random error is that of Bendat and Piersol, generalised to W in H = Σ S_xf,i W_i: the variance of H_pq is
-/// Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq / n_i with the power S_ee that the forces do not explain. With one force it is their
-/// ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
+/// Random error (Bendat and Piersol, generalised to H = Σ S_xf,i W_i): var H_pq = Σ_i S_ee,p (W_iᴴ S_ff,i W_i)_qq / n_i, with the residual
+/// spectrum S_ee of the responses and n_i averages of test i. For one force: ε[|H|] = √(1 − γ²) / (|γ| √(2n)).
 pub(super) fn lines(tests: &[CrossSpectra], shape: Shape, estimator: Estimator) -> Vec<Line> {
     let count = tests.first().map_or(0, |test| test.frequency_hz.len());
     (0..count)
@@ -63,7 +60,7 @@ pub(super) fn lines(tests: &[CrossSpectra], shape: Shape, estimator: Estimator) 
         .collect()
 }
 
-/// The spectra of one test at one line, per average.
+/// Auto- and cross-spectra of one test at one line, divided by the number of averages.
 struct Powers {
     averages: f64,
     ff: Matrix,
@@ -126,7 +123,7 @@ fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize
         Estimator::H2 => second(&xf, &xx, shape)?,
         Estimator::Mean => scaled(&sum(&first, &second(&xf, &xx, shape)?), 0.5),
     };
-    // Power of X − H1 F.
+    // Residual power of X − H1 F: S_xx − 2 Re(S_xf Hᴴ) + H S_ff Hᴴ.
     let explained = product_adjoint(&xf, &first);
     let modelled = product_adjoint(&product(&first, &ff), &first);
     let unbiased = averages / (averages - shape.forces as f64).max(1.0);
@@ -160,7 +157,7 @@ fn line(tests: &[CrossSpectra], shape: Shape, estimator: Estimator, index: usize
     Some(line)
 }
 
-/// S_xx S_fx⁻¹; with one force for each response by itself, as it should be for one.
+/// H2 = S_xx S_fx⁻¹. With one force it is computed separately for each response.
 fn second(xf: &Matrix, xx: &Matrix, shape: Shape) -> Option<Matrix> {
     if shape.forces == 1 {
         let mut h = ZERO;
@@ -174,10 +171,9 @@ fn second(xf: &Matrix, xx: &Matrix, shape: Shape) -> Option<Matrix> {
     Some(product(xx, &inverse))
 }
 
-/// The blocks W_i of the pseudo-inverse of [S_ff,1 S_ff,2 …], and its smallest and largest singular value after each
-/// row has been divided by its norm.
+/// Blocks W_i of the pseudo-inverse of S = [S_ff,1 S_ff,2 …], and the smallest and largest singular value of S with rows of unit norm.
 ///
-/// With more columns than rows and full rank, S⁺ = Sᴴ (S Sᴴ)⁻¹.
+/// For full row rank, S⁺ = Sᴴ (S Sᴴ)⁻¹.
 fn stacked(powers: &[Powers], forces: usize) -> Option<(Vec<Matrix>, (f64, f64))> {
     let gram = powers.iter().fold(ZERO, |gram, test| {
         sum(&gram, &product_adjoint(&test.ff, &test.ff))

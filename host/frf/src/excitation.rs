@@ -1,22 +1,22 @@
-//! How a structure was driven.
+//! Kinds of excitation of a structure.
 
 use quietcut_recording::{Sidecar, TestKind};
 
-/// How the structure was driven, which decides how a record is cut.
+/// Kind of excitation; it selects how a record is divided into segments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Excitation {
-    /// Noise, or a cut: overlapping segments under a window (Welch's method).
+    /// Random excitation, or a cut: overlapping windowed segments (Welch's method).
     Random,
-    /// A frequency that glides: the whole record at once, neighbouring frequencies averaged.
+    /// Swept sine: one transform of the whole record, averaged over neighbouring lines.
     Sweep,
-    /// Blows of a hammer: a segment for each.
+    /// Hammer test: one segment per impact.
     Hammer,
-    /// One frequency after the other: phasors of each.
+    /// Step sine: phasors of force and response at each frequency.
     StepSine,
 }
 
 impl Excitation {
-    /// What a test is driven by.
+    /// Excitation of a recording, from the kind of test in its sidecar.
     pub(super) fn of(sidecar: &Sidecar) -> Self {
         let glides = sidecar.cut.is_some_and(|cut| cut.last_rpm.is_some());
         match sidecar.kind {
@@ -30,7 +30,7 @@ impl Excitation {
         }
     }
 
-    /// The word for people and scripts.
+    /// Name in messages and JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",

@@ -1,53 +1,57 @@
-//! Blows of a hammer: where they are, which of them are double, and the windows for force and response.
+//! Impacts of a hammer test: detection, double impacts, and the windows of force and response.
 
 use super::FrfError;
 use super::driven::Driven;
 
-/// A second pulse within this time is a bounce: nobody strikes twice so fast on purpose.
+/// Longest time from an impact to a bounce of the hammer, s; a pulse within it belongs to the same impact. A choice, below the interval of
+/// deliberate strikes.
 const BOUNCE_S: f64 = 0.4;
 
-/// Part of the largest force that a pulse must reach to be a blow.
+/// Smallest peak of an impact, as a fraction of the largest force of the record. A choice.
 const BLOW: f64 = 0.1;
 
-/// Part of a blow's own peak that a second pulse must reach to count; ringing of filters stays below it.
+/// Smallest second pulse that makes an impact double, as a fraction of the peak of the impact. A choice, above the ringing of
+/// anti-aliasing filters.
 const SECOND: f64 = 0.03;
 
-/// Standard deviations of the noise that any pulse must reach.
+/// Smallest peak of any pulse, in standard deviations of the force noise. A choice: Gaussian noise exceeds eight deviations with a
+/// probability of 1e-15 per sample.
 const NOISE: f64 = 8.0;
 
-/// Part of a segment before the blow.
+/// Length of the segment before the impact, as a fraction of the segment. A choice; its mean gives the offset of the sensor.
 const BEFORE: f64 = 0.01;
 
-/// A blow.
+/// One impact of the hammer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blow {
-    /// Time of its peak, s.
+    /// Time of the force peak, s, from the start of the record.
     pub time_s: f64,
-    /// Its largest force, N, with its sign.
+    /// Peak force, N, with sign.
     pub peak_n: f64,
-    /// Delay and size, as a part of the peak, of the largest second pulse that falls into its segment.
+    /// Largest second pulse within the segment: delay after the peak, s, and height as a fraction of the peak; `None` for a single impact.
     pub second: Option<(f64, f64)>,
-    /// First and last sample of the pulse, and the peak.
+    /// First sample of the force pulse.
     first: usize,
+    /// Last sample of the force pulse.
     last: usize,
 }
 
-/// How blows become segments.
+/// Segment length and exponential window of a hammer test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HammerWindows {
-    /// Length of a segment, s; as long as the blows allow where it is not given.
+    /// Length of a segment, s; `None` for the longest that the intervals between impacts allow.
     pub segment_s: Option<f64>,
-    /// Time constant of the exponential window on force and response, s; none where it is not given.
+    /// Time constant τ of the exponential window on force and response, s; `None` for no window.
     ///
-    /// With e^{−t/τ} on both, the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ. See [`true_damping`].
+    /// With e^{−t/τ} on both signals the FRF is exactly H(iω + 1/τ): every pole λ moves to λ − 1/τ. See [`true_damping`].
     pub exponential_s: Option<f64>,
 }
 
-/// The damping ratio of a mode, from that of an FRF with an exponential window of time constant τ.
+/// Corrects the natural frequency and damping ratio of a mode for an exponential window of time constant τ (`exponential_s`, s).
 ///
 /// The window moves the pole λ = −ζω ± iω√(1 − ζ²) by −1/τ. Its imaginary part stays, so with λ' = λ_measured + 1/τ
-/// the natural frequency is |λ'| and ζ = −Re λ'/|λ'|. Returns natural frequency in Hz and ζ, which is negative where
-/// the measured damping is less than the window's.
+/// the natural frequency is |λ'| and ζ = −Re λ'/|λ'|. Returns the natural frequency, Hz, and ζ. ζ is negative if
+/// the measured damping is less than that of the window.
 pub fn true_damping(frequency_hz: f64, damping_ratio: f64, exponential_s: f64) -> (f64, f64) {
     let decay_hz = frequency_hz * damping_ratio - 1.0 / (std::f64::consts::TAU * exponential_s);
     let damped_hz = frequency_hz * (1.0 - damping_ratio * damping_ratio).max(0.0).sqrt();
@@ -55,24 +59,24 @@ pub fn true_damping(frequency_hz: f64, damping_ratio: f64, exponential_s: f64) -
     (true_hz, decay_hz / true_hz)
 }
 
-/// What blows were cut into.
+/// Windowed segments of the impacts of one record.
 pub(super) struct BlowSegments {
-    /// Forces and responses after their windows, each segment behind the other.
+    /// Windowed force, then responses; the segments of each signal are concatenated.
     pub(super) signals: Vec<Vec<f64>>,
-    /// Samples of a segment.
+    /// Number of samples per segment.
     pub(super) length: usize,
-    /// The blows that are in it.
+    /// Single impacts, whose segments are used.
     pub(super) used: Vec<Blow>,
-    /// Those that are not: double.
+    /// Double impacts, which are left out.
     pub(super) double: Vec<Blow>,
-    /// The largest part of a response's peak, root mean square, with which a segment ends.
+    /// Largest amplitude of a response at the end of a segment, as a fraction of its peak.
     pub(super) left_over: f64,
 }
 
-/// Cuts the blows of a record, which double ones are left out of.
+/// Cuts a record into one windowed segment per single impact; double impacts are left out.
 ///
 /// # Errors
-/// Several forces, no blow, only double ones, segments that are longer than the record.
+/// The record has several forces, no impact, or only double impacts; or the segments are longer than the record.
 pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<BlowSegments, FrfError> {
     let force = driven.only_force("a hammer test")?;
     let rate = driven.recording.sample_rate_hz;
@@ -155,7 +159,7 @@ pub(super) fn segments(driven: &Driven<'_>, windows: HammerWindows) -> Result<Bl
     Ok(cut)
 }
 
-/// Root mean square of the last twentieth, as a part of the peak.
+/// Amplitude (√2 · RMS) of the last twentieth of a segment, as a fraction of its peak.
 fn left_over(segment: &[f64]) -> f64 {
     let tail = &segment[segment.len() - segment.len() / 20..];
     let power = tail.iter().map(|x| x * x).sum::<f64>() / tail.len().max(1) as f64;
@@ -167,8 +171,8 @@ fn left_over(segment: &[f64]) -> f64 {
     }
 }
 
-/// 1 over the pulse and its own width behind it, half a cosine to 0 after that: the force of a hammer that has left is
-/// nothing but noise.
+/// Force window: 1 over the pulse and one pulse width after it, then a half-cosine taper to 0. After the contact the force signal is only
+/// noise.
 fn pulse_weight(blow: &Blow, sample: usize) -> f64 {
     let width = (blow.last - blow.first).max(4);
     let outside = if sample < blow.first {
@@ -183,7 +187,7 @@ fn pulse_weight(blow: &Blow, sample: usize) -> f64 {
     }
 }
 
-/// The most samples that each blow has to itself.
+/// Longest segment, samples, without overlap between impacts.
 fn longest_segment(blows: &[Blow], samples: usize) -> usize {
     let ends = blows.iter().skip(1).map(|blow| blow.first).chain([samples]);
     let shortest = blows
@@ -192,11 +196,11 @@ fn longest_segment(blows: &[Blow], samples: usize) -> usize {
         .map(|(blow, end)| end - blow.first)
         .min()
         .unwrap_or(0);
-    // Each has its part before as well.
+    // The segment also includes its pre-impact part.
     (shortest as f64 / (1.0 + BEFORE)) as usize
 }
 
-/// All blows of a force signal; pulses that follow a blow within a bounce belong to it.
+/// Detects all impacts of a force signal; pulses within [`BOUNCE_S`] after an impact belong to it.
 fn blows(force: &[f64], rate: f64) -> Vec<Blow> {
     let middle = median(force.to_vec());
     let noise = noise(force, middle);
@@ -241,11 +245,11 @@ fn blows(force: &[f64], rate: f64) -> Vec<Blow> {
     blows
 }
 
-/// The largest second pulse before sample `end`: its delay in s, and its part of the peak.
+/// Largest second pulse before sample `end`: delay, s, and height as a fraction of the peak; `None` below the threshold.
 fn second_pulse(force: &[f64], blow: &Blow, end: usize, rate: f64) -> Option<(f64, f64)> {
     let middle = median(force.to_vec());
     let width = (blow.last - blow.first).max(4);
-    // What rings of filters is next to the pulse.
+    // One pulse width after the pulse is skipped, since filters ring there.
     let from = (blow.last + width).min(end);
     let (at, size) = (from..end.min(force.len()))
         .map(|k| (k, (force[k] - middle).abs()))
@@ -255,11 +259,12 @@ fn second_pulse(force: &[f64], blow: &Blow, end: usize, rate: f64) -> Option<(f6
     (size > threshold).then(|| (delay_s, size / blow.peak_n.abs()))
 }
 
-/// Standard deviation of normal noise, from the median of its absolute values: blows are rare.
+/// Standard deviation of Gaussian noise, 1.4826 · median absolute deviation; rare impacts do not affect it.
 fn noise(force: &[f64], middle: f64) -> f64 {
     1.4826 * median(force.iter().map(|f| (f - middle).abs()).collect())
 }
 
+/// Median of the values; 0 if there are none.
 fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;

@@ -1,4 +1,4 @@
-//! A receptance between, below and above the lines of a table.
+//! Interpolation and extrapolation of an FRF table.
 
 use nalgebra::{Matrix3, SMatrix};
 use num_complex::Complex64;
@@ -6,18 +6,18 @@ use num_complex::Complex64;
 use super::{FrfError, FrfTable};
 use quietcut_model::structure::feed_axes;
 
-/// The fewest lines through which a cubic passes.
+/// Smallest number of lines of a table: a cubic polynomial needs four points.
 const LINES_MIN: usize = 4;
 
-/// H(f), m/N, rows displacement, columns force, over all frequencies.
+/// Receptance matrix H(f), m/N, at all frequencies; rows displacement, columns force.
 ///
 /// Between the lines each entry is the cubic through the four nearest lines (Lagrange), equal to the table on its
 /// lines. For a mode of half bandwidth ζf it is off by 0.56 (Δf/ζf)⁴ of the peak midway between lines Δf apart: 0.09 %
 /// with five lines per half bandwidth, 3.5 % with two. [`Interpolation::error`] measures it on the table itself.
 ///
-/// Outside the lines a table says nothing, and H is what any structure does beyond its modes: below the first line
-/// stiffness and viscous damping, Re H constant and Im H as f; above the last one inertia, H as f⁻². Both continue
-/// the table, and both err by as much as modes outside the table make H. H(−f) is the conjugate of H(f).
+/// Below the first line H is that of stiffness and viscous damping: Re H constant, Im H ∝ f. Above the last line H is that of inertia,
+/// H ∝ f⁻². Both continue the table without a step; their error is the contribution of modes outside the table. H(−f) is the conjugate of
+/// H(f).
 #[derive(Clone, Debug)]
 pub struct Interpolation {
     frequency_hz: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct Interpolation {
 }
 
 impl Interpolation {
-    /// Through the lines of a table.
+    /// Interpolation of a table.
     ///
     /// # Errors
     /// The table has fewer than four lines.
@@ -46,7 +46,7 @@ impl Interpolation {
         Ok(Self { frequency_hz, lines })
     }
 
-    /// Through every second line and the last one; `None` where those are too few.
+    /// Interpolation through every second line and the last line; `None` for fewer than four lines.
     pub fn thinned(&self) -> Option<Self> {
         let last = self.lines.len() - 1;
         let kept = || (0..last).step_by(2).chain([last]);
@@ -70,7 +70,7 @@ impl Interpolation {
         &self.frequency_hz
     }
 
-    /// The same receptances seen by a feed that is turned by `angle_deg` from x towards y.
+    /// The receptances in feed coordinates, rotated by `angle_deg` degrees from x towards y: Rᵀ H R.
     pub fn turned(&self, angle_deg: f64) -> Self {
         let machine_from_feed = feed_axes(angle_deg).map(Complex64::from);
         Self {
@@ -83,18 +83,18 @@ impl Interpolation {
         }
     }
 
-    /// H on the lines, m/N.
+    /// H at the lines of the table, m/N.
     pub fn lines(&self) -> &[Matrix3<Complex64>] {
         &self.lines
     }
 
-    /// H(s) at the complex frequency f = s/2πi, Hz.
+    /// H at the complex frequency f = s/(2πi), Hz.
     ///
-    /// Beside the real axis the polynomial of the nearest lines is continued: good as far from it as lines are apart,
-    /// or as the nearest mode allows.
+    /// Off the real axis the cubic of the nearest lines is continued analytically. It is accurate up to about one line spacing from the axis,
+    /// and closer to a pole only to its distance.
     pub fn at(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
         if frequency_hz.re < 0.0 {
-            // Conjugate in s is −f̄ in f.
+            // Complex conjugation of s maps f to −f̄.
             self.at_positive(-frequency_hz.conj()).map(|entry| entry.conj())
         } else {
             self.at_positive(frequency_hz)
@@ -110,13 +110,13 @@ impl Interpolation {
         if frequency_hz.re > last {
             return self.lines[self.lines.len() - 1] * (last / frequency_hz).powi(2);
         }
-        // The first line at or above: two lines below it, it and one more, as far as there are.
+        // The four nearest lines: two below the frequency and two at or above it, shifted inwards at the ends of the table.
         let above = self.frequency_hz.partition_point(|&line| line < frequency_hz.re);
         let from = above.saturating_sub(2).min(self.lines.len() - 4);
         self.cubic([from, from + 1, from + 2, from + 3], frequency_hz)
     }
 
-    /// The cubic through four lines.
+    /// Cubic Lagrange polynomial through four lines.
     fn cubic(&self, nodes: [usize; 4], frequency_hz: Complex64) -> Matrix3<Complex64> {
         let at = nodes.map(|node| self.frequency_hz[node]);
         let mut sum = SMatrix::zeros();
@@ -130,11 +130,11 @@ impl Interpolation {
         sum
     }
 
-    /// The largest error between the lines, as a share of the largest entry of H: an estimate.
+    /// Estimate of the largest interpolation error, as a fraction of the largest entry of H.
     ///
-    /// Every line is predicted from the two lines before and the two after that stand an odd number of lines away, as
-    /// the table with every second line would; a sixteenth of the largest miss is the estimate, since the error of a
-    /// cubic falls with the fourth power of the distance. Noise of the measurement counts as error.
+    /// Each line is predicted from the lines at distances −3, −1, +1 and +3, that is, with twice the line spacing. The estimate is 1/16 of the
+    /// largest prediction error, since the error of a cubic is proportional to the fourth power of the spacing. Measurement noise counts as
+    /// error.
     pub fn error(&self) -> f64 {
         let peak = self.lines.iter().map(largest).fold(0.0, f64::max);
         let count = self.lines.len();
@@ -162,7 +162,7 @@ mod tests {
     use crate::Frf;
     use quietcut_model::structure::Direction;
 
-    /// One mode of 17 Hz, 3 %, as H_xx and H_yx.
+    /// Receptance of one mode of 17 Hz with 3 % damping and unit mass.
     fn mode(frequency_hz: f64) -> Complex64 {
         let (omega, pole) = (TAU * frequency_hz, TAU * 17.0);
         Complex64::new(pole * pole - omega * omega, 2.0 * 0.03 * pole * omega).inv()

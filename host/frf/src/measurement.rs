@@ -1,4 +1,4 @@
-//! Recordings in, receptances with their quality out.
+//! Measurement of receptances from recordings, with coherence and random error.
 
 mod part;
 mod steady;
@@ -28,27 +28,27 @@ use stepped::stepped;
 use struck::struck;
 use usable_lines::{independent, keep_driven};
 
-/// What came out.
+/// Measured receptances with their statistics.
 #[derive(Clone, Debug)]
 pub struct Measurement {
-    /// The receptances. With several forces their coherence is the multiple one of the response.
+    /// Receptances. With several forces the coherence is the multiple coherence of the response.
     pub table: FrfTable,
     /// Standard deviation of |H| of each entry of the table at each frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
-    /// What was measured together.
+    /// Groups of recordings that were evaluated together.
     pub parts: Vec<Part>,
-    /// What whoever uses it should know.
+    /// Warnings for the user, such as double impacts or responses that had not settled.
     pub warnings: Vec<String>,
 }
 
-/// Receptances from recordings.
+/// Measures receptances, m/N, from recordings.
 ///
-/// Recordings of the same forces are averaged; those of other forces add columns. Accelerations and velocities become
-/// displacements by division by (iω)² and iω; 0 Hz is left out.
+/// Recordings with the same forces are averaged; recordings with other forces add columns. Accelerations and velocities are divided by
+/// (iω)² and iω. 0 Hz is left out.
 ///
 /// # Errors
-/// No force or response, forces that are not independent, records too short for the resolution, recordings that do
-/// not fit together.
+/// A recording has no force or no response, or is too short for the resolution; the forces are dependent; the recordings have no common
+/// frequencies.
 pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Result<Measurement, FrfError> {
     let driven = recordings
         .iter()
@@ -79,7 +79,7 @@ pub fn measure(recordings: &[Recording], settings: &MeasurementSettings) -> Resu
     merged(path, measured)
 }
 
-/// All parts at the frequencies that they have in common.
+/// Combines all groups at their common frequencies.
 fn merged(path: &Path, measured: Vec<Measured>) -> Result<Measurement, FrfError> {
     let refused = |what: String| FrfError::Content {
         path: path.into(),
@@ -109,7 +109,7 @@ fn merged(path: &Path, measured: Vec<Measured>) -> Result<Measurement, FrfError>
         )));
     }
     let mut measurement = Measurement {
-        // Filled below: a table cannot be empty.
+        // A table cannot be empty; this placeholder is replaced below.
         table: FrfTable::new(path, vec![0.0], vec![placeholder()])?,
         deviation: Vec::new(),
         parts: Vec::new(),
@@ -146,6 +146,7 @@ fn merged(path: &Path, measured: Vec<Measured>) -> Result<Measurement, FrfError>
     Ok(measurement)
 }
 
+/// Receptance of one line, which fills a table until the measured entries are known.
 fn placeholder() -> Frf {
     Frf {
         response: Direction::X,
@@ -155,6 +156,7 @@ fn placeholder() -> Frf {
     }
 }
 
+/// Measures the receptances of one group of recordings with the same forces and excitation.
 fn part(
     excitation: Excitation,
     members: &[Driven<'_>],

@@ -1,4 +1,4 @@
-//! How receptances are measured from recordings.
+//! Settings of an FRF measurement.
 
 use std::ops::Range;
 
@@ -7,27 +7,27 @@ use super::excitation::Excitation;
 use super::hammer::HammerWindows;
 use super::window::Window;
 
-/// How to measure.
+/// Settings of an FRF measurement from recordings.
 #[derive(Clone, Debug)]
 pub struct MeasurementSettings {
-    /// How it was driven; by the kind of each recording where it is not given.
+    /// Kind of excitation; `None` to use the kind of test in the sidecar of each recording.
     pub excitation: Option<Excitation>,
-    /// How spectra become an FRF.
+    /// FRF estimator.
     pub estimator: Estimator,
-    /// Distance of the frequencies, Hz. Where it is not given: for random excitation eight half-overlapping segments
-    /// for each force, for sweeps eight frequencies averaged for each force.
+    /// Frequency resolution (line spacing), Hz. `None` selects eight half-overlapping segments per force for random excitation, and averages of
+    /// eight lines per force for sweeps.
     pub resolution_hz: Option<f64>,
-    /// Part by which segments overlap.
+    /// Overlap of the segments, as a fraction of their length.
     pub overlap: f64,
     /// Window of the segments of random excitation.
     pub window: Window,
-    /// First and last frequency, Hz; all where it is not given.
+    /// First and last frequency, Hz; `None` for all frequencies.
     pub band_hz: Option<(f64, f64)>,
-    /// Names of channels where not all are meant.
+    /// Names of the channels to use; empty for all channels.
     pub channels: Vec<String>,
-    /// Windows of hammer blows.
+    /// Segment length and exponential window of hammer tests.
     pub hammer: HammerWindows,
-    /// The force that is meant, N, where a step-sine test has several levels.
+    /// Force level to evaluate in a step-sine test with several levels, N; `None` if the test has one level.
     pub force_n: Option<f64>,
 }
 
@@ -47,7 +47,7 @@ impl Default for MeasurementSettings {
     }
 }
 
-/// Lines of a transform within the band; never 0 Hz.
+/// Lines of a transform of `length` samples at `rate` Hz within the band; 0 Hz is excluded.
 pub(super) fn band(settings: &MeasurementSettings, rate: f64, length: usize) -> Range<usize> {
     let line = |hertz: f64| hertz * length as f64 / rate;
     match settings.band_hz {

@@ -1,4 +1,4 @@
-//! A sum of modes through measured receptances: common poles by vector fitting.
+//! Vector fitting: a sum of modes with common poles fitted to measured receptances.
 //!
 //! Gustavsen and Semlyen (1999), with the poles of all functions in common and each function eliminated by itself
 //! (Deschrijver and others, 2008). This is what tool-tip calibration needs of modal analysis, poles and residues in
@@ -11,10 +11,10 @@ use num_complex::Complex64;
 use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 use quietcut_numerics::singular_values::{SingularValueError, Vectors, decompose};
 
-/// Rounds of moving the poles; they settle within a few.
+/// Number of pole relocations. A choice: the poles usually converge within a few.
 const ROUNDS: usize = 20;
 
-/// Why no sum of modes can be fitted.
+/// Error of fitting a sum of modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RationalFitError {
     /// Fewer equations than unknowns.
@@ -41,23 +41,23 @@ pub enum RationalFitError {
 /// A sum of modes H_k(s) = Σ_r R_kr/(s − λ_r) + R*_kr/(s − λ*_r) + d_k + e_k/s², s = iω.
 #[derive(Clone, Debug)]
 pub struct RationalFit {
-    /// The poles with positive imaginary part, 1/s, by rising frequency.
+    /// Poles λ_r with positive imaginary part, rad/s, by ascending frequency.
     pub(crate) poles: Vec<Complex64>,
-    /// Residues, functions by poles.
+    /// Residues R_kr; rows functions, columns poles.
     pub residues: Vec<Vec<Complex64>>,
-    /// Root mean square of what is left, as a part of that of the functions.
+    /// Relative RMS residual of the fit, each function divided by its own RMS.
     pub(crate) rest: f64,
 }
 
 impl RationalFit {
-    /// The part of one mode in a function.
+    /// Contribution of one mode to a function at `frequency_hz`: R/(s − λ) + R*/(s − λ*).
     pub(super) fn mode_at(&self, function: usize, mode: usize, frequency_hz: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency_hz);
         let (pole, residue) = (self.poles[mode], self.residues[function][mode]);
         residue / (s - pole) + residue.conj() / (s - pole.conj())
     }
 
-    /// Natural frequency of a mode, Hz.
+    /// Natural frequency of a mode, Hz: |λ|/2π.
     pub(super) fn frequency_hz(&self, mode: usize) -> f64 {
         self.poles[mode].norm() / TAU
     }
@@ -89,13 +89,13 @@ pub(super) fn fit(
     residues(frequency_hz, functions, poles)
 }
 
-/// The basis of a pole pair at s: the coefficient of the real and of the imaginary part of a residue.
+/// Basis functions of a conjugate pole pair at s: coefficients of the real and the imaginary part of the residue.
 fn pair(s: Complex64, pole: Complex64) -> [Complex64; 2] {
     let (a, b) = ((s - pole).inv(), (s - pole.conj()).inv());
     [a + b, Complex64::i() * (a - b)]
 }
 
-/// The basis of a function: pole pairs, a constant and the inertia of modes below.
+/// Basis functions of an FRF: pole pairs, a constant (modes above the band), and 1/s² (modes below the band).
 fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     let s = Complex64::new(0.0, TAU * frequency_hz);
     let mut row: Vec<Complex64> = poles.iter().flat_map(|&pole| pair(s, pole)).collect();
@@ -104,6 +104,7 @@ fn basis(frequency_hz: f64, poles: &[Complex64], scale: f64) -> Vec<Complex64> {
     row
 }
 
+/// Error for fewer equations than unknowns.
 fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) -> RationalFitError {
     let is_zero = |function: &&&[Complex64]| function.iter().all(|h| h.norm_sqr() == 0.0);
     RationalFitError::Undetermined {
@@ -113,7 +114,7 @@ fn undetermined(frequency_hz: &[f64], functions: &[&[Complex64]], modes: usize) 
     }
 }
 
-/// Poles of the next round: zeros of σ(s) = 1 + Σ c_n φ_n(s), which makes σH a sum of the old poles.
+/// Relocated poles: zeros of σ(s) = 1 + Σ c_n φ_n(s), for which σH is a sum over the previous poles.
 fn moved(
     frequency_hz: &[f64],
     functions: &[&[Complex64]],
@@ -197,7 +198,7 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, Eigenv
         .filter(|value| value.im > 0.0)
         .map(|value| Complex64::new(-value.re.abs(), value.im))
         .collect();
-    // Two real ones are a mode that is not there: try again at a place of its own.
+    // A pair of real zeros is not an oscillatory mode; it is replaced by a start value near the upper end of the band.
     let highest = poles.iter().map(|pole| pole.im).fold(0.0, f64::max);
     while upper.len() < poles.len() {
         let omega = highest * (0.9 + 0.05 * upper.len() as f64);
@@ -206,7 +207,7 @@ fn zeros(poles: &[Complex64], c: &DVector<f64>) -> Result<Vec<Complex64>, Eigenv
     Ok(upper)
 }
 
-/// Residues by least squares, for poles that are settled.
+/// Residues for given poles by linear least squares.
 ///
 /// # Errors
 /// There is no frequency, or an iteration exceeds its bound.
@@ -235,7 +236,7 @@ pub fn residues(
         let solution = decomposed
             .solve(&right, 1e-13)
             .map_err(RationalFitError::Solution)?;
-        // Each function counts alike, however small it is.
+        // Each function is normalized, so that all have equal weight.
         let norm = right.norm_squared();
         if norm > 0.0 {
             rest += (&matrix * &solution - &right).norm_squared() / norm;
@@ -279,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn poles_and_residues_of_known_modes_come_back() {
+    fn poles_and_residues_of_known_modes_are_recovered() {
         let frequency_hz: Vec<f64> = (0..400).map(|k| 5.0 + 0.0625 * f64::from(k)).collect();
         let poles = [(8.9, 0.015), (10.4, 0.02), (17.5, 0.03)].map(|(hertz, damping): (f64, f64)| {
             TAU * hertz * Complex64::new(-damping, (1.0 - damping * damping).sqrt())
@@ -304,7 +305,7 @@ mod tests {
         assert!(fit.rest < 1e-9, "{}", fit.rest);
         for (k, row) in residues.iter().enumerate() {
             for (mode, (pole, (re, im))) in poles.iter().zip(row).enumerate() {
-                // What the arithmetic leaves.
+                // Tolerance: rounding errors.
                 assert!((fit.poles[mode] - pole).norm() < 1e-6 * pole.norm());
                 let residue = Complex64::new(*re, *im);
                 assert!((fit.residues[k][mode] - residue).norm() < 1e-5 * residue.norm());

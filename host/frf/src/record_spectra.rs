@@ -1,4 +1,4 @@
-//! The transform of whole recordings, for fits that go without averages and windows.
+//! Fourier transforms of whole recordings, for fits without averaging and windows.
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -13,45 +13,45 @@ use super::measurement_settings::MeasurementSettings;
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Recording};
 
-/// A channel at the lines of the transform of its whole record.
+/// Fourier transform of one channel over its whole record.
 #[derive(Clone, Debug)]
 pub struct ChannelLines {
-    /// Its name.
+    /// Name of the channel.
     pub name: String,
-    /// Its direction.
+    /// Direction of the force or response.
     pub direction: Direction,
-    /// What it measures.
+    /// Measured quantity.
     pub quantity: Quantity,
-    /// How often a displacement is differentiated: 0, 1 for a velocity, 2 for an acceleration; 0 of a force.
+    /// Order of the time derivative of displacement: 0 displacement, 1 velocity, 2 acceleration; 0 for a force.
     pub derivatives: i32,
-    /// Root mean square of its samples, SI.
+    /// Root mean square of the samples, SI unit.
     pub root_mean_square: f64,
-    /// Variance of the white noise of a sample, where the lowest parts of the whole spectrum are one plateau.
+    /// Variance of white noise per sample, SI unit squared, from the plateau of the spectrum; `None` if there is no plateau.
     pub plateau: Option<f64>,
-    /// Σ x_k e^{−2πi·fk/rate}/√N at each line: white noise of variance σ² per sample has E|·|² = σ² here.
+    /// Transform X(f) = Σ x_k e^{−2πi·fk/rate}/√N at each line; white noise of variance σ² per sample has E|X|² = σ².
     pub lines: Vec<Complex64>,
 }
 
-/// A recording at the lines of its whole transform that lie in a band; no window, no mean taken out.
+/// Fourier transform of a whole recording in a frequency band, without window and without removal of the mean.
 #[derive(Clone, Debug)]
 pub struct RecordSpectra {
-    /// Where it came from.
+    /// File of the recording.
     pub path: PathBuf,
-    /// Its duration, s.
+    /// Duration of the recording, s.
     pub seconds: f64,
-    /// The lines, Hz.
+    /// Frequencies of the lines, Hz.
     pub frequency_hz: Vec<f64>,
-    /// Forces, in the order x, y, z.
+    /// Transforms of the forces, in the order x, y, z.
     pub forces: Vec<ChannelLines>,
-    /// Responses, in the order x, y, z.
+    /// Transforms of the responses, in the order x, y, z.
     pub responses: Vec<ChannelLines>,
 }
 
-/// The spectra of recordings that go on from start to end: random excitation, cuts and sweeps. `None` where one of them
-/// has blows or steps, which are evaluated piece by piece.
+/// Transforms of recordings with continuous excitation: random, cut or swept sine. `None` if a recording is a hammer or step-sine test,
+/// which is evaluated in segments.
 ///
 /// # Errors
-/// No force, no response, a channel that is not there.
+/// A recording has no force or no response, or a chosen channel does not exist.
 pub fn record_spectra(
     recordings: &[Recording],
     settings: &MeasurementSettings,
@@ -88,7 +88,7 @@ fn of_record(driven: &Driven<'_>, band_hz: Option<(f64, f64)>) -> RecordSpectra 
     let scale = (samples.max(1) as f64).sqrt().recip();
     let mut channel = |channel: &quietcut_recording::Channel, direction, derivatives| {
         time.copy_from_slice(&channel.samples);
-        // Only buffers of other lengths than planned are refused.
+        // The transform fails only for buffers of the wrong length.
         let done = plan.process_with_scratch(&mut time, &mut lines, &mut scratch);
         debug_assert!(done.is_ok());
         let squares: f64 = channel.samples.iter().map(|x| x * x).sum();
@@ -119,13 +119,17 @@ fn of_record(driven: &Driven<'_>, band_hz: Option<(f64, f64)>) -> RecordSpectra 
     }
 }
 
-/// Parts of the spectrum whose mean powers are compared, the number that must be alike, and the fewest lines of a part.
+/// Number of adjacent bands of the spectrum whose mean powers are compared to find the noise plateau. A choice.
 const PARTS: usize = 64;
+
+/// Smallest number of bands with equal power that form a noise plateau. A choice.
 const ALIKE: usize = 3;
+
+/// Smallest number of lines per band. A choice: the mean power of a band then has a standard deviation of 14 %.
 const LINES_MIN: usize = 50;
 
-/// The power that the lowest parts of a spectrum have in common: within six standard deviations 1/√n of a mean of n lines.
-/// White noise is what all parts have; where the signal falls below it, nothing else is left.
+/// Noise plateau of a spectrum: the median power of the bands whose mean power exceeds the lowest by at most six standard deviations (1/√n,
+/// relative, for n lines). White noise is equal in all bands; bands without signal show it alone.
 fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
     let count = lines.len() / PARTS;
     if count < LINES_MIN {
@@ -142,7 +146,7 @@ fn plateau(lines: &[Complex64], scale: f64) -> Option<f64> {
 }
 
 impl RecordSpectra {
-    /// i2πf of a line.
+    /// Laplace variable s = i2πf of a line, rad/s.
     pub fn s(&self, line: usize) -> Complex64 {
         Complex64::new(0.0, TAU * self.frequency_hz[line])
     }

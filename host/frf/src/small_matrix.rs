@@ -1,40 +1,40 @@
-//! Matrices of up to three by three, of which a measurement has one for each of its many frequencies.
+//! Complex matrices up to 3 × 3, without allocation: a measurement has one for each frequency line.
 
 use num_complex::Complex64;
 
-/// Rows and columns up to the size in use; the rest is zero.
+/// A complex 3 × 3 matrix; rows and columns beyond the size in use are zero.
 pub(super) type Matrix = [[Complex64; 3]; 3];
 
-/// Nothing in it.
+/// The zero matrix.
 pub(super) const ZERO: Matrix = [[Complex64::ZERO; 3]; 3];
 
-/// A B.
+/// Matrix product A B.
 pub(super) fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// A B*ᵀ.
+/// Product with the adjoint, A Bᴴ.
 pub(super) fn product_adjoint(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[j][k].conj()).sum()))
 }
 
-/// A*ᵀ.
+/// Adjoint (conjugate transpose) Aᴴ.
 pub(super) fn adjoint(a: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i].conj()))
 }
 
-/// A + B.
+/// Sum A + B.
 pub(super) fn sum(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + b[i][j]))
 }
 
-/// s A.
+/// Product s A with a real scalar.
 pub(super) fn scaled(a: &Matrix, s: f64) -> Matrix {
     a.map(|row| row.map(|entry| entry * s))
 }
 
-/// The inverse of the first `size` rows and columns, by elimination with the largest pivot; `None` where it is singular
-/// to working precision.
+/// Inverse of the leading `size` × `size` block by Gauss–Jordan elimination with partial pivoting; `None` if it is singular to working
+/// precision.
 pub(super) fn inverse(a: &Matrix, size: usize) -> Option<Matrix> {
     let mut left = *a;
     let mut right = ZERO;
@@ -65,11 +65,10 @@ pub(super) fn inverse(a: &Matrix, size: usize) -> Option<Matrix> {
     Some(right)
 }
 
-/// The smallest and the largest eigenvalue of D^−½ A D^−½ with the diagonal D of a Hermitian matrix, of its first
-/// `size` ≤ 3 rows and columns. They lie from 0 to `size`; 0 where a diagonal entry is.
+/// Smallest and largest eigenvalue of D^−½ A D^−½ for the leading `size` × `size` block (`size` ≤ 3) of a positive semidefinite Hermitian
+/// matrix A with diagonal D. Both lie between 0 and `size`; the smallest is 0 if a diagonal entry is 0.
 ///
-/// In closed form: with ones on the diagonal, μ = λ − 1 solves μ³ − pμ − q = 0 with p the sum of the |a_ij|² and
-/// q = 2 Re(a_12 a_23 a_31).
+/// Closed form: with a unit diagonal, μ = λ − 1 solves μ³ − pμ − q = 0 with p = Σ_{i<j} |a_ij|² and q = 2 Re(a_12 a_23 a_31).
 pub(super) fn extreme_eigenvalues(a: &Matrix, size: usize) -> (f64, f64) {
     let entry = |i: usize, j: usize| {
         let scale = (a[i][i].re * a[j][j].re).sqrt();
@@ -113,7 +112,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_inverse_undoes(a in matrix(), size in 1usize..4) {
+        fn a_matrix_times_its_inverse_is_the_identity(a in matrix(), size in 1usize..4) {
             let mut a = a;
             (0..3).for_each(|i| (0..3).filter(|&j| i >= size || j >= size).for_each(|j| a[i][j] = Complex64::ZERO));
             let Some(inverse) = inverse(&a, size) else { return Ok(()) };
@@ -128,7 +127,7 @@ mod tests {
         }
 
         #[test]
-        fn eigenvalues_are_those_of_the_library(a in matrix(), size in 1usize..4) {
+        fn extreme_eigenvalues_agree_with_nalgebra(a in matrix(), size in 1usize..4) {
             let power = product_adjoint(&a, &a);
             let (least, most) = extreme_eigenvalues(&power, size);
             let scaled = nalgebra::DMatrix::from_fn(size, size, |i, j| {

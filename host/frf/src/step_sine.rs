@@ -1,4 +1,4 @@
-//! One frequency after the other: the steps of a record, and the phasors of force and response in each.
+//! Step-sine tests: segments of constant frequency, and phasors of force and response in each.
 
 use std::f64::consts::TAU;
 
@@ -8,61 +8,62 @@ use num_complex::Complex64;
 use super::FrfError;
 use super::driven::Driven;
 
-/// Fewest periods that make a step.
+/// Smallest number of periods of a frequency step. A choice: the scatter of the period needs several.
 const PERIODS_MIN: usize = 8;
 
-/// Relative change of the period that begins a new step, at least.
+/// Smallest relative change of the period that begins a new step. A choice, below usual frequency increments.
 const STEP: f64 = 1.5e-3;
 
-/// Periods within which a former amplitude of the force is forgotten: more than one, and less than a step has.
+/// Decay time of the tracked force amplitude, in periods. A choice: more than one period, and less than a step.
 const FORGET: f64 = 3.0;
 
-/// The longest that it is remembered, s, which is also how long before a period is known.
+/// Longest decay time of the tracked force amplitude, s; also used before the first period is known. A choice.
 const FORGET_S: f64 = 1.0;
 
-/// Pieces of a step that are demodulated each by itself: they tell noise, and whether it has settled.
+/// Number of subsegments of a step that are demodulated separately, to estimate noise and settling. A choice.
 const PIECES: usize = 8;
 
-/// A response has settled where the ratio of its phasor to the force's is off by less than this part of its size,
+/// Largest relative deviation of the phasor ratio (response/force) of a settled response from its mean over the second half. A choice: 0.2 %.
 const SETTLED: f64 = 2e-3;
 
-/// or by less than so many standard deviations of noise: one piece in some thousands is off by more.
+/// Largest deviation of a settled phasor ratio that noise explains, in standard deviations. For a complex Gaussian error, 1 of 8000
+/// subsegments exceeds it.
 const NOISE: f64 = 3.0;
 
-/// One frequency.
+/// Result of one frequency step.
 #[derive(Clone, Debug)]
 pub(super) struct Step {
     pub(super) frequency_hz: f64,
-    /// Samples of this frequency.
+    /// Number of samples of the step.
     samples: usize,
     /// Amplitude of the force, N.
     pub(super) force_n: f64,
-    /// Response by force of each response, as it was measured.
+    /// Phasor ratio response/force of each response, in the measured quantity.
     pub(super) h: Vec<Complex64>,
-    /// Part of the response's power, near the frequency, that repeats from piece to piece.
+    /// Coherence of each response over the subsegments of the step.
     pub(super) coherence: Vec<f64>,
-    /// Standard deviation of |H|.
+    /// Standard deviation of |H| of each response.
     pub(super) deviation: Vec<f64>,
-    /// Whether the responses had settled.
+    /// True if all responses reached steady state.
     pub(super) is_settled: bool,
 }
 
-/// The steps of a record at one force.
+/// All steps of a record at one force level.
 #[derive(Clone, Debug)]
 pub(super) struct Level {
     /// Median of the amplitudes of the force, N.
     pub(super) force_n: f64,
-    /// By rising frequency; of a frequency that comes again the longest is taken, and the last of equally long ones.
+    /// Steps by ascending frequency. Of repeated frequencies the longest step is kept, the last of about equal ones.
     pub(super) steps: Vec<Step>,
 }
 
-/// Forces within this ratio are one level.
+/// Largest ratio of forces that count as one force level. A choice.
 const SAME_LEVEL: f64 = 1.05;
 
-/// The levels of a record in their order: frequencies that come again at another force are another level.
+/// Force levels of a record, in order of time. Repeated frequencies at another force form another level.
 ///
 /// # Errors
-/// Several forces, or no stretch of constant frequency.
+/// The record has several forces, or no segment of constant frequency.
 pub(super) fn levels(driven: &Driven<'_>) -> Result<Vec<Level>, FrfError> {
     let force = driven.only_force("a step-sine test")?;
     let rate = driven.recording.sample_rate_hz;
@@ -96,7 +97,7 @@ pub(super) fn levels(driven: &Driven<'_>) -> Result<Vec<Level>, FrfError> {
     Ok(levels)
 }
 
-/// Steps in their order, cut where a frequency comes again that is not that of the step before.
+/// Divides the steps into passes through the frequencies: a new pass begins when an earlier frequency returns.
 fn passes(steps: Vec<Step>) -> Vec<Vec<Step>> {
     let mut passes: Vec<Vec<Step>> = Vec::new();
     for step in steps {
@@ -140,7 +141,7 @@ fn by_frequency(mut steps: Vec<Step>) -> Vec<Step> {
     kept
 }
 
-/// Samples of constant frequency and its period, by the upward crossings of the force.
+/// Segment of constant frequency: first and last sample, and period in samples, from the upward zero crossings of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stretch {
     first: usize,
@@ -158,7 +159,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
         let spread = scatter(&periods[from..to]);
         let tolerance = |mean: f64| (STEP * mean).max(5.0 * spread);
         let mean = |to: usize| (crossings[to] - crossings[from]) / (to - from) as f64;
-        // A start within a change of frequency has no common period, and one with a pause has a long one.
+        // A start within a frequency change has scattered periods, and a start with a pause has one long period.
         let is_pause = |period: &f64| (period - mean(to)).abs() > 0.5 * mean(to);
         if spread > 10.0 * STEP * mean(to) || periods[from..to].iter().any(is_pause) {
             from += 1;
@@ -166,7 +167,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
         }
         while to < periods.len() {
             let now = mean(to);
-            // One period alone may be off by noise; two in a row are a new step, and a long one is a pause.
+            // One deviating period may be noise. Two in a row begin a new step. A long period is a pause.
             let off = |k: usize| periods.get(k).map_or(0.0, |period| (period - now).abs());
             let is_off = |k: usize| off(k) > tolerance(now);
             let drift = || (crossings[to] - crossings[to - PERIODS_MIN]) / PERIODS_MIN as f64 - now;
@@ -189,7 +190,7 @@ fn stretches(force: &[f64], rate: f64) -> Vec<Stretch> {
     stretches
 }
 
-/// Standard deviation of a few periods, from the median of their deviations.
+/// Robust standard deviation of periods: 1.4826 · median absolute deviation.
 fn scatter(periods: &[f64]) -> f64 {
     let mut sorted = periods.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -199,8 +200,7 @@ fn scatter(periods: &[f64]) -> f64 {
     1.4826 * deviations[deviations.len() / 2]
 }
 
-/// Times, in samples, at which the force crosses its mean upward, with a hysteresis of a third of its amplitude there,
-/// which noise does not pass.
+/// Times, in samples, of the upward crossings of the force through its mean. A hysteresis of a third of the local amplitude rejects noise.
 fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
     let mean = force.iter().sum::<f64>() / force.len().max(1) as f64;
     let mut forget = FORGET_S * rate;
@@ -229,11 +229,11 @@ fn crossings(force: &[f64], rate: f64) -> Vec<f64> {
     crossings
 }
 
-/// Phasors over the settled part of a stretch.
+/// Phasor ratios over the settled part of a segment; `None` if the segment is too short.
 fn demodulated(driven: &Driven<'_>, force: &[f64], stretch: Stretch, rate: f64) -> Option<Step> {
     let period = refined(force, stretch);
     let periods = ((stretch.last - stretch.first) as f64 / period).floor() as usize;
-    // Whole periods in each piece, as long as can be.
+    // Each subsegment has the largest possible whole number of periods.
     let per_piece = (periods / PIECES).max(1);
     let pieces = periods / per_piece;
     let length = (per_piece as f64 * period).round() as usize;
@@ -243,7 +243,7 @@ fn demodulated(driven: &Driven<'_>, force: &[f64], stretch: Stretch, rate: f64) 
     let phasors = |signal: &[f64]| -> Option<Vec<Phasor>> {
         (0..pieces)
             .map(|piece| {
-                // Counted from the end: what has not settled is at the start.
+                // Subsegments are counted from the end, since transients are at the start.
                 let end =
                     stretch.last - ((pieces - 1 - piece) as f64 * per_piece as f64 * period).round() as usize;
                 phasor(signal, end.checked_sub(length)?, length, period)
@@ -280,7 +280,7 @@ fn demodulated(driven: &Driven<'_>, force: &[f64], stretch: Stretch, rate: f64) 
     Some(step)
 }
 
-/// H1 over pieces, its coherence and the deviation of its absolute value.
+/// H1 estimate over the subsegments, its coherence, and the standard deviation of |H|.
 fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     let count = forces.len() as f64;
     let pairs = || responses.iter().zip(forces).map(|(x, f)| (x.value, f.value));
@@ -298,9 +298,9 @@ fn averaged(forces: &[Phasor], responses: &[Phasor]) -> (Complex64, f64, f64) {
     (h, coherence, (0.5 * variance).sqrt())
 }
 
-/// The first piece from which on all responses have settled; `None` where not even the last half has.
+/// First subsegment from which all responses are settled; `None` if the second half is not settled.
 ///
-/// From there on each piece is the mean of the last half, but for [`SETTLED`] or what its noise explains.
+/// Settled: the phasor ratio differs from its mean over the second half by less than [`SETTLED`] (relative) or [`NOISE`] standard deviations.
 fn settled_from(ratios: &[Vec<Phasor>]) -> Option<usize> {
     let pieces = ratios.first()?.len();
     let first = |ratio: &Vec<Phasor>| {
@@ -315,7 +315,7 @@ fn settled_from(ratios: &[Vec<Phasor>]) -> Option<usize> {
     (from <= pieces / 2).then_some(from)
 }
 
-/// The period of a stretch, from how its phase turns between its halves.
+/// Refined period of a segment, samples, from the phase shift between its halves.
 fn refined(force: &[f64], stretch: Stretch) -> f64 {
     let mut period = stretch.period;
     for _ in 0..3 {
@@ -327,14 +327,14 @@ fn refined(force: &[f64], stretch: Stretch) -> f64 {
         ) else {
             return period;
         };
-        // Phasors refer to sample 0 of the record: between equal ones lies a whole number of periods.
+        // The phase of all phasors refers to sample 0 of the record. So equal phases mean that the period is exact.
         let turned = (b.value * a.value.conj()).arg();
         period = 1.0 / (1.0 / period + turned / TAU / half as f64);
     }
     period
 }
 
-/// A complex amplitude, and the variance that noise beside the sine gives it.
+/// Complex amplitude of a sine, and its variance due to noise.
 #[derive(Clone, Copy, Debug)]
 struct Phasor {
     value: Complex64,
@@ -342,7 +342,7 @@ struct Phasor {
 }
 
 impl Phasor {
-    /// The ratio of two.
+    /// Ratio of two phasors, with propagated variance.
     fn by(self, other: Self) -> Self {
         let value = self.value / other.value;
         Self {
@@ -352,8 +352,7 @@ impl Phasor {
     }
 }
 
-/// The complex amplitude X of x = Re X e^{iωk} + offset + drift over samples `first .. first + length`, by least
-/// squares.
+/// Complex amplitude X of x_k = Re(X e^{iωk}) + offset + linear drift over samples `first .. first + length`, by least squares.
 fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Phasor> {
     let samples = signal.get(first..first.checked_add(length)?)?;
     let row = |k: usize| {
@@ -376,7 +375,7 @@ fn phasor(signal: &[f64], first: usize, length: usize, period: f64) -> Option<Ph
     let count = length as f64;
     Some(Phasor {
         value: Complex64::new(solution[0], solution[1]),
-        // 2σ²/n for each part.
+        // Variance 2σ²/n of the real part and of the imaginary part each.
         variance: 4.0 * rest / (count - 4.0).max(1.0) / count,
     })
 }

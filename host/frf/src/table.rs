@@ -15,15 +15,15 @@ pub struct Frf {
     pub response: Direction,
     /// Direction of the force: x, y or z.
     pub force: Direction,
-    /// One value per line of the table, m/N; force and displacement as e^{+iωt}.
+    /// Receptance at each line of the table, m/N; sign convention e^{+iωt}.
     pub receptance: Vec<Complex64>,
-    /// Ordinary coherence γ² of each line, from 0 to 1; `None` where nothing is known of it.
+    /// Coherence γ² at each line, from 0 to 1; `None` if unknown.
     pub coherence: Option<Vec<f64>>,
 }
 
-/// Receptances over common frequencies.
+/// Table of receptances at common frequencies.
 ///
-/// Frequencies ascend and are not negative; there is at least one line and one receptance, none twice.
+/// Frequencies ascend and are not negative. The table has at least one line and one receptance, and no receptance twice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrfTable {
     path: PathBuf,
@@ -32,18 +32,18 @@ pub struct FrfTable {
 }
 
 impl Frf {
-    /// Both directions in the order of a header: `xy` is displacement in x by force in y.
+    /// Name from both directions, as in a column header: `xy` is displacement in x due to force in y.
     pub fn name(&self) -> String {
         format!("{}{}", self.response, self.force)
     }
 }
 
 impl FrfTable {
-    /// A table of given values; `path` is the file it came from or goes to, for messages.
+    /// Creates a table from frequencies and receptances; `path` is the file of the table, used in messages.
     ///
     /// # Errors
-    /// Frequencies that do not ascend from 0 or more, receptances that are not finite, of another length than the
-    /// frequencies, of rotations, or twice the same, coherence outside 0 to 1.
+    /// Frequencies are negative or do not ascend; a receptance is not finite, has another length than the frequencies, is of a rotation or is
+    /// given twice; a coherence lies outside 0 to 1.
     pub fn new(path: &Path, frequency_hz: Vec<f64>, entries: Vec<Frf>) -> Result<Self, FrfError> {
         let table = Self {
             path: path.into(),
@@ -59,7 +59,7 @@ impl FrfTable {
         }
     }
 
-    /// What keeps the values from being a table.
+    /// Description of the first fault in the values; `None` for a valid table.
     fn fault(&self) -> Option<String> {
         if self.frequency_hz.is_empty() || self.entries.is_empty() {
             return Some(
@@ -109,7 +109,7 @@ impl FrfTable {
         None
     }
 
-    /// The file it came from or goes to.
+    /// File that the table was read from or is written to.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -124,14 +124,14 @@ impl FrfTable {
         &self.entries
     }
 
-    /// The receptance of displacement in `response` by force in `force`; `None` where it was not measured.
+    /// Receptance of displacement in direction `response` due to force in direction `force`; `None` if the table lacks it.
     pub fn entry(&self, response: Direction, force: Direction) -> Option<&Frf> {
         self.entries
             .iter()
             .find(|entry| entry.response == response && entry.force == force)
     }
 
-    /// The receptances of x, y and z that the table does not have, as `xy`.
+    /// Names (such as `xy`) of the receptances in x, y and z that the table lacks.
     pub fn missing(&self) -> Vec<String> {
         const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
         AXES.iter()
@@ -141,7 +141,7 @@ impl FrfTable {
             .collect()
     }
 
-    /// H of one line, m/N, rows displacement, columns force in x, y, z; zero where nothing was measured.
+    /// Receptance matrix H at one line, m/N, rows displacement, columns force in x, y, z; entries that the table lacks are zero.
     ///
     /// `None` beyond the last line.
     pub fn line(&self, index: usize) -> Option<Matrix3<Complex64>> {
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_is_refused() {
+    fn invalid_tables_are_refused() {
         use Direction::{Rx, X};
         let refused = |frequencies: &[f64], entries: Vec<Frf>, said: &str| {
             let error = FrfTable::new(Path::new("a.csv"), frequencies.to_vec(), entries).unwrap_err();

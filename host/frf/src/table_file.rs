@@ -1,4 +1,4 @@
-//! The table in a file: CSV with `frequency_hz,hxx_re [m/N],hxx_im [m/N],hxy_re [m/N],…`, optional `coherence_xx`.
+//! FRF tables in CSV files: `frequency_hz,hxx_re [m/N],hxx_im [m/N],hxy_re [m/N],…`, optional `coherence_xx`.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -9,7 +9,7 @@ use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Quantity, Unit};
 
-/// What a column holds.
+/// Content of a column, from its header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Content {
     Frequency,
@@ -21,7 +21,7 @@ enum Content {
     Coherence(Pair),
 }
 
-/// Direction of the displacement and of the force.
+/// Directions of displacement and force.
 type Pair = (Direction, Direction);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ enum Part {
     Imaginary,
 }
 
-/// The unit of a frequency response function: SI units in one of it, and how often displacement was differentiated.
+/// Unit of an FRF: conversion factor to SI, and order of the time derivative of displacement (0 receptance, 1 mobility, 2 accelerance).
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Compliance {
     factor: f64,
@@ -44,14 +44,14 @@ struct Column {
 }
 
 impl FrfTable {
-    /// Reads a table: CSV, or UFF 58 where the name ends so.
+    /// Reads an FRF table from CSV, or from UFF 58 with the extension uff, unv or bunv.
     ///
-    /// Displacement (m, mm, um, nm), velocity or acceleration per force (N, kN): mobility and accelerance become
-    /// receptance. A header without unit is m/N. Lines that begin with # are comments.
+    /// Units: displacement (m, mm, um, nm), velocity or acceleration per force (N, kN). Mobility and accelerance are converted to receptance.
+    /// A header without unit means m/N. Lines that begin with # are comments.
     ///
     /// # Errors
-    /// The file cannot be read; a column whose name or unit is not known or whose other part is missing; a line with a
-    /// value that is no number, or whose frequency does not ascend.
+    /// The file cannot be read; a column has an unknown name or unit, or lacks its real or imaginary part; a value is not a number; the
+    /// frequencies do not ascend.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FrfError> {
         let path = path.as_ref();
         let ending = quietcut_recording::file::ending(path);
@@ -61,7 +61,7 @@ impl FrfTable {
         }
     }
 
-    /// A table from the text of a file; `path` is for messages.
+    /// Parses a table from CSV text; `path` is used in messages.
     ///
     /// # Errors
     /// As [`FrfTable::read`].
@@ -86,9 +86,9 @@ impl FrfTable {
         assemble(path, columns)
     }
 
-    /// Writes the table to `path`: afterwards the file is there whole, or what was there before still is.
+    /// Writes the table to `path` as CSV, atomically: on an error the previous file stays unchanged.
     ///
-    /// Numbers are written with all their digits: what is read back is the same table.
+    /// Numbers are written with all digits, so that reading the file gives the same table.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -179,7 +179,7 @@ fn column(path: &Path, title: &str) -> Result<Column, FrfError> {
     })
 }
 
-/// `xy`: displacement in x by force in y.
+/// Parses directions such as `xy`: displacement in x, force in y.
 fn pair_of(text: &str) -> Option<Pair> {
     let axis = |text: &str| {
         let direction: Direction = text.parse().ok()?;
@@ -195,7 +195,7 @@ impl Compliance {
         derivatives: 0,
     };
 
-    /// The receptance, m/N, of a value in this unit; `None` where it cannot be integrated: at 0 Hz.
+    /// Converts a value in this unit to receptance, m/N; `None` for mobility and accelerance at 0 Hz.
     fn receptance(self, value: Complex64, frequency_hz: f64) -> Option<Complex64> {
         let rate = Complex64::new(0.0, TAU * frequency_hz).powi(self.derivatives);
         let receptance = value * self.factor / rate;
@@ -203,7 +203,7 @@ impl Compliance {
     }
 }
 
-/// A unit such as `um/N`, `m/s^2/N` or `g/N`.
+/// Parses the unit of an FRF, such as `um/N`, `m/s^2/N` or `g/N`.
 fn compliance(text: &str) -> Result<Compliance, String> {
     let wrong = || {
         format!(
@@ -314,7 +314,7 @@ fn assemble(path: &Path, columns: Vec<Column>) -> Result<FrfTable, FrfError> {
                 column.title
             )));
         };
-        // Each pair is made once, where its real part stands.
+        // The entry is created once, at the column of its real part.
         if part == Part::Imaginary {
             continue;
         }

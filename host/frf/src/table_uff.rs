@@ -1,4 +1,4 @@
-//! The table in UFF 58: a complex function of type 4 for each receptance, a real one of type 6 for its coherence.
+//! FRF tables in UFF 58: a complex function of type 4 per receptance, a real function of type 6 for its coherence.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -23,7 +23,7 @@ impl From<RecordingError> for FrfError {
     }
 }
 
-/// Reads the functions of type 4, and coherence for those that have it.
+/// Reads an FRF table: the functions of type 4 with their coherence, if present.
 pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
     let sets = data_sets(path)?;
     let found: Vec<i64> = sets.iter().map(|set| set.header.function.code()).collect();
@@ -41,7 +41,7 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
         let frequencies = frequencies(set).map_err(wrong)?;
         let mut entry = receptance(set, &frequencies).map_err(wrong)?;
         let keep = frequency_hz.get_or_insert_with(|| without_rest(&entry, &frequencies));
-        // What cannot be integrated at 0 Hz has no line there.
+        // Mobility and accelerance cannot be integrated at 0 Hz, so the table has no line there.
         let from = frequencies.len().saturating_sub(keep.len());
         if frequencies.get(from..) != Some(keep.as_slice()) {
             return Err(wrong(format!(
@@ -70,7 +70,7 @@ pub(super) fn read(path: &Path) -> Result<FrfTable, FrfError> {
     FrfTable::new(path, frequency_hz.unwrap_or_default(), entries)
 }
 
-/// Frequencies without one at which the receptance is no number: 0 Hz of a mobility or an accelerance.
+/// Frequencies without 0 Hz if the receptance is not finite there (mobility or accelerance).
 fn without_rest(entry: &Frf, frequencies: &[f64]) -> Vec<f64> {
     let is_rest = frequencies.first() == Some(&0.0);
     let from = usize::from(is_rest && entry.receptance.first().is_some_and(|value| !value.is_finite()));
@@ -129,7 +129,7 @@ fn direction(dof: &DegreeOfFreedom, what: &str) -> Result<(Direction, f64), Stri
     Ok((axis, dof.direction.signum() as f64))
 }
 
-/// SI units in one, and how often displacement was differentiated: 0 receptance, 1 mobility, 2 accelerance.
+/// Conversion factor to SI, and order of the time derivative of displacement: 0 receptance, 1 mobility, 2 accelerance.
 fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     let needed = "receptance (m/N), mobility (m/s/N) or accelerance (m/s^2/N) is needed";
     let (ordinate, denominator) = ratio(set)?;
@@ -145,7 +145,7 @@ fn compliance(set: &DataSet) -> Result<(f64, i32), String> {
     Ok((ordinate.factor / denominator.factor, derivatives))
 }
 
-/// The units above and below. Some writers put both into the label of the ordinate: `(m/s^2)/N`.
+/// Units of numerator and denominator. Some writers put both into the unit label of the ordinate: `(m/s^2)/N`.
 fn ratio(set: &DataSet) -> Result<(Unit, Unit), String> {
     let Header {
         ordinate,
@@ -189,8 +189,8 @@ fn is_coherence_of(other: &DataSet, set: &DataSet) -> bool {
 }
 
 impl FrfTable {
-    /// Writes the table to `path` as UFF 58, receptances in m/N: afterwards the file is there whole, or what was there
-    /// before still is. Numbers have thirteen digits as text and all as binary; as text the frequencies have seven.
+    /// Writes the table to `path` as UFF 58, receptances in m/N, atomically: on an error the previous file stays unchanged. Text keeps thirteen
+    /// digits of receptances and seven of frequencies; binary keeps all digits of receptances.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -221,7 +221,7 @@ impl FrfTable {
         Ok(())
     }
 
-    /// First frequency and step, where seven digits of both give every frequency to a thousandth of the step.
+    /// First frequency and step, Hz, if both rounded to seven digits give every frequency within 0.001 steps; else `None`.
     fn even(&self) -> Option<(f64, f64)> {
         let (&first, &last) = (self.frequency_hz().first()?, self.frequency_hz().last()?);
         let count = self.frequency_hz().len();
@@ -306,7 +306,7 @@ mod tests {
                 written.write_uff(&path, form).unwrap();
                 let read = FrfTable::read(&path).unwrap();
                 for (a, b) in read.frequency_hz().iter().zip(written.frequency_hz()) {
-                    // Seven digits, or a thousandth of a step.
+                    // Tolerance: 0.001 steps, the rounding of the frequencies.
                     assert!((a - b).abs() <= 1e-3 * step, "{a} {b}");
                 }
                 for (a, b) in read.entries().iter().zip(written.entries()) {
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn receptance_mobility_and_accelerance_are_told_apart() {
+    fn receptance_mobility_and_accelerance_are_distinguished() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.uff");
         let force = "        13    0    1    0 NONE                 N";
@@ -340,7 +340,7 @@ mod tests {
         };
         let value = Complex64::new(1.0, 2.0);
         let omega = Complex64::new(0.0, TAU);
-        // The reference looks against the axis: the sign turns.
+        // The reference direction is negative, so the sign is reversed.
         for (ordinate, denominator, expected, lines) in [
             (
                 "         8    1    0    0 NONE                 m",

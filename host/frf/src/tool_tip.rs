@@ -1,8 +1,8 @@
-//! Tool-tip calibration: a sensor on the spindle housing, and what the tool tip does.
+//! Tool-tip calibration: receptances at the tool tip from a sensor on the spindle housing.
 //!
-//! Where spindle, holder and tool move as a rigid body in a mode, tip T and sensor S keep the ratio φ_T/φ_S of their
-//! mode shape (equations 7.13 and 7.14). Two blows of a hammer at the tip, one with the sensor where it sits during
-//! the cut and one with a sensor at the tip, give it for each mode.
+//! If spindle, holder and tool move as a rigid body in a mode, the motions of tip T and sensor S keep the constant ratio φ_T/φ_S of the
+//! mode shape. Two hammer tests with impacts at the tip give this ratio for each mode: one with the sensor at its position during the cut,
+//! one with a sensor at the tip.
 
 use num_complex::Complex64;
 
@@ -10,44 +10,42 @@ use super::rational_fit::{RationalFit, RationalFitError, fit};
 use super::{Frf, FrfError, FrfTable};
 use quietcut_model::structure::Direction;
 
-/// The most modes that are looked for.
+/// Largest number of modes in a fit. A choice; vector fitting of more modes needs a narrower band.
 const MODES_MAX: usize = 8;
 
-/// A further mode must take off this part of what is left, to be one.
+/// Smallest relative decrease of the residual by which a further mode is accepted. A choice.
 const WORTH: f64 = 0.3;
 
-/// What is left of a good fit, as a part: no mode is looked for beyond.
+/// Relative residual below which no further mode is added. A choice, near the noise of a clean measurement.
 const GOOD: f64 = 2e-3;
 
-/// Farthest that a mode may move between the calibration and the cut, as a part of its frequency.
+/// Largest shift of a natural frequency between calibration and cut, |ln(f₁/f₂)|. A choice.
 const SAME: f64 = 0.15;
 
-/// Part of the largest residue below which a pole is noise, no mode.
+/// Smallest peak of a mode, as a fraction of the largest peak; a pole with a lower peak is noise. A choice.
 const MODE: f64 = 2e-3;
 
-/// The ratio of tip and sensor in one mode.
+/// Ratio of the mode shape at tool tip and sensor, for one mode and response direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModeRatio {
-    /// Natural frequency, Hz, in the calibration.
+    /// Natural frequency in the calibration, Hz.
     pub frequency_hz: f64,
     /// Direction of the response.
     pub response: Direction,
-    /// φ_T/φ_S.
+    /// Mode shape ratio φ_T/φ_S (tip over sensor).
     pub ratio: f64,
-    /// How far the residues are from this ratio: root mean square, as a part. A rigid body in a clean measurement has
-    /// few hundredths.
+    /// Relative RMS deviation of the residues from this ratio. A rigid body in a clean measurement gives a few 0.01.
     pub misfit: f64,
 }
 
-/// Receptances at the tool tip from those at a sensor on the housing.
+/// Computes receptances at the tool tip from receptances at a sensor on the housing.
 ///
-/// `housing` and `tip` are the calibration: responses at the sensor and at the tip to forces at the tip. `measured` is
-/// what is calibrated, with responses at the same sensor. Each of its modes is fitted, and multiplied by the ratio of
-/// the nearest mode of the calibration: H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r. With one mode this is equation (7.14);
-/// with several, the tail of each mode gets its own ratio as well.
+/// `housing` and `tip` are the calibration: responses at the sensor and at the tip to forces at the tip. `measured` has responses at the
+/// same sensor. Each mode r of `measured` is fitted and scaled with the ratio of the nearest calibrated mode:
+/// H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r.
 ///
 /// # Errors
-/// Tables without a receptance in common, too few lines, a mode without a counterpart in the calibration.
+/// The tables have no common receptance or too few lines; a mode has no counterpart in the calibration.
 pub fn calibrate(
     measured: &FrfTable,
     housing: &FrfTable,
@@ -100,7 +98,7 @@ fn nearest(ratios: &[ModeRatio], hertz: f64, response: Direction) -> Option<&Mod
         .min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
-/// The ratios of all modes and directions of a calibration.
+/// Mode shape ratios of all modes and response directions of a calibration.
 fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError> {
     let refused = |what: String| FrfError::Content {
         path: tip.path().into(),
@@ -163,11 +161,11 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
     Ok(ratios)
 }
 
-/// The fewest modes that describe the functions.
+/// Fits the smallest number of modes that describes the functions; `None` if no fit succeeds.
 fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit, RationalFitError> {
     let mut best: Option<RationalFit> = None;
     let mut refused = None;
-    // A mode may only help once the next is there, too.
+    // The search stops after two mode counts without improvement: one further mode may help only together with the next.
     let mut in_vain = 0;
     for count in 1..=MODES_MAX {
         let next = match fit(frequency_hz, functions, count) {
@@ -192,9 +190,9 @@ fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit
     best.ok_or_else(|| refused.unwrap_or(RationalFitError::Solution("no model order is tried")))
 }
 
-/// Poles that are modes: lightly damped, and seen in a function.
+/// Indices of the poles that are modes: lightly damped (ζ < 0.3), and with a significant peak in at least one function.
 fn mode_numbers(modes: &RationalFit) -> Vec<usize> {
-    // At its peak a mode is its residue by its decay.
+    // Peak height of a mode: |residue| / decay rate.
     let height =
         |function: usize, mode: usize| modes.residues[function][mode].norm() / modes.poles[mode].re.abs();
     let functions = 0..modes.residues.len();
@@ -226,7 +224,7 @@ mod tests {
 
     use super::*;
 
-    /// Modes of frequency, damping ratio, shape of the tip in x and y; a table of tip or sensor.
+    /// FRF table at the tip, or at the sensor if `ratios` are given. Each mode: natural frequency (Hz), damping ratio, mode shape in x and y.
     fn table(modes: &[(f64, f64, [f64; 2])], ratios: Option<&[f64]>, noise: f64, seed: u64) -> FrfTable {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let frequency_hz: Vec<f64> = (0..400).map(|k| 8.0 + 0.05 * f64::from(k)).collect();
@@ -277,7 +275,7 @@ mod tests {
             let ratios: Vec<f64> = modes.iter().map(|_| random.random_range(0.6..0.9)).collect();
             let housing = table(&modes, Some(&ratios), 0.002, 100 + seed);
             let tip = table(&modes, None, 0.002, 200 + seed);
-            // In the cut, modes move and are damped more.
+            // During the cut the natural frequencies shift and the damping increases.
             let in_cut = modes.map(|(hertz, damping, shape)| (0.97 * hertz, 1.4 * damping, shape));
             let measured = table(&in_cut, Some(&ratios), 0.002, 300 + seed);
             let truth = table(&in_cut, None, 0.0, 0);
@@ -287,7 +285,7 @@ mod tests {
                     .iter()
                     .position(|mode| (mode.0 / ratio.frequency_hz - 1.0).abs() < 0.01)
                     .unwrap();
-                // Half a percent: noise of 0.2 % of the peak, over the dozens of lines of a peak.
+                // Expected error below 0.5 %: noise of 0.2 % of the peak, averaged over the lines of a peak.
                 assert!(
                     (ratio.ratio * ratios[mode] - 1.0).abs() < 0.01,
                     "seed {seed}: {ratio:?} {ratios:?}"
@@ -299,7 +297,7 @@ mod tests {
                     let at = truth.frequency_hz().partition_point(|&f| f < hertz);
                     let (h, truth) = (entry.receptance[at].norm(), expected.receptance[at].norm());
                     let highest = expected.receptance.iter().map(|h| h.norm()).fold(0.0, f64::max);
-                    // Peaks, that is: not where a mode hardly shows.
+                    // Only peaks above a fifth of the largest are compared.
                     if truth > 0.2 * highest {
                         assert!(
                             (h / truth - 1.0).abs() < 0.02,
@@ -313,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_together_is_refused() {
+    fn incompatible_calibration_tables_are_refused() {
         let modes = [(11.0, 0.02, [1.0, 0.2])];
         let (housing, tip) = (table(&modes, Some(&[0.7]), 0.0, 1), table(&modes, None, 0.0, 1));
         let elsewhere = table(&[(16.0, 0.02, [1.0, 0.2])], Some(&[0.7]), 0.0, 1);

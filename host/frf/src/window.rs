@@ -1,21 +1,21 @@
-//! Windows of a segment.
+//! Time windows of segments, and the number of independent averages of overlapping segments.
 
 use std::f64::consts::TAU;
 
-/// The weight of the samples of a segment before it is transformed.
+/// Time window that weights the samples of a segment before the Fourier transform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Window {
-    /// 1 everywhere: for what begins and ends at rest within the segment.
+    /// w = 1: for transients that begin and end at rest within the segment.
     Rectangular,
-    /// ½ − ½ cos: leaks least far away.
+    /// Hann window w_k = ½ − ½ cos(2πk/N): side lobes fall fastest.
     #[default]
     Hann,
-    /// 0.54 − 0.46 cos.
+    /// Hamming window w_k = 0.54 − 0.46 cos(2πk/N): lowest first side lobes.
     Hamming,
 }
 
 impl Window {
-    /// The weights of `length` samples, periodic: the sample after the last would be the first again.
+    /// Window weights w_k, k = 0 … N − 1, for N = `length` samples, with period N.
     pub fn weights(self, length: usize) -> Vec<f64> {
         let raised_cosine = |mean: f64| -> Vec<f64> {
             (0..length)
@@ -30,10 +30,9 @@ impl Window {
     }
 }
 
-/// The number of independent averages that `segments` segments make, which start `shift` samples apart.
+/// Effective number of independent averages of n = `segments` segments whose starts are `shift` samples apart (Welch 1967).
 ///
-/// n / (1 + 2 Σ_j (1 − j/n) ρ_j²) with ρ_j = Σ_k w_k w_{k+j·shift} / Σ_k w_k² (Welch 1967): overlapping segments
-/// share samples, so they say less than as many separate ones.
+/// n_eff = n / (1 + 2 Σ_j (1 − j/n) ρ_j²) with ρ_j = Σ_k w_k w_{k+j·shift} / Σ_k w_k²: overlapping segments are correlated.
 pub(super) fn effective_averages(weights: &[f64], shift: usize, segments: usize) -> f64 {
     let energy: f64 = weights.iter().map(|w| w * w).sum();
     let mut shared = 0.0;
@@ -47,7 +46,7 @@ pub(super) fn effective_averages(weights: &[f64], shift: usize, segments: usize)
     segments as f64 / (1.0 + 2.0 * shared)
 }
 
-/// The smallest even number from `length` on whose prime factors are 2, 3 and 5: transforms of it are fast.
+/// Smallest even transform length ≥ `length` with prime factors 2, 3 and 5 only, for which the FFT is fast.
 pub(super) fn fast_length(length: usize) -> usize {
     let is_fast = |mut number: usize| {
         for factor in [2, 3, 5] {
@@ -69,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn half_overlap_of_a_hann_window_is_worth_a_sixth_less() {
+    fn half_overlap_of_a_hann_window_reduces_the_effective_averages() {
         let weights = Window::Hann.weights(1000);
         // ρ = 1/6 at half overlap: n/(1 + 2·(1 − 1/n)/36).
         let expected = 15.0 / (1.0 + 2.0 * (14.0 / 15.0) / 36.0);

@@ -1,4 +1,4 @@
-//! Recordings that are evaluated together.
+//! Group of recordings that are evaluated together.
 
 use num_complex::Complex64;
 
@@ -9,27 +9,26 @@ use crate::hammer::Blow;
 use crate::table::Frf;
 use quietcut_model::structure::Direction;
 
-/// Recordings that were evaluated together.
+/// Group of recordings with the same forces and excitation, evaluated together.
 #[derive(Clone, Debug)]
 pub struct Part {
-    /// Number of recordings.
+    /// Number of recordings in the group.
     pub recordings: usize,
     /// Directions of the forces.
     pub forces: Vec<Direction>,
-    /// How they drove.
+    /// Kind of excitation.
     pub excitation: Excitation,
-    /// Independent averages.
+    /// Effective number of independent averages.
     pub averages: f64,
-    /// Frequencies at which forces were not independent, which are left out.
+    /// Frequencies left out because the forces are dependent there, Hz.
     pub left_out_hz: Vec<f64>,
-    /// Smallest of the singular values of the forces over all frequencies that are left, each force divided by its
-    /// root mean square; 1 for one force.
+    /// Smallest singular value of the forces over all remaining frequencies, each force divided by its root mean square; 1 for one force.
     pub least_singular: f64,
-    /// The blows that were used, and those that were double.
+    /// Single impacts (used) and double impacts (left out) of a hammer test; `None` for other excitation.
     pub blows: Option<(Vec<Blow>, Vec<Blow>)>,
 }
 
-/// One part at its frequencies: a column for each response and force.
+/// Receptances of one group, with their standard deviations, at the frequencies of the group.
 pub(super) struct Measured {
     pub(super) part: Part,
     pub(super) frequency_hz: Vec<f64>,
@@ -37,7 +36,7 @@ pub(super) struct Measured {
     pub(super) warnings: Vec<String>,
 }
 
-/// Columns in m/N.
+/// Converts FRF lines to receptances in m/N: integrates velocities and accelerations.
 pub(super) fn receptances(
     part: Part,
     lines: &[Line],

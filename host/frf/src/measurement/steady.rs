@@ -1,4 +1,4 @@
-//! Spectra of a record that goes on: noise, cuts and sweeps.
+//! Spectra of records with continuous excitation: random, cuts and sweeps.
 
 use crate::cross_spectra::{CrossSpectra, Segments, averaged, smoothed};
 use crate::driven::Driven;
@@ -7,7 +7,7 @@ use crate::excitation::Excitation;
 use crate::measurement_settings::{MeasurementSettings, band};
 use crate::window::fast_length;
 
-/// Spectra of a record that goes on, at the lines of the band.
+/// Auto- and cross-spectra of a record with continuous excitation, at the lines of the band.
 pub(super) fn steady(
     excitation: Excitation,
     driven: &Driven<'_>,
@@ -62,11 +62,11 @@ pub(super) fn steady(
     ))
 }
 
-/// Segments for each force where nothing is asked for.
+/// Number of segments per force if no resolution is set. A choice between random error and resolution.
 const SEGMENTS_PER_FORCE: usize = 8;
 
-/// Lines of a whole record that are averaged for each force where nothing is asked for.
+/// Number of averaged lines per force for sweeps if no resolution is set. A choice between random error and resolution.
 const LINES_PER_FORCE: usize = 8;
 
-/// Part of a swept record over which its ends are tapered: what rings on at the ends leaks less.
+/// Length of the taper at each end of a swept record, as a fraction of the record. A choice; it reduces leakage from vibration at the ends.
 const TAPER: f64 = 0.01;

@@ -1,4 +1,4 @@
-//! Receptances of a step-sine test: one phasor for each step.
+//! Receptances of a step-sine test: one phasor ratio per frequency step.
 
 use super::part::{Measured, Part, receptances};
 use crate::driven::Driven;
@@ -7,7 +7,7 @@ use crate::estimate::Line;
 use crate::measurement_settings::MeasurementSettings;
 use crate::step_sine::{self, Level};
 
-/// One phasor for each step.
+/// Measures the receptances of a step-sine test, one frequency line per step.
 pub(super) fn stepped(
     mut part: Part,
     members: &[Driven<'_>],
@@ -69,7 +69,7 @@ pub(super) fn stepped(
     Ok(receptances(part, &lines, first, warnings))
 }
 
-/// The level of a step-sine test that is meant.
+/// Force level to evaluate: the only one, or the level nearest to `force_n`.
 fn level(driven: &Driven<'_>, force_n: Option<f64>) -> Result<Level, FrfError> {
     let mut levels = step_sine::levels(driven)?;
     let all: Vec<String> = levels
@@ -96,5 +96,5 @@ fn level(driven: &Driven<'_>, force_n: Option<f64>) -> Result<Level, FrfError> {
     }
 }
 
-/// Ratio of forces that count as one level.
+/// Largest ratio of forces that count as one level, when selecting a level and when warning of a varying force. A choice.
 const SAME_FORCE: f64 = 1.2;

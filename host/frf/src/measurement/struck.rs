@@ -1,4 +1,4 @@
-//! Spectra of the blows of a hammer.
+//! Spectra of hammer tests.
 
 use super::part::Part;
 use crate::cross_spectra::{CrossSpectra, Segments, averaged};
@@ -7,7 +7,7 @@ use crate::error::FrfError;
 use crate::hammer::{self, Blow};
 use crate::measurement_settings::{MeasurementSettings, band};
 
-/// Spectra of blows.
+/// Auto- and cross-spectra of hammer tests, one segment per single impact; one result per recording.
 pub(super) fn struck(
     part: &mut Part,
     members: &[Driven<'_>],
@@ -25,7 +25,7 @@ pub(super) fn struck(
     let rate = members[0].recording.sample_rate_hz;
     let length = cuts.iter().map(|cut| cut.length).min().unwrap_or(0);
     if cuts.iter().any(|cut| cut.length != length) {
-        // All records at the lines of the one with the shortest segments.
+        // All records use the segment length of the record with the shortest segments, so that their lines agree.
         windows.segment_s = Some(length as f64 / rate);
         cuts = members
             .iter()
@@ -56,10 +56,13 @@ pub(super) fn struck(
             .iter()
             .map(|blow: &Blow| format!("{:.3}", blow.time_s))
             .collect();
-        warnings.push(format!("double blows are left out: at {} s", times.join(", ")));
+        warnings.push(format!("double impacts are left out: at {} s", times.join(", ")));
     }
     if used.len() < 3 {
-        warnings.push(format!("{} blows: coherence and errors say little", used.len()));
+        warnings.push(format!(
+            "{} impacts: coherence and errors are uncertain with fewer than 3",
+            used.len()
+        ));
     }
     if left_over > LEFT_OVER {
         warnings.push(format!(
@@ -77,5 +80,6 @@ pub(super) fn struck(
     Ok(spectra)
 }
 
-/// Part of the peak that may be left where segments end: twice as much, as a part of a resonance, is its bias.
+/// Largest amplitude at the end of a segment without a warning, as a fraction of the peak. Truncation biases a resonance by about twice this
+/// fraction. A choice.
 const LEFT_OVER: f64 = 0.02;

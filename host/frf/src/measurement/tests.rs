@@ -1,4 +1,4 @@
-//! Known structures under synthetic excitation. Responses are exact: force held between samples, modes in closed form.
+//! Tests on known structures with synthetic excitation. Responses are exact: closed-form modes, forces linear between samples.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +13,7 @@ use quietcut_recording::{Channel, Quantity, Sidecar, TestKind};
 
 const RATE: f64 = 512.0;
 
-/// A mode: frequency, damping ratio, mass, shape in x, y, z.
+/// A mode: natural frequency, damping ratio, modal mass, mode shape in x, y, z.
 struct Mode {
     hertz: f64,
     damping: f64,
@@ -156,7 +156,7 @@ fn in_band() -> MeasurementSettings {
     }
 }
 
-/// The largest error of an entry, as a part of its largest value.
+/// Largest error of an entry, as a fraction of its largest value.
 fn error(measurement: &Measurement, name: &str) -> f64 {
     let entry = measurement
         .table
@@ -428,7 +428,7 @@ fn dependent_forces_are_refused_and_further_tests_make_them_independent() {
     }
 }
 
-/// A half sine of 8 ms.
+/// Adds an impact at `at_s` to the force: a half sine of 8 ms.
 fn blow(force: &mut [f64], at_s: f64, newtons: f64) {
     let (first, width) = ((at_s * RATE) as usize, (0.03 * RATE) as usize);
     for k in 0..=width {
@@ -437,7 +437,7 @@ fn blow(force: &mut [f64], at_s: f64, newtons: f64) {
 }
 
 #[test]
-fn hammer_blows_are_cut_out_and_double_ones_left_out() {
+fn impacts_become_segments_and_double_impacts_are_left_out() {
     let mut random = random(30);
     let mut force = vec![0.0; (64.0 * RATE) as usize];
     for (index, at_s) in [1.0, 13.1, 25.3, 37.2, 49.4].into_iter().enumerate() {
@@ -497,7 +497,7 @@ fn an_exponential_window_moves_the_poles_by_its_decay_and_nothing_else() {
         .map(|&f| shifted(f).norm())
         .fold(0.0, f64::max);
     for (&hertz, h) in measurement.table.frequency_hz().iter().zip(&entry.receptance) {
-        // What rings of the blow before is e^{−ζωt}: under 1 %.
+        // The free decay after the previous impact, e^{−ζωt}, has fallen below 1 %.
         assert!(
             (h - shifted(hertz)).norm() < 0.012 * peak,
             "{hertz}: {h} {}",
@@ -520,7 +520,7 @@ fn an_exponential_window_moves_the_poles_by_its_decay_and_nothing_else() {
 }
 
 #[test]
-fn a_slow_sweep_gives_the_band_that_it_drove() {
+fn a_slow_sweep_gives_receptances_in_its_frequency_range() {
     let mut random = random(40);
     let seconds = 300.0;
     let force: Vec<f64> = (0..(seconds * RATE) as usize)
@@ -552,7 +552,7 @@ fn a_slow_sweep_gives_the_band_that_it_drove() {
 }
 
 #[test]
-fn step_sine_is_demodulated_through_drift_and_says_what_had_not_settled() {
+fn step_sine_is_demodulated_with_drift_and_reports_unsettled_steps() {
     let mut random = random(50);
     let frequencies: Vec<f64> = (0..17).map(|k| 15.0 + 0.5 * f64::from(k)).collect();
     let (stay_s, pause_s) = (12.0, 1.5);

@@ -1,10 +1,10 @@
-//! Lines at which the forces drove, and drove independently.
+//! Selection of the frequency lines with sufficient and independent forces.
 
 use super::part::Part;
 use crate::cross_spectra::CrossSpectra;
 use crate::estimate::{DEPENDENT, Line, Shape};
 
-/// Leaves out the lines at which a sweep did not drive.
+/// Removes the lines outside the frequency range of a sweep.
 pub(super) fn keep_driven(lines: &mut Vec<Line>, spectra: &[CrossSpectra], shape: Shape) {
     let power = |line: usize| -> f64 {
         let forces = (0..shape.forces).map(|force| {
@@ -24,11 +24,11 @@ pub(super) fn keep_driven(lines: &mut Vec<Line>, spectra: &[CrossSpectra], shape
     lines.retain(is_driven);
 }
 
-/// Part of the largest power of the force below which a sweep is not there: shakers lose up to a hundredth of it at
-/// resonances.
+/// Smallest force power of a line within the range of a sweep, as a fraction of the largest. At resonances the force of a shaker drops to
+/// about 1e-2 of the largest power.
 const DRIVEN: f64 = 1e-3;
 
-/// Leaves out the lines at which the forces depend on each other.
+/// Removes the lines with dependent forces; an error if these are more than half of all lines.
 pub(super) fn independent(lines: &mut Vec<Line>, part: &mut Part, shape: Shape) -> Result<(), String> {
     let count = lines.len();
     let dependent: Vec<Line> = lines
