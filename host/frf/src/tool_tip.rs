@@ -161,7 +161,7 @@ fn ratios(housing: &FrfTable, tip: &FrfTable) -> Result<Vec<ModeRatio>, FrfError
     Ok(ratios)
 }
 
-/// Fits the smallest number of modes that describes the functions; `None` if no fit succeeds.
+/// Fits the smallest number of modes that describes the functions. If no fit succeeds, the error of the first failed fit is returned.
 fn modes(frequency_hz: &[f64], functions: &[&[Complex64]]) -> Result<RationalFit, RationalFitError> {
     let mut best: Option<RationalFit> = None;
     let mut refused = None;
