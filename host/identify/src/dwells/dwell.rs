@@ -10,7 +10,7 @@ use quietcut_recording::{Channel, Quantity, Recording};
 
 /// A segment of a recording with one constant excitation frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
+pub struct DwellSegment {
     /// First sample.
     pub from: usize,
     /// Index after the last sample.
@@ -78,7 +78,7 @@ const BLOCK_S: f64 = 0.1;
 ///
 /// A segment ends where the force pauses or its frequency steps. A step without a pause shows as a change of the time between zero
 /// crossings that exceeds its scatter.
-pub fn stretches(recording: &Recording) -> Vec<Stretch> {
+pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
     let Some(force) = recording
         .channels
         .iter()
@@ -132,7 +132,7 @@ fn energy(samples: &[f64]) -> f64 {
 const PERIODS: usize = 8;
 
 /// Cuts `samples[from..]` where the frequency steps.
-fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<Stretch>) {
+fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegment>) {
     let crossings = rising_crossings(samples, from);
     if crossings.len() <= 2 * PERIODS {
         return;
@@ -155,7 +155,7 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<Stretch>) {
         if stepped || end == local.len() {
             let last = if stepped { end } else { crossings.len() - 1 };
             if last > begin + 2 * PERIODS {
-                found.push(Stretch {
+                found.push(DwellSegment {
                     from: crossings[begin].ceil() as usize,
                     to: crossings[last].floor() as usize,
                     frequency_hz: frequency(begin, last),
@@ -190,7 +190,7 @@ impl Dwell {
     /// The periodic motion in `samples` of a recording with `harmonics` harmonics, its frequency refined from all channels.
     ///
     /// `None` where there are fewer samples than the fit needs, or no force.
-    pub fn fit(recording: &Recording, stretch: Stretch, harmonics: usize) -> Option<Self> {
+    pub fn fit(recording: &Recording, stretch: DwellSegment, harmonics: usize) -> Option<Self> {
         let count = stretch.to.checked_sub(stretch.from)?;
         if count < 4 * (2 * harmonics + 1) {
             return None;

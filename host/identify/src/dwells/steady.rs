@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
 use crate::criteria::{LEAST_DWELL_PERIODS, STEADY_CHANGE, STEADY_DEVIATIONS};
-use crate::dwells::dwell::{Dwell, Stretch, direction_of, pool_variances, stretches};
+use crate::dwells::dwell::{Dwell, DwellSegment, direction_of, dwell_segments, pool_variances};
 use quietcut_recording::Recording;
 
 /// Length of the transient at the start of each dwell.
@@ -34,7 +34,7 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
     let mut steady = Steady::default();
     for recording in recordings {
         let name = recording.path.display();
-        let found = stretches(recording);
+        let found = dwell_segments(recording);
         if found.is_empty() {
             steady.warnings.push(format!(
                 "{name}: no frequency is held; a step-sine test is needed"
@@ -94,10 +94,15 @@ struct Settled {
 
 /// The settled part of a segment. If its motion still changes, its last half or quarter is taken, as long as that has enough
 /// periods.
-fn settled(recording: &Recording, stretch: Stretch, harmonics: usize, settling: Settling) -> Option<Settled> {
+fn settled(
+    recording: &Recording,
+    stretch: DwellSegment,
+    harmonics: usize,
+    settling: Settling,
+) -> Option<Settled> {
     let (dwell, whole) = first_settled(recording, stretch, harmonics, settling)?;
     let least = (LEAST_DWELL_PERIODS * recording.sample_rate_hz / stretch.frequency_hz).ceil() as usize;
-    let last = |samples: usize| Stretch {
+    let last = |samples: usize| DwellSegment {
         from: stretch.to - samples,
         ..stretch
     };
@@ -130,7 +135,7 @@ fn settled(recording: &Recording, stretch: Stretch, harmonics: usize, settling: 
 }
 
 /// True where no motion changes from the first half of a dwell to the second.
-fn is_still(recording: &Recording, part: Stretch, dwell: &Dwell) -> bool {
+fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     let middle = (part.from + part.to) / 2;
     let halves = [part.from..middle, middle..part.to];
     dwell.motions.iter().all(|line| {
@@ -172,13 +177,13 @@ fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f6
 /// The settled part of a stretch, and whether it is long enough to have settled.
 fn first_settled(
     recording: &Recording,
-    stretch: Stretch,
+    stretch: DwellSegment,
     harmonics: usize,
     settling: Settling,
 ) -> Option<(Dwell, bool)> {
     let count = (stretch.to - stretch.from) as f64;
     let least = LEAST_DWELL_PERIODS * recording.sample_rate_hz / stretch.frequency_hz;
-    let from = |seconds: f64| Stretch {
+    let from = |seconds: f64| DwellSegment {
         from: stretch.from + (seconds * recording.sample_rate_hz).ceil() as usize,
         ..stretch
     };
@@ -211,11 +216,11 @@ fn first_settled(
 /// Windows of a tone with slowly changing force: each window of `periods` periods is a dwell.
 pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
     let mut dwells = Vec::new();
-    for stretch in stretches(recording) {
+    for stretch in dwell_segments(recording) {
         let length = (periods * recording.sample_rate_hz / stretch.frequency_hz).round() as usize;
         let mut from = stretch.from;
         while length > 0 && from + length <= stretch.to {
-            let part = Stretch {
+            let part = DwellSegment {
                 from,
                 to: from + length,
                 ..stretch

@@ -7,10 +7,10 @@ use quietcut_model::effects::EffectName;
 
 pub use quietcut_model::effects::describing_functions::*;
 
-/// A kind of nonlinearity.
+/// Type of a nonlinear restoring or damping force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum Nonlinearity {
     /// k3·x³.
     CubicStiffness,
     /// k2·x²: seen at twice the frequency.
@@ -27,8 +27,8 @@ pub enum Kind {
     Hysteresis,
 }
 
-impl Kind {
-    /// Its name, as in a case.
+impl Nonlinearity {
+    /// Name of the effect, as in a case file.
     pub fn name(self) -> &'static str {
         match self {
             Self::CubicStiffness => EffectName::CubicStiffness.name(),

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use crate::criteria::{EXPLAINED_SHARE, KIND_EVIDENCE};
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::{Dwell, Line};
-use crate::nonlinear::describing::{self, Kind};
+use crate::nonlinear::describing::{self, Nonlinearity};
 use crate::nonlinear::homogeneity::line;
 
 /// The result.
@@ -19,7 +19,7 @@ pub struct Verdict {
     /// True if the data are consistent with a linear structure.
     pub linear: bool,
     /// The kinds that explain the level dependence, strongest first. Empty for a linear structure and where no kind explains it.
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<Nonlinearity>,
     /// χ² per degree of freedom of a linear structure: near 1 if the structure is linear.
     pub linear_misfit: f64,
     /// The same with the named kinds.
@@ -101,11 +101,14 @@ pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
             kinds.retain(|kind| {
                 !matches!(
                     kind,
-                    Kind::CubicStiffness | Kind::SofteningHardening | Kind::Backlash | Kind::Hysteresis
+                    Nonlinearity::CubicStiffness
+                        | Nonlinearity::SofteningHardening
+                        | Nonlinearity::Backlash
+                        | Nonlinearity::Hysteresis
                 )
             });
         }
-        kinds.push(Kind::QuadraticStiffness);
+        kinds.push(Nonlinearity::QuadraticStiffness);
     }
     Ok(Verdict {
         linear: alone <= chance && !second && !third,
@@ -225,7 +228,7 @@ impl<'a> Base<'a> {
 
 #[derive(Clone, Debug)]
 struct Choice {
-    kinds: Vec<Kind>,
+    kinds: Vec<Nonlinearity>,
     parameters: usize,
     sum: f64,
 }
@@ -274,12 +277,14 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
 impl Candidate {
     /// A nonlinear spring and a nonlinear damping can act together. Hysteresis is both already.
     fn goes_with(&self, other: &Self) -> bool {
-        self.spring != other.spring && self.kind != Kind::Hysteresis && other.kind != Kind::Hysteresis
+        self.spring != other.spring
+            && self.kind != Nonlinearity::Hysteresis
+            && other.kind != Nonlinearity::Hysteresis
     }
 }
 
 struct Candidate {
-    kind: Kind,
+    kind: Nonlinearity,
     spring: bool,
     parameters: usize,
     features: Vec<Vec<Complex64>>,
@@ -325,28 +330,28 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
         features(0.5 * (from + to))
     };
     vec![
-        candidate(Kind::CubicStiffness, true, 1, vec![cubic.clone()]),
+        candidate(Nonlinearity::CubicStiffness, true, 1, vec![cubic.clone()]),
         candidate(
-            Kind::CubicDamping,
+            Nonlinearity::CubicDamping,
             false,
             1,
             vec![feature(&|p| describing::cubic_damping(p.amplitude, p.omega))],
         ),
         candidate(
-            Kind::CoulombFriction,
+            Nonlinearity::CoulombFriction,
             false,
             1,
             vec![feature(&|p| describing::coulomb_friction(p.amplitude))],
         ),
-        candidate(Kind::SofteningHardening, true, 2, vec![cubic, quintic]),
+        candidate(Nonlinearity::SofteningHardening, true, 2, vec![cubic, quintic]),
         candidate(
-            Kind::Backlash,
+            Nonlinearity::Backlash,
             true,
             2,
             scan(&|point, gap| describing::backlash(point.amplitude, gap)),
         ),
         candidate(
-            Kind::Hysteresis,
+            Nonlinearity::Hysteresis,
             true,
             2,
             scan(&|point, yield_m| describing::hysteresis(point.amplitude, yield_m)),

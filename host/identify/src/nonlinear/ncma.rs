@@ -14,18 +14,18 @@ pub struct Curve {
     pub points: Vec<(f64, Complex64)>,
 }
 
-/// The mode linearized about one amplitude.
+/// Linearized mode at one vibration amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linearized {
     /// Amplitude of the force, N.
     pub force_n: f64,
-    /// |H| at both points, m/N.
+    /// Receptance magnitude |H| at both points, m/N.
     pub receptance: f64,
-    /// ω_r, rad/s.
+    /// Natural frequency ω_r, rad/s.
     pub omega: f64,
-    /// η_r.
+    /// Loss factor η_r.
     pub loss_factor: f64,
-    /// A_r + iB_r.
+    /// Complex modal constant A_r + iB_r.
     pub modal_constant: Complex64,
 }
 
@@ -35,7 +35,7 @@ pub struct Linearized {
 pub struct Map {
     /// Coefficients of a from the highest power of F down, then those of b, then those of c.
     pub coefficients: Vec<f64>,
-    /// Standard deviations of them.
+    /// Standard deviations of the coefficients.
     pub deviations: Vec<f64>,
     /// NRMSE: root mean square of the residual over that of the values.
     pub relative_error: f64,
@@ -58,7 +58,7 @@ pub fn evaluate(coefficients: &[f64], force_n: f64, receptance: f64) -> f64 {
 }
 
 impl Map {
-    /// Its value.
+    /// Value of the map at force F, N, and receptance X/F, m/N.
     pub fn at(&self, force_n: f64, receptance: f64) -> f64 {
         evaluate(&self.coefficients, force_n, receptance)
     }
@@ -146,7 +146,7 @@ impl Curve {
         (peak > 0 && peak + 1 < self.points.len()).then_some(peak)
     }
 
-    /// Where |H| first passes `level` among the intervals that begin at `starts`.
+    /// First crossing of |H| with `level`, searched in the intervals that begin at `starts`: ω and H.
     fn crossing(&self, level: f64, starts: Vec<usize>) -> Option<(f64, Complex64)> {
         let start = starts.into_iter().find(|&i| {
             let (a, b) = (
@@ -168,7 +168,7 @@ impl Curve {
         Some((low, self.between(start, low)))
     }
 
-    /// H at `omega` by the cubic through the four points around the interval that begins at `start`.
+    /// H at `omega` from the cubic through the four points around the interval that begins at `start`.
     fn between(&self, start: usize, omega: f64) -> Complex64 {
         let first = start.saturating_sub(1).min(self.points.len().saturating_sub(4));
         let around = &self.points[first..(first + 4).min(self.points.len())];
@@ -186,11 +186,11 @@ impl Curve {
     }
 }
 
-/// Eqs 4.5 and 4.6: ω_r, η_r and A_r + iB_r of a mode through two receptances.
+/// Mode through two receptances (thesis eqs 4.5 and 4.6): natural frequency ω_r, loss factor η_r, modal constant A_r + iB_r.
 ///
 /// With p = ω_r² and g = η_r ω_r² the two complex equations H_j·(p − ω_j² + i·g) = A + iB are linear in p, g, A, B.
 pub fn two_points(points: [(f64, Complex64); 2]) -> Option<(f64, f64, Complex64)> {
-    // Everything by the size of H and of ω², so that the system is well scaled.
+    // H and ω² are normalized, so that the linear system is well scaled.
     let size = points[0].1.norm();
     let scale = points[0].0 * points[0].0;
     let mut matrix = Matrix4::zeros();
@@ -215,7 +215,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_points_of_a_mode_give_it_back() {
+    fn two_points_of_a_mode_recover_its_parameters() {
         let (omega, eta) = (109.0, 0.033);
         let constant = Complex64::new(5e-3, 2e-4);
         let h = |w: f64| constant / Complex64::new(omega * omega - w * w, eta * omega * omega);
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_of_the_printed_form_is_found_again() {
+    fn a_map_of_the_printed_form_is_recovered() {
         let mut points = Vec::new();
         for force_n in [4.2, 9.8, 16.5] {
             for k in 0..12 {

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::criteria::BAND_SIGNAL_TO_NOISE;
 use crate::least_squares::{scaled_inverse, scaled_least_squares};
-use crate::nonlinear::spectrum::{Spectral, band_of, loudest_hz};
+use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
 use crate::student::NINETY_PERCENT;
 use quietcut_recording::Quantity;
 
@@ -183,17 +183,17 @@ impl Record<'_> {
         let mut band_hz = options
             .band_hz
             .unwrap_or_else(|| band_of(self.motion, self.rate_hz, BAND_SIGNAL_TO_NOISE));
-        let loudest_hz = loudest_hz(self.motion, self.rate_hz);
+        let dominant_hz = dominant_frequency_hz(self.motion, self.rate_hz);
         // Noise that is integrated has no end towards frequency 0.
         let integrated = matches!(self.quantity, Quantity::Velocity | Quantity::Acceleration);
-        let lowest_hz = if integrated { 0.25 * loudest_hz } else { 0.0 };
+        let lowest_hz = if integrated { 0.25 * dominant_hz } else { 0.0 };
         band_hz[0] = band_hz[0].max(lowest_hz);
         let driven = self.force.iter().any(|force| *force != 0.0);
         if !driven && options.mass_kg.is_none() {
             return Err(SurfaceError::NoForce);
         }
         // Harmonics that a nonlinear term makes stand above the band of what is fitted, and belong to the surface.
-        let highest_hz = (1.5 * band_hz[1]).max(3.5 * loudest_hz).min(0.5 * self.rate_hz);
+        let highest_hz = (1.5 * band_hz[1]).max(3.5 * dominant_hz).min(0.5 * self.rate_hz);
         let motion = self.motion([lowest_hz, highest_hz]);
         // With a known mass the left side is f − m q̈, and mass is no term.
         let mass = options.mass_kg.unwrap_or(0.0);

@@ -178,7 +178,7 @@ fn loudest(smooth: &[f64]) -> usize {
 }
 
 /// The dominant frequency of a record, Hz, to about 1/400 of half its sample rate.
-pub fn loudest_hz(samples: &[f64], rate_hz: f64) -> f64 {
+pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     let (smooth, width_hz) = smooth_power(samples, rate_hz);
     (loudest(&smooth) as f64 + 0.5) * width_hz
 }

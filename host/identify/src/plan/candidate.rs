@@ -1,4 +1,4 @@
-//! Possible tests, each with its Fisher information about the unknowns.
+//! Candidate tests of a plan, each with its Fisher information about the unknown parameters.
 
 use std::f64::consts::{FRAC_2_PI, PI};
 
@@ -15,13 +15,13 @@ use quietcut_model::structure::{Direction, FirstOrder, Structure};
 use quietcut_simulate::STANDARD_GRAVITY;
 use quietcut_stability::{CubicTerms, Problem, Variable};
 
-/// Half the difference, in standard deviations, over which responses are differenced.
+/// Step of the central differences of responses, in standard deviations of the parameter. A choice.
 const STEP: f64 = 0.05;
 
-/// Phases at which the force of a cut is looked at, in each part of the tooth period with the same teeth.
+/// Number of phases at which the cutting force is evaluated in each interval of the tooth period with the same teeth in cut. A choice.
 const PHASES: usize = 90;
 
-/// Most speeds at which a limit may be bracketed.
+/// Largest number of speeds at which the stability limit may be bracketed. A choice that bounds the computing time.
 const BRACKETS: usize = 40;
 
 /// A test at the machine.
@@ -41,7 +41,7 @@ pub enum Test {
         rpm: f64,
         /// Axial depth, mm.
         depth_mm: f64,
-        /// How long the forces are recorded, s.
+        /// Duration of the force recording, s.
         seconds: f64,
     },
     /// Cuts at one speed that bracket the limit, each halving the interval; the chatter frequency is read from those that
@@ -49,20 +49,20 @@ pub enum Test {
     Cuts {
         /// Spindle speed, rev/min.
         rpm: f64,
-        /// Where the limit is expected, mm.
+        /// Expected depth of the stability limit, mm.
         about_mm: f64,
-        /// How narrow the bracket is to become, mm.
+        /// Final width of the bracket, mm.
         bracket_mm: f64,
     },
 }
 
-/// A test and its information.
+/// A candidate test and its Fisher information.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
     pub(super) test: Test,
-    /// J: the inverse of the covariance that the test alone leaves, in units of the deviations before.
+    /// Fisher information matrix J; parameters in units of their prior standard deviations.
     pub(super) information: DMatrix<f64>,
-    /// Which limit of the chart it brackets.
+    /// Index of the chart's stability limit that the test brackets; `None` for other tests.
     pub(super) limit: Option<usize>,
 }
 
@@ -89,7 +89,7 @@ pub(super) fn candidates(
     candidates
 }
 
-/// A depth that is known to lie anywhere in the bracket has the variance w²/12; beside it a frequency.
+/// Candidate that brackets a stability limit: the limit depth, uniform within the bracket width w (variance w²/12), and the chatter frequency.
 fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     let plane = &limit.planes[0];
     let bracket_mm = means.bracket * plane.depth_mm;
@@ -110,7 +110,7 @@ fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     }
 }
 
-/// The cases at ± a step along a variable; `None` where one of them cannot be.
+/// Cases at plus and minus one step of a variable; `None` if one of them is invalid.
 fn shifted(case: &Case, variable: &Variable) -> Option<[Case; 2]> {
     let at = |deviations: f64| {
         let mut moved = case.clone();
@@ -119,10 +119,10 @@ fn shifted(case: &Case, variable: &Variable) -> Option<[Case; 2]> {
     Some([at(-STEP)?, at(STEP)?])
 }
 
-/// A hammer in every direction of the machine.
+/// Candidate hammer tests, one for each direction of the machine.
 ///
 /// A response a = −ω²H(ω)F(ω) in white noise of one-sided density S holds the information
-/// J_ij = 4/S ∫₀^∞ Re(∂_i a* ∂_j a) dω/2π per blow, with F the transform of a half sine.
+/// J_ij = 4/S ∫₀^∞ Re(∂_i a* ∂_j a) dω/2π per impact, with F the transform of a half sine.
 fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
     let Some(structure) = &case.structure else {
         return Vec::new();
@@ -134,7 +134,7 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
     let Some(&(highest_hz, _)) = grid.last() else {
         return Vec::new();
     };
-    // Up to the highest mode a half sine of this length excites without a gap: its first zero is at 1.5/pulse.
+    // The spectrum of a half sine has its first zero at 1.5/pulse length, so this pulse excites all modes.
     let pulse_s = 0.75 / highest_hz;
     let structures: Vec<Option<[FirstOrder; 2]>> = unknowns
         .variables
@@ -205,8 +205,7 @@ fn hammers(case: &Case, unknowns: &Unknowns, means: &Means) -> Vec<Candidate> {
         .collect()
 }
 
-/// Frequencies and the width that each stands for, Hz: fine within the resonances, from half the lowest to twice the
-/// highest of the modes.
+/// Quadrature nodes and weights in frequency, Hz: from half the lowest to twice the highest natural frequency, dense at resonances.
 fn frequency_grid(structure: &FirstOrder) -> Vec<(f64, f64)> {
     let modes: Vec<(f64, f64)> = structure
         .poles()
@@ -221,7 +220,7 @@ fn frequency_grid(structure: &FirstOrder) -> Vec<(f64, f64)> {
         return Vec::new();
     };
     let coarse = (0..=200).map(|i| lowest * 0.5 * (4.0 * highest / lowest).powf(f64::from(i) / 200.0));
-    // The tangent spaces points evenly in the phase of a resonance.
+    // The tangent spaces the nodes uniformly in the phase of a resonance.
     let fine = modes.iter().flat_map(|&(hz, half_width_hz)| {
         (-60..=60).map(move |i| hz + half_width_hz * (PI / 2.0 * f64::from(i) / 61.0).tan())
     });
@@ -239,18 +238,18 @@ fn frequency_grid(structure: &FirstOrder) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// |F(f)|, N s, of half a sine.
+/// Magnitude |F(f)| of the transform of a half-sine impact, N s, at `hz`.
 fn half_sine(peak_n: f64, pulse_s: f64, hz: f64) -> f64 {
     let turns = hz * pulse_s;
     let from_pole = 1.0 - 4.0 * turns * turns;
     if from_pole.abs() < 1e-6 {
-        // Between numerator and denominator both zero.
+        // Limit where numerator and denominator are both zero.
         return peak_n * pulse_s * 0.5;
     }
     peak_n * pulse_s * FRAC_2_PI * ((PI * turns).cos() / from_pole).abs()
 }
 
-/// A cut at half the lowest limit of the chart, where it is: stable, so that chips are as thick as the feed makes them.
+/// Candidate cut on a dynamometer at half the lowest stability limit of the chart: stable, so that the feed alone sets the chip thickness.
 ///
 /// J_ij = 2T/S · mean over the period of ∂_i F · ∂_j F.
 fn force(

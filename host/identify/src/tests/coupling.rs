@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::dwells::dwell::{Dwell, pool_variances, stretches};
+use crate::dwells::dwell::{Dwell, dwell_segments, pool_variances};
 use crate::nonlinear::harmonic_balance::Grid;
 use crate::nonlinear::law::{Extra, Law, Role};
 use crate::nonlinear::steady_fit::Data;
@@ -62,7 +62,7 @@ fn dwells(recording: &Recording, noise: f64, seed: u64, harmonics: usize) -> Vec
         ..Noise::default()
     }
     .add(&mut noisy, seed);
-    let mut dwells: Vec<Dwell> = stretches(&noisy)
+    let mut dwells: Vec<Dwell> = dwell_segments(&noisy)
         .into_iter()
         .filter_map(|mut stretch| {
             stretch.from = stretch.to.saturating_sub(640);

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::joints::{posture, tool_space, whole_jacobian};
-use crate::dwells::dwell::{Dwell, Stretch, pool_variances, stretches};
+use crate::dwells::dwell::{Dwell, DwellSegment, dwell_segments, pool_variances};
 use crate::nonlinear::law::Extra;
 use crate::robot::cubic_joints::{CubicJointFit, PostureDwells, fit};
 use crate::robot::joints::JointParameter;
@@ -73,10 +73,10 @@ fn dwells(recording: &Recording, seed: u64) -> Vec<Dwell> {
         ..Noise::default()
     };
     noise.add(&mut noisy, seed);
-    let mut dwells: Vec<Dwell> = stretches(&noisy)
+    let mut dwells: Vec<Dwell> = dwell_segments(&noisy)
         .into_iter()
         .filter_map(|stretch| {
-            let last = Stretch {
+            let last = DwellSegment {
                 from: stretch.to.saturating_sub(768),
                 ..stretch
             };
@@ -222,8 +222,8 @@ fn cubic_joints_come_back_and_tell_peaks_at_unseen_postures() {
 }
 
 fn dwells_without_noise(recording: &Recording) -> Vec<Dwell> {
-    let found = stretches(recording).into_iter().filter_map(|stretch| {
-        let last = Stretch {
+    let found = dwell_segments(recording).into_iter().filter_map(|stretch| {
+        let last = DwellSegment {
             from: stretch.to.saturating_sub(768),
             ..stretch
         };

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::dwells::dwell::{Dwell, pool_variances, stretches};
+use crate::dwells::dwell::{Dwell, dwell_segments, pool_variances};
 use crate::dwells::steady::windows;
-use crate::nonlinear::describing::Kind;
+use crate::nonlinear::describing::Nonlinearity;
 use crate::nonlinear::homogeneity::regions;
 use crate::nonlinear::linearity::{Verdict, judge};
 use quietcut_model::structure::{Direction, Form, Structure};
@@ -54,7 +54,7 @@ fn verdict(recordings: &[Recording], seed: u64) -> Verdict {
     for (level, recording) in recordings.iter().enumerate() {
         let mut noisy = recording.clone();
         noise.add(&mut noisy, 64 * seed + level as u64);
-        let mut of_level: Vec<Dwell> = stretches(&noisy)
+        let mut of_level: Vec<Dwell> = dwell_segments(&noisy)
             .into_iter()
             .filter_map(|mut stretch| {
                 stretch.from = stretch.to.saturating_sub(1024);
@@ -89,26 +89,29 @@ fn linear_rigs_are_called_linear_98_times_in_a_hundred() {
 
 #[test]
 fn nonlinear_rigs_are_called_by_their_kind() {
-    let rigs: [(&[&str], &[Kind]); 8] = [
-        (&["cubic-stiffness=-3e12"], &[Kind::CubicStiffness]),
-        (&["cubic-stiffness=3e12"], &[Kind::CubicStiffness]),
-        (&["cubic-damping=3e6"], &[Kind::CubicDamping]),
-        (&["quadratic-stiffness=1.5e9"], &[Kind::QuadraticStiffness]),
+    let rigs: [(&[&str], &[Nonlinearity]); 8] = [
+        (&["cubic-stiffness=-3e12"], &[Nonlinearity::CubicStiffness]),
+        (&["cubic-stiffness=3e12"], &[Nonlinearity::CubicStiffness]),
+        (&["cubic-damping=3e6"], &[Nonlinearity::CubicDamping]),
+        (
+            &["quadratic-stiffness=1.5e9"],
+            &[Nonlinearity::QuadraticStiffness],
+        ),
         (
             &[
                 "softening-hardening=-1e13",
                 "softening-hardening.k5_n_per_m5=1e21",
             ],
-            &[Kind::SofteningHardening],
+            &[Nonlinearity::SofteningHardening],
         ),
-        (&["coulomb-friction=0.8"], &[Kind::CoulombFriction]),
+        (&["coulomb-friction=0.8"], &[Nonlinearity::CoulombFriction]),
         (
             &["backlash=0.02", "backlash.stiffness_fraction=0.1"],
-            &[Kind::Backlash],
+            &[Nonlinearity::Backlash],
         ),
         (
             &["hysteresis=1.5e5", "hysteresis.yield_m=1e-5"],
-            &[Kind::Hysteresis],
+            &[Nonlinearity::Hysteresis],
         ),
     ];
     let mut wrong = Vec::new();
@@ -138,7 +141,7 @@ fn nonlinear_rigs_are_called_by_their_kind() {
     found.sort();
     println!("cubic spring and damper: {found:?}");
     assert!(wrong.is_empty(), "{wrong:?}");
-    assert_eq!(found, [Kind::CubicStiffness, Kind::CubicDamping]);
+    assert_eq!(found, [Nonlinearity::CubicStiffness, Nonlinearity::CubicDamping]);
 }
 
 #[test]
@@ -285,7 +288,7 @@ fn cross_receptances_of_symmetric_matrices_are_reciprocal() {
                 ..Noise::default()
             };
             noise.add(&mut recording, 2 * seed + index as u64);
-            dwells.extend(stretches(&recording).into_iter().filter_map(|mut stretch| {
+            dwells.extend(dwell_segments(&recording).into_iter().filter_map(|mut stretch| {
                 stretch.from = stretch.to.saturating_sub(1024);
                 Dwell::fit(&recording, stretch, 3)
             }));

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use crate::dwells::dwell::{Dwell, Stretch, pool_variances, stretches};
+use crate::dwells::dwell::{Dwell, DwellSegment, dwell_segments, pool_variances};
 use crate::nonlinear::harmonic_balance::Grid;
 use crate::nonlinear::law::{Extra, Law, Role};
 use crate::nonlinear::steady_fit::{Data, Fit};
@@ -72,8 +72,8 @@ pub(crate) fn truth(structure: &Structure, law: &Law) -> DVector<f64> {
 }
 
 /// A recording of the last `samples` samples of every dwell, one behind the other, and where they stand.
-fn last_of_each(recording: &Recording, dwells: usize, samples: usize) -> (Recording, Vec<Stretch>) {
-    let found = stretches(recording);
+fn last_of_each(recording: &Recording, dwells: usize, samples: usize) -> (Recording, Vec<DwellSegment>) {
+    let found = dwell_segments(recording);
     assert_eq!(found.len(), dwells);
     let mut cut = recording.clone();
     for (channel, whole) in cut.channels.iter_mut().zip(&recording.channels) {
@@ -85,7 +85,7 @@ fn last_of_each(recording: &Recording, dwells: usize, samples: usize) -> (Record
     let stretches = found
         .iter()
         .enumerate()
-        .map(|(index, stretch)| Stretch {
+        .map(|(index, stretch)| DwellSegment {
             from: index * samples,
             to: (index + 1) * samples,
             ..*stretch

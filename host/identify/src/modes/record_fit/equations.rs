@@ -1,4 +1,4 @@
-//! Normal equations of a record, with its transient eliminated.
+//! Normal equations of one record for the parameters of the structure, with the transient of the record eliminated.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -8,33 +8,33 @@ use super::line::{Line, of_forces, powers};
 use super::unknowns::{SMOOTH, Unknowns};
 use super::variances::Variances;
 
-/// Lines whose derivatives are multiplied in one go.
+/// Number of frequency lines per block of the Jacobian products. A choice that keeps a block in the cache.
 const BLOCK: usize = 64;
 
-/// What is added to the diagonal of the transient's equations, as a part of it: some of its terms are hardly there.
+/// Relative ridge on the diagonal of the transient's normal equations, which regularizes terms without data. A choice, near the rounding error.
 const RIDGE: f64 = 1e-12;
 
-/// What a record says about the structure.
+/// Normal equations of the structure from one record.
 pub(super) struct Equations {
-    /// Re(Jᴴ J) of the structure, less what the transient explains as well.
+    /// Schur complement of Re(Jᴴ J) for the structure after elimination of the transient.
     pub(super) normal: DMatrix<f64>,
     pub(super) gradient: DVector<f64>,
     transients: Cholesky<f64, Dyn>,
     scale: DVector<f64>,
-    /// Transient by structure.
+    /// Coupling between transient and structure; rows transient, columns structure.
     mixed: DMatrix<f64>,
     of_transient: DVector<f64>,
 }
 
 impl Equations {
-    /// The step of the transient that goes with a step of the structure.
+    /// Step of the transient parameters for a given step of the structure parameters.
     pub(super) fn transient(&self, step: &DVector<f64>) -> DVector<f64> {
         let right = (&self.of_transient - &self.mixed * step).component_mul(&self.scale);
         self.transients.solve(&right).component_mul(&self.scale)
     }
 }
 
-/// The equations of a record; `None` where they break down.
+/// Normal equations of a record; `None` if they are singular.
 pub(super) fn equations(
     data: &Data<'_>,
     record: usize,
@@ -102,7 +102,7 @@ fn eliminated(gram: &DMatrix<f64>, structure: usize, transient: usize) -> Option
     })
 }
 
-/// What the noise of the most likely forces adds to Re(Jᴴ J): that of forces drawn from their covariance
+/// Contribution of the uncertainty of the estimated forces to Re(Jᴴ J), for forces with the covariance
 /// P = V_f − V_f Hᴴ C⁻¹ H V_f.
 pub(super) fn of_force_noise(
     data: &Data<'_>,
@@ -150,7 +150,7 @@ pub(super) fn of_force_noise(
     Some(gram)
 }
 
-/// Derivatives of sⁿ H F + T by the parameters of the structure; T only where the forces are those of the line.
+/// Derivatives of sⁿ H F + T with respect to the parameters of the structure; T is included only for the forces of the line itself.
 fn of_structure(
     data: &Data<'_>,
     record: usize,
@@ -218,7 +218,7 @@ fn of_structure(
     }
 }
 
-/// Derivatives by the transient of the record, after those of the structure.
+/// Derivatives with respect to the transient parameters; their columns follow those of the structure.
 fn of_transient(
     data: &Data<'_>,
     record: usize,

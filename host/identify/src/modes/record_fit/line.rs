@@ -1,4 +1,4 @@
-//! One line of a record: what is left of it, its covariance, and the forces that are most likely.
+//! One frequency line of a record: residual, covariance, and maximum likelihood estimate of the forces.
 
 use nalgebra::{Cholesky, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -8,25 +8,25 @@ use super::unknowns::{SMOOTH, Unknowns};
 use super::variances::Variances;
 use crate::modes::shape;
 
-/// Responses and forces beyond those of the record are zero, with a variance of one.
+/// Residual and forces of one frequency line. Unused responses and forces are zero with unit variance.
 pub(super) struct Line {
     pub(super) s: Complex64,
-    /// sⁿ H, responses by forces of the record.
+    /// FRF matrix sⁿ H; rows responses, columns forces of the record.
     pub(super) gain: Matrix3<Complex64>,
-    /// e = X − sⁿ H F − T.
+    /// Residual e = X − sⁿ H F − T.
     pub(super) left: Vector3<Complex64>,
-    /// C⁻¹ e.
+    /// Weighted residual C⁻¹ e.
     pub(super) weighted: Vector3<Complex64>,
-    /// eᴴ C⁻¹ e.
+    /// Weighted square of the residual, eᴴ C⁻¹ e.
     pub(super) square: f64,
-    /// L⁻¹ of C = L Lᴴ.
+    /// Whitening matrix L⁻¹ of the covariance C = L Lᴴ.
     pub(super) whitening: Matrix3<Complex64>,
-    /// F + V_f Hᴴ s̄ⁿ C⁻¹ e: the gradient of the squares is that of a fit to these forces.
+    /// Maximum likelihood forces F + V_f Hᴴ s̄ⁿ C⁻¹ e; the gradient of the cost equals that of a fit with these forces.
     pub(super) force: Vector3<Complex64>,
 }
 
 impl Line {
-    /// `None` where the covariance is not positive definite.
+    /// Evaluates one line; `None` if the covariance is not positive definite.
     pub(super) fn of(
         data: &Data<'_>,
         record: usize,
@@ -69,12 +69,12 @@ impl Line {
     }
 }
 
-/// V_f as complex numbers; zero beyond the forces of the record.
+/// Variances V_f of the force noise as complex numbers; zero for unused forces.
 pub(super) fn of_forces(variances: &Variances) -> Vector3<Complex64> {
     Vector3::from_fn(|q, _| Complex64::from(variances.measured.get(q).copied().unwrap_or(0.0)))
 }
 
-/// sⁿ H at a line.
+/// FRF matrix sⁿ H of the measured responses at s.
 pub(super) fn gain(data: &Data<'_>, record: usize, unknowns: &Unknowns, s: Complex64) -> Matrix3<Complex64> {
     let (responses, forces) = &data.axes[record];
     let mut gain = Matrix3::zeros();
@@ -103,7 +103,7 @@ pub(super) fn gain(data: &Data<'_>, record: usize, unknowns: &Unknowns, s: Compl
     gain
 }
 
-/// (s/is₀)ʲ iʲ, which is real or imaginary in turn: the transform of a real signal has such.
+/// Polynomial basis (s/is₀)ʲ iʲ of the transient, alternately real and imaginary, as the transform of a real signal requires.
 pub(super) fn powers(data: &Data<'_>, s: Complex64) -> [Complex64; SMOOTH] {
     std::array::from_fn(|j| (s / data.omega).powi(j as i32))
 }

@@ -1,20 +1,20 @@
-//! Modes refined on the lines of whole records: maximum likelihood with noise in forces and responses alike, and with the
-//! transient of each record as unknowns.
+//! Maximum likelihood fit of modes to the transforms of whole records, with noise in forces and responses, and with the transient of each
+//! record as unknown parameters.
 //!
 //! At each line of the transform of a whole record, without a window,
 //!
 //!   X(k) = sⁿ H(s) F(k) + T(s) + noise,   s = i2πk/duration,
 //!
-//! n being 0 for a displacement, 2 for an acceleration. T has the poles of H and a polynomial in s: what moves before the
-//! record begins and rings on after it ends. With it nothing leaks and no average over frequencies bends the resonances
+//! with n = 0 for a displacement, 1 for a velocity, 2 for an acceleration. The transient T has the poles of H and a polynomial in s. It models
+//! the initial and final state of the record, so that neither leakage nor frequency averaging biases the resonances
 //! (Pintelon and Schoukens, System Identification, 2nd ed. 2012, chapters 6 and 9). Averaged receptances (thesis eqs
 //! 7.7–7.12) do both; and H1 takes noise of the forces for force, which weighs where the forces of a cut are nearly
 //! dependent.
 //!
-//! What is left, e = X − sⁿ H F − T, has the covariance C = V_x + sⁿ H (V_f + V_d) Hᴴ s̄ⁿ: noise of the responses, noise of
-//! the measured forces, and forces that act and are not measured, such as those of what is not linear in the structure.
+//! The residual e = X − sⁿ H F − T, has the covariance C = V_x + sⁿ H (V_f + V_d) Hᴴ s̄ⁿ: noise of the responses, noise of
+//! the measured forces, and unmeasured forces, such as nonlinear restoring forces of the structure.
 //! The parameters minimise Σ eᴴ C⁻¹ e with V_f's part of C moving along, which is maximum likelihood over the unknown
-//! true forces. Noise is white within the band, one variance per channel and record, found from what is left ([`noise`]).
+//! true forces. Noise is white within the band, one variance per channel and record, estimated from the residual ([`noise`]).
 
 mod data;
 mod equations;
@@ -42,21 +42,21 @@ use quietcut_frf::RecordSpectra;
 use unknowns::{Transient, Unknowns};
 use variances::Variances;
 
-/// Rounds in which parameters and variances of noise find each other, and the relative change of the variances at which
-/// they have.
+/// Largest number of rounds that alternate between parameters and noise variances. A choice.
 const ROUNDS: usize = 30;
+/// Relative change of the noise variances below which the rounds have converged. A choice.
 const SAME_NOISE: f64 = 1e-3;
 
 const STEPS_MAX: usize = 100;
 const DAMPING_MAX: f64 = 1e12;
 
-/// Relative decrease of the squares below which they are least.
+/// Relative decrease of the cost below which the iteration has converged. A choice.
 const SETTLED: f64 = 1e-9;
 
-/// Refines the modes of `model`, which come from averaged receptances, on the records themselves.
+/// Refines the modes of `model`, estimated from averaged receptances, by a maximum likelihood fit to the records.
 ///
 /// # Errors
-/// Other directions than those of the model, too few or too many lines, a fit that does not converge.
+/// The records have other directions than the model, or too few or too many lines; the fit does not converge.
 pub fn refine_by_records(
     model: &ModalModel,
     records: &[RecordSpectra],
@@ -82,7 +82,7 @@ pub fn refine_by_records(
     Ok((updated(&data, model, &refined), data.found(&variances)))
 }
 
-/// Σ eᴴ C⁻¹ e.
+/// Cost Σ eᴴ C⁻¹ e over all lines and records.
 fn squares(data: &Data<'_>, variances: &[Variances], unknowns: &Unknowns) -> f64 {
     let of_record = |record: usize| -> f64 {
         (0..data.records[record].frequency_hz.len())
@@ -95,7 +95,7 @@ fn squares(data: &Data<'_>, variances: &[Variances], unknowns: &Unknowns) -> f64
     (0..data.records.len()).map(of_record).sum()
 }
 
-/// Levenberg and Marquardt; transients are eliminated record by record.
+/// Levenberg–Marquardt iteration; the transient of each record is eliminated.
 fn least_squares(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) -> Option<Unknowns> {
     let mut least = squares(data, variances, &unknowns);
     let mut damping = 1e-3;
@@ -131,8 +131,8 @@ fn least_squares(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknown
     None
 }
 
-/// The fit with its covariance B⁻¹ M B⁻¹: M is that of the gradient, which the noise of the estimated forces makes larger
-/// than the curvature B of half the squares.
+/// Fit with its covariance B⁻¹ M B⁻¹. M is the covariance of the gradient and B the curvature of half the cost; the uncertainty of the
+/// estimated forces makes M larger than B.
 fn finished(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) -> Option<Refined> {
     let directions = unknowns
         .structure
@@ -153,7 +153,7 @@ fn finished(data: &Data<'_>, variances: &[Variances], mut unknowns: Unknowns) ->
         curvature -= equations::of_force_noise(data, record, &unknowns, variances)?;
     }
     let bread = constrained_inverse(&unknowns.structure, &shared, &curvature)?;
-    // Of a complex number of variance 1, what goes along a direction has a variance of ½.
+    // A complex number of unit variance has variance ½ along any direction.
     let covariance = &bread * (0.5 * of_gradient) * &bread;
     let (mut rest, mut all, mut values) = (0.0, 0.0, 0);
     for (record, spectra) in data.records.iter().enumerate() {

@@ -1,8 +1,7 @@
-//! The variances of the noise, from what is left of a fit.
+//! Noise variances of the channels, estimated from the residual of a fit.
 //!
-//! What is left is normal with C = Σ_c v_c B_c: B is one entry of the diagonal for the noise of a response and g gᴴ for
-//! that of a force with the column g of sⁿ H. Resonances in what is left come of forces, the rest of responses. The
-//! likelihood is climbed by Fisher's scoring: v = A⁻¹ b, A_cd = Σ tr(C⁻¹B_cC⁻¹B_d), b_c = Σ eᴴC⁻¹B_cC⁻¹e over the lines.
+//! The residual e is Gaussian with covariance C = Σ_c v_c B_c. B_c is one diagonal entry for the noise of a response, and g gᴴ for the noise
+//! of a force with the column g of sⁿ H. So resonances in the residual indicate force noise. The likelihood is maximized by Fisher scoring: v = A⁻¹ b, A_cd = Σ tr(C⁻¹B_cC⁻¹B_d), b_c = Σ eᴴC⁻¹B_cC⁻¹e over the lines.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use num_complex::Complex64;
@@ -15,24 +14,25 @@ use crate::criteria::LEAST_RELATIVE_NOISE;
 use quietcut_frf::ChannelLines;
 use quietcut_numerics::eigenvalues::of_symmetric;
 
-/// Steps of scoring in one round.
+/// Number of Fisher scoring steps per round. A choice; later rounds continue the iteration.
 const STEPS: usize = 10;
 
-/// The least that a step leaves of a variance.
+/// Smallest factor by which one step may reduce a variance. A choice that damps the iteration.
 const SHRINK: f64 = 0.1;
 
-/// Lines of a band over which forces are looked at together. Of so many the least eigenvalue of the noise of three channels
-/// is hardly ever below [`EIGENVALUE`] of its variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
+/// Number of lines per band in which the force spectral matrix is averaged. With this number the smallest eigenvalue of the sample covariance
+/// of three noise channels is rarely below [`EIGENVALUE`] times the variance (Marchenko and Pastur: (1 − √(3/64))² = 0.61).
 const BAND: usize = 64;
+/// Lower bound of the smallest eigenvalue of a sample noise covariance over [`BAND`] lines, relative to the variance; below the expected 0.61.
 const EIGENVALUE: f64 = 0.5;
 
-/// What is added to the diagonal of the scores, as a part of their trace.
+/// Ridge on the diagonal of the scoring matrix, relative to its trace. A choice, near the rounding error.
 const RIDGE: f64 = 1e-12;
 
-/// Force noise that fits begin with, as a part of the power of the force in the band.
+/// Start value of the force noise variance, relative to the power of the force in the band. A choice.
 const FORCE_START: f64 = 1e-6;
 
-/// All of what is left is noise of the responses.
+/// Start values: the whole residual is attributed to response noise.
 pub(super) fn start(data: &Data<'_>, record: usize, unknowns: &Unknowns) -> Variances {
     let spectra = &data.records[record];
     let mut variances = Variances {
@@ -64,7 +64,7 @@ fn least(channel: &ChannelLines) -> f64 {
     (LEAST_RELATIVE_NOISE * channel.root_mean_square).powi(2)
 }
 
-/// The least that the noise of a force can be: its plateau, where it has one.
+/// Lower bound of the force noise variance: the plateau of its spectrum, if there is one.
 fn lowest(channel: &ChannelLines) -> f64 {
     channel.plateau.unwrap_or(0.0).max(least(channel))
 }
@@ -73,13 +73,13 @@ fn mean_square(lines: &[Complex64]) -> f64 {
     lines.iter().map(|line| line.norm_sqr()).sum::<f64>() / lines.len().max(1) as f64
 }
 
-/// Improves the variances of a record; the largest relative change that matters: of the covariance of what is left.
+/// Updates the noise variances of a record. Returns the largest relative change of the residual covariance.
 pub(super) fn again(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) -> f64 {
     let before = variances.clone();
     let responses = variances.responses.len();
     let spectra = &data.records[record];
     let values = 2.0 * (spectra.frequency_hz.len() * responses) as f64;
-    // What the transient and the structure take along.
+    // Degrees of freedom used by the parameters of transient and structure.
     let unknown = unknowns.transients.iter().map(Transient::width).sum::<usize>() / data.records.len()
         + unknowns.structure.parameters().len() / data.records.len();
     let unbiased = values / (values - unknown as f64).max(1.0);
@@ -114,14 +114,14 @@ pub(super) fn again(data: &Data<'_>, record: usize, unknowns: &Unknowns, varianc
         }
         divide(data, record, unknowns, variances);
     }
-    // A variance that others hide may wander without a trace: what counts is the sum at each line.
+    // A single variance may be poorly determined; convergence is judged by the total covariance of each line.
     for k in (0..spectra.frequency_hz.len()).step_by(16) {
         let pair = (
             Line::of(data, record, unknowns, &before, k),
             Line::of(data, record, unknowns, variances, k),
         );
         if let (Some(old), Some(new)) = pair {
-            // tr(C_old C_new⁻¹) of each pair of whitenings.
+            // tr(C_old C_new⁻¹) from the two whitening matrices.
             let mixed = new.whitening * old.whitening.try_inverse().unwrap_or_else(Matrix3::identity);
             let part = mixed.norm_squared() / 3.0;
             change = f64::max(change, (part - 1.0).abs());
@@ -130,12 +130,12 @@ pub(super) fn again(data: &Data<'_>, record: usize, unknowns: &Unknowns, varianc
     change
 }
 
-/// A⁻¹ b, where it is not below the bounds: what is stays there while the others are sought again.
+/// Solution of A v = b with lower bounds: variances at a bound are fixed there and the others are solved again.
 fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: &[f64]) -> Option<Vec<f64>> {
     let mut next = current.to_vec();
     let mut free: Vec<usize> = (0..current.len()).collect();
     loop {
-        // In units of the present values.
+        // Variances are scaled by their current values.
         let size = free.len();
         let mut scaled = DMatrix::from_fn(size, size, |i, j| {
             normal[(free[i], free[j])] * current[free[i]] * current[free[j]]
@@ -164,8 +164,8 @@ fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: 
     }
 }
 
-/// Which part of the forces' noise is in the measured forces: their plateau; without one, as much as leaves S_ff − V_f
-/// positive in every direction. The rest acts without being measured.
+/// Divides the force noise into measurement noise and unmeasured forces. Measurement noise is the plateau of the force spectrum, or else the
+/// largest V_f for which S_ff − V_f is positive definite. The rest is unmeasured force that acts on the structure.
 fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut Variances) {
     let spectra = &data.records[record];
     let count = spectra.frequency_hz.len();
@@ -178,7 +178,7 @@ fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut V
             let sum: Complex64 = lines.clone().map(|k| a[k] * b[k].conj()).sum();
             sum / (lines.len() as f64 * (variances.forces[i] * variances.forces[j]).sqrt())
         });
-        // Spectra that are not finite say nothing of independent forces.
+        // Spectra that are not finite give no bound.
         of_symmetric(power).map_or(0.0, |eigen| eigen.eigenvalues.min())
     };
     let least = (0..bands).map(eigenvalue).fold(f64::INFINITY, f64::min);
@@ -197,7 +197,7 @@ fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut V
     }
 }
 
-/// A and b.
+/// Fisher scoring matrix A and right-hand side b (module documentation).
 fn scores(
     data: &Data<'_>,
     record: usize,
@@ -209,7 +209,7 @@ fn scores(
     let (mut normal, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
     for k in 0..data.records[record].frequency_hz.len() {
         let line = Line::of(data, record, unknowns, variances, k)?;
-        // Every B is a column times its adjoint.
+        // Every B_c is the product of a column and its adjoint.
         let column = |c: usize| -> Vector3<Complex64> {
             if c < responses {
                 Vector3::from_fn(|p, _| if p == c { Complex64::ONE } else { Complex64::ZERO })
