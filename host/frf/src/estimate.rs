@@ -5,7 +5,8 @@ use super::small_matrix::{
     Matrix, ZERO, adjoint, extreme_eigenvalues, inverse, product, product_adjoint, scaled, sum,
 };
 
-/// Estimator of a frequency response function. The names H1 and H2 follow the standard use (Bendat and Piersol).
+/// Estimator of a frequency response function. The names H1 and H2 follow the standard use (Bendat and Piersol);
+/// equations (4.1) and (4.2) of the thesis exchange them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimator {
     /// H1 = S_xf S_ff⁻¹: unbiased with noise in the responses only.
@@ -13,9 +14,9 @@ pub enum Estimator {
     H1,
     /// H2 = S_xx S_fx⁻¹: unbiased with noise in the forces only.
     H2,
-    /// Mean ½ (H1 + H2).
+    /// Mean ½ (H1 + H2), thesis eq. (4.4).
     Mean,
-    /// Pseudo-inverse H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests. The forces of one test may be dependent if those of all
+    /// Pseudo-inverse H = [S_xf,1 S_xf,2 …][S_ff,1 S_ff,2 …]⁺ over several tests (thesis eq. 7.12). The forces of one test may be dependent if those of all
     /// tests together are independent.
     PseudoInverse,
 }
@@ -30,7 +31,7 @@ pub(super) struct Line {
     pub(super) frequency_hz: f64,
     /// FRF matrix, rows responses, columns forces; responses as measured, before integration to displacement.
     pub(super) h: Matrix,
-    /// Multiple coherence of each response: fraction of its power that is linearly related to the forces.
+    /// Multiple coherence of each response (thesis eq. 7.10): fraction of its power that is linearly related to the forces.
     pub(super) coherence: [f64; 3],
     /// Standard deviation of |H| for each response and force (random error).
     pub(super) deviation: [[f64; 3]; 3],

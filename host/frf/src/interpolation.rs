@@ -90,8 +90,8 @@ impl Interpolation {
 
     /// H at the complex frequency f = s/(2πi), Hz.
     ///
-    /// Off the real axis the cubic of the nearest lines is continued analytically. It is accurate up to about one line spacing from the axis,
-    /// and closer to a pole only to its distance.
+    /// Off the real axis the cubic of the nearest lines is continued analytically. It is accurate within about one line spacing of the
+    /// axis, or within the distance of the nearest pole if that is smaller.
     pub fn at(&self, frequency_hz: Complex64) -> Matrix3<Complex64> {
         if frequency_hz.re < 0.0 {
             // Complex conjugation of s maps f to −f̄.

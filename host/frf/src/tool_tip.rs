@@ -1,7 +1,7 @@
 //! Tool-tip calibration: receptances at the tool tip from a sensor on the spindle housing.
 //!
 //! If spindle, holder and tool move as a rigid body in a mode, the motions of tip T and sensor S keep the constant ratio φ_T/φ_S of the
-//! mode shape. Two hammer tests with impacts at the tip give this ratio for each mode: one with the sensor at its position during the cut,
+//! mode shape (thesis eqs 7.13 and 7.14). Two hammer tests with impacts at the tip give this ratio for each mode: one with the sensor at its position during the cut,
 //! one with a sensor at the tip.
 
 use num_complex::Complex64;
@@ -42,7 +42,7 @@ pub struct ModeRatio {
 ///
 /// `housing` and `tip` are the calibration: responses at the sensor and at the tip to forces at the tip. `measured` has responses at the
 /// same sensor. Each mode r of `measured` is fitted and scaled with the ratio of the nearest calibrated mode:
-/// H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r.
+/// H_TT = H_ST + Σ_r (φ_T/φ_S − 1)_r H_ST,r. For one mode this is thesis eq. (7.14).
 ///
 /// # Errors
 /// The tables have no common receptance or too few lines; a mode has no counterpart in the calibration.
