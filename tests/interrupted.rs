@@ -121,7 +121,7 @@ fn an_interrupted_diagnosis_leaves_nothing() {
             "--direction",
             "x",
             "--frequency-hz",
-            "10:25:1",
+            "10:25:2",
             "--force-n",
             "20",
             "--noise-percent",

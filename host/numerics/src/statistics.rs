@@ -204,7 +204,7 @@ fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     let factor = (a * x.ln() + b * (-x).ln_1p() - log_beta(a, b)).exp() / a;
     let step = |k: usize| -> [f64; 2] {
         let m = (k / 2) as f64;
-        let numerator = if k % 2 == 0 {
+        let numerator = if k.is_multiple_of(2) {
             m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m))
         } else {
             -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0))

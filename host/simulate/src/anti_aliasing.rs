@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Half the length of the filter, in samples of the output: the shortest Hann-windowed sinc with 40 dB from half the sampling rate on
+/// Half the length of the filter, in samples of the output: a Hann-windowed sinc with 40 dB from half the sampling rate on
 /// (checked by the test below).
 const HALF: usize = 12;
 

@@ -18,7 +18,7 @@ const SMOOTH_FROM: u8 = 5;
 const SAME_TIME: f64 = 1e-9;
 
 /// Hysteresis of loss of contact, as a fraction of the feed per tooth: a chip whose thickness tends to zero, as in a slot, must not lose
-/// contact by integration errors. The value is a factor of 10 above the relative tolerance of the integration.
+/// contact by integration errors. The value is a choice above the integration error.
 const CONTACT_TOLERANCE: f64 = 1e-7;
 /// Smallest hysteresis of loss of contact, m, for a cut without feed: above rounding of displacements.
 const CONTACT_TOLERANCE_MIN_M: f64 = 1e-15;
