@@ -229,7 +229,7 @@ impl Default for State {
     }
 }
 
-/// The output for one input sample.
+/// Output of the decimation cascade for one input sample: a sample of the tool band and one of the structure band, each only when due.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Output {
     /// A sample of the tool band, if one is due.

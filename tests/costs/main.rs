@@ -1,8 +1,8 @@
 //! The processor time of the command's main stages, as ratios to a fixed loop on the same core.
 //!
 //! ```text
-//! cargo bench -p quietcut-tests --bench costs                 # prints the ratios, and what has become slower by more than 10 %
-//! cargo bench -p quietcut-tests --bench costs -- --record     # writes them to tests/results/costs.json
+//! cargo build --release -p quietcut && cargo bench -p quietcut-tests --bench costs                 # prints the ratios, and what has become slower by more than 10 %
+//! cargo bench -p quietcut-tests --bench costs -- --record     # writes them to tests/data/costs.json
 //! ```
 //!
 //! Each stage is a run of the command on one thread. Its cost is the smallest user time of several runs, divided by that of the
@@ -64,7 +64,7 @@ fn main() {
 }
 
 fn file() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("results/costs.json")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data/costs.json")
 }
 
 /// The first line that a command prints.

@@ -79,7 +79,7 @@ impl Surface {
         let key = t.clamp(within[0], within[1]);
         let index = self.arcs.partition_point(|arc| arc.to_s <= key);
         let arc = match self.arcs.get(index).or(self.arcs.back()) {
-            // Before the first arc the tool is at rest.
+            // Before the first arc of the surface the tooth left that of a tool with zero displacement.
             Some(arc) if index > 0 || arc.from_s <= key => arc,
             _ => return cutter.reach_m(tooth, place, [0.0; 3]),
         };

@@ -39,7 +39,7 @@ pub struct Bench {
     cuts: Sender<Heard>,
     client: Client,
     serial_port: String,
-    /// Sequence number and time of the next block, if the next cut follows without a pause.
+    /// Sequence number of the first block of the next simulated cut; the numbering continues from cut to cut.
     next_sequence: u32,
     /// Seed of the sensor noise of the next cut.
     seed: u64,

@@ -29,7 +29,7 @@ pub struct EffectSpec {
     pub summary: &'static str,
     /// The equation that changes.
     pub equation: &'static str,
-    /// What shows it in a recording.
+    /// Signs of the effect in a recording, by which it is recognised.
     pub shows: &'static str,
     /// What it does not show, and which other effects look the same.
     pub hidden_by: &'static str,

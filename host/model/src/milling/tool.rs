@@ -1,6 +1,6 @@
 //! The milling tool.
 
-/// A milling tool with straight cutting edges.
+/// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// Number of teeth, at least 1.
