@@ -38,10 +38,10 @@
 //! feed_per_tooth_mm = 0.15
 //! "#;
 //! let case = Case::parse(Path::new("robot.toml"), text)?;
-//! let model = VirtualCut::new(900.0, 1.0, 0.5).model(&case)?;
+//! let model = VirtualCut::new(900.0, 1.0, 4.0).model(&case)?;
 //! let mut workspace = Workspace::new(&model);
 //! let mut largest_m: f64 = 0.0;
-//! model.run(0.5, Settings::default(), |segment| {
+//! model.run(4.0, Settings::default(), |segment| {
 //!     let motion = segment.motion(segment.to_s(), &mut workspace);
 //!     largest_m = largest_m.max(motion.displacement_m[1].abs());
 //! })?;
