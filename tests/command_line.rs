@@ -5,8 +5,19 @@
 use quietcut_tests::command::{cases, folder, quietcut};
 
 const VERBS: [&str; 13] = [
-    "demo", "identify", "diagnose", "plan", "simulate", "frf", "lobes", "table", "upload", "info", "work",
-    "monitor", "replay",
+    "demo",
+    "identify",
+    "diagnose",
+    "plan",
+    "simulate",
+    "frf",
+    "lobes",
+    "table",
+    "upload",
+    "info",
+    "working-point",
+    "monitor",
+    "replay",
 ];
 
 /// The commands under "Example:" in the help of a verb.
@@ -47,13 +58,13 @@ fn bad_usage_has_status_2() {
     run(&["info"]).refused(&["<PORT>"]);
     run(&["lobes", "a.toml", "--rpm", "600:2400", "--depth-mm", "1:2:3"])
         .refused(&["--rpm", "first:last:count"]);
-    let work = |depth, feed| {
+    let working_point = |depth, feed| {
         let cut = ["--start", "90", "--exit", "180", "--feed", feed];
-        run(&[&["work", "simulated", "--depth-mm", depth], &cut[..]].concat())
+        run(&[&["working-point", "simulated", "--depth-mm", depth], &cut[..]].concat())
     };
-    work("-2", "0.15").refused(&["--depth-mm", "-2", "greater than 0"]);
-    work("2", "0").refused(&["--feed", "greater than 0"]);
-    work("two", "0.15").refused(&["--depth-mm", "two", "not a number"]);
+    working_point("-2", "0.15").refused(&["--depth-mm", "-2", "greater than 0"]);
+    working_point("2", "0").refused(&["--feed", "greater than 0"]);
+    working_point("two", "0.15").refused(&["--depth-mm", "two", "not a number"]);
     run(&["replay", "a.csv", "--teeth", "0"]).refused(&["--teeth", "0", "from 1 to 255"]);
 }
 
@@ -172,6 +183,19 @@ fn json_is_exactly_one_object() {
         &["replay", "a.csv", "--table", "a.qct", "--port", "simulated"],
         &["upload", "simulated", "a.qct"],
         &["info", "simulated"],
+        &[
+            "working-point",
+            "simulated",
+            "--depth-mm",
+            "2",
+            "--start",
+            "90",
+            "--exit",
+            "180",
+            "--feed",
+            "0.15",
+        ],
+        // The former name of the verb.
         &[
             "work",
             "simulated",

@@ -48,6 +48,9 @@ const EXAMPLES_LEFT_OUT: &[(&str, &str)] = &[
     ),
 ];
 
+/// Former names of verbs that the command still takes: name in the help, former name.
+const FORMER_NAMES: [(&str, &str); 1] = [("working-point", "work")];
+
 /// Ways to compute limits.
 const METHODS: [&str; 7] = [
     "collocation",
@@ -78,7 +81,7 @@ fn text_of(command: &Path, arguments: &[&str]) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// The lines under "Example:" in the help of every verb.
+/// The lines under "Example:" in the help of every verb, also with the former name of the verb.
 fn examples(command: &Path) -> Result<Vec<Question>, String> {
     let help = text_of(command, &["help"])?;
     let (_, verbs) = help
@@ -110,6 +113,13 @@ fn examples(command: &Path) -> Result<Vec<Question>, String> {
             })
             .collect();
         found.push(Question::new("examples", &lines));
+        for (_, former) in FORMER_NAMES.iter().filter(|(name, _)| *name == verb) {
+            let renamed: Vec<String> = lines
+                .iter()
+                .filter_map(|line| Some(format!("{former}{}", line.strip_prefix(verb)?)))
+                .collect();
+            found.push(Question::new("examples", &renamed));
+        }
     }
     Ok(found)
 }

@@ -50,11 +50,11 @@ pub fn the_command_uploads_tells_and_asks(port: &str) {
         "0.15",
     ];
     let expected = serde_json::json!({"depth_mm": 2.0, "start_deg": 90.0, "exit_deg": 180.0, "feed_per_tooth_mm": 0.15, "posture": 0});
-    let told = run(&[&["work", port, "--json"], &cut[..]].concat());
+    let told = run(&[&["working-point", port, "--json"], &cut[..]].concat());
     assert_eq!(told["working_point"], expected);
     assert_eq!(told["feed_direction_deg"], serde_json::Value::Null);
     let direction = ["--feed-direction-deg", "30"];
-    let told = run(&[&["work", port, "--json"], &cut[..], &direction[..]].concat());
+    let told = run(&[&["working-point", port, "--json"], &cut[..], &direction[..]].concat());
     assert_eq!(told["feed_direction_deg"], 30.0);
     // A second run of the command opens a new session with the same device.
     let info = run(&["info", port, "--json"]);

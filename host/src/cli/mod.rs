@@ -28,7 +28,7 @@ pub mod simulate;
 pub mod table;
 pub mod upload;
 mod varied;
-pub mod work;
+pub mod working_point;
 
 use std::io::IsTerminal;
 use std::panic;
@@ -64,7 +64,8 @@ enum Verb {
     Table(table::Args),
     Upload(upload::Args),
     Info(info::Args),
-    Work(work::Args),
+    #[command(visible_alias = "work")]
+    WorkingPoint(working_point::Args),
     Monitor(monitor::Args),
     Replay(replay::Args),
 }
@@ -137,7 +138,7 @@ fn run(verb: Verb) -> Result<(), Error> {
         Verb::Table(args) => table::run(args),
         Verb::Upload(args) => upload::run(args),
         Verb::Info(args) => info::run(args),
-        Verb::Work(args) => work::run(args),
+        Verb::WorkingPoint(args) => working_point::run(args),
         Verb::Monitor(args) => monitor::run(args),
         Verb::Replay(args) => replay::run(args),
     }

@@ -222,7 +222,7 @@ pub fn not_known(why: &NotKnown) -> String {
             "it depends on the feed direction, and has no layers near that of the cut".into()
         }
         NotKnown::FeedDirectionNotTold => {
-            "it depends on the feed direction, which is not set (set it with `quietcut work`, \
+            "it depends on the feed direction, which is not set (set it with `quietcut working-point`, \
              --feed-direction-deg)"
                 .into()
         }
@@ -233,7 +233,7 @@ pub fn not_known(why: &NotKnown) -> String {
 fn assumed(point: &WorkingPoint) -> String {
     format!(
         "no working point is set; assuming an axial depth of {:.2} mm, immersion from {} to {}, {} per tooth (set it with \
-         `quietcut work`)",
+         `quietcut working-point`)",
         point.axial_depth.0, point.start, point.exit, point.feed_per_tooth
     )
 }
@@ -276,7 +276,7 @@ mod tests {
             why(&advice, &judgement, Some(Rpm(900.2))),
             "the nearest speed to 900 rev/min where a cut 2.00 mm deep is stable with margin in the lobe table; \
              no working point is set; assuming an axial depth of 2.00 mm, immersion from 90 ° to 180 °, 0.15 mm per \
-             tooth (set it with `quietcut work`)"
+             tooth (set it with `quietcut working-point`)"
         );
         let by_rule = Advice {
             source: Source::ToothPassingRule,

@@ -1,4 +1,4 @@
-//! `quietcut work`: sets the working point of the cut on the device.
+//! `quietcut working-point`: sets the working point of the cut on the device.
 
 use quietcut_core::units::{Degrees, Millimeters};
 use quietcut_core::working_point::WorkingPoint;
@@ -10,7 +10,9 @@ use crate::report::answer::number;
 
 /// Sets the working point of the cut on the device; without it, advice states the working point that it assumes.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  quietcut work simulated --depth-mm 2 --start 90 --exit 180 --feed 0.15")]
+#[command(
+    after_help = "Example:\n  quietcut working-point simulated --depth-mm 2 --start 90 --exit 180 --feed 0.15"
+)]
 pub struct Args {
     #[command(flatten)]
     port: PortArgs,
