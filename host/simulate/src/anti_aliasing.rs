@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Half the length of the filter, in samples of the output: a Hann-windowed sinc with 40 dB from half the sampling rate on
-/// (checked by the test below).
+/// Half the length of the filter, in output samples. With this length the Hann-windowed sinc attenuates by 40 dB from half the output
+/// sampling rate on; the test of this file checks that.
 const HALF: usize = 12;
 
 /// The −6 dB frequency of the filter as a fraction of the output sampling rate: the middle of the transition band from 0.35 to 0.5.

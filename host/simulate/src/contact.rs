@@ -10,11 +10,12 @@ use quietcut_model::cutter::{Immersion, Tooth};
 use quietcut_numerics::crossing::first_below_zero;
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// Order of the derivative from which on a kink of the surface needs no end of a step: the integrator has order 5.
+/// Least order of the discontinuous derivative of a surface at which an integration step need not end: it does not lower the order of an
+/// integrator of order 5.
 const SMOOTH_FROM: u8 = 5;
 
-/// Relative tolerance, in tooth-passing periods, within which two times count as equal. A choice: far above rounding and far below any
-/// duration in milling.
+/// Two instants closer than this fraction of the shortest tooth-passing period count as equal. Rounding of the time, 2.2e-16 of it, stays
+/// below this for 4 million periods; entries and exits of milling are much further apart.
 const SAME_TIME: f64 = 1e-9;
 
 /// Hysteresis of loss of contact, as a fraction of the feed per tooth: a chip whose thickness tends to zero, as in a slot, must not lose
@@ -23,7 +24,7 @@ const CONTACT_TOLERANCE: f64 = 1e-7;
 /// Smallest hysteresis of loss of contact, m, for a cut without feed: above rounding of displacements.
 const CONTACT_TOLERANCE_MIN_M: f64 = 1e-15;
 
-/// State of contact of all teeth, and the surfaces that they leave.
+/// State of contact of all teeth with the workpiece, and the machined surfaces that the teeth leave.
 #[derive(Clone, Debug)]
 pub(super) struct Contact<'a> {
     cutting: &'a Cutting,
@@ -32,14 +33,15 @@ pub(super) struct Contact<'a> {
     within: [f64; 2],
     same_time_s: f64,
     longest_delay_s: f64,
-    /// Difference in order between a discontinuous derivative of the force and that of the displacement: 2, or 1 without modal mass.
+    /// Orders of derivative by which a discontinuity of the displacement is higher than that of the force: 2, or 1 if the velocity jumps with
+    /// the force.
     gain_of_order: u8,
 }
 
 #[derive(Clone, Debug)]
 /// State of contact of one tooth.
 struct ToothState {
-    /// True between the start angle and the exit angle of the cut.
+    /// True while the tooth is between the start angle and the exit angle of the cut (engagement arc).
     in_arc: bool,
     /// Time of the next entry into, or exit from, the engagement arc, s.
     next_switch_s: f64,
@@ -98,7 +100,7 @@ impl<'a> Contact<'a> {
         for tooth in &cutter.teeth {
             contact.teeth.push(ToothState::new());
             let angle = (cutting.spindle.angle_rad(0.0) + tooth.angle_rad - cutter.start_rad) / TAU;
-            // A tooth at the start angle enters the arc now.
+            // A tooth at the start angle, within rounding, enters the engagement arc at t = 0.
             let pass = (angle + SAME_TIME).floor();
             let index = contact.teeth.len() - 1;
             contact.teeth[index].pass = pass;
@@ -113,7 +115,7 @@ impl<'a> Contact<'a> {
         for index in 0..contact.teeth.len() {
             contact.teeth[index].in_material = contact.teeth[index].spans.contain(contact.same_time_s);
         }
-        // The surface has a step at t = 0, where the rest ends and the motion begins.
+        // The surface may have a step at t = 0: before that time a tool at rest left it.
         contact.kink_of_motion(0.0, 0);
         contact
     }
@@ -153,7 +155,7 @@ impl<'a> Contact<'a> {
         let depth_m = self.depth_m(t, x);
         let mut sum = [[0.0; 3]; 3];
         for tooth in self.cutting_teeth() {
-            // The flank force acts radially: its depth fraction is the radial one.
+            // The flank force acts radially, so that the radial fraction of the axial depth applies.
             let depth_m = depth_m * self.shares(tooth, t)[1];
             let damping = cutter
                 .force
@@ -224,7 +226,7 @@ impl<'a> Contact<'a> {
         left - cutter.recession_m(place, self.feed_m(tooth, t))
     }
 
-    /// The first time after `t`, s, at which a tooth enters or leaves the arc, meets or leaves material, or meets a kink of the surface.
+    /// The first time after `t`, s, at which a tooth enters or leaves the engagement arc or the material, or meets a kink of the surface.
     pub(super) fn next_switch_s(&self, t: f64) -> f64 {
         let after = t + self.same_time_s;
         let of_teeth = self.teeth.iter().map(|state| {
@@ -259,7 +261,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Moves a tooth into or out of the arc; true if it entered.
+    /// Moves a tooth into or out of the engagement arc if its entry or exit lies before the time `now`, s; true if it entered.
     fn switch_arc(&mut self, index: usize, now: f64) -> bool {
         let mut entered = false;
         while self.teeth[index].next_switch_s <= now {
@@ -297,7 +299,7 @@ impl<'a> Contact<'a> {
             .spans(&cutting.cutter, &cutting.spindle, open_s, close_s);
     }
 
-    /// Moves a tooth out of the arc until its passing number `pass`.
+    /// Moves a tooth out of the engagement arc; its next entry is that of tooth passing number `pass`.
     fn leave(&mut self, index: usize) {
         let open_s = self.open_s(index);
         let state = &mut self.teeth[index];
@@ -307,7 +309,8 @@ impl<'a> Contact<'a> {
         state.spans = MaterialWindows::default();
     }
 
-    /// Decides for each tooth that has just entered the arc whether it is in contact, from the chip thickness shortly afterwards.
+    /// Decides for each tooth that has just entered the engagement arc whether it is in contact, from the sign of its chip thickness shortly
+    /// afterwards.
     fn touch(&mut self, t: f64, x: [f64; 3], v: [f64; 3]) {
         if self.cutting.regeneration != Regeneration::AllPasses {
             return;
@@ -349,7 +352,7 @@ impl<'a> Contact<'a> {
         let sign = if self.teeth[index].at_surface { 1.0 } else { -1.0 };
         let tolerance_m =
             (CONTACT_TOLERANCE * self.cutting.cutter.feed_per_tooth_m).max(CONTACT_TOLERANCE_MIN_M);
-        // Positive while the state of contact persists.
+        // Chip thickness, m, with a sign that makes it positive while the present state of contact persists.
         let margin = |u: f64| {
             let x = std::array::from_fn(|axis| at(&displacement[axis], u));
             sign * self.chip(tooth, t + u * h, x).thickness_m + tolerance_m
@@ -393,7 +396,8 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Derivative `order` of the force is discontinuous at `t`; so is a higher derivative of the surface that is being cut.
+    /// Notes that derivative `order` of the force is discontinuous at the time `t`, s: the surfaces that are being cut then have a kink in
+    /// derivative `order` + `gain_of_order`.
     fn kink_of_force(&mut self, t: f64, order: u8) {
         self.kink_of_motion(t, order + self.gain_of_order);
     }
@@ -406,7 +410,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// The surface of tooth `index` has a kink at the time `t`: the next tooth meets it one regenerative delay later.
+    /// Notes a kink at the time `t`, s, of the surface that tooth `index` leaves: the next tooth meets it one regenerative delay later.
     fn kink_behind(&mut self, index: usize, t: f64, order: u8) {
         if order >= SMOOTH_FROM {
             return;
@@ -423,7 +427,7 @@ impl<'a> Contact<'a> {
         }
     }
 
-    /// Applies the kinks that a tooth meets up to the time `now`.
+    /// Applies the kinks of the surface that tooth `index` meets up to the time `now`, s.
     fn pass_kinks(&mut self, index: usize, now: f64) {
         while let Some((when, order)) = self.teeth[index]
             .kinks

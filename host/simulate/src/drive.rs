@@ -2,8 +2,8 @@
 
 /// An external excitation force on the tool, such as that of a shaker or a hammer.
 pub trait Drive: Send + Sync {
-    /// The commanded force at the time `t`, N, in the machine's x, y, z. The integrator does not evaluate it within 1e-9 of a step of a
-    /// knot, see [`Self::next_knot_s`].
+    /// The commanded force at the time `t`, N, in the machine's x, y, z. The integrator does not evaluate it closer to a knot
+    /// ([`Self::next_knot_s`]) than 1e-9 of the length of a step.
     fn force_n(&self, t: f64) -> [f64; 3];
 
     /// Force drop per velocity of the tool, N s/m: the back-EMF of a shaker without force control reduces the force at resonance.
@@ -16,7 +16,8 @@ pub trait Drive: Send + Sync {
         f64::INFINITY
     }
 
-    /// The longest integration step that resolves the force, s. It limits the steps while friction sticks, when no error of the motion does.
+    /// The longest integration step that resolves the force, s. While friction sticks, the tool is at rest and error control does not limit
+    /// the step; this length then does.
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
     }

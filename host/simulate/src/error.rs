@@ -13,22 +13,22 @@ pub enum SimulateError {
         "the tool's diameter is not known, so its way into the workpiece is not: give diameter_mm in [tool], or let the depth grow instead"
     )]
     NoDiameter,
-    /// The displacement exceeded the bound of [`super::Settings::largest_m`].
+    /// The displacement of the tool exceeded the bound [`super::Settings::largest_m`].
     #[error(
         "at {time_s:.6} s the tool is displaced by {displacement_mm:.3} mm and growing: beyond that the model means nothing (a softening spring has given way, or the cut is so unstable that loss of contact does not bound it)"
     )]
     Diverged {
-        /// Time of the simulation, s.
+        /// Simulated time at which the run stopped, s.
         time_s: f64,
         /// Displacement of the tool, mm.
         displacement_mm: f64,
     },
-    /// More steps than [`super::Settings::steps_max`].
+    /// The integration took more steps than [`super::Settings::steps_max`].
     #[error(
         "at {time_s:.6} s {steps} steps were taken, and no more are allowed: the equations are too stiff"
     )]
     TooManySteps {
-        /// Time of the simulation, s.
+        /// Simulated time at which the run stopped, s.
         time_s: f64,
         /// Number of accepted and rejected steps.
         steps: u64,
@@ -38,7 +38,7 @@ pub enum SimulateError {
         "at {time_s:.6} s tooth {tooth} leaves the surface the moment it touches it and touches it the moment it leaves: the edge force is too large for this structure"
     )]
     ContactUndecided {
-        /// Time of the simulation, s.
+        /// Simulated time at which the run stopped, s.
         time_s: f64,
         /// Number of the tooth, from 1.
         tooth: usize,
@@ -48,7 +48,7 @@ pub enum SimulateError {
         "at {time_s:.6} s no regime of the restoring forces (friction, backlash) is consistent with the motion: two of them act against each other"
     )]
     BranchUndecided {
-        /// Time of the simulation, s.
+        /// Simulated time at which the run stopped, s.
         time_s: f64,
     },
     /// A rig drives a direction that the structure does not have.

@@ -22,7 +22,7 @@ pub struct Statistics {
     pub branch_changes: u64,
 }
 
-/// A run in progress.
+/// Time integration of a model in progress: time, states, regimes and the last step.
 pub(super) struct Integrator<'a> {
     model: &'a Model,
     settings: Settings,
@@ -36,7 +36,7 @@ pub(super) struct Integrator<'a> {
     next_h: f64,
     statistics: Statistics,
     workspace: Workspace,
-    /// The regime of each restoring force of the model.
+    /// The regime of each restoring force of the model, such as stick or slip.
     branches: Vec<Branch>,
     /// Start and end of the evaluated step, s, moved inwards by a rounding margin.
     within: [f64; 2],
@@ -219,7 +219,7 @@ impl<'a> Integrator<'a> {
         if model.terms[index].locked(self.branches[index]) {
             return held[axis];
         }
-        // The rate already contains the slip force: the holding force is that force plus the remaining unbalanced force.
+        // `rate` already contains the friction force of slip: the holding force is that force plus the remaining unbalanced force.
         let at = self.at(t, y);
         let sliding = model.terms[index].restoring_n(self.branches[index], &at, &y[self.place(index)]);
         let locked = std::array::from_fn(|other| other == axis);
@@ -428,7 +428,8 @@ impl<'a> Integrator<'a> {
         contact.min(drive).min(end_s)
     }
 
-    /// The longest step, s: half the shortest tooth-passing period, so that the surface in front exists and no change of contact is missed.
+    /// The longest step, s: half the shortest tooth-passing period. The surface in front of a tooth is then known, and no change of contact is
+    /// missed.
     fn longest_step(&self, end_s: f64) -> f64 {
         self.contact
             .as_ref()

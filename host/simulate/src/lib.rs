@@ -1,7 +1,8 @@
 //! Time-domain simulation: the delay differential equations of milling integrated in time, test rigs, and the sensors that record them.
 //!
-//! The equations are those of thesis chapters 3 and 6 without smoothing. Teeth enter and leave exactly at their angles. The chip thickness
-//! follows from the surface that *all* earlier passes left (eqs 6.20 to 6.27), and a tooth that does not reach the surface has no force.
+//! The equations are those of thesis chapters 3 and 6. Entry and exit of the teeth are not smoothed: a tooth enters and leaves exactly at its
+//! angles. The chip thickness follows from the surface that *all* earlier tooth passings left (eqs 6.20 to 6.27). A tooth that does not reach
+//! the surface has no force.
 //!
 //! Main types: [`VirtualCut`] describes a cut of a case, [`Model`] is its equation of motion, [`Segment`] the motion over one step with dense
 //! output, [`rig::Rig`] a test with shaker, hammer or free decay, [`Recorder`] the recording of a cut.
@@ -49,7 +50,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! This crate computes no stability limit and estimates no parameter. It knows no table of receptances.
+//! This crate computes no stability limit, estimates no parameter and uses no table of receptances.
 
 mod anti_aliasing;
 mod contact;

@@ -59,7 +59,7 @@ impl Model {
         }
     }
 
-    /// Force F on the tool with process damping, N: solves F = `force` − D v and v = C A x + C B F for both F and v.
+    /// Force F on the tool with process damping, N. Solves F = `force` − D v together with the velocity v = C A y + C B F of the first-order form.
     fn damped_n(&self, force: [f64; 3], damping: [[f64; 3]; 3], y: &[f64]) -> [f64; 3] {
         let v = Vector3::from(
             self.dynamics
@@ -69,7 +69,7 @@ impl Model {
         let jump = self.dynamics.velocity_per_force();
         let jump = Matrix3::from_fn(|i, j| jump[i][j]);
         let free = Vector3::from(force) - damping * v;
-        // D·C B is small against 1, so that the matrix is regular.
+        // D C B is small compared with 1, so that the matrix I + D C B is regular.
         (Matrix3::identity() + damping * jump)
             .lu()
             .solve(&free)
@@ -77,7 +77,8 @@ impl Model {
             .into()
     }
 
-    /// Writes ẏ at the time `t` and displacement `x`; returns the force on the tool from cut and excitation, N.
+    /// Writes the derivative ẏ of the states `y` at the time `t`, s, and displacement `x`, m; returns the force on the tool from cut and
+    /// excitation, N.
     pub(super) fn rate(
         &self,
         context: StepContext<'_>,

@@ -56,13 +56,13 @@ impl MaterialWindows {
 }
 
 impl Passage {
-    /// Time from first contact with a face to full engagement, s; the exit takes as long.
+    /// Time from the first contact with the front face of the workpiece to full engagement, s; the exit through the end face takes as long.
     ///
     /// # Errors
     /// The tool has no diameter.
     pub fn way_in_s(cutter: &Cutter, spindle: &Spindle) -> Result<f64, SimulateError> {
         let radius_m = cutter.radius_m.ok_or(SimulateError::NoDiameter)?;
-        // The last point of the arc to reach a face is one of its two ends.
+        // Of all points of the engagement arc, one of its two ends reaches a face of the workpiece last.
         let last = cutter.start_rad.sin().min(cutter.exit_rad.sin());
         Ok(radius_m * (1.0 - last) / feed_speed(cutter, spindle))
     }
@@ -99,7 +99,7 @@ impl Passage {
         else {
             return f64::INFINITY;
         };
-        // If the ramps cross below the full depth, their crossing is a knot too.
+        // If growth and decrease of the depth overlap, the rate also jumps halfway between start and end.
         let knots = [
             start_s,
             start_s + ramp_s,
@@ -121,7 +121,7 @@ impl Passage {
             Self::Ramp { end_s, .. } => t >= end_s,
             Self::Feed { end_s, .. } => {
                 let radius_m = cutter.radius_m.unwrap_or(0.0);
-                // One revolution more, so that no tooth is within its last passing.
+                // Feed of one further revolution, in which every tooth ends its last passing.
                 let revolution_feed_m = cutter.feed_per_tooth_m * cutter.teeth.len() as f64;
                 (t - end_s) * feed_speed(cutter, spindle) > radius_m + revolution_feed_m
             }
@@ -143,8 +143,8 @@ impl Passage {
                 let opened_rad = spindle.angle_rad(open_s);
                 let sin = |t: f64| (cutter.start_rad + (spindle.angle_rad(t) - opened_rad)).sin();
                 let window = [open_s, close_s];
-                // sin φ minus the position of a face over the radius is positive beyond the face. It is concave in t, since
-                // the spindle speed varies slowly compared with a tooth passing.
+                // sin φ minus (position of a face)/R is positive where the tooth is beyond that face. This difference is
+                // concave in t, since the spindle speed varies slowly compared with a tooth passing.
                 let behind_front = positive(|t| sin(t) - (1.0 - speed * (t - start_s)), window);
                 let behind_end = positive(|t| sin(t) - (1.0 - speed * (t - end_s)), window);
                 let [before, after] = complement(behind_end, window);
@@ -170,7 +170,7 @@ fn intersection(a: Option<[f64; 2]>, b: Option<[f64; 2]>) -> Option<[f64; 2]> {
     (both[0] < both[1]).then_some(both)
 }
 
-/// The parts of `window` before and after `excluded`.
+/// The two subintervals of `window` before and after `excluded`.
 fn complement(excluded: Option<[f64; 2]>, window: [f64; 2]) -> [Option<[f64; 2]>; 2] {
     match excluded {
         None => [Some(window), None],

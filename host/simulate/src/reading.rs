@@ -15,7 +15,7 @@ pub struct Reading {
     rate_hz: f64,
     count: usize,
     is_mean: bool,
-    /// Samples; for mean accelerations the velocities half a sampling interval before each sample, and one after the last.
+    /// Samples of the channel. If `is_mean`: velocities half a sampling interval before each sample, and half an interval after the last.
     values: Vec<f64>,
 }
 
@@ -33,7 +33,8 @@ impl Reading {
         }
     }
 
-    /// Takes the samples that lie in the newest integration step. Before t = 0 the tool stands still at its initial displacement.
+    /// Takes the samples that lie in the newest integration step. A delay of the sensor places the first samples before t = 0, where the tool
+    /// is at rest at its initial displacement.
     pub fn observe(&mut self, segment: &Segment<'_>) {
         let (early, count) = if self.is_mean {
             (0.5, self.count + 1)

@@ -187,7 +187,7 @@ impl VirtualCut {
         seed: Option<u64>,
     ) -> Result<Vec<f64>, VirtualCutError> {
         let [pitch_s, _] = spindle.bounds_s(TAU / f64::from(tachometer.wheel.positions));
-        // Two samples for each rise and fall, and one for each level between them.
+        // Shortest pitch of the wheel, s: two samples for the rise, two for the fall, and one for each level between them.
         let least = 6.0 / rate_hz;
         if pitch_s < least {
             return Err(VirtualCutError::WheelTooFine {
@@ -225,7 +225,7 @@ impl VirtualCut {
 /// The accelerometers of a recording: one for each combination of delay and sensor location.
 struct Sensors {
     accelerometer: Option<(Accelerometer, u64)>,
-    /// One pickup that the sampler serves, and the sampler.
+    /// Each sampler with the pickup of one of the channels that it serves.
     samplers: Vec<(Pickup, Sampler)>,
 }
 

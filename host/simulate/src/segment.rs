@@ -23,7 +23,7 @@ pub struct Motion {
     pub velocity_m_per_s: [f64; 3],
     /// Acceleration of the tool, m/s²; `None` if a step of the force makes the velocity jump, see [`super::Dynamics::velocity_jumps`].
     pub acceleration_m_per_s2: Option<[f64; 3]>,
-    /// Force of cut and drive on the tool, N.
+    /// Force on the tool, N: cutting force plus external excitation.
     pub force_n: [f64; 3],
 }
 
@@ -32,7 +32,7 @@ pub struct Motion {
 pub struct Workspace {
     pub(super) state: Vec<f64>,
     pub(super) rate: Vec<f64>,
-    /// Equations whose output is the motion at a sensor away from the tool tip; `None` for the motion of the tool.
+    /// Equations of motion with the motion at a sensor away from the tool tip as output; `None` for a sensor at the tool.
     pub(super) seen: Option<Dynamics>,
 }
 

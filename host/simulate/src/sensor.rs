@@ -13,11 +13,12 @@ use super::{Model, Segment, Spindle, Workspace};
 
 /// Standard gravity, m/s².
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
-/// Ratio of the rate at which the motion is evaluated to the sampling rate of the sensor. A choice: the low pass then has a transition
-/// band of 0.23 to 0.5 of the sampling rate with [`HALF`] taps on each side.
+/// Ratio of the rate at which the motion is evaluated to the sampling rate of the sensor. A choice: the difference of the velocity over a
+/// quarter of the sampling interval then lowers the gain by 0.5 % at the upper end of the pass band (sinc of 0.23/4).
 const OVERSAMPLING: usize = 4;
-/// Taps of the anti-aliasing filter on each side of its centre, in oversampled steps: the length that gives the transition band above.
-const HALF: usize = 32;
+/// Number of taps of the anti-aliasing filter on each side of its centre tap, at the oversampled rate. From Kaiser's formula
+/// N = (A − 7.95)/(2.285 Δω) with a stop band of A = 70 dB and a transition band Δω = 2π·0.27/[`OVERSAMPLING`]: N = 64 = 2·32.
+const TAPS_PER_SIDE: usize = 32;
 
 /// A triaxial digital accelerometer at the tool, aligned with the machine axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +85,7 @@ pub struct Sampler {
     accelerometer: Accelerometer,
     step_s: f64,
     delay_s: f64,
-    filter: [f64; 2 * HALF + 1],
+    filter: [f64; 2 * TAPS_PER_SIDE + 1],
     workspace: Workspace,
     /// Number of velocities evaluated so far; velocity k belongs to the time (k − ½) oversampled steps.
     taken: usize,
@@ -105,7 +106,7 @@ impl Sampler {
             workspace: Workspace::new(model),
             taken: 0,
             velocity: [0.0; 3],
-            ring: vec![[0.0; 3]; 2 * HALF + 1],
+            ring: vec![[0.0; 3]; 2 * TAPS_PER_SIDE + 1],
             samples: Vec::new(),
         }
     }
@@ -127,7 +128,7 @@ impl Sampler {
 
     /// Time that the simulation must continue beyond the last sample, s, without the delay: half the filter length.
     pub fn tail_s(&self) -> f64 {
-        (HALF + 1) as f64 * self.step_s
+        (TAPS_PER_SIDE + 1) as f64 * self.step_s
     }
 
     /// Takes the samples that lie in the newest integration step.
@@ -149,11 +150,11 @@ impl Sampler {
     fn take(&mut self, velocity: [f64; 3]) {
         let length = self.ring.len();
         if self.taken > 0 {
-            // This acceleration belongs to the oversampled step `taken − 1`.
+            // The acceleration between the last two velocities belongs to the oversampled step `taken − 1`.
             let index = self.taken - 1;
             self.ring[index % length] =
                 std::array::from_fn(|axis| (velocity[axis] - self.velocity[axis]) / self.step_s);
-            if index >= HALF && (index - HALF).is_multiple_of(OVERSAMPLING) {
+            if index >= TAPS_PER_SIDE && (index - TAPS_PER_SIDE).is_multiple_of(OVERSAMPLING) {
                 let mut sum = [0.0; 3];
                 for (offset, weight) in self.filter.iter().enumerate() {
                     // Before t = 0 the ring holds zeros, as the tool is at rest.
@@ -183,7 +184,7 @@ impl Sampler {
         } = self.accelerometer;
         let rate_hz = self.accelerometer.rate_hz();
         let count = self.accelerometer.count();
-        // White noise with the bandwidth of half the sampling rate.
+        // Standard deviation, m/s², of white noise with the bandwidth of half the sampling rate.
         let noise = noise_g_per_root_hertz * STANDARD_GRAVITY * (0.5 * rate_hz).sqrt();
         let mut noise_source = stream(seed, Stream::Noise);
         let mut stamp_source = stream(seed, Stream::Stamps);
@@ -276,16 +277,16 @@ fn nanoseconds(t: f64) -> Nanoseconds {
 
 /// Weights of the anti-aliasing low pass at the oversampled rate: a sinc with the −6 dB point at 0.365 of the sampling rate, under a Kaiser
 /// window with β = 7 (stop band −70 dB).
-fn low_pass() -> [f64; 2 * HALF + 1] {
+fn low_pass() -> [f64; 2 * TAPS_PER_SIDE + 1] {
     let cutoff = 0.365 / OVERSAMPLING as f64;
-    let weights: [f64; 2 * HALF + 1] = std::array::from_fn(|index| {
-        let n = index as f64 - HALF as f64;
+    let weights: [f64; 2 * TAPS_PER_SIDE + 1] = std::array::from_fn(|index| {
+        let n = index as f64 - TAPS_PER_SIDE as f64;
         let sinc = if n == 0.0 {
             2.0 * cutoff
         } else {
             (2.0 * PI * cutoff * n).sin() / (PI * n)
         };
-        let r = n / (HALF as f64 + 1.0);
+        let r = n / (TAPS_PER_SIDE as f64 + 1.0);
         sinc * bessel_i0(7.0 * (1.0 - r * r).sqrt())
     });
     let sum: f64 = weights.iter().sum();

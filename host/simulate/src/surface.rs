@@ -5,19 +5,19 @@ use std::collections::VecDeque;
 use quietcut_model::cutter::{Cutter, Immersion, Tooth};
 use quietcut_numerics::dormand_prince::{Quartic, at};
 
-/// Interpolation nodes, as fractions of a step, for the surface below a tooth that is out of contact. Six equidistant nodes: the polynomial
-/// of degree 5 has the order of the integrator.
+/// Interpolation nodes, as fractions of an integration step, for the surface below a tooth that is out of contact. Six equidistant nodes give
+/// a polynomial of degree 5, the order of the integrator.
 pub(super) const SURFACE_NODES: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 
-/// The surface behind one tooth over somewhat more than the last tooth passing, as a function of the time of the passing.
+/// The machined surface that one tooth left during its last 1.5 tooth-passing periods, as a function of the time at which the tooth passed.
 ///
-/// Heights, m, are along the chip thickness as in [`Cutter::reach_m`], in the frame that feeds with the tool.
+/// Heights of the surface, m, are along the chip thickness as in [`Cutter::reach_m`], in the frame that feeds with the tool.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     arcs: VecDeque<SurfaceArc>,
 }
 
-/// The surface that corresponds to one integration step, from `from_s` to `to_s`.
+/// Piece of the machined surface that a tooth left behind during one integration step, from `from_s` to `to_s`.
 #[derive(Clone, Copy, Debug)]
 struct SurfaceArc {
     from_s: f64,
@@ -26,16 +26,17 @@ struct SurfaceArc {
 }
 
 #[derive(Clone, Copy, Debug)]
-/// Height of a surface arc over the time.
+/// Height of a piece of the machined surface as a function of the time at which the tooth passed.
 enum Profile {
-    /// Cut by the tooth: the surface is the path of the edge, from the displacement of the tool.
+    /// Cut by the tooth: the surface is the path of its edge, which follows from the displacement of the tool (dense output, m).
     Cut([Quartic; 3]),
-    /// Not reached by the edge: the surface of an earlier passing, as Newton's divided differences at [`SURFACE_NODES`].
+    /// Not reached by the edge: the surface of an earlier tooth passing persists; its heights as Newton's divided differences at
+    /// [`SURFACE_NODES`].
     Uncut([f64; 6]),
 }
 
 impl Surface {
-    /// Appends the arc that the tooth cuts from `from_s` to `to_s`, s, while the tool moves along `displacement`.
+    /// Appends the piece of surface that the tooth cuts from `from_s` to `to_s`, s, while the tool moves along `displacement`.
     pub(super) fn push_cut(&mut self, from_s: f64, to_s: f64, displacement: [Quartic; 3]) {
         self.arcs.push_back(SurfaceArc {
             from_s,
@@ -44,7 +45,7 @@ impl Surface {
         });
     }
 
-    /// Appends the arc that the tooth does not reach from `from_s` to `to_s`, s; `heights`, m, are at [`SURFACE_NODES`].
+    /// Appends the piece of surface that the tooth does not reach from `from_s` to `to_s`, s; `heights`, m, are at [`SURFACE_NODES`].
     pub(super) fn push_uncut(&mut self, from_s: f64, to_s: f64, mut heights: [f64; 6]) {
         for order in 1..heights.len() {
             for i in (order..heights.len()).rev() {
@@ -58,16 +59,17 @@ impl Surface {
         });
     }
 
-    /// Removes the arcs that end before `t`, s.
+    /// Removes the pieces of surface that end before the time `t`, s.
     pub(super) fn forget_before(&mut self, t: f64) {
         while self.arcs.front().is_some_and(|arc| arc.to_s < t) {
             self.arcs.pop_front();
         }
     }
 
-    /// Height of the surface that `tooth` left at the time `t`, m; before the first arc the tool was at rest.
+    /// Height of the surface that `tooth` left at the time `t`, m. Before the first recorded piece the tool was at rest.
     ///
-    /// `within` are the ends of the evaluated step, s. Where two arcs meet at one of these ends, the arc inside the step is used.
+    /// `within` are start and end of the evaluated step, s, each minus the regenerative delay. Where two pieces meet at one of these times,
+    /// the piece inside the step is used.
     pub(super) fn height_m(
         &self,
         cutter: &Cutter,
@@ -79,7 +81,7 @@ impl Surface {
         let key = t.clamp(within[0], within[1]);
         let index = self.arcs.partition_point(|arc| arc.to_s <= key);
         let arc = match self.arcs.get(index).or(self.arcs.back()) {
-            // Before the first arc of the surface the tooth left that of a tool with zero displacement.
+            // Before the first recorded piece, the surface is that of a tool with zero displacement.
             Some(arc) if index > 0 || arc.from_s <= key => arc,
             _ => return cutter.reach_m(tooth, place, [0.0; 3]),
         };

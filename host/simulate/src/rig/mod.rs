@@ -128,7 +128,7 @@ impl Rig {
         Ok((recording, statistics))
     }
 
-    /// The force channel, then the response channels by quantity and direction.
+    /// Sensors of the rig in the order of the channels: the force, then the responses by quantity and direction.
     fn pickups(&self, structure: &Structure, driven: usize) -> Vec<Pickup> {
         let mut pickups = vec![Pickup::of_axis(Quantity::Force, driven)];
         for quantity in &self.measured {
