@@ -14,7 +14,7 @@ use crate::milling::{Cut, Material, Runout, Tool};
 /// larger ψ passes earlier: tooth j cuts the surface left by tooth j + 1.
 #[derive(Clone, Debug)]
 pub struct Cutter {
-    /// The teeth in the order of ψ.
+    /// The teeth in the order of their angle ψ on the tool.
     pub teeth: Vec<Tooth>,
     /// Immersion angle of entry, rad.
     pub start_rad: f64,
@@ -42,13 +42,13 @@ pub struct Tooth {
     pub angle_rad: f64,
     /// Radial runout of the tooth, m: its radius minus the mean radius.
     pub radial_m: f64,
-    /// Index of the preceding tooth, which left the surface in front.
+    /// Index of the tooth that passes before this one and left the surface that this one cuts.
     pub ahead: usize,
-    /// Index of the following tooth, which cuts the surface behind.
+    /// Index of the tooth that passes after this one and cuts the surface that this one leaves.
     pub behind: usize,
-    /// Pitch angle to the preceding tooth, rad.
+    /// Pitch angle to the tooth that passes before this one, rad.
     pub pitch_rad: f64,
-    /// Feed during a rotation by the pitch angle, m.
+    /// Feed during a rotation of the tool by the pitch angle of this tooth, m.
     pub feed_m: f64,
 }
 
@@ -59,7 +59,7 @@ impl Cutter {
     /// The number of pitch angles differs from the number of teeth, or their sum is not 360 degrees.
     pub fn new(tool: &Tool, material: &Material, cut: &Cut, axial_depth_m: f64) -> Result<Self, ModelError> {
         let edge_rad = tool.edge_angle_deg.to_radians();
-        // Exact values for 90 degrees: axial vibration then has no influence on the chip thickness.
+        // Exact sine and cosine of 90°: axial vibration then has no influence on the chip thickness, not even by rounding.
         let (sin_edge, cos_edge) = if tool.edge_angle_deg == 90.0 {
             (1.0, 0.0)
         } else {
@@ -120,7 +120,7 @@ impl Cutter {
         (outward + tooth.radial_m) * self.sin_edge - x[2] * self.cos_edge
     }
 
-    /// Contribution of the feed `feed_m`, m, to the chip thickness, m.
+    /// Contribution of a feed `feed_m`, m, to the chip thickness, m: feed·sin φ·sin γ.
     pub fn recession_m(&self, at: Immersion, feed_m: f64) -> f64 {
         feed_m * at.sin * self.sin_edge
     }
@@ -146,7 +146,7 @@ fn teeth(tool: &Tool, feed_per_tooth_m: f64) -> Result<Vec<Tooth>, ModelError> {
     }
     let mut angle_rad = 0.0;
     let teeth = (0..count).map(|index| {
-        // Exact fractions of a revolution for equal pitch.
+        // Angle of the tooth at equal pitch, free of accumulated rounding.
         let equal = TAU * index as f64 / count as f64;
         if index > 0 {
             angle_rad += tool.pitch_deg[index].to_radians();

@@ -19,7 +19,7 @@ pub struct Dynamics {
     b: Vec<[f64; 3]>,
     c: [Vec<f64>; 3],
     ca: [Vec<f64>; 3],
-    /// C B, (m/s)/N: jump of the velocity per jump of the force; zero for matrices.
+    /// C B, (m/s)/N: jump of the velocity of the tool per jump of the force; zero for a structure given by matrices.
     cb: [[f64; 3]; 3],
     /// C A B, 1/kg: acceleration of the tool per force.
     cab: [[f64; 3]; 3],
@@ -28,7 +28,8 @@ pub struct Dynamics {
     velocity_jumps: bool,
 }
 
-/// Cubic terms f₃ = damping·v∘³ + stiffness·q∘³ in v̇; q are the first `degrees_of_freedom` states and v the following ones.
+/// Cubic terms f₃ = damping·v∘³ + stiffness·q∘³ of v̇, where q are the first `degrees_of_freedom` states, v the following ones, and ∘³ is
+/// the cube of each element.
 #[derive(Clone, Debug)]
 struct Cubic {
     degrees_of_freedom: usize,
@@ -48,14 +49,13 @@ impl Dynamics {
         let c = DMatrix::from_fn(3, order, |axis, state| c[(axis, state)]);
         let ca = &c * &a;
         let jump = &c * &b;
-        // The residues of modes with a mass matrix sum to zero except for rounding and the digits of the file. A sum below
-        // 1e-6 of the residues is below the resolution of any sensor.
+        // Modes of a structure with a mass matrix have C B = 0, except for rounding and the digits of the case file.
         let velocity_jumps = jump.amax() > 1e-6 * c.amax() * b.amax() * order as f64;
         let cubic = match structure.equation() {
             Some(matrices) if structure.is_nonlinear() => Some(cubic(&matrices, &a)?),
             _ => None,
         };
-        // A unit state of modes and joints moves the tool by up to |C|; states of matrices are displacements.
+        // State for a tool displacement of 1 m: 1/|C| for modes and joints; the states of matrices are displacements in m.
         let size = |state: usize| {
             let moved = c.column(state).amax();
             match &structure.form {
@@ -88,7 +88,8 @@ impl Dynamics {
         (self.cb, self.cab) = (product(&self.c), product(&self.ca));
     }
 
-    /// One more mode behind the states: η̈ + 2ζω η̇ + ω² η = F/m along `axis`, and the tool moves by η along it too.
+    /// Appends the two states of a mode, η̈ + 2ζω η̇ + ω² η = F/m, which the force along `axis` excites and which displaces the tool by η along
+    /// that axis.
     pub fn add_mode(&mut self, axis: usize, frequency_hz: f64, damping_ratio: f64, modal_mass_kg: f64) {
         let (order, omega) = (self.order, std::f64::consts::TAU * frequency_hz);
         let wider = order + 2;
@@ -96,7 +97,7 @@ impl Dynamics {
         for (new, old) in a.chunks_exact_mut(wider).zip(self.a.chunks_exact(order)) {
             new[..order].copy_from_slice(old);
         }
-        // States (η, η̇/ω).
+        // The two new states are η and η̇/ω.
         a[order * wider + order + 1] = omega;
         a[(order + 1) * wider + order] = -omega;
         a[(order + 1) * wider + order + 1] = -2.0 * damping_ratio * omega;
@@ -114,7 +115,7 @@ impl Dynamics {
         self.note_products();
     }
 
-    /// The same equations with the motion of a sensor away from the tool as output, see [`FirstOrder::seen`]. Forces still act on the tool.
+    /// These equations with the motion of a sensor away from the tool as output, see [`FirstOrder::seen`]. Forces still act on the tool.
     #[must_use]
     pub fn seen(&self, modes: &[f64]) -> Self {
         let FirstOrder { a, c, .. } = self.first_order().seen(modes);
@@ -142,7 +143,7 @@ impl Dynamics {
         self.order
     }
 
-    /// Magnitude of each state for a displacement of the tool of 1 m: the scale of the error control.
+    /// Magnitude of each state that belongs to a displacement of the tool of 1 m: the scale of the integrator's error control.
     pub fn sizes(&self) -> &[f64] {
         &self.sizes
     }
@@ -180,7 +181,7 @@ impl Dynamics {
         (!self.velocity_jumps).then(|| std::array::from_fn(|axis| dot(&self.ca[axis], rate)))
     }
 
-    /// Velocity of the tool, m/s, under the force in N: C A x + C B F.
+    /// Velocity of the tool, m/s, at the states `x` under the `force` F, N: C A x + C B F.
     pub fn velocity_under(&self, x: &[f64], force: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|axis| {
             let jump = if self.velocity_jumps {

@@ -6,10 +6,10 @@ use crate::structure::StructureError;
 /// A machine model that cannot be assembled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
-    /// A structure with indefinite or singular matrices.
+    /// A structure with an indefinite or singular matrix, or one whose poles cannot be computed.
     #[error(transparent)]
     Structure(#[from] StructureError),
-    /// An effect that does not apply to the structure.
+    /// An effect of a case that does not apply to its structure or cut.
     #[error(transparent)]
     Effect(#[from] EffectError),
     /// Pitch angles that do not fit the number of teeth, or whose sum is not 360 degrees.

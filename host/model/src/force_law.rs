@@ -11,7 +11,7 @@ use crate::milling::Material;
 /// - wear: the whole force times 1 + r·t.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceLaw {
-    /// Cutting coefficients K_c and edge coefficients K_e.
+    /// Cutting coefficients K_c and edge coefficients K_e of the workpiece material.
     material: Material,
     sin_edge: f64,
     cos_edge: f64,
@@ -43,7 +43,7 @@ impl ChipLaw {
                 .copysign(thickness_m)
     }
 
-    /// Derivative p·(h/h₀)^(p − 1) of the effective chip thickness; infinite at h = 0 for p < 1.
+    /// Derivative p·(h/h₀)^(p − 1) of the effective chip thickness with respect to h; infinite at h = 0 for p < 1.
     pub fn slope(self, thickness_m: f64) -> f64 {
         self.exponent * (thickness_m.abs() / self.reference_m).powf(self.exponent - 1.0)
     }
@@ -58,8 +58,8 @@ pub struct ProcessDamping {
     pub friction: f64,
 }
 
-/// Force components of an edge: tangential, towards the tool axis and along the tool axis. The latter two follow from the radial and axial
-/// components and the edge angle.
+/// Force components of an edge in the axes of the tool: tangential, inwards (towards the tool axis) and along the tool axis. The latter two
+/// follow from the radial and axial components normal and parallel to the edge, and from the edge angle.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
     tangential: f64,
@@ -136,8 +136,8 @@ impl ForceLaw {
         self.force_of_n(at, thickness_m, [depth_m; 3])
     }
 
-    /// Cutting force as [`Self::force_n`], with separate effective depths, m, for the components tangential, towards the axis and along the
-    /// axis; in solid material they are equal.
+    /// Cutting force on the tool, N, with a separate effective depth, m, for each component: tangential, towards the tool axis, along the
+    /// tool axis. In solid material the three depths are equal, see [`Self::force_n`].
     pub fn force_of_n(&self, at: Immersion, thickness_m: f64, depths_m: [f64; 3]) -> [f64; 3] {
         let thickness_m = self
             .chip
@@ -161,7 +161,7 @@ impl ForceLaw {
             at.outward[1] * self.sin_edge,
             -self.cos_edge,
         ];
-        // A unit normal force along the chip thickness, directed towards the axis, and its friction force.
+        // Direction of a unit flank force along the chip thickness, towards the tool axis, together with its friction force.
         let force = Coefficients::new(damping.friction, 1.0, 0.0, self.sin_edge, self.cos_edge).force(at);
         let size = damping.n_per_m / cutting_speed_m_per_s * depth_m;
         force.map(|force| normal.map(|normal| -size * force * normal))

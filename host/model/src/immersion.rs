@@ -3,8 +3,8 @@
 /// Sine and radial direction at one immersion angle φ.
 #[derive(Clone, Copy, Debug)]
 pub struct Immersion {
-    /// sin φ, the component of the feed along the radial direction.
+    /// sin φ: component of a unit feed along the radial direction, outwards.
     pub sin: f64,
-    /// Unit vector radially outwards, in the machine's x and y.
+    /// Unit vector from the tool axis to the tooth, in the machine's x and y.
     pub(super) outward: [f64; 2],
 }

@@ -2,8 +2,7 @@
 
 use super::{At, Branch, Term};
 
-/// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals; the vectors of an axis without motion are
-/// empty.
+/// Displacement and velocity of the tool in the machine's axes, sampled at constant intervals. An axis without motion has empty vectors.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
     /// Sampling interval, s.
@@ -14,7 +13,7 @@ pub struct Motion {
     pub x: [Vec<f64>; 3],
     /// Velocity of the tool by axis, m/s.
     pub v: [Vec<f64>; 3],
-    /// Noise level of the velocity by axis, m/s: below it a velocity is indistinguishable from rest.
+    /// Noise level of the velocity by axis, m/s: a velocity below it cannot be told from rest.
     pub rest_m_per_s: [f64; 3],
 }
 
@@ -52,7 +51,7 @@ impl Motion {
         }
     }
 
-    /// Advances the motion along an axis in time by `seconds`: sample k gets the value at `seconds` later.
+    /// Shifts the motion along an axis to earlier times by `seconds`: sample k gets the value that was `seconds` after it.
     pub fn advance(&mut self, axis: usize, seconds: f64) {
         let place = seconds / self.step_s;
         for signal in [&mut self.x[axis], &mut self.v[axis]] {
@@ -135,10 +134,10 @@ pub fn restoring_from(term: &dyn Term, motion: &Motion, own: &mut [f64]) -> [Vec
     force
 }
 
-/// The regime at `at`, after the regime `branch` of the previous sample.
+/// The regime of a restoring force at the instant `at`, from its regime `branch` at the previous sample.
 fn settled(term: &dyn Term, branch: Option<Branch>, at: &At, own: &[f64]) -> Branch {
     let mut now = branch.unwrap_or_else(|| term.next(None, at, own, 0.0));
-    // Between two samples a motion may pass through several regimes.
+    // Between two samples a motion may pass through several regimes. Four changes bound the loop.
     for _ in 0..4 {
         if term.margin(now, at, own, 0.0) >= 0.0 {
             break;

@@ -22,7 +22,7 @@ enum SpeedProfile {
 /// A linear change of the spindle speed from t = 0 on; the speed is constant before and after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct LinearSweep {
-    /// First and last speed, rad/s.
+    /// Spindle speed before and after the change, rad/s.
     speeds: [f64; 2],
     seconds: f64,
 }
@@ -35,7 +35,7 @@ impl LinearSweep {
 
     fn angle_rad(self, t: f64) -> f64 {
         let within = t.clamp(0.0, self.seconds);
-        // Mean speed within the sweep, and constant speed before or after it.
+        // Angle from the mean speed within the sweep, plus that from the constant speed before or after the sweep.
         0.5 * (self.speeds[0] + self.speed(within)) * within + self.speed(t) * (t - within)
     }
 
@@ -48,7 +48,7 @@ impl LinearSweep {
         if angle_rad >= whole {
             return self.seconds + (angle_rad - whole) / last;
         }
-        // Root of first·t + ½·a·t² = angle, in the form without cancellation.
+        // Root t of first·t + ½·a·t² = angle with a the angular acceleration, in the form without cancellation.
         let acceleration = (last - first) / self.seconds;
         2.0 * angle_rad / (first + (first * first + 2.0 * acceleration * angle_rad).sqrt())
     }
@@ -72,7 +72,7 @@ impl Fluctuation {
         self.delta / omega * (self.phase_rad.cos() - (omega * t + self.phase_rad).cos())
     }
 
-    /// Speed at the time `t` divided by the mean speed.
+    /// Spindle speed at the time `t`, s, divided by the mean spindle speed.
     fn share(self, t: f64) -> f64 {
         1.0 + self.delta * (TAU * self.frequency_hz * t + self.phase_rad).sin()
     }
@@ -147,7 +147,7 @@ impl Spindle {
         }
     }
 
-    /// Delay between the spindle angle at `t` and that `angle_rad` earlier, s; for the pitch angle this is the regenerative delay.
+    /// Time, s, that the spindle took to rotate by the last `angle_rad` before the time `t`; for the pitch angle this is the regenerative delay.
     pub fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
         match self.profile {
             SpeedProfile::Steady => angle_rad / self.speed_rad_per_s,
@@ -157,7 +157,7 @@ impl Spindle {
         }
     }
 
-    /// [`Self::delay_s`] divided by the delay at the mean speed.
+    /// Delay [`Self::delay_s`] divided by the delay at the mean spindle speed.
     pub fn delay_share(&self, t: f64, angle_rad: f64) -> f64 {
         match self.profile {
             SpeedProfile::Steady => 1.0,
@@ -186,7 +186,7 @@ impl Spindle {
     }
 }
 
-/// Solves t + lead(t) = `mean_s` for t, s, by Newton's method with bisection as safeguard; the left side increases monotonically.
+/// Solves t + lead(t) = `mean_s` for the time t, s, by Newton's method with bisection as safeguard; t + lead(t) increases monotonically.
 fn inverse(fluctuation: Fluctuation, mean_s: f64) -> f64 {
     let reach_s = 2.0 * fluctuation.delta.abs() / (TAU * fluctuation.frequency_hz);
     let (mut low, mut high) = (mean_s - reach_s, mean_s + reach_s);

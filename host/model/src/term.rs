@@ -18,7 +18,8 @@ pub struct At {
     pub v: [f64; 3],
 }
 
-/// Jacobian of a restoring force f_r with respect to displacement and velocity; rows force, columns motion, along x, y, z.
+/// Jacobian of a restoring force f_r with respect to displacement and velocity of the tool; rows are the components of the force, columns
+/// those of the motion, along x, y, z.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slopes {
     /// ∂f_r/∂x, N/m.
@@ -36,27 +37,27 @@ pub type Branch = u8;
 /// exactly where [`Term::margin`] falls below zero; [`Term::next`] then selects the next regime. A [`Term::locked`] regime keeps one axis
 /// at rest, as sticking friction does: f_r then balances all other forces on that axis.
 pub trait Term: Debug + Send + Sync {
-    /// Number of internal states. They are displacements in m, which the error control of the integrator assumes.
+    /// Number of internal states. Each is a displacement in m, which the error control of the integrator assumes.
     fn states(&self) -> usize {
         0
     }
 
-    /// Updates the internal states `own` to the displacement `at`, if they depend on the path only; false if they are rate-dependent and
-    /// must be integrated.
+    /// Updates the internal states `own` to the displacement of `at`, if they depend on the path of the displacement only. Returns false if
+    /// they depend on its rate and must be integrated.
     fn follow(&self, _at: &At, _own: &mut [f64]) -> bool {
         false
     }
 
-    /// Limits internal states that a long integration step has carried beyond their admissible range.
+    /// Limits the internal states `own` to their admissible range, which a long integration step may leave.
     fn confine(&self, _own: &mut [f64]) {}
 
-    /// Sets the internal states for a recording that begins during a motion; a simulation begins with zero states.
+    /// Sets the internal states `own` at the first sample of a recording, which may begin during a motion; a simulation begins with zeros.
     fn begin(&self, _at: &At, _own: &mut [f64]) {}
 
-    /// Restoring force f_r, N, in the given regime.
+    /// Restoring force f_r, N, in the regime `branch`, which is not locked.
     fn restoring_n(&self, branch: Branch, at: &At, own: &[f64]) -> [f64; 3];
 
-    /// Jacobian of f_r; `None` for a force that is not differentiable everywhere, or that has internal states.
+    /// Jacobian of f_r; `None` for a force that is not differentiable everywhere or has internal states.
     fn slopes(&self, _at: &At) -> Option<Slopes> {
         None
     }
@@ -86,13 +87,13 @@ pub trait Term: Debug + Send + Sync {
         f64::INFINITY
     }
 
-    /// The regime at the start (`before` = `None`), or after the regime `before` has ended.
+    /// The regime that holds from now on: the first one (`before` = `None`), or the one that follows the ended regime `before`.
     fn next(&self, _before: Option<Branch>, _at: &At, _own: &[f64], _holding_n: f64) -> Branch {
         0
     }
 }
 
-/// The current regime of each restoring force, in their order.
+/// The current regime of each restoring force of a model, in their order.
 #[derive(Clone, Copy, Debug)]
 pub struct Branches<'a>(pub &'a [Branch]);
 
@@ -123,7 +124,8 @@ pub fn rate(
     };
     let mut left = minus(force, restoring(terms, branches, &at, own_y));
     if dynamics.velocity_jumps() {
-        // The velocity depends on the force directly: fixed-point iteration, which converges for damping small against inertia.
+        // Here the velocity depends on the force, and the force on the velocity. A fixed-point iteration solves for both; it
+        // converges where damping forces are small compared with inertial forces.
         for _ in 0..40 {
             let before = at.v;
             at.v = dynamics.velocity_under(&y[..order], left);
@@ -170,7 +172,7 @@ fn restoring(terms: &[Box<dyn Term>], branches: Branches<'_>, at: &At, own: &[f6
     sum
 }
 
-/// Sets the accelerations of the locked axes to zero in `rate`; returns the holding force f_r, N.
+/// Sets the accelerations of the locked (sticking) axes to zero in `rate`; returns the holding force f_r, N, that does so.
 fn hold(
     dynamics: &Dynamics,
     terms: &[Box<dyn Term>],

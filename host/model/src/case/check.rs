@@ -17,14 +17,14 @@ impl Case {
     /// Reads a case file.
     ///
     /// # Errors
-    /// The file cannot be read, is not TOML, has a key that does not belong or lacks one that does, or has a
-    /// value that no machine, tool or cut can have.
+    /// The file cannot be read, is not TOML, has an unknown key, lacks a required key, or has a value that no machine, tool or cut can
+    /// have.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CaseError> {
         let path = path.as_ref();
         Self::parse(path, &quietcut_recording::file::read_text(path)?)
     }
 
-    /// A case from the text of a case file; `path` is for its name and for messages.
+    /// A case from the text of a case file. `path` gives the default name of the case and is named in error messages.
     ///
     /// # Errors
     /// As [`Case::read`].
@@ -83,7 +83,7 @@ fn syntax(path: &Path, text: &str, error: &toml::de::Error) -> CaseError {
     }
 }
 
-/// The line, from 1, in which a byte of the text stands.
+/// Number of the line, from 1, that contains the byte at `offset` of the text.
 fn line_of(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
 }

@@ -2,45 +2,45 @@
 
 /// The standard deviation of one parameter, in the unit of that parameter: a key `…_std` of the case.
 ///
-/// Deviations are independent of one another and normal.
+/// The errors of different parameters are independent of one another and normally distributed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// The uncertain parameter.
     pub parameter: Parameter,
-    /// Its standard deviation, positive.
+    /// Standard deviation of the parameter, positive, in the unit of the parameter.
     pub std: f64,
 }
 
-/// A parameter of a case that may carry a deviation. Indices count from 0.
+/// A parameter of a case that may have a standard deviation. Indices of rows, columns, modes and joints count from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Parameter {
-    /// An entry of the mass matrix.
+    /// Mass matrix entry: row, column.
     Mass(usize, usize),
-    /// An entry of the damping matrix.
+    /// Damping matrix entry: row, column.
     Damping(usize, usize),
-    /// An entry of the stiffness matrix.
+    /// Stiffness matrix entry: row, column.
     Stiffness(usize, usize),
-    /// An entry of the matrix on the cubes of velocities.
+    /// Entry of the matrix of cubic damping, which multiplies the cubes of the velocities: row, column.
     CubicDamping(usize, usize),
-    /// An entry of the matrix on the cubes of displacements.
+    /// Entry of the matrix of cubic stiffness, which multiplies the cubes of the displacements: row, column.
     CubicStiffness(usize, usize),
     /// Natural frequency of a mode, Hz.
     Frequency(usize),
     /// Damping ratio of a mode.
     DampingRatio(usize),
-    /// Real (false) or imaginary (true) part of an entry of a left shape: mode, entry, part.
+    /// Real (false) or imaginary (true) part of one entry of a left mode shape: index of the mode, index of the entry, part.
     Left(usize, usize, bool),
-    /// Real (false) or imaginary (true) part of an entry of a right shape: mode, entry, part.
+    /// Real (false) or imaginary (true) part of one entry of a right mode shape: index of the mode, index of the entry, part.
     Right(usize, usize, bool),
-    /// Stiffness of a joint.
+    /// Stiffness of a robot joint.
     JointStiffness(usize),
-    /// Damping of a joint.
+    /// Damping of a robot joint.
     JointDamping(usize),
-    /// Stiffness of a joint on the cube of its angle.
+    /// Cubic stiffness of a robot joint, which multiplies the cube of the joint angle.
     JointCubicStiffness(usize),
-    /// Damping of a joint on the cube of its angular velocity.
+    /// Cubic damping of a robot joint, which multiplies the cube of the angular velocity.
     JointCubicDamping(usize),
-    /// Mass of the link behind a joint.
+    /// Mass of the link that a robot joint carries.
     LinkMass(usize),
     /// Edge angle of the tool.
     EdgeAngle,
@@ -71,7 +71,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// Key of the parameter in the case file; rows, columns and modes count from 1.
+    /// Key of the parameter in the case file; in keys, rows, columns, modes and joints count from 1.
     pub fn key(self) -> String {
         let entry = |matrix: &str, i: usize, j: usize| format!("structure.{matrix}[{}][{}]", i + 1, j + 1);
         let shape = |mode: usize, side: &str, index: usize, imaginary: bool| {

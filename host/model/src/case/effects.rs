@@ -4,11 +4,11 @@ use super::Case;
 use crate::effects::{EffectError, Effects};
 
 impl Effects {
-    /// The effects that a case has as extensions: one for each location where `direction`, or else `channel`, is a list. A tool's runout
-    /// is part of the tool and not among them.
+    /// The effects that a case has as extensions. A table whose key `direction` or `channel` is a list gives one effect for each location of
+    /// the list. The runout of the section `[tool]` is not among them.
     ///
     /// # Errors
-    /// An extension that cannot be simulated, or a key or value that it cannot have.
+    /// An unknown extension, an unknown key, or a value that is not possible.
     pub fn of_case(case: &Case) -> Result<Self, EffectError> {
         Self::of_extensions(case.extensions.iter().map(|(name, table)| (name.as_str(), table)))
     }

@@ -12,16 +12,16 @@ pub enum CaseError {
     /// The file cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// Not TOML, a key that does not belong, a key that is missing, or a value of the wrong type.
+    /// A file that is not TOML, an unknown key, a missing key, or a value of the wrong type.
     #[error("{}: line {line}, `{source_line}`: {message}", path.display())]
     Syntax {
         /// The file.
         path: PathBuf,
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
-        /// That line.
+        /// Text of the line.
         source_line: String,
-        /// What the parser found, and what it would have taken.
+        /// The parser's message: the fault, and what it expected.
         message: String,
     },
     /// A value that no machine, tool or cut can have.
@@ -33,12 +33,12 @@ pub enum CaseError {
         line: usize,
         /// The key, with its table: `tool.teeth`.
         key: String,
-        /// The value as read.
+        /// The value that the file has.
         found: String,
         /// The expected value.
         expected: String,
     },
-    /// Values of extensions that are not possible beside each other, or a key that is missing.
+    /// Extensions with a missing key, or with values that are possible alone but not together.
     #[error("{}: line {line}: {error}", path.display())]
     Effect {
         /// The file.
@@ -53,19 +53,19 @@ pub enum CaseError {
     MissingSection {
         /// The file.
         path: PathBuf,
-        /// The table: structure, tool, material, cut.
+        /// Name of the missing section: structure, tool, material or cut.
         section: &'static str,
-        /// Why it is needed.
+        /// The reason why the section is needed.
         what_for: &'static str,
     },
-    /// An extension of the model that cannot be treated by what is asked for.
+    /// An extension of the case that the requested computation cannot treat.
     #[error("{}: [extension.{name}] cannot be treated here: {reason}", path.display())]
     Extension {
         /// The file.
         path: PathBuf,
         /// Name of the extension.
         name: String,
-        /// Why not, and what can be done instead.
+        /// The reason why it cannot be treated, and a remedy.
         reason: String,
     },
 }

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-/// A number with its place in the file.
+/// A number with its position in the case file, for messages.
 pub(super) type Number = Spanned<f64>;
-/// A matrix by rows, with its place in the file.
+/// A matrix by rows, with its position in the case file, for messages.
 pub(super) type Rows = Spanned<Vec<Vec<f64>>>;
 
-/// Tables `[extension.NAME]` by name, with the line of each key.
+/// Tables `[extension.NAME]` by name; names, keys and values with their positions in the case file.
 pub(super) type ExtensionsFile = BTreeMap<Spanned<String>, BTreeMap<Spanned<String>, Spanned<toml::Value>>>;
 
 #[derive(Deserialize)]
@@ -27,7 +27,7 @@ pub(super) struct CaseFile {
     pub(super) extension: ExtensionsFile,
 }
 
-/// All kinds of structure in one table: `kind` decides which keys are allowed.
+/// Section `[structure]` with the keys of all kinds of structure; the key `kind` decides which of them are allowed.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StructureFile {

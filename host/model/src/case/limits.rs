@@ -1,6 +1,6 @@
 //! Limits of the machine's spindle.
 
-/// Limits of spindle speed and power; advised speeds stay within them.
+/// Limits of spindle speed and power of the machine; advised speeds stay within them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineLimits {
     /// Slowest spindle speed, rev/min.

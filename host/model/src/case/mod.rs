@@ -1,8 +1,7 @@
 //! The case file: structure, tool, material and cut of one machine and job.
 //!
-//! Sections may be missing where a verb does not need them; unknown keys are an error. x is the feed
-//! direction, y the normal, z the tool axis; angles in degrees, lengths in mm where a machinist says mm, SI
-//! otherwise.
+//! A section may be missing if a command does not need it; an unknown key is an error. x, y and z are the machine's axes, z that of the
+//! tool. Angles are in degrees, lengths of tool and cut in mm, all other quantities in SI units unless the key names another unit.
 
 mod check;
 mod deviation;
@@ -30,10 +29,10 @@ use crate::structure::Structure;
 pub struct Case {
     /// Path of the case file.
     pub path: PathBuf,
-    /// Name of the case; the file name without extension if the file gives none.
+    /// Name of the case: key `name`, otherwise the file name without extension.
     pub name: String,
-    /// The machine. Its values are finite and of the right shape; whether the matrices are definite is judged
-    /// where they are used.
+    /// Structure of the machine; `None` without this section. Its values are finite and of the right shape. [`Structure::check`] tests
+    /// whether the matrices are definite.
     pub structure: Option<Structure>,
     /// The tool.
     pub tool: Option<Tool>,
@@ -45,10 +44,10 @@ pub struct Case {
     pub limits: Option<MachineLimits>,
     /// Posture of the robot at which the structure was measured.
     pub posture: Posture,
-    /// Standard deviations of parameters (keys `…_std`).
+    /// Standard deviations of the parameters of the case (keys `…_std`).
     pub deviations: Vec<Deviation>,
-    /// Extensions of the model by name, as they stand in the file. Names, keys and values are those of the
-    /// [`EffectSpec`]s; whether the structure has the direction is checked where the effect is used.
+    /// Tables `[extension.NAME]` by name. Their names, keys and values agree with the [`EffectSpec`]s; whether the structure has the
+    /// direction of an effect is checked when the effect is applied.
     pub extensions: BTreeMap<String, toml::Table>,
 }
 
@@ -103,13 +102,13 @@ impl Case {
         self.extensions.contains_key(effect.name())
     }
 
-    /// The specifications of its extensions, in the order of their names.
+    /// The specifications of the effects that the case has as extensions, in the order of their names.
     pub fn effects(&self) -> impl Iterator<Item = &'static EffectSpec> + '_ {
         let known = self.extensions.keys().filter_map(|name| name.parse().ok());
         known.map(EffectName::spec)
     }
 
-    /// True where the depth of cut follows the axial vibration: edge and feed terms of eq. 3.7 act then.
+    /// True if the axial depth of cut follows the axial vibration: the edge and feed terms of thesis eq. 3.7 then act.
     pub fn axial_depth_modulation(&self) -> bool {
         self.extensions
             .get(EffectName::AxialDepthModulation.name())
@@ -118,10 +117,10 @@ impl Case {
             .unwrap_or(false)
     }
 
-    /// Refuses the extensions for which `reason` has a reason.
+    /// Refuses the case if `reason` returns a reason against one of its extensions.
     ///
     /// # Errors
-    /// The first such extension, with its reason.
+    /// The first extension with a reason against it, and that reason.
     pub fn refuse_extensions(
         &self,
         reason: impl Fn(&EffectSpec) -> Option<&'static str>,

@@ -9,14 +9,14 @@ use crate::structure::{Form, Joint, Matrices, Mode};
 impl Parameter {
     /// Value of the parameter in a case; `None` if the case has no such parameter.
     pub fn value(self, case: &Case) -> Option<f64> {
-        // Reading uses the same table as changing, on a copy.
+        // The table `slot` gives mutable access; reading uses it on a copy of the case.
         self.slot(&mut case.clone()).map(|value| *value)
     }
 
     /// Adds `by` to the value of the parameter in a case.
     ///
-    /// Start and exit angle stay within 0 to 180 degrees, outside of which a tooth cuts no chip. False if the case
-    /// lacks the parameter, or if the new value is outside its physical range.
+    /// Start and exit angle are limited to 0 to 180 degrees, since a tooth cuts no chip beyond. Returns false if the case lacks the
+    /// parameter, or if the new value is outside its physical range.
     pub fn shift(self, case: &mut Case, by: f64) -> bool {
         let Some(value) = self.slot(case) else {
             return false;

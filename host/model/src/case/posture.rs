@@ -7,7 +7,7 @@ use quietcut_recording::RecordedPosture;
 pub struct Posture {
     /// Index of the posture, shared by host and device; 0 on a machine tool.
     pub index: u8,
-    /// Joint angles, degrees, from the base on.
+    /// Joint angles, degrees, in the order from the base to the tool; empty for a machine tool.
     pub joints_deg: Vec<f64>,
 }
 

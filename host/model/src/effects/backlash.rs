@@ -64,7 +64,8 @@ const SHARE: Prior = Prior {
     ..Prior::open(0.0, 1.0, "a share above 0 and up to 1")
 };
 
-/// The describing function for a stiffness of 1 that does not act within ±`half_gap`, less the spring itself.
+/// Describing function of f_r for a stiffness of 1: dead zone of ±`half_gap` minus the linear spring, at the displacement amplitude
+/// `amplitude` (both in m).
 pub fn describing_function(amplitude: f64, half_gap: f64) -> Complex64 {
     if amplitude <= half_gap {
         return Complex64::new(-1.0, 0.0);
@@ -136,7 +137,7 @@ impl Term for Play {
         match before {
             None if x > self.half_gap_m => ABOVE,
             None if x < -self.half_gap_m => BELOW,
-            // The edge is reached: it goes on to the other side of it.
+            // The displacement has reached an edge of the gap and continues beyond that edge.
             Some(WITHIN) if x > 0.0 => ABOVE,
             Some(WITHIN) => BELOW,
             _ => WITHIN,

@@ -1,11 +1,11 @@
-//! Dry friction: f_r += fc·sign(v); at rest it holds whatever is within ±fc.
+//! Dry friction: f_r += fc·sign(v); at rest, f_r balances any other force within ±fc.
 //!
-//! Through a play of total width g in series (a damper that its rod takes along only after the play) the friction follows a
-//! slider w that moves with the tool only where |x − w| = g/2: after each reversal there is no force until the play is crossed.
+//! With a backlash of total width g in series, the friction acts on a slider at the position w, which the tool moves only while
+//! |x − w| = g/2: after each reversal of the motion there is no force until the backlash is crossed.
 //!
-//! A joint with clearance closes softly: its contact is pressed in by δ before it carries fc, by Hertz's law of contacts of bodies
-//! that are not conforming (Lankarani & Nikravesh, J. Mech. Design 112, 1990; without their damping),
-//! f_r = fc·((|x − w| − g/2)/δ)^1.5 towards w, and w moves where |x − w| = g/2 + δ.
+//! With a clearance whose contact is soft, the contact is indented by δ before it transmits fc, by Hertz's law for contacts of
+//! non-conforming bodies (Lankarani & Nikravesh, J. Mech. Design 112, 1990; without their damping):
+//! f_r = fc·((|x − w| − g/2)/δ)^1.5 towards w. The tool moves the slider while |x − w| = g/2 + δ.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -82,15 +82,16 @@ pub(super) const COULOMB_FRICTION: EffectSpec = EffectSpec {
 const FORCE: Prior = Prior::not_negative("a force of 0 or more");
 const LENGTH: Prior = Prior::not_negative("a length of 0 or more");
 
-/// The describing function for fc = 1: 4/(πX) in quadrature.
+/// Describing function of Coulomb friction for fc = 1 N at the displacement amplitude X, m: 4/(πX) in phase with the velocity.
 pub fn describing_function(amplitude: f64) -> Complex64 {
     Complex64::new(0.0, 4.0 / (PI * amplitude))
 }
 
-/// A backlash before the friction (`[extension.backlash]` with `before = "coulomb-friction"`) is a backlash in series with it.
+/// Moves gap and contact of a backlash in series with friction (`[extension.backlash]` with `before = "coulomb-friction"`) to the values
+/// of the friction.
 ///
 /// # Errors
-/// It stands before something else, or there is no friction.
+/// The key `before` names another effect, or there is no friction.
 pub(super) fn take_play(all: &mut Vec<Values>) -> Result<(), EffectError> {
     let Some(index) = all
         .iter()
@@ -138,25 +139,25 @@ const STICKS: Branch = 0;
 const FORWARD: Branch = 1;
 const BACKWARD: Branch = 2;
 
-/// What the tool takes along where it is so far from it.
+/// Slider of the friction, which the tool moves while their distance is `reach_m`.
 #[derive(Debug)]
 struct Slider {
     axis: usize,
     reach_m: f64,
 }
 
-/// Behind a play: the same, and free within it; at rest it holds at one end or the other.
+/// Friction in series with a backlash: no force within the backlash; stick is possible at either of its ends.
 #[derive(Debug)]
 struct BehindPlay {
     friction: Friction,
     slider: Slider,
 }
 
-/// Behind a clearance that closes softly: nothing sticks, the contact gives way.
+/// Friction in series with a clearance whose contact is soft: the tool never sticks, since the contact is elastic.
 #[derive(Debug)]
 struct BehindClearance {
     friction: Friction,
-    /// At its reach the contact is pressed in as far as friction can.
+    /// Its `reach_m` is half the clearance plus the depth to which the friction force can indent the contact.
     slider: Slider,
     contact_m: f64,
 }
@@ -211,7 +212,7 @@ impl Term for Friction {
         self.sliding(branch)
     }
 
-    /// Of friction that differs with direction the mean acts at the fundamental.
+    /// If the friction force differs between the two directions of motion, the fundamental is that of their mean.
     fn describing_function(&self, amplitude_m: f64, _: f64) -> Option<Complex64> {
         Some(0.5 * (self.plus_n + self.minus_n) * describing_function(amplitude_m))
     }
@@ -234,7 +235,8 @@ impl Term for Friction {
 
     fn next(&self, before: Option<Branch>, at: &At, _: &[f64], holding_n: f64) -> Branch {
         let moving = before.is_none() && at.v[self.axis] != 0.0;
-        // A hair beyond the limit still counts as held: the end of sticking is found there to rounding only.
+        // The integrator finds the end of stick, where the holding force equals fc, to rounding only. A relative margin of 1e-9
+        // above rounding makes sure that slip follows.
         let beyond = if before == Some(STICKS) { -1e-9 } else { 0.0 };
         if moving {
             if at.v[self.axis] > 0.0 { FORWARD } else { BACKWARD }
@@ -249,18 +251,18 @@ impl Term for Friction {
 }
 
 impl Slider {
-    /// How far the tool is from it.
+    /// Displacement of the tool minus that of the slider, m.
     fn ahead_m(&self, at: &At, own: &[f64]) -> f64 {
         at.x[self.axis] - own[0]
     }
 
-    /// In motion it is taken along; at rest nobody knows.
+    /// Initial position of the slider: if the tool moves, it trails the tool by `reach_m`; if the tool is at rest, it is taken to be at the tool.
     fn begin(&self, at: &At, own: &mut [f64]) {
         let moving = at.v[self.axis].signum() * f64::from(u8::from(at.v[self.axis] != 0.0));
         own[0] = at.x[self.axis] - self.reach_m * moving;
     }
 
-    /// The play operator: it stays where it is as long as the tool is within its reach. A hair beyond that is the end of the play.
+    /// The play operator: the slider stays at rest while the tool is within `reach_m` of it, with a relative margin of 1e-9 for rounding.
     fn follow(&self, at: &At, own: &mut [f64]) {
         let reach_m = self.reach_m * (1.0 + 1e-9);
         let x = at.x[self.axis];
@@ -282,7 +284,7 @@ impl Slider {
         }
     }
 
-    /// Which way it is taken along, where the tool is at the end of its reach.
+    /// Regime in which the tool moves the slider, if their distance is `reach_m`; `None` within the backlash.
     fn taken(&self, at: &At, own: &[f64]) -> Option<Branch> {
         let ahead_m = self.ahead_m(at, own);
         let is_at_end = ahead_m.abs() >= self.reach_m * (1.0 - 1e-9);
@@ -342,7 +344,7 @@ impl Term for BehindPlay {
     }
 }
 
-/// Hertz's exponent of contacts that are not conforming.
+/// Exponent of Hertz's law, force over indentation, for contacts of non-conforming bodies.
 const HERTZ: f64 = 1.5;
 
 impl Term for BehindClearance {

@@ -1,4 +1,4 @@
-//! A channel of motion reads p of another direction too.
+//! A channel of motion also reads a fraction p of the motion in another direction (cross-axis sensitivity).
 
 use std::sync::Arc;
 
@@ -52,7 +52,7 @@ impl Effect for CrossAxis {
     fn alter_channel(&self, channel: &mut Pickup) {
         if let Some(axis) = self.direction.axis()
             && meant(self.channel.as_deref(), channel)
-            // What reads that direction anyhow reads nothing of another.
+            // Without a named channel, the channels of that direction itself are left as they are.
             && (self.channel.is_some() || channel.weights[axis] == 0.0)
         {
             channel.weights[axis] += self.fraction;

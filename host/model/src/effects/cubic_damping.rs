@@ -37,7 +37,7 @@ pub(super) const CUBIC_DAMPING: EffectSpec = EffectSpec {
     },
 };
 
-/// The describing function for c3 = 1: ¾ω³X² in quadrature.
+/// Describing function of c3·v³ for c3 = 1 at the displacement amplitude X, m, and ω, rad/s: ¾ω³X² in phase with the velocity.
 pub fn describing_function(amplitude: f64, omega: f64) -> Complex64 {
     Complex64::new(0.0, 0.75 * omega.powi(3) * amplitude * amplitude)
 }

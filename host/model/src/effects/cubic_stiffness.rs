@@ -37,7 +37,7 @@ pub(super) const CUBIC_STIFFNESS: EffectSpec = EffectSpec {
     },
 };
 
-/// The describing function for k3 = 1: ¾X².
+/// Describing function of k3·x³ for k3 = 1 at the displacement amplitude X, m: ¾X².
 pub fn describing_function(amplitude: f64) -> Complex64 {
     Complex64::new(0.75 * amplitude * amplitude, 0.0)
 }

@@ -46,7 +46,7 @@ pub(super) const EDGE_FORCE: EffectSpec = EffectSpec {
 
 #[derive(Clone, Copy, Debug)]
 struct EdgeForce {
-    /// Tangential, radial, axial; those that are not given stay as they are.
+    /// Tangential, radial and axial edge coefficient, N/mm; `None` leaves that of the case.
     n_per_mm: [Option<f64>; 3],
 }
 

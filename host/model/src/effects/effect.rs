@@ -7,17 +7,17 @@ use super::{EffectError, EffectName};
 use crate::structure::Structure;
 use crate::{Cutter, Dynamics, ModelError, Spindle, Term};
 
-/// An effect with values. It acts by one of these methods; the others change nothing.
+/// An effect with values for its parameters. It acts through one or more of the methods that change a model; by default they do nothing.
 pub trait Effect: Debug + Send + Sync {
-    /// Its entry in the list.
+    /// Entry of the effect in the list of all effects.
     fn id(&self) -> EffectName;
 
-    /// Its name in cases, answers and on the command line.
+    /// Name of the effect in cases, in answers and on the command line.
     fn name(&self) -> &'static str {
         self.id().name()
     }
 
-    /// Changes a parameter of the structure.
+    /// Changes parameters of the structure that a case can also state.
     ///
     /// # Errors
     /// The structure has no such parameter.
@@ -25,26 +25,26 @@ pub trait Effect: Debug + Send + Sync {
         Ok(())
     }
 
-    /// Changes the equations of the `structure` beyond what a case can say.
+    /// Changes the equation of motion of `structure` in a way that no case can state, such as an additional mode.
     ///
     /// # Errors
-    /// The structure does not have the direction.
+    /// The structure does not have the direction of the effect.
     fn alter_dynamics(&self, _structure: &Structure, _dynamics: &mut Dynamics) -> Result<(), EffectError> {
         Ok(())
     }
 
-    /// Terms that the equation of motion of `structure` gets.
+    /// Restoring forces that the effect adds to the equation of motion of `structure`.
     ///
     /// # Errors
-    /// The structure does not have the direction, or cannot have the term.
+    /// The structure does not have the direction of the effect, or its static stiffness is not known.
     fn terms(&self, _structure: &Structure) -> Result<Vec<Box<dyn Term>>, EffectError> {
         Ok(Vec::new())
     }
 
-    /// Changes the tool or its cut.
+    /// Changes tool, cut or cutting force.
     ///
     /// # Errors
-    /// What the cutter refuses.
+    /// The tool or the cut lacks a quantity that the effect requires.
     fn alter_cutter(&self, _cutter: &mut Cutter) -> Result<(), ModelError> {
         Ok(())
     }
@@ -52,6 +52,6 @@ pub trait Effect: Debug + Send + Sync {
     /// Changes the rotation of the spindle.
     fn alter_spindle(&self, _spindle: &mut Spindle) {}
 
-    /// Changes what a channel reads.
+    /// Changes weights, gain or delay of a measured channel.
     fn alter_channel(&self, _channel: &mut Pickup) {}
 }

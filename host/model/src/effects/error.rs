@@ -27,12 +27,12 @@ pub enum EffectError {
         /// The key.
         key: &'static str,
     },
-    /// A change over a record of unknown length.
+    /// A change per recording, for a recording of unknown length.
     #[error("effect `{name}`: the length of the record is not known here; give {name}.{key} instead")]
     NoDuration {
         /// The effect.
         name: &'static str,
-        /// The key to give.
+        /// The key to give instead.
         key: &'static str,
     },
     /// A value that is not possible.
@@ -40,11 +40,11 @@ pub enum EffectError {
     Value {
         /// The effect.
         name: &'static str,
-        /// The key; empty for the VALUE of the command line.
+        /// The key; empty for the VALUE of `--effect NAME=VALUE`.
         key: String,
         /// The value as given.
         found: String,
-        /// What would be right.
+        /// Description of the possible values.
         needed: &'static str,
     },
     /// A direction that the structure does not have, or one that must be given.
@@ -62,18 +62,18 @@ pub enum EffectError {
     Structure {
         /// The effect.
         name: &'static str,
-        /// The fault, and what would be right.
+        /// The fault, and the remedy.
         what: String,
     },
-    /// Something that the cut of the case does not allow.
+    /// An effect that the cut of the case does not allow.
     #[error("effect `{name}`: {what}")]
     Cut {
         /// The effect.
         name: &'static str,
-        /// The fault, and what would be right.
+        /// The fault, and the remedy.
         what: &'static str,
     },
-    /// Friction on a tool without inertia.
+    /// Friction on a structure given by modes that have no mass matrix, so that the tool cannot stick.
     #[error(
         "{name}: the modes of this structure add up to no mass (their residues do not sum to zero), so that no friction can hold it; use mass, damping and stiffness matrices",
         name = EffectName::CoulombFriction.name()
@@ -82,7 +82,7 @@ pub enum EffectError {
 }
 
 impl EffectError {
-    /// The effect and the key that are at fault, where they are known.
+    /// Name of the effect and key that are at fault; `None` if they are not known.
     pub fn location(&self) -> Option<(&str, &str)> {
         match self {
             Self::Form(_) => None,

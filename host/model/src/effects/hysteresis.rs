@@ -1,6 +1,6 @@
 //! Bouc–Wen hysteresis: f_r += k_h·(z − x), ż = v·(1 − |z/z_y|ⁿ·(γ·sgn(v·z) + β)).
 //!
-//! γ and β are shape numbers with γ + β = 1, so that z saturates at ±z_y; at small motion z = x and nothing is added.
+//! γ and β are shape parameters with γ + β = 1, so that z saturates at ±z_y. At small motion z = x, and f_r is zero.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -68,12 +68,13 @@ const ZERO_TO_ONE: Prior = Prior {
     ..Prior::open(0.0, 1.0, "a number from 0 to 1")
 };
 
-/// The describing function of a Bouc–Wen element of stiffness 1, n = 1 and γ = β = ½, less the spring: (z − x) at the fundamental.
+/// Describing function of z − x, a Bouc–Wen element of stiffness 1 minus the linear spring, for n = 1 and γ = β = ½, at the displacement
+/// amplitude `amplitude`, m.
 ///
-/// With n = 1 and γ = β the element is linear while it unloads and saturates exponentially while it loads.
+/// With n = 1 and γ = β the element is linear while it unloads, and saturates exponentially while it loads.
 pub fn describing_function(amplitude: f64, yield_m: f64) -> Complex64 {
-    // From peak to peak: unloading from +z₀ with slope 1 to z = 0, then loading z = −z_y(1 − e^{−s/z_y}) over what is
-    // left, to −z₀. z₀ is the fixed point of that.
+    // Half a period from the upper to the lower peak of x: z unloads from +z₀ with slope 1 to 0, then loads over the rest s of the
+    // stroke as z = −z_y(1 − e^{−s/z_y}), to −z₀. The peak z₀ is the fixed point of this map.
     let stroke = 2.0 * amplitude;
     let mut low = 0.0;
     let mut high = yield_m.min(stroke);
@@ -85,7 +86,7 @@ pub fn describing_function(amplitude: f64, yield_m: f64) -> Complex64 {
     let top = 0.5 * (low + high);
     let count = 256;
     let mut sum = Complex64::ZERO;
-    // Half a period from the upper peak down: x = X·cos p; the other half is the same turned around.
+    // Fourier integral over half a period, x = X·cos p from the upper peak down; the other half contributes the same by symmetry.
     for k in 0..count {
         let p = PI * (f64::from(k) + 0.5) / f64::from(count);
         let gone = amplitude * (1.0 - p.cos());
@@ -95,7 +96,7 @@ pub fn describing_function(amplitude: f64, yield_m: f64) -> Complex64 {
             yield_m * (-(gone - top) / yield_m).exp_m1()
         };
         let rest = z - amplitude * p.cos();
-        // Against cos p in phase, and against −sin p, the velocity, in quadrature.
+        // Component of z − x in phase with the displacement cos p, and in phase with the velocity −sin p.
         sum += Complex64::new(rest * p.cos(), -rest * p.sin());
     }
     sum * (2.0 / (f64::from(count) * amplitude))
@@ -116,8 +117,9 @@ struct BoucWen {
     axis: usize,
 }
 
-/// Bits of a branch: the signs of velocity and of z.
+/// Bit of a regime that is set for negative velocity.
 const BACKWARD: Branch = 1;
+/// Bit of a regime that is set for negative z.
 const NEGATIVE: Branch = 2;
 
 impl Effect for Hysteresis {
@@ -160,21 +162,22 @@ impl Term for BoucWen {
             gamma,
             ..
         } = self.effect;
-        // On its branch z has its sign; a stage beyond the end of the branch goes on smoothly where n is odd.
+        // Within a regime the sign of z is constant. The signed power continues the law smoothly for a stage of the integrator beyond
+        // the end of the regime.
         let share = of_z * own[0] / yield_m;
         let power = share.signum() * share.abs().powf(exponent);
         let shape = gamma * of_velocity * of_z + (1.0 - gamma);
         rate[0] = at.v[self.axis] * (1.0 - power * shape);
     }
 
-    /// With γ + β = 1 no z beyond ±z_y is reached.
+    /// With γ + β = 1, z stays within ±z_y; only an integration error exceeds this range.
     fn confine(&self, own: &mut [f64]) {
         own[0] = own[0].clamp(-self.effect.yield_m, self.effect.yield_m);
     }
 
     fn margin(&self, branch: Branch, at: &At, own: &[f64], _: f64) -> f64 {
         let (of_velocity, of_z) = Self::signs(branch);
-        // Both as shares of something of their size; only the signs count.
+        // Velocity and z have different units, but only the sign of the margin is used.
         (of_velocity * at.v[self.axis]).min(of_z * own[0])
     }
 
@@ -187,7 +190,7 @@ impl Term for BoucWen {
             branch |= NEGATIVE;
         }
         let Some(before) = before else { return branch };
-        // At the end of a branch one of the two is at zero: that one changes its sign.
+        // A regime ends where velocity or z becomes zero; that quantity changes its sign.
         let (of_velocity, of_z) = Self::signs(before);
         let (v, z) = (of_velocity * at.v[self.axis], of_z * own[0]);
         if v * self.effect.yield_m.recip() < z * self.effect.yield_m.recip() {

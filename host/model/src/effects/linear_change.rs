@@ -1,8 +1,8 @@
-//! A linear parameter that differs from the case: VALUE is a relative change, a key an absolute value.
+//! Mass, stiffness or damping that differs from the case: VALUE is a relative change r, a key may give an absolute value.
 //!
-//! Of matrices all of M, C or K is scaled, or with a direction its diagonal entry alone; an absolute value is that
-//! diagonal entry. Of modes all are changed as those of a structure whose M, C or K is scaled: stiffness 1 + r makes
-//! ω grow by √(1 + r), ζ and the residues shrink by it; mass makes all three shrink; damping scales ζ.
+//! In a structure given by matrices, the whole matrix M, C or K is scaled by 1 + r; with a direction, only the diagonal entry of
+//! that direction is scaled or replaced. In a structure given by modes, all modes change as if M, C or K were scaled: stiffness
+//! multiplies ω by √(1 + r) and divides ζ and the residues by it; mass divides all three by √(1 + r); damping multiplies ζ by 1 + r.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use super::{Effect, EffectError, EffectName, Prior, Values};
 use crate::structure::{Direction, Form, Mode, Structure};
 
-/// A parameter that vanishes or changes its sign is another machine.
+/// Bounds of a relative change: a mass, stiffness or damping that vanishes or changes its sign is not possible.
 pub(super) const ABOVE_MINUS_ONE: Prior = Prior::open(-1.0, f64::INFINITY, "a relative change above −1");
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,9 +24,9 @@ pub(super) enum Matrix {
 #[derive(Clone, Copy, Debug)]
 enum Change {
     Relative(f64),
-    /// An entry of the matrix.
+    /// Absolute value of a diagonal entry of the matrix, in SI units.
     Entry(f64),
-    /// Frequency or damping ratio of the only mode.
+    /// Absolute value of the natural frequency, Hz, or of the damping ratio of the only mode.
     OfMode(f64),
 }
 

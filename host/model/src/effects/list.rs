@@ -22,14 +22,14 @@ macro_rules! list {
             /// All effects.
             pub const ALL: [Self; ALL.len()] = [$(Self::$variant),+];
 
-            /// Its specification.
+            /// The specification of the effect.
             pub const fn spec(self) -> &'static EffectSpec {
                 match self {
                     $(Self::$variant => &$module::$spec,)+
                 }
             }
 
-            /// Its name in cases, answers and on the command line.
+            /// Name of the effect in cases, in answers and on the command line.
             pub const fn name(self) -> &'static str {
                 self.spec().name
             }

@@ -7,10 +7,10 @@ use super::{Effect, EffectError, EffectName};
 use crate::structure::{Direction, Structure};
 use crate::{At, Branch, Slopes, Term};
 
-/// f_r, N, from up to two coefficients, the displacement x, m, and the velocity v, m/s.
+/// Force law: f_r, N, from up to two coefficients, the displacement x, m, and the velocity v, m/s.
 pub(super) type Law = fn([f64; 2], f64, f64) -> f64;
 
-/// N(X, ω), N/m, from the coefficients, the amplitude X, m, and ω, rad/s.
+/// Describing function N(X, ω), N/m, of a force law, from its coefficients, the displacement amplitude X, m, and ω, rad/s.
 pub(super) type DescribingFunction = fn([f64; 2], f64, f64) -> Complex64;
 
 /// A force that depends on displacement and velocity along one direction.
@@ -18,14 +18,14 @@ pub(super) type DescribingFunction = fn([f64; 2], f64, f64) -> Complex64;
 pub(super) struct LocalForce {
     /// The effect.
     pub(super) id: EffectName,
-    /// The coefficients of the law; the second is 0 where it has one.
+    /// The coefficients of the force law; the second is 0 if the law has only one.
     pub(super) coefficients: [f64; 2],
     pub(super) law: Law,
-    /// ∂f_r/∂x and ∂f_r/∂v of the law.
+    /// Derivatives ∂f_r/∂x, N/m, and ∂f_r/∂v, N s/m, of the force law.
     pub(super) slopes: fn([f64; 2], f64, f64) -> [f64; 2],
-    /// N(X, ω) of the law: see [`Term::describing_function`].
+    /// Describing function N(X, ω) of the force law: see [`Term::describing_function`].
     pub(super) describing_function: DescribingFunction,
-    /// The direction; `None` for the only one of a structure.
+    /// Direction of the force; `None` for the only direction of a structure.
     pub(super) direction: Option<Direction>,
 }
 

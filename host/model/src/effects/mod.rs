@@ -1,4 +1,5 @@
-//! Effects: what a machine, a cut or a sensor may have beyond the plain model. One file each, with its [`EffectSpec`] and its physics.
+//! Effects: deviations of a machine, a cut or a sensor from the linear model of the case. Each effect has one file with its [`EffectSpec`]
+//! and its physics.
 //!
 //! [`EffectName`] is the only list. Names, keys, help, the table of the documentation, the checks of cases, simulation and the treatment
 //! in stability follow from it. To add an effect: write its file and name it twice below, as a module and in the list.

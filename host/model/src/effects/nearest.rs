@@ -1,6 +1,6 @@
 //! The known word that is closest to an unknown one.
 
-/// The fewest letters to insert, delete or replace on the way from one word to another (Levenshtein).
+/// Least number of letters to insert, delete or replace that turns one word into the other (Levenshtein distance).
 fn edit_distance(from: &str, to: &str) -> usize {
     let to: Vec<char> = to.chars().collect();
     let mut row: Vec<usize> = (0..=to.len()).collect();
@@ -16,7 +16,8 @@ fn edit_distance(from: &str, to: &str) -> usize {
     row[to.len()]
 }
 
-/// The known word that is closest: the only one that begins so, or one of which fewer than half of the letters differ.
+/// The known word closest to `word`: the only one that begins with it, or the one with the least edit distance, if that is below half of its
+/// letters.
 pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let known: Vec<&str> = known.into_iter().collect();
     let mut beginning = known.iter().filter(|known| known.starts_with(word));
@@ -31,7 +32,7 @@ pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) 
         .map(|(_, known)| known)
 }
 
-/// The words that would be right, the closest first.
+/// The known words as text for a message: the word closest to `word` first, if there is one, then all.
 pub(crate) fn expected<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
     let all = known.join(", ");

@@ -3,24 +3,24 @@
 /// One parameter of an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
-    /// The key in cases and answers; empty where only the command line has it, as the VALUE of the effect.
+    /// Key of the parameter in cases and answers; empty if only the command line has the parameter, as the VALUE of the effect.
     pub key: &'static str,
-    /// Its unit; empty for words and for numbers without a unit.
+    /// Unit of the parameter; empty for words and for dimensionless numbers.
     pub unit: &'static str,
-    /// The type of its value.
+    /// Type of the value: number, word or switch.
     pub kind: ValueKind,
-    /// True where the effect is linear in it.
+    /// True if the effect is linear in this parameter.
     pub linear: bool,
-    /// True for the parameter that the VALUE of the command line stands for.
+    /// True for the parameter that VALUE sets in `--effect NAME=VALUE`.
     pub main: bool,
-    /// The values that it can have, before any recording is seen.
+    /// Physically possible values of the parameter.
     pub prior: Prior,
-    /// What it is.
+    /// Meaning of the parameter in words, for the help.
     pub meaning: &'static str,
 }
 
 impl Parameter {
-    /// A number of any size in a unit.
+    /// A parameter whose value may be any finite number, in `unit`.
     pub(super) const fn number(key: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self {
             key,
@@ -33,7 +33,7 @@ impl Parameter {
         }
     }
 
-    /// A word.
+    /// A parameter whose value is a word.
     pub(super) const fn word(key: &'static str, meaning: &'static str) -> Self {
         Self {
             kind: ValueKind::Word,
@@ -41,22 +41,22 @@ impl Parameter {
         }
     }
 
-    /// The same parameter, in which the effect is linear.
+    /// This parameter, marked as one in which the effect is linear.
     pub(super) const fn linear(self) -> Self {
         Self { linear: true, ..self }
     }
 
-    /// The same parameter, for which the VALUE of the command line stands.
+    /// This parameter, marked as the one that VALUE sets in `--effect NAME=VALUE`.
     pub(super) const fn main(self) -> Self {
         Self { main: true, ..self }
     }
 
-    /// The same parameter within bounds.
+    /// This parameter with the bounds `prior` of its value.
     pub(super) const fn within(self, prior: Prior) -> Self {
         Self { prior, ..self }
     }
 
-    /// The same parameter with another type of value.
+    /// This parameter with a value of the type `kind`.
     pub(super) const fn of_kind(self, kind: ValueKind) -> Self {
         Self { kind, ..self }
     }
@@ -65,9 +65,9 @@ impl Parameter {
 /// The type of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueKind {
-    /// A number; a list where the effect acts at several locations.
+    /// A number; a list of numbers if the effect acts at several locations.
     Number,
-    /// A number, or one for each mode of the structure.
+    /// One number for all modes of the structure, or one for each mode.
     NumberPerMode,
     /// A word.
     Word,
@@ -75,16 +75,16 @@ pub enum ValueKind {
     Switch,
 }
 
-/// The values that a parameter can have.
+/// Physically possible values of a parameter: an interval.
 #[derive(Clone, Copy, Debug)]
 pub struct Prior {
-    /// The lower bound.
+    /// Lower bound of the interval.
     pub low: f64,
-    /// The upper bound.
+    /// Upper bound of the interval.
     pub high: f64,
-    /// True where the bound itself is possible: lower, upper.
+    /// True if the lower bound itself is possible, and true if the upper one is.
     pub closed: [bool; 2],
-    /// The bounds in words, for messages.
+    /// The possible values in words, for messages.
     pub words: &'static str,
 }
 
@@ -94,7 +94,7 @@ impl Prior {
     /// x > 0.
     pub const POSITIVE: Self = Self::open(0.0, f64::INFINITY, "a number greater than 0");
 
-    /// Between two bounds that are not possible themselves.
+    /// Values between two bounds that are not possible themselves.
     pub(super) const fn open(low: f64, high: f64, words: &'static str) -> Self {
         Self {
             low,
@@ -104,12 +104,12 @@ impl Prior {
         }
     }
 
-    /// 0 or more.
+    /// Values of 0 or more.
     pub(super) const fn not_negative(words: &'static str) -> Self {
         Self::from(0.0, words)
     }
 
-    /// The lower bound or more.
+    /// Values of at least `low`.
     pub(super) const fn from(low: f64, words: &'static str) -> Self {
         Self {
             closed: [true, false],
@@ -117,7 +117,7 @@ impl Prior {
         }
     }
 
-    /// True for a finite number within the bounds.
+    /// True if `value` is finite and within the bounds.
     pub fn allows(&self, value: f64) -> bool {
         let above = value > self.low || (self.closed[0] && value == self.low);
         let below = value < self.high || (self.closed[1] && value == self.high);

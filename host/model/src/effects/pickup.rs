@@ -2,24 +2,24 @@
 
 use quietcut_recording::Quantity;
 
-/// The reading of a channel: a mix of axes, scaled and delayed.
+/// The reading of a channel: a weighted sum of the machine's axes, delayed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pickup {
-    /// Its name: `ax`, `y`, `fx` …
+    /// Name of the channel, such as `ax`, `y` or `fx`.
     pub name: String,
     /// The measured quantity: force, displacement, velocity or acceleration.
     pub quantity: Quantity,
-    /// The weights of the machine's x, y and z in the reading.
+    /// Weights of the machine's x, y and z in the reading, gain included.
     pub weights: [f64; 3],
-    /// For each mode of a modal structure: the ratio of the motion of the sensor to that of the tool. Empty where the sensor moves as
-    /// the tool.
+    /// For each mode of a structure given by modes: ratio of the motion of the sensor to that of the tool. Empty if the sensor moves with the
+    /// tool.
     pub modes: Vec<f64>,
-    /// Its delay, s.
+    /// Delay of the reading behind the motion, s.
     pub delay_s: f64,
 }
 
 impl Pickup {
-    /// A channel of one axis (0, 1, 2), without an error.
+    /// An error-free channel of one axis: 0, 1, 2 for x, y, z.
     pub fn of_axis(quantity: Quantity, axis: usize) -> Self {
         let prefix = match quantity {
             Quantity::Force => "f",
@@ -38,7 +38,7 @@ impl Pickup {
         }
     }
 
-    /// The reading of a quantity along x, y and z.
+    /// The reading if the measured quantity has the components `value` along x, y and z.
     pub fn read(&self, value: [f64; 3]) -> f64 {
         self.weights
             .iter()

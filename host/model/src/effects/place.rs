@@ -1,11 +1,11 @@
-//! Where an effect acts: the directions of a structure and its static stiffness along them.
+//! Location of an effect in a structure: the axis of a direction, and the static stiffness along the axes.
 
 use nalgebra::{DMatrix, Matrix3};
 
 use super::EffectError;
 use crate::structure::{Direction, Structure};
 
-/// The axis of `direction`, or the only axis of the structure where none is given.
+/// Index 0, 1, 2 of the axis of `direction`; of the only axis of the structure if `direction` is `None`.
 pub(super) fn axis_of(
     structure: &Structure,
     direction: Option<Direction>,
@@ -38,8 +38,8 @@ pub(super) fn axis_of(
     }
 }
 
-/// K along x, y and z, N/m: the inverse of the static receptance; the matrix K itself where there are no rotations.
-/// Axes that the structure does not have are zero.
+/// Static stiffness matrix along x, y and z, N/m: the inverse of the static receptance, which is K itself for a structure without
+/// rotations. Rows and columns of axes that the structure does not have are zero.
 pub(super) fn static_stiffness(
     structure: &Structure,
     name: &'static str,
@@ -67,7 +67,7 @@ pub(super) fn static_stiffness(
     Ok(whole)
 }
 
-/// A force along one axis.
+/// Vector of a force of `force_n`, N, along one axis.
 pub(super) fn along(axis: usize, force_n: f64) -> [f64; 3] {
     let mut force = [0.0; 3];
     force[axis] = force_n;

@@ -17,7 +17,7 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
     parameters: &[Parameter::number("c2_ns2_per_m2", "N s²/m²", "quadratic damping")
         .linear()
         .main()],
-    // |v|·v has the continuous derivative 2·|v|.
+    // The force is smooth enough for a Jacobian: the derivative 2·|v| of |v|·v is continuous.
     treatment: Treatment::Smooth,
     candidates: &["one law along one direction, or a law along each"],
     shares_term_with: &[],
@@ -39,7 +39,8 @@ pub(super) const QUADRATIC_DAMPING: EffectSpec = EffectSpec {
     },
 };
 
-/// The describing function for c2 = 1: the damping c_eq = (8/3π)·ω·X, that is (8/3π)·ω²·X in quadrature.
+/// Describing function of c2·|v|·v for c2 = 1 at the displacement amplitude X, m, and ω, rad/s: (8/3π)·ω²·X in phase with the velocity, which
+/// is an equivalent damping of (8/3π)·ω·X.
 fn describing_function(amplitude: f64, omega: f64) -> Complex64 {
     Complex64::new(0.0, 8.0 / (3.0 * PI) * omega * omega * amplitude)
 }

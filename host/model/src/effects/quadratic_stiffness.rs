@@ -31,7 +31,7 @@ pub(super) const QUADRATIC_STIFFNESS: EffectSpec = EffectSpec {
             coefficients: [values.main("k2_n_per_m2")?, 0.0],
             law: |[k2, _], x, _| k2 * x.powi(2),
             slopes: |[k2, _], x, _| [2.0 * k2 * x, 0.0],
-            // An even force has no fundamental.
+            // An even function of x has no component at the fundamental frequency.
             describing_function: |_, _, _| Complex64::ZERO,
             direction: values.direction()?,
         }))

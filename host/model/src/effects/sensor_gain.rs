@@ -56,7 +56,7 @@ impl Effect for SensorGain {
     }
 }
 
-/// The named channel; without a name those of motion, not those of force.
+/// True if a sensor effect acts on `channel`: the channel of that name, or without a name every channel of motion.
 pub(super) fn meant(name: Option<&str>, channel: &Pickup) -> bool {
     match name {
         Some(name) => channel.name == name,

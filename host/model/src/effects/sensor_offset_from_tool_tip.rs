@@ -1,6 +1,6 @@
-//! The sensor sits away from the tool tip: of each mode it reads a share, that of a rigid body between the two.
+//! The sensor sits away from the tool tip, so that it reads each mode with the ratio of the mode shape at the sensor to that at the tool.
 //!
-//! y = Σ ratio_r·u_r with u_r what mode r moves the tool. Of a structure that is not given by its modes there is one ratio for all.
+//! y = Σ ratio_r·u_r with u_r the displacement of the tool in mode r. A structure that is not given by modes has one ratio for all motion.
 
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ pub(super) const SENSOR_OFFSET_FROM_TOOL_TIP: EffectSpec = EffectSpec {
 
 #[derive(Clone, Debug)]
 struct SensorOffset {
-    /// One for all modes, or one for each.
+    /// One ratio for all modes, or one for each mode.
     ratios: Vec<f64>,
     channel: Option<String>,
 }

@@ -17,13 +17,14 @@ impl Effects {
     /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE`, in any order.
     ///
     /// # Errors
-    /// A text of another form, a name or a key that is not known, a value that cannot be; a change over the record, whose
-    /// length is not known: see [`Self::parse_over`].
+    /// A text of another form, an unknown name or key, or a value that is not possible. Drift and wear by VALUE, since the length of the
+    /// recording is not known: see [`Self::parse_over`].
     pub fn parse<'a>(texts: impl IntoIterator<Item = &'a str>) -> Result<Self, EffectError> {
         Self::parse_over(texts, None)
     }
 
-    /// The same for a record of a known length in s: the VALUE of drift and wear is the change over it.
+    /// Effects from `NAME=VALUE` and `NAME.KEY=VALUE` for a recording of the length `record_s`, s. The VALUE of drift and wear is the change
+    /// over the whole recording.
     ///
     /// # Errors
     /// As [`Self::parse`].
@@ -54,15 +55,15 @@ impl Effects {
     /// The effect of one table `[extension.NAME]`.
     ///
     /// # Errors
-    /// An extension that cannot be simulated, or a key or value that it cannot have.
+    /// An unknown extension, an unknown key, or a value that is not possible.
     pub fn of_extension(name: &str, table: &toml::Table) -> Result<Self, EffectError> {
         Self::build(vec![extension(name, table)?])
     }
 
-    /// The effects of several tables `[extension.NAME]`, some of which may belong together.
+    /// The effects of several tables `[extension.NAME]`; a backlash may be in series with the friction of another table.
     ///
     /// # Errors
-    /// An extension that cannot be simulated, or a key or value that it cannot have.
+    /// An unknown extension, an unknown key, or a value that is not possible.
     pub fn of_extensions<'a>(
         tables: impl IntoIterator<Item = (&'a str, &'a toml::Table)>,
     ) -> Result<Self, EffectError> {
@@ -91,13 +92,13 @@ impl Effects {
             .map(Self)
     }
 
-    /// Those of `self`, then those of `other`.
+    /// The effects of `self`, followed by those of `other`.
     pub fn and(mut self, other: &Self) -> Self {
         self.0.extend(other.0.iter().cloned());
         self
     }
 
-    /// The structure as these effects make it, as far as that is a change of its own numbers.
+    /// `structure` with the parameters that these effects change; restoring forces and additional modes are not part of it.
     ///
     /// # Errors
     /// An effect that the structure cannot have.
@@ -109,10 +110,10 @@ impl Effects {
         Ok(structure)
     }
 
-    /// The equations of `structure` with these effects.
+    /// The equation of motion of `structure` with these effects, and the restoring forces that they add.
     ///
     /// # Errors
-    /// What an effect cannot do to this structure, or an indefinite structure.
+    /// An effect that is not possible for this structure, or an indefinite structure.
     pub fn dynamics(&self, structure: &Structure) -> Result<(Dynamics, Vec<Box<dyn Term>>), ModelError> {
         let structure = self.altered(structure)?;
         let mut dynamics = Dynamics::new(&structure)?;
@@ -127,10 +128,10 @@ impl Effects {
         Ok((dynamics, terms))
     }
 
-    /// The tool in its cut as these effects make it.
+    /// The tool in its cut with the changes of these effects.
     ///
     /// # Errors
-    /// What the cutter refuses, or what goes with it only on some structures.
+    /// The tool or the cut lacks a quantity that an effect requires.
     pub fn cutter(&self, mut cutter: Cutter) -> Result<Cutter, ModelError> {
         for effect in &self.0 {
             effect.alter_cutter(&mut cutter)?;
@@ -138,7 +139,7 @@ impl Effects {
         Ok(cutter)
     }
 
-    /// The spindle as these effects make it.
+    /// The spindle motion with the changes of these effects.
     pub fn spindle(&self, mut spindle: Spindle) -> Spindle {
         for effect in &self.0 {
             effect.alter_spindle(&mut spindle);
@@ -146,7 +147,7 @@ impl Effects {
         spindle
     }
 
-    /// The channel as these effects make it.
+    /// The reading of a channel with the changes of these effects.
     pub fn pickup(&self, mut channel: Pickup) -> Pickup {
         for effect in &self.0 {
             effect.alter_channel(&mut channel);
@@ -158,7 +159,7 @@ impl Effects {
 fn extension(name: &str, table: &toml::Table) -> Result<Values, EffectError> {
     let effect: EffectName = name.parse()?;
     let mut values = Values::new(effect);
-    // The standard deviation of a parameter changes no equation.
+    // A key that ends in `_std` is the standard deviation of a parameter; it changes no equation.
     for (key, value) in table.iter().filter(|(key, _)| !key.ends_with("_std")) {
         let value = Value::of_toml(value).ok_or_else(|| EffectError::Value {
             name: effect.name(),

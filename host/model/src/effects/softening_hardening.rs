@@ -44,7 +44,7 @@ pub(super) const SOFTENING_HARDENING: EffectSpec = EffectSpec {
     },
 };
 
-/// The describing function of the quintic term for k5 = 1: ⅝X⁴.
+/// Describing function of k5·x⁵ for k5 = 1 at the displacement amplitude X, m: ⅝X⁴.
 pub fn quintic_describing_function(amplitude: f64) -> Complex64 {
     Complex64::new(0.625 * amplitude.powi(4), 0.0)
 }

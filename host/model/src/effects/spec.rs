@@ -7,37 +7,37 @@ use super::parameter::Parameter;
 use super::values::Values;
 use super::{EffectError, EffectName};
 
-/// One effect of the list [`EffectName`]: everything that cases, answers, help and documentation say of it.
+/// Specification of one effect of the list [`EffectName`]. Cases, answers, help and documentation all use it.
 pub struct EffectSpec {
-    /// The entry of the list.
+    /// Entry of the effect in the list of all effects.
     pub id: EffectName,
-    /// The word in cases, in answers and on the command line.
+    /// Name of the effect in cases, in answers and on the command line.
     pub name: &'static str,
-    /// The part of the model that it changes.
+    /// Part of the model that the effect changes.
     pub class: Class,
-    /// Where it acts.
+    /// Locations at which the effect can act.
     pub locations: Locations,
-    /// Its parameters. The keys of the location are not among them: see [`Locations::keys`].
+    /// Parameters of the effect. The keys that set its location are not among them: see [`Locations::keys`].
     pub parameters: &'static [Parameter],
-    /// The treatment in stability computations.
+    /// Treatment of the effect in stability computations.
     pub treatment: Treatment,
-    /// The forms that compete under this name in a diagnosis.
+    /// Forms of the effect, such as different friction laws, that compete as candidate models in a diagnosis.
     pub candidates: &'static [&'static str],
-    /// Effects with a term in common at one location: not identifiable beside each other.
+    /// Effects that share a term of the equation with this one, so that the two are not identifiable together at one location.
     pub shares_term_with: &'static [EffectName],
-    /// One sentence.
+    /// The effect in one sentence.
     pub summary: &'static str,
-    /// The equation that changes.
+    /// Equation of the effect: the change of the model.
     pub equation: &'static str,
     /// Signs of the effect in a recording, by which it is recognised.
     pub shows: &'static str,
-    /// What it does not show, and which other effects look the same.
+    /// Recordings that do not show the effect, and other effects that look the same.
     pub hidden_by: &'static str,
-    /// Where its equation is published.
+    /// Publication of the equation of the effect.
     pub source: &'static str,
-    /// The lines of a table `[extension.NAME]` that holds it.
+    /// Example: the lines of a table `[extension.NAME]` of a case.
     pub example: &'static str,
-    /// Makes the effect. A key that it leaves in the values is a key that the effect does not have.
+    /// Builds the effect from the given values and removes those that it uses; a key that remains is unknown.
     pub(super) build: fn(&mut Values) -> Result<Arc<dyn Effect>, EffectError>,
 }
 
@@ -47,19 +47,19 @@ impl EffectSpec {
         self.parameters.iter().find(|parameter| parameter.main)
     }
 
-    /// The parameter of a key.
+    /// The parameter of the effect with this key.
     pub fn parameter(&self, key: &str) -> Option<&'static Parameter> {
         self.parameters.iter().find(|parameter| parameter.key == key)
     }
 
-    /// All keys of a table `[extension.NAME]`, those of the location last.
+    /// All keys of the table `[extension.NAME]` of the effect; keys of the location last.
     pub fn keys(&self) -> impl Iterator<Item = &'static str> + '_ {
         let own = self.parameters.iter().map(|parameter| parameter.key);
         own.filter(|key| !key.is_empty())
             .chain(self.locations.keys().iter().copied())
     }
 
-    /// The keys as a reader lists them, the VALUE of the command line first where it has no key.
+    /// The keys of the effect as a list for messages. If VALUE has no key, its meaning comes first.
     pub fn keys_in_words(&self) -> String {
         let value = self
             .main()
@@ -81,9 +81,9 @@ impl std::fmt::Debug for EffectSpec {
 pub enum Class {
     /// Masses and modes.
     Inertia,
-    /// The restoring side of the equation of motion.
+    /// Restoring forces of the equation of motion: stiffness, damping, friction and others.
     RestoringForce(Argument),
-    /// The force of the cut.
+    /// Cutting force.
     CuttingForce,
     /// Tool and chip geometry.
     Geometry,
@@ -93,36 +93,36 @@ pub enum Class {
     Sensor,
 }
 
-/// The quantity on which a restoring force depends first of all.
+/// The main quantity on which a restoring force depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Argument {
-    /// Displacement: a spring. A spring that changes with time counts as a spring.
+    /// Displacement, as for a spring; also for a spring that changes with time.
     Displacement,
-    /// Velocity: a damper. A hysteresis loop counts as friction, which it approaches at large slip.
+    /// Velocity, as for a damper or friction; also for a hysteresis loop, which approaches friction at large slip.
     Velocity,
     /// The displacements of two directions.
     TwoDisplacements,
 }
 
-/// Where an effect acts.
+/// Locations at which an effect can act, and the keys that set them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Locations {
-    /// Along one direction; a list of directions has an effect along each. The only direction of a structure needs no key.
+    /// Along one direction, or along each of a list of directions. In a structure with a single direction the key may be missing.
     EachDirection,
-    /// On the whole structure, or along the directions that are given.
+    /// On the whole structure, or only along the given directions.
     WholeOrDirection,
     /// Between two directions.
     TwoDirections,
     /// On the cut.
     Cut,
-    /// In the named channels; without a name in every channel of motion.
+    /// In the named channels of a recording; without a name, in every channel of motion.
     Channels,
-    /// In the named channels, from another direction.
+    /// In the named channels of a recording, which read the motion of another direction.
     ChannelsFromDirection,
 }
 
 impl Locations {
-    /// The keys that set the location.
+    /// The keys of a case that set the location of an effect.
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
             Self::EachDirection | Self::WholeOrDirection => &["direction"],
@@ -137,20 +137,20 @@ impl Locations {
 /// The treatment of an effect in stability computations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Treatment {
-    /// It changes the matrices or modes of the linear structure.
+    /// The effect changes the matrices or modes of the linear structure.
     LinearStructure,
-    /// It changes coefficients or geometry of the linear cutting process.
+    /// The effect changes coefficients or geometry of the linear cutting process.
     LinearProcess,
-    /// A smooth restoring force: its Jacobian acts about the forced orbit.
+    /// A smooth restoring force: it is linearized about the forced periodic orbit.
     Smooth,
-    /// A chip law or the damping of the flank: it acts through the depth or about the forced chip.
+    /// A power law of the chip thickness or process damping: the cutting force is linearized about the forced chip thickness.
     ChipLaw,
-    /// A restoring force that is not smooth: its equivalent stiffness and damping act at the amplitude of the forced orbit.
+    /// A restoring force that is not smooth: replaced by its equivalent stiffness and damping at the amplitude of the forced periodic orbit.
     Equivalent,
-    /// It changes with time: the limits hold for one moment. The text says what to give instead.
+    /// The effect changes with time, so that limits hold for one moment only. The text names what to give instead.
     OfMoment(&'static str),
-    /// Stability is not defined with it. The text says why.
+    /// No stability limits are computed with this effect. The text states the reason.
     Refused(&'static str),
-    /// It changes a reading and no limit.
+    /// The effect changes a measured channel but no stability limit.
     Sensor,
 }

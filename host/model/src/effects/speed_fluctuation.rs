@@ -43,7 +43,7 @@ pub(super) const SPEED_FLUCTUATION: EffectSpec = EffectSpec {
     },
 };
 
-/// A spindle that stops or rotates backwards does not cut.
+/// Bounds of the relative amplitude δ: beyond them the spindle stops or rotates backwards.
 const BELOW_ONE: Prior = Prior::open(-1.0, 1.0, "a number between -1 and 1");
 
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,7 @@ use crate::structure::Direction;
 /// A value as it was given.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A number; true is 1 and false is 0.
+    /// A number, or a switch: true is 1 and false is 0.
     Number(f64),
     /// A word.
     Text(String),
@@ -20,7 +20,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// A number where the text is one, several numbers or words where it has commas.
+    /// Value of a text from the command line: a number if the text is one, a list of numbers or words if it has commas, otherwise a word.
     pub fn of_text(text: &str) -> Self {
         let text = text.trim();
         if let Ok(number) = text.parse() {
@@ -36,7 +36,7 @@ impl Value {
         }
     }
 
-    /// `None` for tables, dates and lists of anything but words alone or numbers alone.
+    /// Value of a TOML value. `None` for tables, dates, and lists that contain anything but words or anything but numbers.
     pub fn of_toml(value: &toml::Value) -> Option<Self> {
         match value {
             toml::Value::Boolean(on) => Some(Self::Number(f64::from(u8::from(*on)))),
@@ -72,13 +72,13 @@ impl Value {
     }
 }
 
-/// The values given for one effect; the effect takes out what it has a key for.
+/// The values given for one effect. The effect removes those that it uses, so that unknown keys remain.
 #[derive(Clone, Debug)]
 pub struct Values {
     effect: EffectName,
-    /// By key; the VALUE of the command line has the key "".
+    /// Values by key; the VALUE of the command line has the empty key.
     by_key: BTreeMap<String, Value>,
-    /// Length of the record, s; `None` where it is not set.
+    /// Length of the recording, s, over which VALUE changes drift and wear; `None` if it is not known.
     record_s: Option<f64>,
 }
 
@@ -91,7 +91,7 @@ impl Values {
         }
     }
 
-    /// The same for a record of a length in s.
+    /// These values for a recording of the length `record_s`, s.
     pub(super) fn over(mut self, record_s: Option<f64>) -> Self {
         self.record_s = record_s;
         self
@@ -105,7 +105,7 @@ impl Values {
         self.by_key.insert(key.into(), value);
     }
 
-    /// The bounds of a key; those of the main parameter for the VALUE of the command line.
+    /// The bounds of the parameter with this key; those of the main parameter for the empty key (VALUE).
     fn prior(&self, key: &str) -> Prior {
         let parameter = if key.is_empty() {
             self.effect.spec().main()
@@ -115,10 +115,10 @@ impl Values {
         parameter.map_or(Prior::ANY, |parameter| parameter.prior)
     }
 
-    /// The number of a key; `None` where it is not given.
+    /// Removes and returns the number with this key; `None` if it is not given.
     ///
     /// # Errors
-    /// It is no finite number, or out of the bounds of its parameter.
+    /// The value is not a finite number, or out of the bounds of its parameter.
     pub(super) fn number(&mut self, key: &str) -> Result<Option<f64>, EffectError> {
         let prior = self.prior(key);
         match self.by_key.remove(key) {
@@ -128,11 +128,12 @@ impl Values {
         }
     }
 
-    /// One set of values for each location, where `direction`, or else `channel`, is a list: a list of numbers has one for each, a single
-    /// number is the same for all. Numbers for each mode belong to one channel.
+    /// Splits values whose `direction` or `channel` is a list into one set of values for each location. A list of numbers has one number for
+    /// each location; a single number applies to all. An effect with one number per mode acts on one channel, so that its channels are not
+    /// split.
     ///
     /// # Errors
-    /// A list of numbers that is not as long as that of the locations.
+    /// The number of values in a list differs from the number of locations.
     pub(super) fn by_location(self) -> Result<Vec<Self>, EffectError> {
         let has_number_per_mode = self
             .effect
@@ -176,7 +177,7 @@ impl Values {
         Ok(names.iter().enumerate().map(of).collect())
     }
 
-    /// The main parameter, by its key or as VALUE.
+    /// Number of the main parameter, given by its key or as VALUE.
     pub(super) fn main(&mut self, key: &'static str) -> Result<f64, EffectError> {
         match self.number("")? {
             Some(number) => Ok(number),
@@ -184,7 +185,7 @@ impl Values {
         }
     }
 
-    /// The main parameter that may have several numbers, by its key or as VALUE.
+    /// Numbers of a main parameter that may have one for each mode, given by its key or as VALUE.
     pub(super) fn main_numbers(&mut self, key: &'static str) -> Result<Vec<f64>, EffectError> {
         let given = if self.by_key.contains_key("") { "" } else { key };
         match self.by_key.remove(given) {
@@ -207,7 +208,7 @@ impl Values {
         }
     }
 
-    /// A relative rate per s: by its key, or from the VALUE, which is the change over the whole record.
+    /// Relative rate of change, 1/s: given by its key, or as VALUE, which is the change over the whole recording.
     pub(super) fn rate(&mut self, key: &'static str) -> Result<f64, EffectError> {
         match (self.number("")?, self.record_s) {
             (Some(change), Some(record_s)) => Ok(change / record_s),
@@ -232,7 +233,7 @@ impl Values {
         }
     }
 
-    /// The error of a value that is possible alone but not beside the others.
+    /// The error of a value that is possible alone but not together with the other values.
     pub(super) fn clash(&self, key: &str, found: impl ToString, needed: &'static str) -> EffectError {
         self.wrong(key, &Value::Text(found.to_string()), needed)
     }
@@ -288,8 +289,10 @@ impl Values {
         }
     }
 
+    /// Checks that the effect has used all values.
+    ///
     /// # Errors
-    /// A key that the effect has not taken.
+    /// A key that the effect does not have.
     pub(super) fn finish(self) -> Result<(), EffectError> {
         match self.by_key.into_keys().next() {
             None => Ok(()),

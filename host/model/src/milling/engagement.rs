@@ -4,14 +4,15 @@ use std::f64::consts::PI;
 
 use super::{Cut, Tool};
 
-/// Fraction of a pitch below which a subinterval counts as rounding of angles given in degrees and is dropped. A choice.
+/// Fraction of a pitch angle below which a subinterval is dropped: it then is rounding of angles that are given in degrees. Far above the
+/// rounding of a double, 2e-16, and far below the digits of a case file.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// The teeth that cut during one tooth period of a tool with equal pitch.
+/// The teeth that cut during one tooth-passing period of a tool with equal pitch.
 ///
-/// The period starts when a tooth enters. At phase ψ from 0 to the pitch θ, tooth k stands at the immersion angle
-/// start + kθ + ψ, and cuts while that is below the exit angle. Two subintervals follow: in the first one more tooth
-/// cuts than in the second; either may be empty.
+/// The tooth-passing period starts when a tooth enters. At phase ψ from 0 to the pitch angle θ, tooth k is at the immersion angle
+/// start + kθ + ψ, and cuts while that angle is below the exit angle. The period therefore has two subintervals: in the first, one
+/// more tooth cuts than in the second. Either subinterval may be empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Engagement {
     /// Immersion angle of entry, rad.
@@ -25,9 +26,9 @@ pub struct Engagement {
 /// A subinterval of the tooth-passing period with a constant number of teeth in cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Subinterval {
-    /// Phase at its start, rad.
+    /// Phase of the tooth-passing period at the start of the subinterval, rad.
     pub from: f64,
-    /// Phase at its end, rad.
+    /// Phase of the tooth-passing period at the end of the subinterval, rad.
     pub to: f64,
     /// Number of teeth in cut; 0 means free vibration.
     pub teeth: usize,
@@ -43,7 +44,7 @@ impl Engagement {
         }
     }
 
-    /// The subintervals of one tooth period, in order, together [0, θ].
+    /// The subintervals of one tooth-passing period in the order of the phase; together they cover [0, θ].
     pub fn subintervals(&self) -> Vec<Subinterval> {
         let pitches = (self.exit - self.start) / self.pitch;
         let mut always = pitches.floor();
@@ -73,7 +74,7 @@ impl Engagement {
         subintervals
     }
 
-    /// Immersion angle, rad, of the k-th cutting tooth at a phase: the one that entered k periods ago.
+    /// Immersion angle, rad, of tooth number `tooth` in cut at a phase, rad: the tooth that entered that many periods ago.
     pub fn angle(&self, tooth: usize, phase: f64) -> f64 {
         self.start + tooth as f64 * self.pitch + phase
     }

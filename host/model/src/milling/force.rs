@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Engagement, Material, Tool};
 
-/// A vector that rotates with the tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal, axial direction.
+/// A vector that rotates with a tooth: v(φ) = constant + cosine·cos φ + sine·sin φ, in feed, normal and axial direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotatingVector {
     /// Constant part, independent of φ.
@@ -16,13 +16,13 @@ pub struct RotatingVector {
 }
 
 impl RotatingVector {
-    /// The vector at immersion angle φ, rad.
+    /// The vector v(φ) at the immersion angle φ, rad.
     pub fn at(&self, angle: f64) -> Vector3<f64> {
         let (sin, cos) = angle.sin_cos();
         self.constant + self.cosine * cos + self.sine * sin
     }
 
-    /// ∫ v(φ) uᵀ(φ) dφ from `start` to `exit`, rad, in closed form.
+    /// ∫ v(φ) uᵀ(φ) dφ over the immersion angle from `start` to `exit`, rad, with u = `other`; closed form.
     fn product_integral(&self, other: &Self, start: f64, exit: f64) -> Matrix3<f64> {
         let ((s0, c0), (s1, c1)) = (start.sin_cos(), exit.sin_cos());
         let length = exit - start;
@@ -39,7 +39,7 @@ impl RotatingVector {
             + (v.cosine * u.sine.transpose() + v.sine * u.cosine.transpose()) * sin_cos
     }
 
-    /// ∫ v(φ) dφ from `start` to `exit`, rad.
+    /// ∫ v(φ) dφ over the immersion angle from `start` to `exit`, rad.
     fn integral(&self, start: f64, exit: f64) -> Vector3<f64> {
         self.constant * (exit - start)
             + self.cosine * (exit.sin() - start.sin())
@@ -50,20 +50,20 @@ impl RotatingVector {
 /// The force on one tooth of axial depth a with chip thickness h at immersion angle φ:
 /// F = a·(cutting(φ)·h + edge(φ)), on the tool, in feed, normal and axial direction.
 ///
-/// The chip thickness is h = normal(φ)ᵀ(f_t e_x + u − u_τ) with u the displacement of the tool and u_τ that of the
-/// tooth before at the same angle. Per unit of depth: SI units, N/m² and N/m.
+/// The chip thickness is h = normal(φ)ᵀ(f_t e_x + u − u_τ), where u is the displacement of the tool and u_τ that one tooth-passing period
+/// before, when the preceding tooth was at the same angle. The coefficients are forces per axial depth, in N/m² and N/m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToothForce {
-    /// K_tc times the direction of the cutting force, Pa: eq. 7.2 with +k_rc cos γ in row 3.
+    /// K_tc times the direction of the cutting force, Pa: thesis eq. 7.2 with +k_rc cos γ in row 3.
     pub cutting: RotatingVector,
-    /// Direction in which displacement makes the chip thicker, without unit (eq. 3.1).
+    /// Direction in which a displacement of the tool makes the chip thicker, without unit (thesis eq. 3.1).
     pub normal: RotatingVector,
-    /// Edge force per depth, N/m (eq. 3.6).
+    /// Edge force per axial depth, N/m (thesis eq. 3.6).
     pub edge: RotatingVector,
 }
 
 impl ToothForce {
-    /// The force of a tool in a material.
+    /// The force on a tooth of `tool` in a workpiece `material`.
     pub fn new(tool: &Tool, material: &Material) -> Self {
         let (sin, cos) = tool.edge_angle_deg.to_radians().sin_cos();
         const PA_PER_MPA: f64 = 1e6;
@@ -97,7 +97,7 @@ impl ToothForce {
         self.cutting.at(angle) * (self.normal.at(angle).x * feed_per_tooth_m) + self.edge.at(angle)
     }
 
-    /// The averages over a tooth period that averaged methods use.
+    /// The averages over a tooth-passing period, which zeroth-order approximation and Nyquist criterion use.
     pub fn averaged(&self, engagement: &Engagement, feed_per_tooth_m: f64) -> Averaged {
         let Engagement { start, exit, pitch } = *engagement;
         let directional = self.cutting.product_integral(&self.normal, start, exit) / pitch;
@@ -106,16 +106,16 @@ impl ToothForce {
     }
 }
 
-/// Averages of all cutting teeth over one tooth period.
+/// Averages over one tooth-passing period of the sum over all teeth in cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Averaged {
-    /// K_tc α₀, Pa.
+    /// Averaged directional coefficient matrix K_tc α₀, Pa.
     pub directional: Matrix3<f64>,
-    /// Force per depth from feed and edges, N/m: the z column of β_e + β_f, and the mean of the forced force.
+    /// Mean force per axial depth from feed and edges, N/m: the z column of β_e + β_f.
     pub forced: Vector3<f64>,
 }
 
-/// Tangential, radial and axial force in feed, normal and axial direction (eq. 3.4).
+/// The vector in feed, normal and axial direction of a tangential, radial and axial force on a tooth with edge angle γ (thesis eq. 3.4).
 fn projected(tangential: f64, radial: f64, axial: f64, sin: f64, cos: f64) -> RotatingVector {
     let inward = radial * sin + axial * cos;
     RotatingVector {

@@ -5,18 +5,18 @@ use num_complex::Complex64;
 
 use super::{Engagement, RotatingVector, ToothForce};
 
-/// One coefficient of the Fourier series over the tooth period, which starts when a tooth enters, of the sum over all
-/// cutting teeth: α(t) = Σ_k α_k e^{ikΩt} with Ω = 2π/τ.
+/// One coefficient of the Fourier series of the sum over all teeth in cut, α(t) = Σ_k α_k e^{ikΩt} with Ω = 2π/τ. The tooth-passing
+/// period τ starts when a tooth enters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
-    /// K_tc α_k, Pa.
+    /// Coefficient K_tc α_k of the directional matrix, Pa.
     pub directional: Matrix3<Complex64>,
-    /// Force per depth from feed and edges, N/m: the z column of (β_e + β_f)_k.
+    /// Coefficient of the force per axial depth from feed and edges, N/m: the z column of (β_e + β_f)_k.
     pub forced: Vector3<Complex64>,
 }
 
 impl ToothForce {
-    /// The k-th harmonic, in closed form. Harmonic −k is its complex conjugate, harmonic 0 the average.
+    /// The k-th harmonic of the tooth-passing frequency, in closed form. Harmonic −k is its complex conjugate, harmonic 0 the average.
     pub fn harmonic(&self, engagement: &Engagement, feed_per_tooth_m: f64, k: i32) -> Harmonic {
         let (cutting, normal, edge) = (
             exponentials(&self.cutting),
@@ -38,7 +38,7 @@ impl ToothForce {
     }
 }
 
-/// Coefficients of e^{−iφ}, 1, e^{iφ}.
+/// The coefficients of e^{−iφ}, 1 and e^{iφ} of a rotating vector.
 fn exponentials(vector: &RotatingVector) -> [Vector3<Complex64>; 3] {
     let half = |sign: f64| {
         vector.cosine.zip_map(&vector.sine, |cos, sin| {

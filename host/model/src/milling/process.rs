@@ -13,7 +13,7 @@ pub struct Process {
     pub engagement: Engagement,
     /// Feed per tooth, m.
     pub feed_per_tooth_m: f64,
-    /// True if the axial depth follows the axial vibration z: F then contains −(β_e + β_f) z (eq. 3.7).
+    /// True if the axial depth follows the axial vibration z: the cutting force then contains −(β_e + β_f) z (thesis eq. 3.7).
     pub axial_depth_modulation: bool,
 }
 

@@ -1,11 +1,13 @@
 //! The milling tool.
 
-/// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to it.
+/// A milling tool without helix: each cutting edge is straight, in a plane with the tool axis, at the edge angle to the normal plane of
+/// that axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// Number of teeth, at least 1.
     pub teeth: usize,
-    /// Edge angle γ at the midpoint of the engaged length, degrees, in (0, 90]; 90 is a square end mill.
+    /// Edge angle γ between the cutting edge and the normal plane of the tool axis, degrees, in (0, 90], at the midpoint of the engaged
+    /// length; 90 is a square end mill.
     pub edge_angle_deg: f64,
     /// Diameter, mm; `None` if the case does not give it.
     pub diameter_mm: Option<f64>,
@@ -33,7 +35,7 @@ impl Tool {
     /// True for a tool with variable pitch, whose delay equation has several delays.
     pub fn has_variable_pitch(&self) -> bool {
         let equal = self.equal_pitch_deg();
-        // Printed pitches carry a few digits; below a thousandth of a degree the delays are the same to 1e-5.
+        // Case files give pitch angles with a few digits. A thousandth of a degree changes a delay by about 1e-5 of itself.
         self.pitch_deg.iter().any(|pitch| (pitch - equal).abs() > 1e-3)
     }
 

@@ -7,8 +7,8 @@ use quietcut_numerics::eigenvalues::of_symmetric;
 
 use super::{Direction, Matrices};
 
-/// Relative threshold below which a negative eigenvalue counts as zero. Rounding and matrices printed with few digits shift the zero
-/// eigenvalue of a free body by about this much.
+/// Magnitude of a negative eigenvalue, relative to the largest one, up to which it counts as zero. A free body has a zero eigenvalue, which
+/// rounding and matrices printed with few digits shift by about this much.
 const ZERO: f64 = 1e-9;
 
 /// An indefinite matrix, which no passive structure can have.
@@ -42,7 +42,7 @@ pub enum Remedy {
         row: usize,
         /// The entry as it is.
         value: f64,
-        /// Lower bound that the entry must exceed.
+        /// Lower bound, in the unit of the matrix, that the entry must exceed.
         above: f64,
         /// Name of the degree of freedom.
         direction: Direction,
@@ -134,7 +134,7 @@ fn is_definite(symmetric: &DMatrix<f64>, strict: bool) -> bool {
     let scaled = DMatrix::from_fn(symmetric.nrows(), symmetric.ncols(), |i, j| {
         symmetric[(i, j)] * scale[i] * scale[j]
     });
-    // Entries that are not finite define no definite matrix.
+    // The eigenvalues of a matrix with entries that are not finite cannot be computed: it is not definite.
     let Ok(eigenvalues) = of_symmetric(scaled).map(|eigen| eigen.eigenvalues) else {
         return false;
     };
@@ -150,7 +150,7 @@ fn smallest_eigenvalue(symmetric: &DMatrix<f64>) -> f64 {
     of_symmetric(symmetric.clone()).map_or(f64::NAN, |eigen| eigen.eigenvalues.min())
 }
 
-/// Searches for one change, then two: a reversed sign, or a reversed sign and a larger diagonal entry.
+/// Searches for a change of one entry, then of two, that makes the matrix definite: a reversed sign, a larger diagonal entry, or both.
 ///
 /// If entries (i,j), (j,k) and (i,k) have a product of the wrong sign, reversing any one of them suffices. Mass, damping and stiffness of a
 /// mechanism follow from diagonal matrices by the same change of coordinates, so entries whose sign differs from that in the mass matrix

@@ -23,10 +23,10 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All six degrees of freedom.
+    /// All six degrees of freedom of a rigid body.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 
-    /// The name in files: x, y, z, rx, ry, rz.
+    /// The name of the direction in files: x, y, z, rx, ry, rz.
     pub fn name(self) -> &'static str {
         match self {
             Self::X => "x",

@@ -8,10 +8,10 @@ use quietcut_numerics::eigenvalues::{EigenvalueError, of_real};
 
 /// First-order form ẋ = A x + B F, u = C x; F is the force on the tool centre point and u its displacement, along x, y, z.
 ///
-/// Real, n states. From matrices x = (q, q̇/s) with s the root of ‖M⁻¹K‖, so that all entries of A are frequencies.
-/// From complex modes x holds real and imaginary part of each modal coordinate η̇ = λη + Ψᴸᵀ F, and
-/// u = 2 Re(Ψᴿ η): exact also where residues do not sum to zero and no mass matrix exists.
-/// Directions that the structure does not have are rigid: zero columns of B, zero rows of C.
+/// All n states are real. From matrices, x = (q, q̇/s) with s the root of ‖M⁻¹K‖, so that all entries of A are frequencies.
+/// From complex modes, x holds real and imaginary part of each modal coordinate η̇ = λη + Ψᴸᵀ F, and u = 2 Re(Ψᴿ η). That is
+/// exact also if the residues do not sum to zero, so that no mass matrix exists.
+/// The structure is rigid in directions that it does not have: zero columns of B, zero rows of C.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstOrder {
     /// A, n × n, 1/s.
@@ -60,7 +60,7 @@ impl FirstOrder {
         }
     }
 
-    /// The same structure with the motion of a sensor away from the tool as output: `modes[r]` is the shape of mode r at the sensor divided by
+    /// This structure with the motion of a sensor away from the tool as output u: `modes[r]` is the shape of mode r at the sensor divided by
     /// its shape at the tool, 1 for modes beyond the list. Only for modal structures, whose two states per mode are adjacent.
     #[must_use]
     pub fn seen(&self, modes: &[f64]) -> Self {
@@ -72,7 +72,7 @@ impl FirstOrder {
         seen
     }
 
-    /// Poles of the structure, rad/s, sorted by imaginary part.
+    /// Poles of the structure (eigenvalues of A), rad/s, sorted by imaginary part.
     ///
     /// [`Structure::first_order`] refuses a structure whose poles cannot be computed. If an entry of A is set to a value that is
     /// not finite afterwards, the list is empty.
@@ -124,7 +124,7 @@ fn from_second_order(matrices: &Matrices, jacobian: &Matrix3xX<f64>) -> Result<F
         .ok_or(StructureError::SingularMass)?;
     let stiffness = &inverse_mass * &matrices.stiffness;
     let damping = &inverse_mass * &matrices.damping;
-    // A free mass has no natural frequency: its damping rate sets the scale, or 1/s without damping.
+    // Scale s of the velocities, 1/s. A free mass has no natural frequency: its damping rate is the scale, or 1/s without damping.
     let scale = match stiffness.norm().sqrt().max(damping.norm()) {
         scale if scale > 0.0 => scale,
         _ => 1.0,

@@ -1,20 +1,23 @@
 //! A robot of rigid links on compliant joints, linearized at a posture.
 //!
-//! With the joint angles' deviations q from the posture, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ F and u = J q: the tool-space
-//! matrices of thesis eq. 3.14, J⁻ᵀ · J⁻¹, where J has an inverse, and still right where it has none (a straight wrist) and for
-//! any number of joints. Left out are the change of M and J within a vibration, and gravity: q and its cubes count from where the robot
-//! hangs, which is a milliradian or so from the commanded angles. On the robot of the cases that moves peaks by 0.3 % (a test).
+//! Let q be the deviations of the joint angles from the posture q₀. Then M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = Jᵀ F and u = J q.
+//! Where J has an inverse, these are the tool-space matrices J⁻ᵀ · J⁻¹ of thesis eq. 3.14. The equations also hold where J has none (a
+//! straight wrist), and for any number of joints.
+//!
+//! Two things are neglected: the change of M and J within a vibration, and gravity. Gravity deflects the joints by about a milliradian from
+//! the commanded angles; q and its cubes count from the deflected position. For the robot of the cases that moves peaks of the receptance
+//! by 0.3 %, as a test shows.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Rotation3, Unit, Vector3};
 
 use super::Matrices;
 
-/// A joint and the link that it carries; all places in the base's axes with all joint angles at zero.
+/// A joint and the link that it carries. Positions are in the base frame, with all joint angles at zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Axis, of length 1: the link turns about it by the right-hand rule.
+    /// Joint axis, of length 1: the link rotates about it by the right-hand rule.
     pub axis: Unit<Vector3<f64>>,
-    /// A point on the axis, m.
+    /// A point on the joint axis, m.
     pub point_m: Vector3<f64>,
     /// Joint stiffness, N m/rad.
     pub stiffness_nm_per_rad: f64,
@@ -24,22 +27,22 @@ pub struct Joint {
     pub cubic_stiffness_nm_per_rad3: f64,
     /// Cubic damping coefficient of the joint's angular velocity, N m s³/rad³.
     pub cubic_damping_nms3_per_rad3: f64,
-    /// Inertia of motor and gear about the axis, reflected to the link side, kg m².
+    /// Moment of inertia of motor and gear about the joint axis, reflected to the link side, kg m².
     pub rotor_kg_m2: f64,
     /// Mass of the link, kg.
     pub mass_kg: f64,
     /// Centre of mass of the link, m.
     pub center_m: Vector3<f64>,
-    /// Inertia of the link about its centre of mass, kg m².
+    /// Inertia tensor of the link about its centre of mass, kg m².
     pub inertia_kg_m2: Matrix3<f64>,
 }
 
 /// A robot at a posture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robot {
-    /// The joints from the base on.
+    /// The joints in their order from the base to the tool.
     pub joints: Vec<Joint>,
-    /// The tool centre point with all joint angles at zero, m.
+    /// Position of the tool centre point with all joint angles at zero, m.
     pub tool_m: Vector3<f64>,
     /// Joint angles, rad, one for each joint.
     pub angles_rad: Vec<f64>,
@@ -47,9 +50,9 @@ pub struct Robot {
 
 /// Positions and orientations of joints, links and tool at a posture, in the base frame.
 struct Placed {
-    /// Axis and a point on it, of each joint.
+    /// For each joint, the direction of its axis and a point on that axis, m.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
-    /// Rotation and centre of mass of each link.
+    /// For each link, its rotation from the zero position and its centre of mass, m.
     links: Vec<(Rotation3<f64>, Vector3<f64>)>,
     tool_m: Vector3<f64>,
 }
@@ -73,7 +76,7 @@ impl Robot {
                 rotation * joint.point_m + shift,
             ));
             let turn = Rotation3::from_axis_angle(&joint.axis, *angle);
-            // x ↦ turn (x − point) + point, before all that the joints below do.
+            // This joint maps x to turn (x − point) + point, before the joints between it and the base act.
             shift += rotation * (joint.point_m - turn * joint.point_m);
             rotation *= turn;
             links.push((rotation, rotation * joint.center_m + shift));
@@ -103,7 +106,7 @@ impl Robot {
         jacobian(&placed, self.joints.len(), center)
     }
 
-    /// Mass matrix M(q₀) in joint angles, kg m².
+    /// Mass matrix M(q₀) of the equation of motion in joint angles, kg m².
     pub fn mass(&self) -> DMatrix<f64> {
         let placed = self.placed();
         let mut mass = DMatrix::from_diagonal(&self.of_joints(|joint| joint.rotor_kg_m2).diagonal());
@@ -123,7 +126,7 @@ impl Robot {
         mass
     }
 
-    /// The equation of motion in joint angles.
+    /// The matrices of the equation of motion in joint angles.
     pub fn matrices(&self) -> Matrices {
         let cubic = |of: fn(&Joint) -> f64| {
             let matrix = self.of_joints(of);
@@ -138,7 +141,7 @@ impl Robot {
         }
     }
 
-    /// One number of each joint as a diagonal matrix.
+    /// Diagonal matrix of one property of each joint.
     fn of_joints(&self, of: impl Fn(&Joint) -> f64) -> DMatrix<f64> {
         let count = self.joints.len();
         DMatrix::from_fn(
@@ -149,7 +152,7 @@ impl Robot {
     }
 }
 
-/// Displacement of a point behind the first `count` joints per angle of each.
+/// Displacement of a point, m, per angle of each of the first `count` joints, rad; these joints carry the point.
 fn jacobian(placed: &Placed, count: usize, point: Vector3<f64>) -> Matrix3xX<f64> {
     let columns: Vec<Vector3<f64>> = placed.axes[..count]
         .iter()

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Mass, damping and stiffness matrices in M q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = F, with ∘³ the cube of each element.
 ///
-/// All square with one row per direction; SI: kg, N s/m, N/m, N s³/m³, N/m³.
+/// All matrices are square with one row per direction, in SI units: kg, N s/m, N/m, N s³/m³, N/m³.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matrices {
     /// M, kg.

@@ -23,8 +23,8 @@ pub use modes::Mode;
 /// The structure of a case, in the machine's directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
-    /// The direction of each degree of freedom (matrices) or of each entry of the mode shapes (modes).
-    /// Cutting forces and chip thickness involve x, y and z only.
+    /// The direction of each degree of freedom (matrices) or of each entry of the mode shapes (modes). Cutting forces and chip thickness
+    /// depend on x, y and z only.
     pub directions: Vec<Direction>,
     /// Representation of the dynamics: matrices, modes or joints.
     pub form: Form,
@@ -45,11 +45,11 @@ impl Structure {
     /// Checks that mass, damping and stiffness are definite.
     ///
     /// # Errors
-    /// Each indefinite matrix with its smallest eigenvalue and the entries that cause it.
+    /// Indefinite matrices, each with its smallest eigenvalue and the entries that make it indefinite.
     pub fn check(&self) -> Result<(), StructureError> {
         let found = match &self.form {
             Form::Matrices(matrices) => definiteness::indefinite(matrices, &self.directions),
-            // A passive robot is definite: its joints have positive mass and stiffness.
+            // The matrices of a robot are definite, since each joint has positive mass and stiffness.
             Form::Modes(_) | Form::Joints(_) => Vec::new(),
         };
         if found.is_empty() {

@@ -5,15 +5,14 @@ use num_complex::Complex64;
 
 use super::FirstOrder;
 
-/// Relative distance below which two poles form one mode: the mode shapes of (nearly) repeated poles are not defined individually. A choice
-/// between rounding of the eigenvalues and the spacing of distinct modes.
+/// Relative distance below which two poles form one mode, because the mode shapes of (nearly) repeated poles are not defined individually.
+/// It lies above the rounding of a double eigenvalue, √2e-16 ≈ 1.5e-8, and below the spacing of distinct modes.
 const SAME: f64 = 1e-6;
 
 /// Modal part of A for one pole pair λ = −ζω + iω√(1 − ζ²).
 ///
-/// A = Σ_r λ_r P_r + conjugates, with projectors P_r. A change of the pole leaves P_r unchanged, and
-/// with it the residue right·leftᵀ of the receptance. This holds for matrices and modes alike. Repeated poles, as of a round tool, form one
-/// modal part.
+/// A = Σ_r λ_r P_r + conjugates, with projectors P_r. A change of the pole at constant mode shapes leaves P_r unchanged, and thus the residue
+/// right·leftᵀ of the receptance, for structures given by matrices and by modes. Repeated poles, as of a round tool, form one modal part.
 #[derive(Clone, Debug)]
 pub struct ModalPart {
     /// Pole λ, rad/s, with positive imaginary part.
@@ -33,18 +32,18 @@ impl ModalPart {
         -self.pole.re / self.pole.norm()
     }
 
-    /// ∂A/∂ω, without unit, with ζ and the shapes kept: ∂λ/∂ω = λ/ω.
+    /// ∂A/∂ω, without unit, at constant damping ratio ζ and mode shapes: ∂λ/∂ω = λ/ω.
     pub fn by_omega(&self) -> DMatrix<f64> {
         self.moved(self.pole / self.omega())
     }
 
-    /// ∂A/∂ζ, rad/s, with ω and the shapes kept: ∂λ/∂ζ = −ω − iωζ/√(1 − ζ²).
+    /// ∂A/∂ζ, rad/s, at constant natural frequency ω and mode shapes: ∂λ/∂ζ = −ω − iωζ/√(1 − ζ²).
     pub fn by_damping_ratio(&self) -> DMatrix<f64> {
         let (omega, zeta) = (self.omega(), self.damping_ratio());
         self.moved(Complex64::new(-omega, -omega * zeta / (1.0 - zeta * zeta).sqrt()))
     }
 
-    /// Residue C P B of the receptance of its structure at the pole, m/N/s, rows displacement, columns force.
+    /// Residue C P B of the receptance of `structure` at the pole λ, m/(N s); rows are displacements, columns forces.
     pub fn residue(&self, structure: &FirstOrder) -> Matrix3<Complex64> {
         let complex = |entry: f64| Complex64::new(entry, 0.0);
         let residue = structure.c.map(complex) * &self.projector * structure.b.map(complex);
@@ -82,7 +81,7 @@ impl FirstOrder {
         let right = invariant(&self.a, pole, group.len())?;
         let left = invariant(&self.a.transpose(), pole, group.len())?;
         let projector = &right * (left.transpose() * &right).try_inverse()? * left.transpose();
-        // P² = P by construction; A P = λ P holds only for poles with as many shapes as their number.
+        // P² = P by construction. A P = λ P holds only for a pole that has as many mode shapes as its multiplicity.
         let miss = self.a.map(Complex64::from) * &projector - &projector * pole;
         (miss.norm() < 10.0 * SAME * pole.norm() * projector.norm()).then_some(ModalPart { pole, projector })
     }
@@ -91,7 +90,7 @@ impl FirstOrder {
 /// Orthonormal basis of the invariant subspace of `matrix` at the eigenvalue `pole`, from inverse iteration with `count` vectors.
 fn invariant(matrix: &DMatrix<f64>, pole: Complex64, count: usize) -> Option<DMatrix<Complex64>> {
     let size = matrix.nrows();
-    // A shift beside the pole keeps the matrix regular, and separates the vectors by 1e7 in each of three steps.
+    // A shift of 1e-7 away from the pole keeps the matrix regular. Each of the three steps then reduces other eigenvectors by about 1e7.
     let shift = pole * (1.0 + 1e-7);
     let lu = (matrix.map(Complex64::from) - DMatrix::identity(size, size) * shift).lu();
     let start =

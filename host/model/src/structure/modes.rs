@@ -4,16 +4,16 @@ use num_complex::Complex64;
 
 /// One complex mode. It contributes right·leftᵀ/(s − λ) to the receptance H(s), plus the complex conjugate term at the conjugate pole.
 ///
-/// λ = −ζω + iω√(1 − ζ²) with ω = 2π·frequency; no conjugation and no further factor in the residue.
+/// The pole is λ = −ζω + iω√(1 − ζ²) with ω = 2π·frequency. The residue right·leftᵀ has no conjugation and no further factor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
     /// Natural frequency, Hz.
     pub frequency_hz: f64,
     /// Damping ratio ζ, in [0, 1).
     pub damping_ratio: f64,
-    /// Left shape Ψᴸ: how forces drive the mode; one entry per direction.
+    /// Left mode shape Ψᴸ, by which forces excite the mode; one entry per direction.
     pub left: Vec<Complex64>,
-    /// Right shape Ψᴿ: how the mode moves the structure; one entry per direction.
+    /// Right mode shape Ψᴿ, by which the mode displaces the structure; one entry per direction.
     pub right: Vec<Complex64>,
 }
 

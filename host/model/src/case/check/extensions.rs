@@ -11,7 +11,7 @@ use crate::effects::nearest::expected;
 use crate::effects::{EffectName, EffectSpec, Effects, Parameter, ValueKind};
 use crate::structure::Direction;
 
-/// Endings of keys that are units.
+/// Endings of keys that state a unit, by which a key with another unit is recognised.
 const UNITS: [&str; 40] = [
     "_n_per_m",
     "_n_per_mm",
@@ -55,7 +55,7 @@ const UNITS: [&str; 40] = [
     "_percent",
 ];
 
-/// A key without its unit.
+/// A key without the ending that states its unit.
 fn stem(key: &str) -> &str {
     UNITS
         .iter()
@@ -64,7 +64,7 @@ fn stem(key: &str) -> &str {
         .unwrap_or(key)
 }
 
-/// The parameter that a key of another unit, or of none, stands for.
+/// The parameter whose key differs from `key` in the unit only; `None` if there is none.
 fn of_other_unit(spec: &EffectSpec, key: &str) -> Option<&'static Parameter> {
     let with_key = || {
         spec.parameters
@@ -98,7 +98,7 @@ impl Check<'_> {
         Ok(extensions)
     }
 
-    /// Keys that are missing, and values that are not possible beside each other.
+    /// Refuses extensions with a missing key, or with values that are possible alone but not together.
     fn extensions_together(
         &self,
         file: &ExtensionsFile,
@@ -173,7 +173,7 @@ impl Check<'_> {
         Err(self.wrong(value, &full, value.get_ref(), format!("{needed}{unit}")))
     }
 
-    /// A word, or a list of words.
+    /// Checks the value of a key that sets the location of an effect: a name, or a list of names.
     fn location(&self, value: &Spanned<Value>, full: &str, key: &str) -> Result<(), CaseError> {
         let fits = |word: &Value| match word.as_str() {
             Some(word) => key == "channel" || word.parse::<Direction>().is_ok(),
@@ -202,7 +202,7 @@ fn is_number(kind: ValueKind) -> bool {
     matches!(kind, ValueKind::Number | ValueKind::NumberPerMode)
 }
 
-/// A number or a list of numbers; `None` for anything else.
+/// The numbers of a TOML value that is a number or a list of numbers; `None` for any other value.
 fn numbers(value: &Value) -> Option<Vec<f64>> {
     let number = |value: &Value| {
         value

@@ -9,7 +9,7 @@ use crate::case::{CaseError, Parameter};
 use crate::structure::{Direction, Joint, Robot};
 
 impl Check<'_> {
-    /// Refuses what only a robot has, beside another kind.
+    /// Refuses joints and tool position, which only a robot has, in a structure of another kind.
     pub(super) fn no_joints_but_with_their_kind(
         &self,
         file: &Spanned<StructureFile>,
@@ -140,7 +140,7 @@ impl Check<'_> {
         Ok(joint)
     }
 
-    /// [xx, yy, zz] or [xx, yy, zz, xy, xz, yz].
+    /// Inertia tensor from its entries [xx, yy, zz] or [xx, yy, zz, xy, xz, yz], kg m²; it must be positive definite.
     fn inertia(&self, file: &Spanned<Vec<f64>>, key: &str) -> Result<Matrix3<f64>, CaseError> {
         let inertia = match file.get_ref()[..] {
             [xx, yy, zz] => Matrix3::from_diagonal(&Vector3::new(xx, yy, zz)),

@@ -183,7 +183,7 @@ impl Check<'_> {
         }
     }
 
-    /// Refuses matrices beside another kind of structure.
+    /// Refuses mass, damping and stiffness matrices in a structure of another kind.
     pub(super) fn no_matrices(&self, table: &StructureFile, expected: &str) -> Result<(), CaseError> {
         let strangers = [
             ("mass", &table.mass),
