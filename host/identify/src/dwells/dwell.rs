@@ -15,47 +15,48 @@ pub struct DwellSegment {
     pub from: usize,
     /// Index after the last sample.
     pub to: usize,
-    /// The frequency as first estimated, Hz.
+    /// First estimate of the frequency, Hz.
     pub frequency_hz: f64,
 }
 
-/// A measured periodic motion.
+/// A measured steady periodic motion: Fourier coefficients of all channels over one segment.
 #[derive(Clone, Debug)]
 pub struct Dwell {
     /// Fundamental frequency, rad/s.
     pub omega: f64,
-    /// Its variance.
+    /// Variance of the fundamental frequency, (rad/s)².
     pub omega_variance: f64,
-    /// Number of samples used.
+    /// Number of samples of the segment.
     pub samples: usize,
-    /// (AᵀA)⁻¹ of the harmonic regression: times a channel's variance, the covariance of its coefficients.
+    /// (AᵀA)⁻¹ of the harmonic regression with design matrix A. Multiplied by the noise variance of a channel it is the covariance
+    /// of the coefficients of that channel.
     pub gram_inverse: DMatrix<f64>,
-    /// The force channels.
+    /// Fourier coefficients of the force channels.
     pub forces: Vec<Line>,
-    /// The channels of motion.
+    /// Fourier coefficients of the motion channels.
     pub motions: Vec<Line>,
 }
 
-/// Fourier coefficients of a channel: 1, cos, sin, cos 2 … with the phase zero at the middle of the segment.
+/// Fourier coefficients of one channel: 1, cos, sin, cos 2 …, with the phase zero at the middle of the segment.
 #[derive(Clone, Debug)]
 pub struct Line {
     /// The direction of the channel.
     pub direction: Direction,
-    /// What it measures.
+    /// The quantity that the channel measures.
     pub quantity: Quantity,
-    /// The coefficients.
+    /// Coefficients of 1, cos, sin, cos 2 …, in the unit of the channel.
     pub coefficients: DVector<f64>,
-    /// Variance of the noise of one sample.
+    /// Noise variance of one sample.
     pub variance: f64,
 }
 
 impl Line {
-    /// Amplitude of harmonic h.
+    /// Amplitude of harmonic h, in the unit of the channel.
     pub fn amplitude(&self, h: usize) -> f64 {
         self.coefficients[2 * h - 1].hypot(self.coefficients[2 * h])
     }
 
-    /// The harmonic h as a complex amplitude: the channel is the real part of it times e^{ihωt}.
+    /// Complex amplitude of harmonic h: the harmonic is the real part of it times e^{ihωt}.
     pub fn phasor(&self, h: usize) -> num_complex::Complex64 {
         num_complex::Complex64::new(self.coefficients[2 * h - 1], -self.coefficients[2 * h])
     }
@@ -99,7 +100,7 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
     let (Some(&quietest), Some(&loudest)) = (sorted.get(sorted.len() / 50), sorted.last()) else {
         return Vec::new();
     };
-    // The threshold lies between the noise and the lowest force level.
+    // The threshold of the block level lies between the noise and the lowest force level.
     let threshold = (3.0 * quietest).min(0.3 * loudest).max(0.02 * loudest);
     let mut found = Vec::new();
     let mut start = None;
@@ -108,7 +109,7 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
         match (loud, start) {
             (true, None) => start = Some(index),
             (false, Some(first)) => {
-                // The blocks at the ends may be half filled.
+                // The first and last block of a segment may contain a pause and are left out.
                 let (from, to) = ((first + 1) * block, (index - 1).max(first + 1) * block);
                 split(
                     &force.samples[..to.min(force.samples.len())],
@@ -131,7 +132,7 @@ fn energy(samples: &[f64]) -> f64 {
 /// Periods over which the frequency is estimated in the search for steps.
 const PERIODS: usize = 8;
 
-/// Cuts `samples[from..]` where the frequency steps.
+/// Splits `samples[from..]` into segments of constant frequency.
 fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegment>) {
     let crossings = rising_crossings(samples, from);
     if crossings.len() <= 2 * PERIODS {
@@ -150,7 +151,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
             begin,
             (begin + (end - begin).max(PERIODS)).min(crossings.len() - 1),
         );
-        // Ten times the scatter is no chance event; a thousandth is less than any step of a test.
+        // A step exceeds ten times the scatter of the local frequency, and a thousandth of the frequency, which is less than the
+        // step of any test.
         let stepped = end < local.len() && (local[end] - held).abs() > (10.0 * scatter).max(1e-3 * held);
         if stepped || end == local.len() {
             let last = if stepped { end } else { crossings.len() - 1 };
@@ -161,7 +163,7 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
                     frequency_hz: frequency(begin, last),
                 });
             }
-            // The window that saw the step holds both frequencies.
+            // The window in which the step was found contains both frequencies and is skipped.
             begin = if stepped && last > begin + 2 * PERIODS {
                 end + PERIODS
             } else {
@@ -171,7 +173,7 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
     }
 }
 
-/// Fractional sample indices of the rising zero crossings, at most one per noisy crossing.
+/// Fractional sample indices of the rising zero crossings, with hysteresis, so that noise gives no second crossing.
 fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
     let size = (energy(&samples[from.min(samples.len())..]) / samples.len().max(1) as f64).sqrt();
     let mut crossings = Vec::new();
@@ -187,9 +189,9 @@ fn rising_crossings(samples: &[f64], from: usize) -> Vec<f64> {
 }
 
 impl Dwell {
-    /// The periodic motion in `samples` of a recording with `harmonics` harmonics, its frequency refined from all channels.
+    /// Fits the periodic motion with `harmonics` harmonics to a segment of a recording; the frequency is refined with all channels.
     ///
-    /// `None` where there are fewer samples than the fit needs, or no force.
+    /// `None` if the segment has fewer samples than the fit requires, or the recording has no force.
     pub fn fit(recording: &Recording, stretch: DwellSegment, harmonics: usize) -> Option<Self> {
         let count = stretch.to.checked_sub(stretch.from)?;
         if count < 4 * (2 * harmonics + 1) {
@@ -206,7 +208,7 @@ impl Dwell {
         let mut omega_variance = f64::INFINITY;
         let mut lines = Vec::new();
         let mut gram_inverse = DMatrix::zeros(0, 0);
-        // Gauss–Newton in the frequency: from half a line width each round squares the error.
+        // Gauss–Newton steps in the frequency. The start is within half a line width, where each step squares the error.
         for round in 0..5 {
             let design = design(count, omega / rate, harmonics);
             gram_inverse = (design.transpose() * &design).try_inverse()?;
@@ -217,7 +219,7 @@ impl Dwell {
                 let coefficients = &gram_inverse * design.tr_mul(&samples);
                 let residual = &samples - &design * &coefficients;
                 let free = count as f64 - (2 * harmonics + 1) as f64;
-                // Rounding of the samples is the least noise there is.
+                // The noise variance is at least that of the rounding of the samples.
                 let variance =
                     (residual.norm_squared() / free).max(1e-28 * samples.norm_squared() / count as f64);
                 if variance > 0.0 {
@@ -256,7 +258,7 @@ impl Dwell {
         (!dwell.forces.is_empty()).then_some(dwell)
     }
 
-    /// The strongest force.
+    /// The force channel with the largest fundamental.
     pub fn force(&self) -> Option<&Line> {
         self.forces
             .iter()
@@ -264,7 +266,7 @@ impl Dwell {
     }
 }
 
-/// 1, cos, sin, cos 2 … of the phase about the middle.
+/// Design matrix of a harmonic regression: columns 1, cos, sin, cos 2 … of the phase, which is zero at the middle.
 fn design(count: usize, radians_per_sample: f64, harmonics: usize) -> DMatrix<f64> {
     let middle = 0.5 * (count as f64 - 1.0);
     let mut design = DMatrix::zeros(count, 2 * harmonics + 1);
@@ -281,7 +283,7 @@ fn design(count: usize, radians_per_sample: f64, harmonics: usize) -> DMatrix<f6
     design
 }
 
-/// Derivative of the fitted signal by ω.
+/// Derivative of the fitted signal by ω, at every sample.
 fn slope_by_omega(coefficients: &DVector<f64>, design: &DMatrix<f64>, rate_hz: f64) -> DVector<f64> {
     let middle = 0.5 * (design.nrows() as f64 - 1.0);
     DVector::from_fn(design.nrows(), |row, _| {

@@ -9,27 +9,27 @@ use crate::criteria::{LEAST_DWELL_PERIODS, STEADY_CHANGE, STEADY_DEVIATIONS};
 use crate::dwells::dwell::{Dwell, DwellSegment, direction_of, dwell_segments, pool_variances};
 use quietcut_recording::Recording;
 
-/// Length of the transient at the start of each dwell.
+/// Length of the transient that is skipped at the start of each dwell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settling {
     /// A length set by the user, s.
     Seconds(f64),
-    /// The first half.
+    /// The first half of the dwell.
     Half,
-    /// Until a decay e^{−σt} has fallen below the noise; σ in 1/s.
+    /// The time in which a decay e^{−σt} falls below the noise; σ in 1/s.
     Decay(f64),
 }
 
-/// Steady motions, and warnings about the dwells left out.
+/// Steady motions found in recordings, and warnings about skipped dwells.
 #[derive(Clone, Debug, Default)]
 pub struct Steady {
-    /// The dwells.
+    /// The dwells with steady motion.
     pub dwells: Vec<Dwell>,
-    /// For people.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Every dwell of every recording, with `harmonics` harmonics.
+/// The steady part of every dwell of every recording, with a Fourier series of `harmonics` harmonics.
 pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) -> Steady {
     let mut steady = Steady::default();
     for recording in recordings {
@@ -83,7 +83,7 @@ pub fn steady(recordings: &[Recording], harmonics: usize, settling: Settling) ->
     steady
 }
 
-/// The settled part of a stretch.
+/// The steady part of a dwell.
 struct Settled {
     dwell: Dwell,
     /// True if the transient has decayed according to the damping of the structure.
@@ -92,8 +92,8 @@ struct Settled {
     still: bool,
 }
 
-/// The settled part of a segment. If its motion still changes, its last half or quarter is taken, as long as that has enough
-/// periods.
+/// The part of a segment after its transient. If its motion still changes, its last half or quarter is taken, provided that it
+/// contains at least [`LEAST_DWELL_PERIODS`] periods.
 fn settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -134,7 +134,7 @@ fn settled(
     }
 }
 
-/// True where no motion changes from the first half of a dwell to the second.
+/// True if no motion channel changes between the first and the second half of a dwell by more than its noise.
 fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     let middle = (part.from + part.to) / 2;
     let halves = [part.from..middle, middle..part.to];
@@ -150,9 +150,10 @@ fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
             return true;
         };
         let change = (second - first).norm();
-        // Each part of a half has the variance 2σ²/n, n half the samples.
+        // Over half of the samples, real and imaginary part each have the variance 4σ²/n with n samples in the dwell; the
+        // difference of two halves has twice that.
         let noise = (8.0 * line.variance / dwell.samples as f64).sqrt();
-        // An error of the frequency turns the phase between the middles of the halves.
+        // An error of the frequency changes the phase from the middle of one half to the middle of the other.
         let turned = line.amplitude(1)
             * dwell.omega_variance.sqrt()
             * (0.5 * dwell.samples as f64 / recording.sample_rate_hz);
@@ -160,7 +161,8 @@ fn is_still(recording: &Recording, part: DwellSegment, dwell: &Dwell) -> bool {
     })
 }
 
-/// X of Re X e^{iφk} + a constant over some samples, k counted from the first of the channel, by least squares.
+/// X of the least-squares fit Re X e^{iφk} + constant to the samples in `range`; k counts from the first sample of the channel, φ
+/// is `radians_per_sample`.
 fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f64) -> Option<Complex64> {
     let mut normal = Matrix3::<f64>::zeros();
     let mut right = Vector3::<f64>::zeros();
@@ -174,7 +176,7 @@ fn phasor(samples: &[f64], range: std::ops::Range<usize>, radians_per_sample: f6
     Some(Complex64::new(solution[0], solution[1]))
 }
 
-/// The settled part of a stretch, and whether it is long enough to have settled.
+/// The part of a segment after its transient, and whether the segment is long enough for the transient to decay below the noise.
 fn first_settled(
     recording: &Recording,
     stretch: DwellSegment,
@@ -198,7 +200,7 @@ fn first_settled(
         Settling::Half => Some((last(half)?, true)),
         Settling::Decay(rate) => {
             let first = last(half)?;
-            // Transient and steady motion begin equally large; a fifth of the noise of a coefficient may be left.
+            // The transient starts as large as the steady motion and must decay to a fifth of the noise of a Fourier coefficient.
             let clearest = first
                 .motions
                 .iter()
@@ -213,7 +215,7 @@ fn first_settled(
     }
 }
 
-/// Windows of a tone with slowly changing force: each window of `periods` periods is a dwell.
+/// Dwells of a tone with slowly changing force: each window of `periods` periods is one dwell.
 pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwell> {
     let mut dwells = Vec::new();
     for stretch in dwell_segments(recording) {
@@ -232,7 +234,7 @@ pub fn windows(recording: &Recording, harmonics: usize, periods: f64) -> Vec<Dwe
     dwells
 }
 
-/// The slowest decay rate for these values of mass, damping and stiffness, 1/s: c/(2m) below critical damping.
+/// The smallest decay rate c/(2m) of the given masses, kg, and dampings, N s/m, in 1/s: that of a mode below critical damping.
 pub fn slowest_decay(masses: &[f64], dampings: &[f64]) -> f64 {
     masses
         .iter()

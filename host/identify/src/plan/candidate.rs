@@ -24,7 +24,7 @@ const PHASES: usize = 90;
 /// Largest number of speeds at which the stability limit may be bracketed. A choice that bounds the computing time.
 const BRACKETS: usize = 40;
 
-/// A test at the machine.
+/// A test at the machine that a plan may contain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Test {
@@ -66,7 +66,7 @@ pub(super) struct Candidate {
     pub(super) limit: Option<usize>,
 }
 
-/// All candidate tests.
+/// All candidate tests of a plan: hammer tests, force tests and brackets of limits.
 pub(super) fn candidates(
     case: &Case,
     problem: &Problem,
@@ -89,7 +89,8 @@ pub(super) fn candidates(
     candidates
 }
 
-/// Candidate that brackets a stability limit: the limit depth, uniform within the bracket width w (variance w²/12), and the chatter frequency.
+/// Candidate that brackets a stability limit by cuts. It measures the limit depth, uniform within the bracket width w (variance
+/// w²/12), and the chatter frequency.
 fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     let plane = &limit.planes[0];
     let bracket_mm = means.bracket * plane.depth_mm;
@@ -110,7 +111,7 @@ fn cuts(index: usize, limit: &KnownLimit, means: &Means) -> Candidate {
     }
 }
 
-/// Cases at plus and minus one step of a variable; `None` if one of them is invalid.
+/// The case with a variable one step below and above its value; `None` if one of the two cases is invalid.
 fn shifted(case: &Case, variable: &Variable) -> Option<[Case; 2]> {
     let at = |deviations: f64| {
         let mut moved = case.clone();
@@ -243,7 +244,7 @@ fn half_sine(peak_n: f64, pulse_s: f64, hz: f64) -> f64 {
     let turns = hz * pulse_s;
     let from_pole = 1.0 - 4.0 * turns * turns;
     if from_pole.abs() < 1e-6 {
-        // Limit where numerator and denominator are both zero.
+        // At this frequency numerator and denominator vanish; this is the limit of the ratio.
         return peak_n * pulse_s * 0.5;
     }
     peak_n * pulse_s * FRAC_2_PI * ((PI * turns).cos() / from_pole).abs()

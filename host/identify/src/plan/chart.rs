@@ -7,25 +7,25 @@ use crate::student::NINETY_PERCENT;
 use quietcut_stability::Basis;
 use quietcut_stability::{Linearized, Plane, SpeedLine};
 
-/// Lobes that are looked at at each speed.
+/// Number of lobes, from the lowest on, that are considered at each speed.
 const LOBES: usize = 4;
 
-/// Points of the distribution of several lobes: a power of 2.
+/// Number of quasi-random points that represent the distribution of the lowest of several lobes: a power of 2.
 const POINTS: u32 = 256;
 
-/// The first limit at a speed, as the lowest of several planes over the unknowns.
+/// The first stability limit at a speed as the lowest of several lobes, each linearized in the unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct KnownLimit {
     /// Spindle speed, rev/min.
     pub(super) rpm: f64,
-    /// The lobes from below; at least one.
+    /// Linearized lobes, lowest first; at least one.
     pub(super) planes: Vec<Plane>,
 }
 
 impl KnownLimit {
-    /// `None` if there is no limit, or if it has no derivative with respect to the unknowns.
+    /// The limit at a speed; `None` if there is no limit, or if it has no derivative with respect to the unknowns.
     ///
-    /// Gradients are filled up with zeros to `size` unknowns: those that only tests see.
+    /// The gradient has `size` entries; those of unknowns that affect only tests are zero.
     pub(super) fn new(line: &SpeedLine, linearized: &Linearized, size: usize) -> Option<Self> {
         let first_mm = line.first_limit?.depth_mm;
         let mut planes = linearized.planes(line);
@@ -43,12 +43,12 @@ impl KnownLimit {
         })
     }
 
-    /// The limit of the case as it stands, mm.
+    /// The limit of the case as given, mm.
     pub(super) fn depth_mm(&self) -> f64 {
         self.planes[0].depth_mm
     }
 
-    /// The planes that may be the lowest.
+    /// Indices of the lobes that may be the lowest when the unknowns deviate.
     fn rivals(&self, roots: &[DVector<f64>]) -> Vec<usize> {
         let is_near = |index: &usize| {
             let apart = self.planes[*index].depth_mm - self.depth_mm();
@@ -60,11 +60,11 @@ impl KnownLimit {
     }
 }
 
-/// The limits of a chart.
+/// The linearized limits of a chart.
 #[derive(Clone, Debug)]
 pub(super) struct KnownChart {
     pub(super) limits: Vec<KnownLimit>,
-    /// Points of the standard normal distribution in 1 … LOBES dimensions.
+    /// Quasi-random points of the standard normal distribution in 1 … [`LOBES`] dimensions.
     points: Vec<Vec<DVector<f64>>>,
 }
 
@@ -77,9 +77,9 @@ impl KnownChart {
         }
     }
 
-    /// The 90 % interval of every limit, mm, where unknowns have the inverse covariance `information`.
+    /// The 90 % interval of every limit, mm, if the unknowns have the inverse covariance `information`.
     pub(super) fn intervals(&self, information: &DMatrix<f64>) -> Vec<[f64; 2]> {
-        // Λ starts as the identity and only grows: it is positive definite but for numbers out of range.
+        // Λ starts as the identity and information is only added, so it is positive definite unless a number overflows.
         let Some(root) = Cholesky::new(information.clone()) else {
             return vec![[f64::NEG_INFINITY, f64::INFINITY]; self.limits.len()];
         };
@@ -99,7 +99,7 @@ impl KnownChart {
     }
 
     fn interval(&self, limit: &KnownLimit, root: &Cholesky<f64, Dyn>) -> [f64; 2] {
-        // Λ = L Lᵀ: a gradient g has the variance |L⁻¹g|².
+        // With Λ = L Lᵀ a limit with the gradient g has the variance |L⁻¹g|².
         let roots: Vec<DVector<f64>> = limit
             .planes
             .iter()
@@ -110,7 +110,8 @@ impl KnownChart {
             let half = NINETY_PERCENT * roots[0].norm();
             return [limit.depth_mm() - half, limit.depth_mm() + half];
         }
-        // Only the rivals' own joint distribution matters: as many coordinates as rivals, the first along the lowest.
+        // The distribution of the lowest rival depends on the rivals alone: the number of coordinates equals the number of rivals,
+        // and the first axis lies along the lowest.
         let vectors: Vec<DVector<f64>> = rivals.iter().map(|&index| roots[index].clone()).collect();
         let coordinates = triangular(&vectors);
         let mut lowest: Vec<f64> = self.points[rivals.len() - 1]
@@ -134,7 +135,7 @@ fn solved(root: &Cholesky<f64, Dyn>, gradient: &DVector<f64>) -> DVector<f64> {
         .unwrap_or_else(|| gradient.clone())
 }
 
-/// The vectors in coordinates of an orthonormal basis of their span, the first along the first.
+/// Coordinates of the vectors in an orthonormal basis of their span whose first axis lies along the first vector.
 fn triangular(vectors: &[DVector<f64>]) -> Vec<DVector<f64>> {
     let size = vectors.len();
     let mut basis: Vec<DVector<f64>> = Vec::with_capacity(size);
@@ -155,7 +156,7 @@ fn triangular(vectors: &[DVector<f64>]) -> Vec<DVector<f64>> {
         .collect()
 }
 
-/// The value below which a share of all lies, between the neighbours at (i + 1/2)/n (Hazen).
+/// The value below which the fraction `share` of a sorted sample lies; the i-th value has the probability (i + 1/2)/n (Hazen).
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let position = (share * sorted.len() as f64 - 0.5).max(0.0);
     let below = (position as usize).min(sorted.len() - 1);

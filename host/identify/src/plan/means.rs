@@ -3,25 +3,25 @@
 /// Means: properties of the possible tests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Means {
-    /// Width of the interval to which cuts bracket a limit, relative to it.
+    /// Width of the interval to which cuts bracket a limit, relative to the limit.
     pub bracket: f64,
-    /// Standard deviation of a measured chatter frequency, relative to it.
+    /// Standard deviation of a measured chatter frequency, relative to the frequency.
     pub chatter_frequency: f64,
-    /// Impacts of a hammer test.
+    /// Number of impacts of a hammer test.
     pub blows: usize,
     /// Peak force of an impact, N.
     pub peak_n: f64,
-    /// Noise of the accelerometer, g/√Hz.
+    /// Noise density of the accelerometer, g/√Hz.
     pub accelerometer_g_per_root_hertz: f64,
-    /// Standard deviation of the gain of hammer and accelerometer, and of that of the dynamometer.
+    /// Relative standard deviation of the gain of hammer and accelerometer, and of the gain of the dynamometer.
     pub calibration: f64,
-    /// Noise of the dynamometer, N/√Hz.
+    /// Noise density of the dynamometer, N/√Hz.
     pub dynamometer_n_per_root_hertz: f64,
-    /// How long a cut is measured, s.
+    /// Duration of the force recording of a cut, s.
     pub seconds: f64,
-    /// Standard deviation of how much natural frequencies differ between standstill and cutting, relative.
+    /// Relative standard deviation of the difference of a natural frequency between standstill and cutting.
     pub standstill_frequency: f64,
-    /// The same of damping ratios.
+    /// Relative standard deviation of the difference of a damping ratio between standstill and cutting.
     pub standstill_damping: f64,
 }
 

@@ -29,142 +29,142 @@ use quietcut_stability::{CubicTerms, Linearized, Problem, SpeedLine, StabilityEr
 use selection::{Chosen, Selection};
 use unknowns::Unknowns;
 
-/// Request of a plan: required width, prior and means.
+/// Request of a plan: chart, required width, prior, and properties of the tests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
     /// Spindle speeds of the chart, rev/min.
     pub speeds_rpm: Vec<f64>,
     /// The largest axial depth of interest, mm.
     pub depth_mm: f64,
-    /// Steps in depth at which multipliers are followed.
+    /// Number of steps in depth at which Floquet multipliers are followed.
     pub samples: usize,
-    /// Every limit is to have a 90 % interval no wider than this share of it.
+    /// Required width of the 90 % interval of every limit, relative to the limit.
     pub width: f64,
     /// Prior of the parameters, for a case that states no standard deviations.
     pub prior: Prior,
-    /// Means: properties of the possible tests.
+    /// Properties of the possible tests.
     pub means: Means,
-    /// True where cubic terms of the structure are left out.
+    /// True to leave out cubic terms of the structure; otherwise a case with cubic terms is refused.
     pub linear: bool,
 }
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
-    /// The case, or a line of the chart.
+    /// The case or a speed of the chart cannot be computed.
     #[error(transparent)]
     Stability(#[from] StabilityError),
-    /// No limit in the chart.
+    /// No speed of the chart has a stability limit up to the largest depth.
     #[error(
         "{case}: at none of the {speeds} speeds is stability lost up to {depth_mm} mm; ask for a greater --depth-mm"
     )]
     NoLimit {
-        /// The case file.
+        /// Path of the case file.
         case: String,
-        /// Number of speeds.
+        /// Number of speeds of the chart.
         speeds: usize,
-        /// The largest depth asked for, mm.
+        /// Largest depth of the chart, mm.
         depth_mm: f64,
     },
-    /// A case without derivatives.
+    /// The limits of the case have no derivatives by the unknowns.
     #[error("{case}: limits have no derivatives with respect to the unknowns: {what}")]
     NoDerivatives {
-        /// The case file.
+        /// Path of the case file.
         case: String,
-        /// The reason.
+        /// Reason why there are no derivatives.
         what: &'static str,
     },
 }
 
-/// A width over the chart, percent of the limits.
+/// Width of the 90 % intervals over the chart, in percent of the limits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Width {
-    /// The widest 90 % interval.
+    /// The widest 90 % interval of the chart, percent of its limit.
     pub widest_percent: f64,
-    /// Where it is.
+    /// Spindle speed of the widest interval, rev/min.
     pub at_rpm: f64,
-    /// The median over the speeds.
+    /// Median of the widths over the speeds, percent.
     pub median_percent: f64,
 }
 
-/// A speed of the chart.
+/// A speed of the chart with its limit and intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Speed {
     /// Spindle speed, rev/min.
     pub rpm: f64,
-    /// First limit of the case as it stands, mm.
+    /// First stability limit of the case as given, mm.
     pub limit_mm: f64,
     /// 90 % interval before any test, mm.
     pub before_mm: [f64; 2],
-    /// 90 % interval after all tests, mm, if they find the case as it stands.
+    /// 90 % interval after all tests, mm, if the tests confirm the case as given.
     pub after_mm: [f64; 2],
 }
 
-/// A test of the plan.
+/// A test of the plan with its cost and its effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Step {
-    /// What to do.
+    /// The test.
     #[serde(flatten)]
     pub test: Test,
-    /// Number of cuts, or 1.
+    /// Number of cuts of a bracket; 1 for every other test.
     pub cuts_or_tests: usize,
-    /// Width after it.
+    /// Width of the intervals after this test and all before it.
     pub after: Width,
 }
 
-/// Why the required width is not reached.
+/// Reason why the required width is not reached.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Obstacle {
-    /// Width if every test is repeated a thousand times.
+    /// Width of the intervals if every candidate test is repeated a thousand times.
     pub at_best: Width,
-    /// The unknowns whose knowledge would narrow the widest interval most. Empty if more repetitions would suffice.
+    /// The unknowns whose exact values would narrow the widest interval most. Empty if a thousand repetitions reach the width.
     pub if_known: Vec<IfKnown>,
 }
 
-/// An unknown, and the width if it were known.
+/// An unknown, and the width of the widest interval if its value were exact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IfKnown {
-    /// The unknown.
+    /// Name of the unknown.
     pub name: String,
-    /// The widest interval if it were known, percent.
+    /// The widest 90 % interval if the unknown were exact, percent of its limit.
     pub widest_percent: f64,
 }
 
-/// A plan.
+/// The fewest tests that narrow the limits of a chart, and their effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// The required width, percent.
     pub wanted_percent: f64,
-    /// True where the tests reach it.
+    /// True if the tests reach the required width.
     pub reached: bool,
-    /// Cuts and other tests, counted alike.
+    /// Total number of cuts and other tests.
     pub cuts_and_tests: usize,
     /// Names of the unknowns, with standard deviations in percent if they are assumed.
     pub unknowns: Vec<String>,
-    /// True where the case says how well its parameters are known; else defaults are assumed.
+    /// True if the case states standard deviations of its parameters; otherwise defaults are assumed.
     pub stated: bool,
-    /// Before any test.
+    /// Width of the intervals before any test.
     pub before: Width,
-    /// The tests, in the order in which to do them.
+    /// The tests in the order in which to carry them out.
     pub tests: Vec<Step>,
-    /// Width after all tests.
+    /// Width of the intervals after all tests.
     pub after: Width,
-    /// Why the width is not reached.
+    /// Reason why the width is not reached; `None` if it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacle: Option<Obstacle>,
-    /// Speeds at which nothing is lost up to the last depth: they do not count.
+    /// Speeds without a stability limit up to the largest depth, rev/min; they do not count.
     pub without_limit_rpm: Vec<f64>,
-    /// Every speed that counts.
+    /// All speeds with a stability limit.
     pub chart: Vec<Speed>,
 }
 
-/// Repetitions of every test for the best possible width.
+/// Number of repetitions of every test that stands for unlimited repetition.
 const AT_BEST: f64 = 1000.0;
 
-/// The fewest tests with which the chart is as narrow as wanted; `progress` is called after each speed.
+/// The fewest tests after which every limit of the chart has the required width; calls `progress` after each speed.
 ///
-/// Intervals are those of the linearized limits: of a machine whose parameters lie within a few deviations of the case.
-/// At each speed the lowest of several lobes counts.
+/// Intervals follow from linearized limits: they hold for machines whose parameters lie within a few standard deviations of the
+/// case. At each speed the lowest of several lobes counts.
 ///
 /// # Errors
 /// The chart cannot be computed, has no limits, or its limits no derivatives.
@@ -175,7 +175,7 @@ pub fn plan(case: &Case, request: &Request, progress: impl Fn() + Sync) -> Resul
     Ok(basis.plan(request, &selection, &chosen))
 }
 
-/// The data of a plan.
+/// Data of a plan: unknowns, linearized limits and candidate tests.
 struct Basis {
     unknowns: Unknowns,
     chart: KnownChart,
@@ -291,7 +291,7 @@ impl Basis {
         }
     }
 
-    /// Every test a thousand times, and what would help most then.
+    /// Width with every test repeated [`AT_BEST`] times, and the unknowns whose exact values would narrow the intervals most then.
     fn obstacle(&self, selection: &Selection<'_>) -> Obstacle {
         let size = self.unknowns.len();
         let mut information = DMatrix::identity(size, size);
@@ -301,7 +301,7 @@ impl Basis {
         let mut if_known: Vec<IfKnown> = (0..size)
             .map(|index| {
                 let mut known = information.clone();
-                // A millionth of the deviation that it had.
+                // A thousand billion times the prior information: the deviation becomes a millionth of the prior one.
                 known[(index, index)] += 1e12;
                 IfKnown {
                     name: self.unknowns.names[index].clone(),

@@ -1,8 +1,8 @@
 //! The cheapest set of tests that narrows every limit to the required width.
 //!
-//! Tests are added one by one, each the one that takes most from the excess Σ max(0, (width/wanted)² − 1) for its cost;
-//! then tests are dropped and exchanged for cheaper ones while the width stays reached. Cuts that bracket a limit cost as
-//! many halvings as their interval needs at that time.
+//! Tests are added one by one, each the one that reduces the excess Σ max(0, (width/required width)² − 1) most per unit of cost.
+//! Then tests are dropped, or exchanged for cheaper ones, as long as the width stays reached. Cuts that bracket a limit cost as
+//! many bisections as the interval of the limit requires before them.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -11,16 +11,16 @@ use super::candidate::{Candidate, Test};
 use super::chart::KnownChart;
 use crate::criteria::{LEAST_GAIN, MOST_TESTS};
 
-/// A test that is done.
+/// A test of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Chosen {
-    /// Which.
+    /// Index of the test among the candidates.
     pub(super) candidate: usize,
-    /// Number of cuts, or 1.
+    /// Number of cuts of a bracket; 1 for every other test.
     pub(super) cost: usize,
 }
 
-/// The search.
+/// Search for the cheapest sufficient set of candidate tests.
 pub(super) struct Selection<'a> {
     chart: &'a KnownChart,
     candidates: &'a [Candidate],
@@ -42,7 +42,7 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// Λ after these tests.
+    /// Inverse covariance Λ of the unknowns after these tests.
     pub(super) fn information(&self, chosen: &[Chosen]) -> DMatrix<f64> {
         chosen.iter().fold(self.nothing.clone(), |sum, one| {
             sum + &self.candidates[one.candidate].information
@@ -54,7 +54,7 @@ impl<'a> Selection<'a> {
         self.excess(information) == 0.0
     }
 
-    /// The cheapest set that was found; one that does not reach the width where none does.
+    /// The cheapest set found that reaches the width, or the greedy set if no set reaches it.
     pub(super) fn fewest(&self) -> Vec<Chosen> {
         let mut chosen = self.greedy();
         if self.is_reached(&self.information(&chosen)) {
@@ -73,12 +73,12 @@ impl<'a> Selection<'a> {
             .sum()
     }
 
-    /// True of cuts that bracket a limit.
+    /// True if the candidate is a series of cuts that brackets a limit.
     pub(super) fn is_bracket(&self, candidate: usize) -> bool {
         self.candidates[candidate].limit.is_some()
     }
 
-    /// How many cuts, or tests, one more of these is.
+    /// Cost of a candidate when the unknowns have the inverse covariance `information`: the number of cuts, or 1 for other tests.
     fn cost(&self, candidate: usize, information: &DMatrix<f64>) -> usize {
         let Candidate {
             limit: Some(limit),
@@ -89,7 +89,7 @@ impl<'a> Selection<'a> {
             return 1;
         };
         let [from, to] = self.chart.intervals(information)[*limit];
-        // Each cut halves; below and above the limit one is needed at least.
+        // Each cut halves the interval; at least one stable and one unstable cut are necessary.
         let halvings = ((to - from) / bracket_mm).log2().ceil();
         if halvings.is_finite() {
             (halvings as usize).max(2)
@@ -98,7 +98,7 @@ impl<'a> Selection<'a> {
         }
     }
 
-    /// The tests with their costs, in this order.
+    /// The candidates with their costs when they are carried out in this order.
     pub(super) fn priced(&self, order: impl IntoIterator<Item = usize>) -> Vec<Chosen> {
         let mut information = self.nothing.clone();
         order
@@ -121,7 +121,7 @@ impl<'a> Selection<'a> {
                 .map(|candidate| {
                     let after = self.excess(&(&information + &self.candidates[candidate].information));
                     let cost = self.cost(candidate, &information) as f64;
-                    // What reaches the width is compared by its cost alone.
+                    // Candidates that reach the width have the same gain and are compared by cost alone.
                     ((excess - after) / cost, after)
                 })
                 .collect();
@@ -140,13 +140,13 @@ impl<'a> Selection<'a> {
         chosen.iter().map(|one| one.cost).sum()
     }
 
-    /// These tests where they reach the width and cost less than `than`.
+    /// The tests with their costs if they reach the width and cost less than `than`.
     fn if_cheaper(&self, order: Vec<usize>, than: usize) -> Option<Vec<Chosen>> {
         let priced = self.priced(order);
         (Self::total(&priced) < than && self.is_reached(&self.information(&priced))).then_some(priced)
     }
 
-    /// The same without the dearest test that is not needed.
+    /// The set without the most expensive test that is not necessary; `None` if all tests are necessary.
     fn without_one(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
         let mut dearest: Vec<usize> = (0..chosen.len()).collect();
         dearest.sort_by_key(|&index| std::cmp::Reverse(chosen[index].cost));
@@ -160,7 +160,7 @@ impl<'a> Selection<'a> {
         })
     }
 
-    /// The same with one test, or two, exchanged for one other.
+    /// A cheaper set in which one or two tests are exchanged for one other; `None` if there is none.
     fn with_another(&self, chosen: &[Chosen]) -> Option<Vec<Chosen>> {
         let total = Self::total(chosen);
         let count = chosen.len();
@@ -173,7 +173,8 @@ impl<'a> Selection<'a> {
                         let kept = (0..count)
                             .filter(|&index| index != a && index != b)
                             .map(|index| chosen[index].candidate);
-                        // What is done once for all comes first: brackets are narrower then.
+                        // Tests that inform about all limits come before brackets: then the intervals are narrower and the brackets
+                        // need fewer cuts.
                         let mut order: Vec<usize> = kept.chain([other]).collect();
                         order.sort_by_key(|&candidate| self.is_bracket(candidate));
                         self.if_cheaper(order, total)

@@ -1,4 +1,4 @@
-//! The unknowns: independent normal variables, each in units of its standard deviation.
+//! The unknowns of a plan: independent normal variables, each in units of its prior standard deviation.
 
 use std::f64::consts::TAU;
 
@@ -10,16 +10,16 @@ use quietcut_model::case::{Case, Deviation, Parameter};
 use quietcut_model::structure::{Form, Joint, Matrices, Mode};
 use quietcut_stability::Variable;
 
-/// Standard deviations, relative, of a case that states none.
+/// Relative standard deviations assumed for a case that states none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
-    /// Of natural frequencies.
+    /// Relative standard deviation of natural frequencies.
     pub frequency: f64,
-    /// Of damping ratios.
+    /// Relative standard deviation of damping ratios.
     pub damping: f64,
-    /// Of modal stiffnesses.
+    /// Relative standard deviation of modal stiffnesses.
     pub stiffness: f64,
-    /// Of K_tc, K_rc and K_ac.
+    /// Relative standard deviation of the cutting coefficients K_tc, K_rc and K_ac.
     pub force: f64,
 }
 
@@ -36,31 +36,31 @@ impl Default for Prior {
     }
 }
 
-/// All that is not known. In vectors over it come first the variables that limits depend on, then what only tests at
-/// standstill see, then the gains of hammer with accelerometer and of the dynamometer.
+/// All unknowns of a plan. A vector of unknowns holds first the variables that the limits depend on, then the differences between
+/// standstill and cutting, then the gain of the hammer test and the gain of the dynamometer.
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
-    /// Variables that limits depend on.
+    /// Variables that the stability limits depend on.
     pub(super) variables: Vec<Variable>,
-    /// How the structure differs at standstill.
+    /// Differences of the structure at standstill from the structure during cutting.
     pub(super) standstill: Vec<Variable>,
-    /// Names, standstill and gains included.
+    /// Names of all unknowns, in the order of a vector of unknowns.
     pub(super) names: Vec<String>,
-    /// True where the case states its deviations.
+    /// True if the case states standard deviations; otherwise those of the prior are assumed.
     pub(super) stated: bool,
 }
 
-/// A matrix, as the parameter that an entry of it is.
+/// The case parameter of an entry (row, column) of a mass, damping or stiffness matrix.
 type Entry = fn(usize, usize) -> Parameter;
 
-/// A variable and what it is.
+/// A variable with its name for the user.
 struct Named {
     variable: Variable,
     name: String,
 }
 
 impl Unknowns {
-    /// Those that the case states (keys that end in `_std`), or else those of `prior`; `None` where there is none.
+    /// The unknowns that the case states (keys that end in `_std`), or else those of `prior`; `None` if there are none.
     pub(super) fn new(case: &Case, prior: &Prior, means: &Means) -> Option<Self> {
         let stated = !case.deviations.is_empty();
         let named = if stated {
@@ -89,17 +89,17 @@ impl Unknowns {
         })
     }
 
-    /// Number of unknowns, standstill and gains included.
+    /// Number of unknowns, including those of standstill and the two gains.
     pub(super) fn len(&self) -> usize {
         self.names.len()
     }
 
-    /// Where the gain of hammer and accelerometer stands.
+    /// Index of the gain of hammer and accelerometer in a vector of unknowns.
     pub(super) fn hammer_gain(&self) -> usize {
         self.len() - 2
     }
 
-    /// Where the gain of the dynamometer stands.
+    /// Index of the gain of the dynamometer in a vector of unknowns.
     pub(super) fn dynamometer_gain(&self) -> usize {
         self.len() - 1
     }
@@ -133,7 +133,8 @@ fn of_forces(case: &Case, relative: f64) -> Vec<Named> {
         .collect()
 }
 
-/// Frequency, damping ratio and stiffness of each mode, with these relative deviations; those of 0 are none.
+/// Variables for frequency, damping ratio and stiffness of each mode with these relative deviations; a deviation of 0 gives no
+/// variable.
 fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Vec<Named> {
     let Some(structure) = &case.structure else {
         return Vec::new();
@@ -166,7 +167,7 @@ fn of_modes(case: &Case, relative: [f64; 3], suffix: &str) -> Vec<Named> {
     named
 }
 
-/// Frequency, and what changes with a relative change of frequency, damping ratio and compliance.
+/// Name of a mode, and the changes of its parameters for a relative change of one in frequency, damping ratio and compliance.
 fn of_mode((index, mode): (usize, &Mode)) -> (String, [Vec<Deviation>; 3]) {
     let one = |parameter, std| vec![Deviation { parameter, std }];
     let shape = mode.left.iter().enumerate().flat_map(|(entry, value)| {
@@ -189,7 +190,8 @@ fn the_mode(frequency_hz: f64) -> String {
     format!("the mode at {frequency_hz:.2} Hz")
 }
 
-/// The same of a joint with its link, were it alone.
+/// Name of a joint, and the changes of its parameters for a relative change of one in frequency, damping ratio and stiffness of the
+/// joint with its link alone.
 fn of_joint((index, joint): (usize, &Joint)) -> (String, [Vec<Deviation>; 3]) {
     let part = |parameter, std| Deviation { parameter, std };
     let stiffness = |factor: f64| {
@@ -202,7 +204,8 @@ fn of_joint((index, joint): (usize, &Joint)) -> (String, [Vec<Deviation>; 3]) {
     (
         format!("joint {}", index + 1),
         [
-            // k ~ ω² and c ~ ω.
+            // A frequency scales with √k at constant inertia: stiffness changes by twice the relative change, damping c = 2ζ√(km)
+            // once.
             vec![stiffness(2.0), damping],
             vec![damping],
             vec![
@@ -214,10 +217,10 @@ fn of_joint((index, joint): (usize, &Joint)) -> (String, [Vec<Deviation>; 3]) {
     )
 }
 
-/// The same of matrices, by their undamped modes Kφ = ω²Mφ, φᵀMφ = 1, with the damping φᵀCφ = 2ζω: what belongs to a mode
-/// alone are multiples of Mφφᵀ M.
+/// Names of the undamped modes Kφ = ω²Mφ of matrices, and the changes of the matrices for a relative change of one in frequency,
+/// damping ratio and stiffness of each mode. With φᵀMφ = 1 and φᵀCφ = 2ζω, a change of one mode alone is a multiple of Mφφᵀ M.
 ///
-/// Only the symmetric parts have such modes; couplings by damping stay as they are.
+/// Modes are those of the symmetric parts of the matrices. Damping that couples modes does not change.
 fn of_matrices(matrices: &Matrices) -> Vec<(String, [Vec<Deviation>; 3])> {
     let symmetric = |matrix: &DMatrix<f64>| (matrix + matrix.transpose()) * 0.5;
     let (mass, damping, stiffness) = (
@@ -267,7 +270,7 @@ fn of_matrices(matrices: &Matrices) -> Vec<(String, [Vec<Deviation>; 3])> {
         Some((
             the_mode(squared.sqrt() / TAU),
             [
-                // ω and with it 2ζω.
+                // Frequency: ω² changes twice as much, and 2ζω once.
                 parts(0.0, modal_damping, 2.0 * squared),
                 parts(0.0, modal_damping, 0.0),
                 parts(1.0, modal_damping, squared),

@@ -1,11 +1,11 @@
 //! Joints of a robot with cubic terms, from steady tones at several postures and force levels, by harmonic balance.
 //!
-//! In deviations q of the joint angles from a posture q₀, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = J(q₀)ᵀ F and u = J(q₀) q: a
-//! cubic term of one joint couples all directions of the tool, differently at every posture. Joint angles are not measured: they
-//! are those of the periodic motion that the parameters give under the measured force. The predicted motion of the tool is fitted
-//! to the measured one, weighted as in [`steady_fit`](crate::nonlinear::steady_fit). A first guess comes from the receptances at
-//! the lowest force of every frequency, and then from the equivalent linearization of the joints at the measured amplitudes a_j of
-//! their angles: k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j².
+//! With the deviations q of the joint angles from a posture q₀, M(q₀) q̈ + C q̇ + K q + C₃ q̇∘³ + K₃ q∘³ = J(q₀)ᵀ F and u = J(q₀)
+//! q. A cubic term of one joint couples all directions of the tool, differently at every posture. Joint angles are not measured:
+//! harmonic balance gives the periodic joint angles under the measured force. The predicted motion of the tool is fitted to the
+//! measured one, with the weights of [`steady_fit`](crate::nonlinear::steady_fit). The first guess comes from the receptances at
+//! the lowest force of every frequency. The equivalent linearization of the joints at the measured amplitudes a_j of their angles,
+//! k_j + ¾ k₃_j a_j² and c_j + ¾ c₃_j ω² a_j², then improves it.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -28,24 +28,24 @@ use quietcut_model::structure::{Direction, Robot};
 /// Steady tones at one posture.
 #[derive(Clone, Debug)]
 pub struct PostureDwells {
-    /// Joint angles, rad.
+    /// Joint angles of the posture, rad.
     pub angles_rad: Vec<f64>,
-    /// The tones.
+    /// The steady tones measured at the posture.
     pub dwells: Vec<Dwell>,
 }
 
-/// A robot whose joints were identified with their cubic terms.
+/// Result of a fit: a robot with identified stiffness, damping and cubic terms of its joints.
 #[derive(Clone, Debug)]
 pub struct CubicJointFit {
-    /// The robot; its posture is that of the start.
+    /// The robot with the fitted parameters, at the posture of the first guess.
     pub robot: Robot,
     /// The fitted parameters.
     pub parameters: Vec<JointParameter>,
-    /// Covariance of the parameters.
+    /// Covariance of the fitted parameters.
     pub covariance: DMatrix<f64>,
-    /// χ² per degree of freedom.
+    /// χ² per degree of freedom of the residual over its noise.
     pub misfit: f64,
-    /// NRMSE of the fundamental of the motion.
+    /// NRMSE of the fundamental of the predicted motion.
     pub relative_error: f64,
     /// True if the covariance comes from the scatter between dwells.
     pub robust: bool,
@@ -82,7 +82,7 @@ pub fn fit(
         parameters.len(),
         parameters.iter().map(|parameter| parameter.value(&start)),
     );
-    // Far from the minimum, what is positive must stay so: its logarithm is sought.
+    // In the first fit stiffness, damping and payload are replaced by their logarithms, which keeps them positive.
     let values_of = |sought: &DVector<f64>| {
         DVector::from_fn(sought.len(), |index, _| {
             if parameters[index].is_cubic() {
@@ -124,7 +124,7 @@ pub fn fit(
     } = normal.spread()?;
     let mut robot = start;
     for (parameter, value) in parameters.iter().zip(values.iter()) {
-        // Stiffness, damping and mass that come out below zero are lost in the noise.
+        // A stiffness, damping or payload fitted below zero is not significant: the data do not determine it.
         if *value <= 0.0 && !parameter.is_cubic() {
             return Err(JointFitError::Undetermined(parameter.name()));
         }
@@ -142,7 +142,7 @@ pub fn fit(
     })
 }
 
-/// Sums over all dwells, in their order for any number of threads.
+/// Normal equations summed over all dwells, always in the same order, so that the number of threads does not change the result.
 fn sums(
     all: &[(&Placed, &Dwell)],
     parameters: usize,
@@ -171,7 +171,7 @@ fn parameters(joints: usize, terms: &[Extra], payload: bool) -> Vec<JointParamet
     parameters
 }
 
-/// Linear joints through the receptances at the lowest force of every frequency.
+/// The robot with linear joints, fitted to the receptances at the lowest force of every frequency.
 fn first_guess(start: &Robot, postures: &[PostureDwells], payload: bool) -> Result<Robot, JointFitError> {
     let tables: Vec<PostureFrf> = postures
         .iter()
@@ -181,7 +181,7 @@ fn first_guess(start: &Robot, postures: &[PostureDwells], payload: bool) -> Resu
     Ok(joints::fit(start, &tables, payload)?.robot)
 }
 
-/// The receptances for the force in one direction, from the dwell of least force at every frequency.
+/// The receptances under force in direction `force`; at each frequency from the dwell with the smallest force.
 fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     let mut dwells: Vec<&Dwell> = posture
         .dwells
@@ -193,7 +193,7 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     let mut kept: Vec<&Dwell> = Vec::with_capacity(dwells.len());
     for dwell in dwells {
         match kept.last_mut() {
-            // Steps of one frequency differ by noise only.
+            // Dwells within 0.1 % in frequency are repetitions of one frequency step.
             Some(last) if dwell.omega < last.omega * (1.0 + 1e-3) => {
                 if amplitude(dwell) < amplitude(last) {
                     *last = dwell;
@@ -211,7 +211,7 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
                 * dwell.force()?.phasor(1);
             let noise = (line.variance * dwell.gram_inverse[(1, 1)]).sqrt() / per_force.norm();
             let receptance = line.phasor(1) / per_force;
-            // At the lowest force, too, joints are not quite linear.
+            // Even at the smallest force the cubic terms change the receptance; the error of the linearization accounts for that.
             Some((receptance, noise.hypot(LINEARIZATION_ERROR * receptance.norm())))
         };
         if let Some(found) = kept.iter().map(of_dwell).collect::<Option<Vec<_>>>() {
@@ -234,14 +234,15 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     })
 }
 
-/// Forces by which the motion at a force is reached from that of small forces.
+/// Number of equal force steps in which the predicted motion is continued from small force to the given force.
 const RISES: u32 = 8;
 
 impl CubicJointFit {
     /// Predicted motion of the tool at a posture under the force F cos ωt, F in N: its fundamental, m, and the standard deviation
     /// of its magnitude in every direction.
     ///
-    /// The motion that is reached by a force that rises slowly. `None` where it ends before: a jump.
+    /// The motion is the one reached when the force rises slowly from zero. `None` if that branch ends in a jump before the given
+    /// force.
     pub fn response(
         &self,
         angles_rad: &[f64],
@@ -290,7 +291,7 @@ impl CubicJointFit {
         let by_values = solution.sensitivities(0..0)?.0 * model.chain(&placed);
         let mut deviation = Vector3::zeros();
         for axis in 0..3 {
-            // d|u| = Re(u* du)/|u|.
+            // Derivative of a magnitude: d|u| = Re(u* du)/|u|.
             let gradient = DVector::from_iterator(
                 values.len(),
                 by_values.column_iter().map(|column| {

@@ -14,23 +14,23 @@ use quietcut_model::structure::{Direction, Robot};
 
 pub(super) const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
-/// The equation of motion, and where its parameters come from.
+/// Equation of motion of the robot, the fitted joint parameters, and the harmonic-balance grid.
 pub(super) struct Model<'a> {
     pub(super) parameters: &'a [JointParameter],
     pub(super) law: Law,
     pub(super) grid: Grid,
 }
 
-/// A posture with the quantities that do not depend on the parameters.
+/// A posture with the matrices that do not depend on the parameters.
 pub(super) struct Placed {
-    /// 3 × n.
+    /// Jacobian of the tool center point: 3 rows (x, y, z), a column per joint.
     pub(super) jacobian: DMatrix<f64>,
-    /// Mass matrix of what is known, and that of a payload of 1 kg.
+    /// Mass matrix without the fitted payload, kg m², and mass matrix per kilogram of payload, m².
     pub(super) mass: [DMatrix<f64>; 2],
 }
 
 impl Placed {
-    /// A robot at its posture; its payload is known where it is no parameter.
+    /// The matrices of `robot` at its posture; the payload counts as given unless it is among `parameters`.
     pub(super) fn new(robot: &Robot, parameters: &[JointParameter]) -> Self {
         let payload = robot.payload_jacobian();
         let payload = payload.tr_mul(&payload);
@@ -56,7 +56,7 @@ fn dynamic(matrix: &Matrix3xX<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(3, matrix.ncols(), |i, j| matrix[(i, j)])
 }
 
-/// Axis, fundamental of the displacement, m, and its deviation, of every channel.
+/// For every motion channel: its axis, the fundamental of its displacement, m, and the standard deviation of that, m.
 pub(super) fn displacements(dwell: &Dwell) -> Vec<(usize, Complex64, f64)> {
     let of = |line: &Line| {
         let order = i32::from(derivative(line.quantity));
@@ -79,7 +79,7 @@ impl<'a> Model<'a> {
         harmonics: usize,
     ) -> Self {
         let mut law = Law::new(joints, terms);
-        // Joints give way each by itself.
+        // A joint has its own stiffness and damping, without coupling to other joints.
         law.parameters.retain(|parameter| match parameter.role {
             Role::Damping(i, j) | Role::Stiffness(i, j) => i == j,
             _ => true,
@@ -91,7 +91,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// θ of the law at a posture.
+    /// Coefficients θ of the equation of motion at a posture, from the values of the joint parameters.
     pub(super) fn theta(&self, placed: &Placed, values: &DVector<f64>) -> DVector<f64> {
         let mut theta = self.chain(placed) * values;
         let mass = self.law.parameters.iter().zip(theta.iter_mut());
@@ -103,7 +103,7 @@ impl<'a> Model<'a> {
         theta
     }
 
-    /// ∂θ/∂values; θ is linear in them.
+    /// Derivative of θ by the joint parameters; θ is linear in them.
     pub(super) fn chain(&self, placed: &Placed) -> DMatrix<f64> {
         DMatrix::from_fn(
             self.law.parameters.len(),
@@ -121,7 +121,7 @@ impl<'a> Model<'a> {
         )
     }
 
-    /// Joint angles per force in x, y and z without the cubic terms: Z⁻¹ Jᵀ, rad/N.
+    /// Joint angles per unit force on the tool in x, y and z, without the cubic terms: Z⁻¹ Jᵀ, rad/N.
     pub(super) fn linear(
         &self,
         placed: &Placed,
@@ -148,7 +148,7 @@ impl<'a> Model<'a> {
             .solve(&placed.jacobian.transpose().map(Complex64::from))
     }
 
-    /// Fourier coefficients of a motion with the fundamental alone.
+    /// Fourier coefficients of a motion that consists of the fundamental `q` alone.
     pub(super) fn fundamental(&self, q: &DVector<Complex64>) -> DVector<f64> {
         let width = self.grid.width();
         let mut x = DVector::zeros(q.len() * width);
@@ -158,7 +158,7 @@ impl<'a> Model<'a> {
         x
     }
 
-    /// Joint angles that give the tool its measured motion and come from a force on the tool: Z⁻¹Jᵀ(J Z⁻¹Jᵀ)⁻¹ u, in the
+    /// Joint angles of the measured motion u of the tool, if it is due to a force on the tool: Z⁻¹Jᵀ(J Z⁻¹Jᵀ)⁻¹ u, in the
     /// directions that were measured.
     pub(super) fn measured(
         &self,
@@ -167,7 +167,7 @@ impl<'a> Model<'a> {
         linear: &DMatrix<Complex64>,
     ) -> Option<DVector<Complex64>> {
         let mut seen = displacements(dwell);
-        // Several channels of one direction say the same.
+        // Of several channels in one direction only the first is used.
         seen.sort_by_key(|(axis, ..)| *axis);
         seen.dedup_by_key(|(axis, ..)| *axis);
         let by_force = DMatrix::from_fn(linear.nrows(), seen.len(), |i, j| linear[(i, seen[j].0)]);
@@ -178,7 +178,7 @@ impl<'a> Model<'a> {
         Some(&by_force * (rows * &by_force).lu().solve(&moved)?)
     }
 
-    /// The periodic motion under the measured force near the measured one.
+    /// Periodic motion under the measured force, found by Newton's method from the measured motion; `None` if there is none nearby.
     pub(super) fn solve(&self, placed: &Placed, dwell: &Dwell, theta: &DVector<f64>) -> Option<Solution> {
         let force = placed.seen().force(dwell, self.grid.width());
         let linear = self.linear(placed, theta, dwell.omega)?;
@@ -193,7 +193,7 @@ impl<'a> Model<'a> {
     }
 
     /// Residual and Jacobian of the equivalent linearization at the measured amplitudes, weighted with its approximation error.
-    /// Flanks then count as much as peaks, and the fit converges from a distant start.
+    /// That error is relative, so off-resonance lines weigh as much as peaks, and the fit converges from a distant start.
     pub(super) fn linearized(
         &self,
         placed: &Placed,
@@ -235,7 +235,7 @@ impl<'a> Model<'a> {
             let left = (measured - moved) * weight;
             (residual[2 * row], residual[2 * row + 1]) = (left.re, left.im);
             for (column, parameter) in self.law.parameters.iter().enumerate() {
-                // du = −(Z⁻¹Jᵀ)ᵀ dZ q.
+                // Derivative of the tool displacement: du = −(Z⁻¹Jᵀ)ᵀ dZ q.
                 let at = |i: usize, j: usize| -linear[(i, axis)] * q[j];
                 let by = match parameter.role {
                     Role::Mass(i, j) if i == j => -at(i, i) * (omega * omega),
@@ -278,7 +278,7 @@ impl<'a> Model<'a> {
         if whole > 0.0 { (left / whole).sqrt() } else { 0.0 }
     }
 
-    /// Fundamental of the tool's motion, m.
+    /// Fundamental of the motion of the tool, m, from the Fourier coefficients `x` of the joint angles.
     pub(super) fn tool(&self, placed: &Placed, x: &DVector<f64>) -> Vector3<Complex64> {
         let width = self.grid.width();
         Vector3::from_fn(|axis, _| {

@@ -2,23 +2,23 @@
 
 use quietcut_model::structure::Robot;
 
-/// A parameter of the fit.
+/// A parameter of a robot that a fit may determine. Joints are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointParameter {
-    /// Stiffness of a joint, from 0.
+    /// Stiffness of a joint, N m/rad.
     Stiffness(usize),
-    /// Damping of a joint, from 0.
+    /// Viscous damping of a joint, N m s/rad.
     Damping(usize),
-    /// Cubic stiffness of a joint, from 0.
+    /// Cubic stiffness of a joint, N m/rad³.
     CubicStiffness(usize),
-    /// Cubic damping of a joint, from 0.
+    /// Cubic damping of a joint, N m s³/rad³.
     CubicDamping(usize),
-    /// Mass of the last link.
+    /// Mass of the last link, which carries tool and payload, kg.
     Payload,
 }
 
 impl JointParameter {
-    /// The key in a case.
+    /// The key of the parameter in a case file.
     pub fn key(self) -> &'static str {
         match self {
             Self::Stiffness(_) => "stiffness_nm_per_rad",
@@ -29,7 +29,7 @@ impl JointParameter {
         }
     }
 
-    /// Index of its joint, from 0, in a robot with `joints` joints.
+    /// Index of the joint of the parameter, from 0, in a robot with `joints` joints.
     pub fn joint(self, joints: usize) -> usize {
         match self {
             Self::Stiffness(joint)
@@ -40,12 +40,12 @@ impl JointParameter {
         }
     }
 
-    /// True for terms without effect at vanishing force; they may be negative.
+    /// True for the cubic terms: they have no effect at vanishing force and may be negative.
     pub fn is_cubic(self) -> bool {
         matches!(self, Self::CubicStiffness(_) | Self::CubicDamping(_))
     }
 
-    /// The name for messages, with the joint counted from 1.
+    /// Name of the parameter for messages, with the joint counted from 1.
     pub fn name(self) -> String {
         match self {
             Self::Payload => format!("payload {}", self.key()),
@@ -66,12 +66,12 @@ impl JointParameter {
         })
     }
 
-    /// Its value.
+    /// The value of the parameter in `robot`.
     pub fn value(self, robot: &Robot) -> f64 {
         self.slot(&mut robot.clone()).map_or(f64::NAN, |value| *value)
     }
 
-    /// Sets its value.
+    /// Sets the value of the parameter in `robot`.
     pub(crate) fn set(self, robot: &mut Robot, value: f64) {
         if let Some(slot) = self.slot(robot) {
             *slot = value;

@@ -1,10 +1,10 @@
 //! Stiffness and damping of a robot's joints from receptances at several postures.
 //!
-//! Geometry and inertia of the links are known (drawings, CAD), but for the mass of the last one if asked: tool and payload. At
-//! each posture H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (eqs 3.14, 3.15 without the inverse of J). What is fitted are the
-//! logarithms of the parameters; weights are the errors of the measured receptances. A first guess of the stiffnesses comes
-//! from the lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in compliance. Cubic terms, which need several levels of force:
-//! [`cubic_joints`](crate::robot::cubic_joints).
+//! The geometry and inertia of the links are given (drawings, CAD). The mass of the last link, which carries tool and payload, may
+//! be a parameter. The receptance at a posture q₀ is H(ω) = J Z⁻¹ Jᵀ with Z = K + iωC − ω²M(q₀) (thesis eqs 3.14, 3.15, without the
+//! inverse of J). The fit determines the logarithms of the parameters and weights each measured receptance by its standard
+//! deviation. The first guess of the stiffnesses comes from the lowest frequencies, where H = Σ J_j J_jᵀ/k_j is linear in the
+//! compliances 1/k_j. Cubic terms require tests at several force levels: [`cubic_joints`](crate::robot::cubic_joints).
 
 use std::f64::consts::TAU;
 
@@ -23,70 +23,71 @@ use quietcut_model::structure::Robot;
 /// Receptances at one posture.
 #[derive(Clone, Debug)]
 pub struct PostureFrf {
-    /// Joint angles, rad.
+    /// Joint angles of the posture, rad.
     pub angles_rad: Vec<f64>,
-    /// The receptances.
+    /// The receptances measured at the posture.
     pub table: FrfTable,
     /// Standard deviation of each entry at each frequency, m/N.
     pub deviation: Vec<Vec<f64>>,
 }
 
-/// A robot whose joints were identified.
+/// Result of a fit: a robot with identified stiffness and damping of its joints.
 #[derive(Clone, Debug)]
 pub struct JointFit {
-    /// The robot; its posture is that of the start.
+    /// The robot with the fitted parameters, at the posture of the first guess.
     pub robot: Robot,
     /// The fitted parameters.
     pub parameters: Vec<JointParameter>,
     /// Covariance of the logarithms of the parameters, from the scatter between receptances and their least error.
     pub covariance: DMatrix<f64>,
-    /// χ² per degree of freedom with the errors of the receptances.
+    /// χ² per degree of freedom: near 1 if the residual is within the standard deviations of the receptances.
     pub misfit: f64,
-    /// NRMSE of the receptances.
+    /// NRMSE of the fitted receptances.
     pub relative_error: f64,
 }
 
-/// Why the fit gives no result.
+/// Reason why the fit of joints gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum JointFitError {
-    /// Angles for another number of joints.
+    /// The number of joint angles of a posture differs from the number of joints.
     #[error("a posture has {found} joint angles; the robot has {joints} joints")]
     Angles {
-        /// Angles.
+        /// Number of joint angles of the posture.
         found: usize,
-        /// Joints.
+        /// Number of joints of the robot.
         joints: usize,
     },
-    /// Parameters that the receptances do not depend on.
+    /// The receptances do not depend on this parameter.
     #[error(
         "the receptances do not determine {0}; postures in which that joint moves the tool, and frequencies up to the modes that it has a part in, are needed"
     )]
     Undetermined(String),
-    /// No minimum was found.
+    /// The iteration found no minimum of the sum of squares.
     #[error(
         "the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}: geometry or inertia of the links may be wrong"
     )]
     NotConverged(f64),
-    /// Steady tones do not give the cubic terms.
+    /// The fit of the cubic terms to steady tones failed.
     #[error(transparent)]
     Tones(#[from] FitError),
 }
 
-/// A posture with the quantities that do not depend on the parameters.
+/// A posture with the matrices that do not depend on the parameters.
 struct Placed<'a> {
     frf: &'a PostureFrf,
     jacobian: Matrix3xX<f64>,
     payload: Matrix3xX<f64>,
-    /// Mass matrix without that of the payload.
+    /// Mass matrix of the links without the mass of the payload.
     mass: DMatrix<f64>,
-    /// One over the error of each entry at each frequency, N/m.
+    /// Inverse of the standard deviation of each receptance at each frequency, N/m.
     weights: Vec<Vec<f64>>,
 }
 
 struct Normal {
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// Σ g gᵀ over the entries of all postures: errors of one receptance hang together, those of several do not.
+    /// Σ g gᵀ over the receptances of all postures, with g the gradient of one receptance. The errors of one receptance at
+    /// different lines are correlated; those of different receptances are not.
     scatter: DMatrix<f64>,
     entries: usize,
     sum: f64,
@@ -95,7 +96,8 @@ struct Normal {
     rows: usize,
 }
 
-/// Fits a robot, whose stiffness and damping are a first guess, to receptances at several postures.
+/// Fits a robot, whose stiffness and damping are a first guess, to receptances at several postures. With `payload` the mass of the
+/// last link is a parameter, too.
 ///
 /// # Errors
 /// See [`JointFitError`].
@@ -129,7 +131,7 @@ pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<Join
         }
         let step = scaled_solve(&matrix, &normal.gradient)
             .ok_or_else(|| JointFitError::Undetermined("all parameters".into()))?;
-        // No parameter more than doubles at a time.
+        // The logarithm of a parameter changes by at most 0.7 per step: a factor of two.
         let step = &step * (0.7 / step.amax().max(0.7));
         let tried = moved(&robot, &parameters, &step);
         let next = sums(&tried, &placed, &parameters);
@@ -152,9 +154,9 @@ pub fn fit(start: &Robot, postures: &[PostureFrf], payload: bool) -> Result<Join
 }
 
 impl JointFit {
-    /// The receptance at a posture and frequency, and the standard deviation of the absolute value of each entry, m/N.
+    /// The receptance at a posture and frequency, and the standard deviation of the magnitude of each entry, m/N.
     ///
-    /// `None` where an undamped robot resonates.
+    /// `None` where an undamped robot is at resonance and Z is singular.
     pub fn receptance(
         &self,
         angles_rad: &[f64],
@@ -170,7 +172,7 @@ impl JointFit {
             .collect();
         let deviation = Matrix3::from_fn(|i, j| {
             let h = model.receptance[(i, j)];
-            // d|H| = Re(H* dH)/|H|.
+            // Derivative of a magnitude: d|H| = Re(H* dH)/|H|.
             let gradient = DVector::from_iterator(
                 slopes.len(),
                 slopes
@@ -203,7 +205,8 @@ fn place<'a>(robot: &Robot, frf: &'a PostureFrf) -> Placed<'a> {
     }
 }
 
-/// Few averages know an error badly; it is smooth over frequency, so that of neighbours is taken together.
+/// Weights 1/σ of the lines of one receptance. A variance estimated from few averages is inaccurate but smooth over frequency, so
+/// it is averaged over neighbouring lines.
 fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
     const NEIGHBOURS: usize = 8;
     (0..deviation.len())
@@ -219,7 +222,7 @@ fn weights(receptance: &[Complex64], deviation: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Stiffnesses from nearly static receptances; damping as if every joint had one of the tangent.
+/// Sets the stiffnesses of the first guess from nearly static receptances. Damping stays that of `robot`.
 fn first_guess(robot: &mut Robot, placed: &[Placed<'_>]) {
     let joints = robot.joints.len();
     let (mut rows, mut right) = (Vec::new(), Vec::new());
@@ -238,7 +241,7 @@ fn first_guess(robot: &mut Robot, placed: &[Placed<'_>]) {
             continue;
         };
         for (line, frequency) in frequencies.iter().enumerate().filter(|(_, f)| **f <= last) {
-            // Below a resonance receptance has grown by 1/(1 − r²) of the static one.
+            // Below a resonance a receptance exceeds the static one by the factor 1/(1 − r²).
             let grown = 1.0 / (1.0 - (NEARLY_STATIC * frequency / last).powi(2));
             for (entry, deviation) in table.entries().iter().zip(&posture.frf.deviation) {
                 let (Some(i), Some(j)) = (entry.response.axis(), entry.force.axis()) else {
@@ -262,7 +265,7 @@ fn first_guess(robot: &mut Robot, placed: &[Placed<'_>]) {
     if let Some(compliance) = scaled_least_squares(&matrix, &DVector::from_vec(right)) {
         for (joint, compliance) in robot.joints.iter_mut().zip(compliance.iter()) {
             let guess = 1.0 / compliance;
-            // A compliance that is hardly seen comes out of noise, or negative: the case knows better.
+            // A compliance with little effect on the receptances may come out negative or far off; then the first guess stays.
             let known = joint.stiffness_nm_per_rad;
             if guess > 0.1 * known && guess < 10.0 * known {
                 joint.stiffness_nm_per_rad = guess;
@@ -291,7 +294,7 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     let scatter = &inverse * &normal.scatter * &inverse * (taken * few * few);
     Ok(JointFit {
         robot,
-        // What scales all receptances scales all parameters.
+        // A calibration error common to all receptances changes all parameters by the same factor.
         covariance: scatter.add_scalar(LEAST_RELATIVE_ERROR * LEAST_RELATIVE_ERROR),
         parameters,
         misfit,
@@ -299,10 +302,10 @@ fn finish(robot: Robot, parameters: Vec<JointParameter>, normal: &Normal) -> Res
     })
 }
 
-/// Receptance at one posture and frequency.
+/// The robot at one posture and frequency: joint angles per force, and receptance.
 struct Model {
     omega: f64,
-    /// Z⁻¹Jᵀ, n × 3.
+    /// Joint angles per force on the tool, Z⁻¹Jᵀ: joints by directions, rad/N.
     angles: DMatrix<Complex64>,
     receptance: Matrix3<Complex64>,
 }
@@ -329,7 +332,7 @@ impl Model {
         })
     }
 
-    /// dH per change of the logarithm of a parameter: −(Z⁻¹Jᵀ)ᵀ dZ (Z⁻¹Jᵀ).
+    /// Derivative of the receptance by the logarithm of a parameter: dH = −(Z⁻¹Jᵀ)ᵀ dZ (Z⁻¹Jᵀ).
     fn slope(
         &self,
         parameter: JointParameter,
@@ -343,7 +346,7 @@ impl Model {
         match parameter {
             JointParameter::Stiffness(joint) => of_joint(joint, Complex64::from(-value)),
             JointParameter::Damping(joint) => of_joint(joint, Complex64::new(0.0, -self.omega * value)),
-            // No part in receptances at vanishing force.
+            // The receptance is that at vanishing force, which cubic terms do not affect.
             JointParameter::CubicStiffness(_) | JointParameter::CubicDamping(_) => Matrix3::zeros(),
             JointParameter::Payload => {
                 let moved = payload.map(Complex64::from) * &self.angles;

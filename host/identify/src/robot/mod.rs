@@ -1,4 +1,4 @@
-//! Joint stiffness and damping of a robot from tests at several postures.
+//! Stiffness, damping and cubic terms of a robot's joints from tests at several postures.
 
 pub mod cubic_joints;
 mod cubic_model;
