@@ -11,19 +11,19 @@ pub use quietcut_model::effects::describing_functions::*;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Nonlinearity {
-    /// k3·x³.
+    /// Cubic spring k3·x³.
     CubicStiffness,
-    /// k2·x²: seen at twice the frequency.
+    /// Quadratic spring k2·x²; it responds at twice the frequency.
     QuadraticStiffness,
-    /// c3·v³.
+    /// Cubic damping c3·v³.
     CubicDamping,
-    /// k3·x³ + k5·x⁵ of opposite signs.
+    /// Springs k3·x³ + k5·x⁵ with coefficients of opposite sign.
     SofteningHardening,
-    /// fc·sign(v).
+    /// Coulomb friction fc·sign(v).
     CoulombFriction,
-    /// A spring with a gap.
+    /// Backlash: a spring with a gap.
     Backlash,
-    /// Bouc–Wen.
+    /// Hysteresis of Bouc and Wen.
     Hysteresis,
 }
 
@@ -50,7 +50,7 @@ mod tests {
 
     use super::*;
 
-    /// The describing function by a plain sum over a period, with x = X·cos p.
+    /// The describing function by numerical summation over a period, with x = X·cos p.
     fn brute(amplitude: f64, force: impl Fn(f64, f64) -> f64) -> Complex64 {
         let count = 200_000;
         let mut sum = Complex64::ZERO;
@@ -75,16 +75,17 @@ mod tests {
             (backlash(0.3, gap), brute(0.3, |x, _| -x.clamp(-gap, gap))),
         ];
         for (closed, summed) in pairs {
-            // A kink costs the midpoint rule a step squared.
+            // The error of the midpoint rule at a kink of the force is of second order in the step.
             assert!((closed - summed).norm() < 1e-6, "{closed} {summed}");
         }
     }
 
     #[test]
     fn hysteresis_is_nothing_small_and_friction_large() {
-        // Much smaller than the yield: z = x but for a share X/z_y.
+        // At amplitudes X far below the yield displacement z_y, z = x up to a relative error of X/z_y.
         assert!(hysteresis(1e-3, 1.0).norm() < 2e-3);
-        // Much larger: −1 (the spring is gone) and friction of z_y; corners round off a share (z_y/X)^(3/2) of it.
+        // At amplitudes X far above z_y the stiffness −1 cancels the spring and friction of the force z_y remains; rounded corners
+        // reduce it by (z_y/X)^(3/2).
         let large = hysteresis(100.0, 1.0);
         assert!((large - (coulomb_friction(100.0) - 1.0)).norm() < 3e-3, "{large}");
     }

@@ -1,8 +1,8 @@
 //! Periodic motion under a periodic force by harmonic balance, with its exact derivatives.
 //!
-//! q(t) = a₀ + Σ_h (a_h cos hωt + b_h sin hωt). The residual of the [`Law`] is taken at N instants of a period and
-//! projected back. N > (p + 1)·H with p the degree of the law: products of p series of H harmonics alias onto none of the
-//! first H, so residual and Jacobian are those of the exact (Galerkin) balance.
+//! q(t) = a₀ + Σ_h (a_h cos hωt + b_h sin hωt). The residual of the [`Law`] is evaluated at N instants of a period and projected
+//! onto the harmonics. With N > (p + 1)·H, p the degree of the law, products of p series of H harmonics alias onto none of the
+//! first H harmonics, so residual and Jacobian are those of the exact (Galerkin) balance.
 
 use std::f64::consts::TAU;
 
@@ -10,36 +10,36 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::nonlinear::law::Law;
 
-/// Collocation instants of a period and the harmonics at them.
+/// Collocation instants of a period, and the values of the harmonics at them.
 #[derive(Clone, Debug)]
 pub struct Grid {
     harmonics: usize,
-    /// N × (2H + 1): the values of 1, cos, sin, cos 2 …
+    /// Values of 1, cos, sin, cos 2 … at the instants: N × (2H + 1).
     value: DMatrix<f64>,
-    /// Their derivatives by the phase ωt.
+    /// Derivatives of the harmonics by the phase ωt.
     rate: DMatrix<f64>,
-    /// Their second derivatives.
+    /// Second derivatives of the harmonics by the phase ωt.
     second: DMatrix<f64>,
-    /// (2H + 1) × N: from values to coefficients.
+    /// Projection from values at the instants to Fourier coefficients: (2H + 1) × N.
     project: DMatrix<f64>,
 }
 
-/// A law, parameters, a frequency and a force.
+/// A harmonic-balance problem: law, parameters, frequency and force.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
     /// The equation of motion.
     pub law: &'a Law,
-    /// Its parameters.
+    /// Parameters θ of the law.
     pub theta: &'a [f64],
     /// Fundamental frequency, rad/s.
     pub omega: f64,
-    /// Fourier coefficients of the force, degree after degree.
+    /// Fourier coefficients of the force, one degree of freedom after the other.
     pub force: &'a DVector<f64>,
 }
 
-/// A periodic motion.
+/// A periodic motion that satisfies the balance.
 pub struct Solution {
-    /// Fourier coefficients, degree after degree.
+    /// Fourier coefficients of the motion, one degree of freedom after the other.
     pub x: DVector<f64>,
     jacobian: LU<f64, Dyn, Dyn>,
     by_theta: DMatrix<f64>,
@@ -50,12 +50,12 @@ pub struct Solution {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("harmonic balance at {frequency_hz:.4} Hz does not converge")]
 pub struct NotConverged {
-    /// The frequency.
+    /// Fundamental frequency of the problem, Hz.
     pub frequency_hz: f64,
 }
 
 impl Grid {
-    /// `harmonics` harmonics for laws up to this degree.
+    /// Grid for `harmonics` harmonics and laws up to the polynomial degree `degree`.
     pub fn new(harmonics: usize, degree: usize) -> Self {
         let samples = (degree + 1) * harmonics + 2;
         let width = 2 * harmonics + 1;
@@ -87,7 +87,7 @@ impl Grid {
         }
     }
 
-    /// Coefficients of one degree of freedom: 2H + 1.
+    /// Number of Fourier coefficients of one degree of freedom: 2H + 1.
     pub fn width(&self) -> usize {
         2 * self.harmonics + 1
     }
@@ -101,7 +101,7 @@ impl Grid {
         self.value.nrows()
     }
 
-    /// u = (q, q̇, q̈) at every instant: 3n × N.
+    /// u = (q, q̇, q̈) at every instant: 3n × N for n degrees of freedom.
     fn motion(&self, dofs: usize, omega: f64, x: &DVector<f64>) -> DMatrix<f64> {
         let width = self.width();
         let mut u = DMatrix::zeros(3 * dofs, self.samples());
@@ -120,7 +120,7 @@ impl Grid {
         u
     }
 
-    /// Coefficients of φ_p, degree after degree, one column per parameter.
+    /// Fourier coefficients of the regressors φ_p: one column per parameter, one degree of freedom after the other.
     pub fn features(&self, law: &Law, omega: f64, x: &DVector<f64>) -> DMatrix<f64> {
         let u = self.motion(law.dofs, omega, x);
         let width = self.width();
@@ -138,7 +138,7 @@ impl Grid {
         features
     }
 
-    /// d(residual)/dx and d(residual)/dω.
+    /// Derivatives of the residual by the Fourier coefficients x and by ω.
     fn jacobian(&self, problem: Problem<'_>, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let Problem {
             law, theta, omega, ..
@@ -149,7 +149,7 @@ impl Grid {
         let mut by_omega = DVector::zeros(law.dofs * width);
         let mut weighted = DMatrix::zeros(samples, width);
         for row in 0..law.dofs {
-            // d(force of this row)/du at every instant.
+            // Derivative of one row of the law by u, at every instant.
             let mut partials = DMatrix::zeros(size, samples);
             for (parameter, &theta) in law.parameters.iter().zip(theta) {
                 for term in parameter.terms.iter().filter(|term| term.row == row) {
@@ -190,7 +190,7 @@ impl Grid {
         (jacobian, by_omega)
     }
 
-    /// The periodic motion near `start`.
+    /// The periodic motion, by Newton's method from `start`.
     ///
     /// # Errors
     /// Newton does not converge.
@@ -207,7 +207,7 @@ impl Grid {
             let (jacobian, by_omega) = self.jacobian(problem, &x);
             let jacobian = jacobian.lu();
             let step = jacobian.solve(&residual).ok_or(failed)?;
-            // Quadratic convergence: after a step of 1e-8 the next is rounding.
+            // Convergence is quadratic: after a relative step of 1e-8 the error is rounding.
             let (moved, length) = (step.norm(), x.norm().max(f64::MIN_POSITIVE));
             if !moved.is_finite() {
                 return Err(failed);
@@ -221,7 +221,7 @@ impl Grid {
                     by_omega,
                 });
             }
-            // A step that is much longer than the motion is cut short.
+            // A step much longer than the motion is shortened.
             let factor = if size.is_infinite() {
                 1.0
             } else {
@@ -235,7 +235,7 @@ impl Grid {
 }
 
 impl Solution {
-    /// dx/dθ, dx/dF (of the coefficients in `of_force`) and dx/dω.
+    /// Derivatives of the motion by θ, by the force coefficients in `of_force`, and by ω.
     pub fn sensitivities(
         &self,
         of_force: std::ops::Range<usize>,
@@ -318,7 +318,7 @@ mod tests {
                     found[i as usize] * if i == 0 { 1.0 } else { of }
                 })
                 .sum();
-            // 39 s are 32 time constants; the integrator is good to 1e-8 per step.
+            // 39 s are 32 time constants of the decay; the integrator has a relative error of 1e-8 per step.
             assert!((y - wanted).abs() < 1e-6 * found.norm(), "{k}: {y} {wanted}");
         }
     }
@@ -330,7 +330,7 @@ mod tests {
         let base = solution(&theta, &law, omega, 9.5, 5);
         let (by_theta, by_force, by_omega) = base.sensitivities(0..11).unwrap();
         let close = |exact: DVector<f64>, difference: DVector<f64>, what: &str| {
-            // Central differences of 1e-5 of a value: 1e-10 of it and its third derivative.
+            // Central differences with a relative step of 1e-5 have a relative error of about 1e-10 times the third derivative.
             assert!(
                 (&exact - &difference).norm() < 1e-6 * exact.norm(),
                 "{what}: {exact} {difference}"

@@ -1,4 +1,4 @@
-//! Higher-order FRF as in thesis eqs 5.15 to 5.17: exact as F → 0 and biased at finite force.
+//! Higher-order FRF by thesis eqs 5.15 to 5.17: exact as F → 0 and biased at finite force.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -11,43 +11,43 @@ use crate::nonlinear::law::{Extra, Law, Role};
 /// H₁, H₃(ω, ω, −ω) and H₅(ω, ω, ω, −ω, −ω) at one frequency, m/N, m/N³, m/N⁵.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HigherOrder {
-    /// rad/s.
+    /// Angular frequency, rad/s.
     pub omega: f64,
-    /// H₁, H₃, H₅.
+    /// The values H₁, H₃, H₅ in m/N, m/N³, m/N⁵.
     pub h: [Complex64; 3],
 }
 
-/// Response at one frequency: force amplitude in N and the displacement phasor against the force, m.
+/// Responses at one frequency under several force amplitudes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
-    /// rad/s.
+    /// Angular frequency, rad/s.
     pub omega: f64,
-    /// (F_n, Q_n).
+    /// Pairs (F_n, Q_n): force amplitude, N, and displacement phasor relative to the force, m.
     pub levels: Vec<(f64, Complex64)>,
 }
 
-/// Parameters from eqs 5.16 and 5.17 with the standard deviations of the linear regressions.
+/// Parameters by thesis eqs 5.16 and 5.17, with the standard deviations of the linear regressions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HfrfFit {
-    /// The law m, c, k, k3, c3.
+    /// The law with the parameters m, c, k, k3, c3.
     pub law: Law,
-    /// θ of the law.
+    /// Values θ of the parameters.
     pub theta: DVector<f64>,
     /// Standard deviations from the scatter over frequency. They do not include the bias of the method.
     pub deviations: DVector<f64>,
-    /// The estimates over frequency.
+    /// The higher-order FRF at each frequency.
     pub estimates: Vec<HigherOrder>,
 }
 
-/// Why eq. 5.15 cannot be solved.
+/// Reason why the method gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HfrfError {
-    /// Fewer than three levels at every frequency, or fewer than two such frequencies.
+    /// Fewer than two frequencies have three or more force levels.
     #[error(
         "{frequencies} frequencies were measured at three or more force levels; higher-order FRF need at least 2 of them"
     )]
     Levels {
-        /// Frequencies with three levels.
+        /// Number of frequencies with three or more force levels.
         frequencies: usize,
     },
     /// The regression is singular.
@@ -85,7 +85,7 @@ pub fn responses(dwells: &[Dwell], tolerance: f64) -> Vec<Response> {
     groups
 }
 
-/// Eq. 5.15 by least squares at one frequency; `None` with fewer than three levels.
+/// Higher-order FRF at one frequency: thesis eq. 5.15 by least squares; `None` with fewer than three force levels.
 pub fn higher_order(response: &Response) -> Option<HigherOrder> {
     if response.levels.len() < 3 {
         return None;
@@ -106,7 +106,7 @@ pub fn higher_order(response: &Response) -> Option<HigherOrder> {
     })
 }
 
-/// Eqs 5.16 and 5.17 over all frequencies.
+/// Parameters from thesis eqs 5.16 and 5.17 over all frequencies.
 ///
 /// # Errors
 /// Too few levels or frequencies.
@@ -122,11 +122,11 @@ pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     let (mut linear_right, mut cubic_right) = (DVector::zeros(rows), DVector::zeros(rows));
     for (index, HigherOrder { omega, h }) in estimates.iter().enumerate() {
         let (re, im) = (2 * index, 2 * index + 1);
-        // [m, k1, c1]
+        // Columns of the linear regression: m, k1, c1.
         (linear[(re, 0)], linear[(re, 1)], linear[(im, 2)]) = (-omega * omega, 1.0, *omega);
         let inverse = h[0].inv();
         (linear_right[re], linear_right[im]) = (inverse.re, inverse.im);
-        // [c3, k3]
+        // Columns of the cubic regression: c3, k3.
         (cubic[(re, 1)], cubic[(im, 0)]) = (-1.0, -omega.powi(3));
         let ratio = h[1] / (h[0].powi(3) * h[0].conj());
         (cubic_right[re], cubic_right[im]) = (ratio.re, ratio.im);
@@ -156,7 +156,7 @@ pub fn fit(responses: &[Response]) -> Result<HfrfFit, HfrfError> {
     })
 }
 
-/// Least squares with standard deviations from the residual.
+/// Least-squares solution with standard deviations from the residual.
 fn regression(
     matrix: &DMatrix<f64>,
     right: &DVector<f64>,

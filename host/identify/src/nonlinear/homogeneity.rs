@@ -1,32 +1,33 @@
-//! Homogeneity at constant frequency: does the response follow a rising force in proportion (thesis section 4.2.3)?
+//! Homogeneity at constant frequency: whether the response is proportional to a rising force (thesis section 4.2.3).
 
 use crate::criteria::{LEAST_REGION_POINTS, REGION_EVIDENCE};
-/// A range of force in which the response is proportional to the force.
+/// A range of force in which the response is a linear function of the force.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Region {
     /// Smallest force, N.
     pub from_n: f64,
     /// Largest force, N.
     pub to_n: f64,
-    /// dX/dF, m/N.
+    /// Slope dX/dF of the response in this range, m/N.
     pub slope: f64,
 }
 
-/// Regions of X(F) at constant frequency under a slowly changing force, and the forces at which X jumps (Fig. 4.8).
+/// Regions in which the response amplitude X(F) is linear, at constant frequency under a slowly changing force F, and the forces at
+/// which X jumps (thesis Fig. 4.8).
 ///
-/// `points` are (F, X) in the order in which they were measured. A line is split in two where that reduces the residual by much
-/// more than noise does. A jump is where two neighbouring lines differ by more than their scatter.
+/// `points` are (F, X) in the order of measurement. A region is split in two where two lines reduce the sum of squares by much more
+/// than noise does. A jump is where two neighbouring lines differ by more than their scatter.
 pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // The scatter of second differences of white noise of deviation σ is √6·σ.
+    // The second differences of white noise with the standard deviation σ have the standard deviation √6·σ.
     let mut bends: Vec<f64> = sorted
         .windows(3)
         .map(|w| (w[2].1 - 2.0 * w[1].1 + w[0].1).abs())
         .collect();
     bends.sort_by(f64::total_cmp);
     let noise = bends.get(bends.len() / 2).copied().unwrap_or(0.0) / (0.6745 * 6.0_f64.sqrt());
-    // A fifth of a percent of the largest response is less than a region's bend.
+    // The curvature of X(F) within one region is not noise: deviations of 0.2 % of the largest response are allowed for.
     let largest = sorted.iter().fold(0.0_f64, |a, (_, x)| a.max(x.abs()));
     let noise = noise.max(2e-3 * largest);
     let mut cuts = vec![0, sorted.len()];
@@ -52,7 +53,7 @@ pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
             let at = 0.5 * (sorted[pair[0].1 - 1].0 + sorted[pair[1].0].0);
             let value = |[level, slope]: [f64; 2]| level + slope * at;
             let miss = (value(pair[1].2) - value(pair[0].2)).abs();
-            // More than noise, and a share of the response that no bend of a smooth curve gives between two windows.
+            // A jump exceeds the noise, and 5 % of the response, which is more than a smooth curve changes between two windows.
             (miss > 6.0 * noise && miss > 0.05 * value(pair[0].2).abs()).then_some(at)
         })
         .collect();
@@ -76,7 +77,8 @@ fn split_line(points: &[(f64, f64)], from: usize, to: usize, noise: f64, cuts: &
     }
 }
 
-/// Removes breaks between segments of one line: the first break of three lines may lie within one of them.
+/// Removes breaks that do not reduce the sum of squares significantly: the first break found in data of three lines may lie within
+/// one of them.
 fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
     let mut index = 1;
     while index + 1 < cuts.len() {
@@ -90,7 +92,7 @@ fn join_lines(points: &[(f64, f64)], noise: f64, cuts: &mut Vec<usize>) {
     }
 }
 
-/// Level and slope of the line through the points, by least squares.
+/// Level at zero and slope of the least-squares line through the points.
 pub(crate) fn line(points: &[(f64, f64)]) -> [f64; 2] {
     let n = points.len() as f64;
     let (sx, sy) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));

@@ -1,6 +1,6 @@
 //! Equations of motion that are linear in their unknown parameters.
 
-/// Σ_p θ_p φ_p(q, q̇, q̈) = F with one row per degree of freedom.
+/// Equation of motion Σ_p θ_p φ_p(q, q̇, q̈) = F, with one row per degree of freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Law {
     /// Number of degrees of freedom n.
@@ -9,16 +9,16 @@ pub struct Law {
     pub parameters: Vec<Parameter>,
 }
 
-/// One parameter and its regressor.
+/// One parameter of a law and its regressor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Its role.
+    /// Meaning of the parameter.
     pub role: Role,
-    /// φ_p.
+    /// Regressor φ_p, a sum of monomials.
     pub terms: Vec<Monomial>,
 }
 
-/// The role of a parameter. Indices are degrees of freedom.
+/// Meaning of a parameter. Indices are degrees of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Role {
     /// M_ij, kg.
@@ -35,9 +35,9 @@ pub enum Role {
     QuinticStiffness(usize),
     /// c3·v³, N s³/m³.
     CubicDamping(usize),
-    /// ½·k·x²y² in the potential, N/m³.
+    /// Potential ½·k·x²y² of two degrees of freedom, k in N/m³.
     QuarticCoupling(usize, usize),
-    /// k·x²y in the potential, N/m².
+    /// Potential k·x²y of two degrees of freedom, k in N/m².
     CubicCoupling(usize, usize),
 }
 
@@ -47,7 +47,7 @@ impl Role {
         matches!(self, Self::Mass(..) | Self::Damping(..) | Self::Stiffness(..))
     }
 
-    /// Its key in answers and cases.
+    /// Key of the parameter in answers and cases.
     pub fn key(self) -> &'static str {
         match self {
             Self::Mass(..) => "mass_kg",
@@ -62,7 +62,7 @@ impl Role {
         }
     }
 
-    /// Its degrees of freedom.
+    /// Degrees of freedom of the parameter.
     pub fn dofs(self) -> Vec<usize> {
         match self {
             Self::Mass(i, j)
@@ -84,18 +84,18 @@ impl Role {
     }
 }
 
-/// factor · Π u_k in one row, with u = (q, q̇, q̈), n entries each.
+/// Term factor · Π u_k in one row of the equation, with u = (q, q̇, q̈), n entries each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monomial {
-    /// The row.
+    /// Row of the equation of motion.
     pub row: usize,
-    /// The factor.
+    /// Constant factor.
     pub factor: f64,
-    /// Indices into u; one may stand several times.
+    /// Indices into u of the factors; an index may occur several times.
     pub factors: Vec<usize>,
 }
 
-/// Nonlinear terms of a law beside mass, damping and stiffness.
+/// Nonlinear terms that a law may contain in addition to mass, damping and stiffness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum Extra {
     /// k2·x² in every direction.
@@ -106,7 +106,7 @@ pub enum Extra {
     SofteningHardening,
     /// c3·v³ in every direction.
     CubicDamping,
-    /// Both potentials, ½·k·x²y² and k·x²y, for every pair of directions.
+    /// Potentials ½·k·x²y² and k·x²y for every pair of directions.
     ModeCoupling,
 }
 
@@ -168,7 +168,7 @@ impl Law {
         Self { dofs, parameters }
     }
 
-    /// The largest power in it.
+    /// Largest polynomial degree of the terms of the law.
     pub fn degree(&self) -> usize {
         let monomials = self.parameters.iter().flat_map(|parameter| &parameter.terms);
         monomials
@@ -177,7 +177,7 @@ impl Law {
             .unwrap_or(1)
     }
 
-    /// Index of a role in θ.
+    /// Index in θ of the parameter with this role; `None` if the law does not have it.
     pub fn index(&self, role: Role) -> Option<usize> {
         self.parameters
             .iter()
@@ -204,14 +204,14 @@ fn couplings(i: usize, j: usize) -> [Parameter; 3] {
 }
 
 impl Monomial {
-    /// Its value.
+    /// Value of the monomial at u.
     pub fn value(&self, u: &[f64]) -> f64 {
         self.factors
             .iter()
             .fold(self.factor, |product, &k| product * u[k])
     }
 
-    /// Adds `weight` times its derivatives by u to `partials`.
+    /// Adds `weight` times the derivatives of the monomial by u to `partials`.
     pub fn add_partials(&self, weight: f64, u: &[f64], partials: &mut [f64]) {
         for (place, &k) in self.factors.iter().enumerate() {
             let others = self

@@ -1,8 +1,9 @@
-//! Is the structure linear, and if not, of what kind is it? (Thesis section 4.2 as tests with error rates.)
+//! Tests whether a structure is linear, and which kind of nonlinearity it has (thesis section 4.2, as tests with error rates).
 //!
-//! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X at one frequency does not depend on the level. The change
-//! with the level is fitted by the describing function of each candidate kind. A kind is named only if it reduces the residual by
-//! much more than chance does. *Harmonics*: the response at 2ω and 3ω stays within noise and what the force's own harmonics cause.
+//! *Force-level dependence* and *homogeneity*: the dynamic stiffness F/X of a linear structure at one frequency does not depend on
+//! the force level. The change with the level is fitted by the describing function of each candidate kind. A kind is named only if
+//! it reduces the sum of squares by much more than chance does. *Harmonics*: the response of a linear structure at 2ω and 3ω is
+//! within the noise and within the response to the harmonics of the force.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -13,16 +14,17 @@ use crate::dwells::dwell::{Dwell, Line};
 use crate::nonlinear::describing::{self, Nonlinearity};
 use crate::nonlinear::homogeneity::line;
 
-/// The result.
+/// Result of the linearity test.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Verdict {
     /// True if the data are consistent with a linear structure.
     pub linear: bool,
-    /// The kinds that explain the level dependence, strongest first. Empty for a linear structure and where no kind explains it.
+    /// The kinds of nonlinearity that explain the level dependence, strongest first. Empty for a linear structure, and if no kind
+    /// explains it.
     pub kinds: Vec<Nonlinearity>,
-    /// χ² per degree of freedom of a linear structure: near 1 if the structure is linear.
+    /// χ² per degree of freedom of a linear model: near 1 if the structure is linear.
     pub linear_misfit: f64,
-    /// The same with the named kinds.
+    /// χ² per degree of freedom of the model with the named kinds.
     pub explained_misfit: f64,
     /// Largest relative change of |X/F| with the force level at one frequency.
     pub level_dependence: f64,
@@ -33,7 +35,7 @@ pub struct Verdict {
 /// Second and third harmonics of the response at one force level, relative to the fundamental.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Harmonics {
-    /// Frequency, Hz.
+    /// Excitation frequency, Hz.
     pub frequency_hz: f64,
     /// Force amplitude, N.
     pub force_n: f64,
@@ -41,35 +43,35 @@ pub struct Harmonics {
     pub second: f64,
     /// |X(3ω)|/|X(ω)|.
     pub third: f64,
-    /// The ratio that noise alone causes.
+    /// Standard deviation of the noise at 2ω, relative to the fundamental.
     pub noise: f64,
 }
 
-/// Why the test gives no result.
+/// Reason why the linearity test gives no result.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LinearityError {
-    /// No frequency was measured at two levels.
+    /// Every frequency was measured at one force level only.
     #[error(
         "no frequency was measured at two or more force levels ({dwells} dwells were found); a step-sine test at several levels, or a tone of rising force, is needed"
     )]
     OneLevel {
-        /// Dwells found.
+        /// Number of dwells found.
         dwells: usize,
     },
 }
 
-/// The dynamic stiffness of one dwell.
+/// Dynamic stiffness F/X measured in one dwell.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     group: usize,
     omega: f64,
     amplitude: f64,
     stiffness: Complex64,
-    /// Variance of real or imaginary part.
+    /// Variance of the real part of the stiffness, equal to that of the imaginary part, (N/m)².
     variance: f64,
 }
 
-/// Tests dwells with force and motion in one direction.
+/// Tests the linearity of a structure from dwells with force and motion in one direction.
 ///
 /// # Errors
 /// No frequency at two levels.
@@ -89,7 +91,7 @@ pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
         parameters: 0,
         sum: alone,
     };
-    // A linear rig's sum is within chance of its degrees of freedom: then there is nothing to explain.
+    // χ² of a linear structure exceeds its degrees of freedom by more than this only by a rare chance.
     let chance = free + 4.0 * (2.0 * free).sqrt();
     let (second, third) = (harmonic(dwells, 2), harmonic(dwells, 3));
     if alone > chance {
@@ -156,7 +158,7 @@ fn points(dwells: &[Dwell]) -> Vec<Point> {
     points.sort_by(|a, b| a.omega.total_cmp(&b.omega));
     let mut group = 0;
     for index in 1..points.len() {
-        // Steps of one frequency scatter by their noise only; a thousandth is closer than steps of a test are.
+        // Dwells within 0.1 % in frequency are repetitions of one frequency step.
         if points[index].omega > points[index - 1].omega * 1.001 {
             group += 1;
         }
@@ -165,7 +167,8 @@ fn points(dwells: &[Dwell]) -> Vec<Point> {
     points
 }
 
-/// The baseline of the test: one free complex stiffness per frequency. Kinds explain its change with the level.
+/// Linear model of the test: one free complex stiffness per frequency. The candidate kinds explain the change of stiffness with the
+/// level.
 struct Base<'a> {
     points: &'a [Point],
     groups: usize,
@@ -183,7 +186,7 @@ impl<'a> Base<'a> {
         2.0 * (self.points.len() - self.groups) as f64
     }
 
-    /// χ² of the residual after the features and a free complex stiffness per frequency.
+    /// χ² of the residual after a fit of `features` and a free complex stiffness per frequency.
     fn sum_of_squares(&self, features: &[Vec<Complex64>]) -> f64 {
         let rows = 2 * self.points.len();
         let mut matrix = DMatrix::zeros(rows, features.len().max(1));
@@ -210,7 +213,7 @@ impl<'a> Base<'a> {
         }
     }
 
-    /// Values over their standard deviation, minus the weighted mean at their frequency.
+    /// Values minus their weighted mean at the same frequency, divided by their standard deviation.
     fn centered(&self, value: &dyn Fn(usize) -> f64) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.groups];
         for (i, point) in self.points.iter().enumerate() {
@@ -233,7 +236,7 @@ struct Choice {
     sum: f64,
 }
 
-/// The simplest set of one or two kinds that explains the level dependence.
+/// The set of one or two kinds with the fewest parameters that explains the level dependence; `nothing` if no kind is significant.
 fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
     let candidates = candidates(base, points);
     let mut all: Vec<Choice> = candidates
@@ -265,8 +268,8 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
     let Some(least) = all.first().cloned() else {
         return nothing;
     };
-    // Of the sets that explain all but a small share, or about as much as the best, the one with the fewest parameters; among
-    // equals the best fit.
+    // Sufficient are sets that leave at most a small share of χ², or not much more than the best set. The set with the fewest
+    // parameters is chosen; among equals the one with the best fit.
     let enough = (least.sum + KIND_EVIDENCE).max(EXPLAINED_SHARE * nothing.sum);
     all.into_iter()
         .filter(|choice| choice.sum <= enough)
@@ -275,7 +278,7 @@ fn choose(base: &Base<'_>, points: &[Point], nothing: Choice) -> Choice {
 }
 
 impl Candidate {
-    /// A nonlinear spring and a nonlinear damping can act together. Hysteresis is both already.
+    /// True if two kinds may act together: a nonlinear spring and a nonlinear damping. Hysteresis contains both already.
     fn goes_with(&self, other: &Self) -> bool {
         self.spring != other.spring
             && self.kind != Nonlinearity::Hysteresis
@@ -300,7 +303,7 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
         parameters,
         features,
     };
-    // Gap and yield displacement are searched over the measured amplitudes and slightly beyond.
+    // Gap and yield displacement are searched from far below the smallest to just above the largest measured amplitude.
     let sizes = points.iter().map(|point| point.amplitude);
     let (least, largest) = sizes.fold((f64::INFINITY, 0.0_f64), |(a, b), x| (a.min(x), b.max(x)));
     let scan = |of: &dyn Fn(&Point, f64) -> Complex64| {
@@ -314,7 +317,7 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
         };
         let sum = |size: f64| base.sum_of_squares(&features(size));
         let (mut from, mut to) = ((0.05 * least).ln(), (1.5 * largest).ln());
-        // A coarse grid, then finer grids around the best value.
+        // A coarse grid is refined three times around the best value.
         for _ in 0..4 {
             let step = (to - from) / 40.0;
             let mut best = (f64::INFINITY, from);
@@ -361,14 +364,14 @@ fn candidates(base: &Base<'_>, points: &[Point]) -> Vec<Candidate> {
 
 /// True if the change of stiffness with the level is that of a quadratic spring alone.
 ///
-/// Balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k, so that the stiffness changes by
-/// k₂(2a₀ + X₂) = −(5/6)k₂²X²/k = −30·k·(X₂/X)². k comes from how F/X changes with frequency at the lowest level.
+/// Harmonic balance of k₂x² near resonance: a₀ = −k₂X²/2k, X₂ = k₂X²/6k. The stiffness changes by k₂(2a₀ + X₂) = −(5/6)k₂²X²/k =
+/// −30·k·(X₂/X)². k follows from the change of F/X with frequency at the lowest level.
 fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
     let shares: Vec<(f64, f64, f64)> = dwells
         .iter()
         .filter_map(|dwell| {
             let (_, motion) = pair(dwell)?;
-            // Displacement shares: a derivative makes the second harmonic larger by 2 each time.
+            // Ratio X₂/X of the displacement: each differentiation multiplies the second harmonic by another factor of 2.
             let larger = f64::from(1 << derivative(motion.quantity));
             let share = at_harmonic(motion, dwell, 2)?.0 / motion.amplitude(1) / larger;
             let size = motion.amplitude(1) / dwell.omega.powi(i32::from(derivative(motion.quantity)));
@@ -397,7 +400,7 @@ fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
         .map(|p| (p.omega * p.omega, p.stiffness.re))
         .collect();
     let [stiffness, _] = line(&by_frequency);
-    // Change of stiffness over (X₂/X)², against the lowest level of the same frequency.
+    // Regression of the change of stiffness on the change of (X₂/X)² against the lowest level of the same frequency.
     let (mut above, mut below) = (0.0, 0.0);
     for point in points {
         let Some(base) = lowest.iter().find(|base| base.group == point.group) else {
@@ -408,7 +411,7 @@ fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
             below += (share - at_base) * (share - at_base);
         }
     }
-    // Within a half either way: damping, other modes and the next order of the balance move it.
+    // The ratio is −30 for a quadratic spring; ±50 % allow for damping, other modes and the next order of the balance.
     let ratio = above / (below * stiffness);
     (-45.0..-15.0).contains(&ratio)
 }
@@ -423,7 +426,7 @@ fn level_dependence(points: &[Point]) -> f64 {
     largest
 }
 
-/// |X(hω)| of the motion and the deviation that noise gives it.
+/// Amplitude |X(hω)| of harmonic h, and its standard deviation from noise.
 fn at_harmonic(line: &Line, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
     let place = 2 * h - 1;
     if line.coefficients.len() <= place + 1 {
@@ -433,7 +436,7 @@ fn at_harmonic(line: &Line, dwell: &Dwell, h: usize) -> Option<(f64, f64)> {
     Some((line.amplitude(h), variance.sqrt()))
 }
 
-/// True if harmonic h of the motion exceeds both the noise and the response to the same harmonic of the force.
+/// True if harmonic h of the motion exceeds both the noise and the response to harmonic h of the force.
 fn harmonic(dwells: &[Dwell], h: usize) -> bool {
     let (mut sum, mut count) = (0.0, 0.0);
     for dwell in dwells {
@@ -445,12 +448,12 @@ fn harmonic(dwells: &[Dwell], h: usize) -> bool {
         else {
             continue;
         };
-        // The receptance at hω, off resonance, is at most that at ω near resonance.
+        // The receptance at hω, above resonance, is at most the receptance at ω near resonance.
         let caused = (f - 3.0 * force_noise).max(0.0) * motion.amplitude(1) / force.amplitude(1);
         sum += ((x - caused).max(0.0) / noise).powi(2);
         count += 2.0;
     }
-    // χ² of `count` degrees of freedom: five of its deviations above its mean.
+    // Significant if χ² exceeds the mean of its distribution by more than five of its standard deviations.
     count > 0.0 && sum > count + 5.0 * (2.0_f64 * count).sqrt()
 }
 

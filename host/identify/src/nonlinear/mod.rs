@@ -1,4 +1,4 @@
-//! Nonlinear restoring forces: tests of linearity, and parameters of nonlinear terms.
+//! Nonlinear restoring forces: linearity tests, and identification of nonlinear terms.
 
 pub mod describing;
 pub mod harmonic_balance;

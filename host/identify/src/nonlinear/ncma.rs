@@ -10,16 +10,16 @@ use crate::least_squares::{scaled_inverse, scaled_least_squares};
 pub struct Curve {
     /// Amplitude of the force, N.
     pub force_n: f64,
-    /// (ω in rad/s, H in m/N), sorted by ω.
+    /// Points (ω in rad/s, H in m/N), sorted by ω.
     pub points: Vec<(f64, Complex64)>,
 }
 
-/// Linearized mode at one vibration amplitude.
+/// Mode linearized at one vibration amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linearized {
     /// Amplitude of the force, N.
     pub force_n: f64,
-    /// Receptance magnitude |H| at both points, m/N.
+    /// Receptance magnitude |H|, m/N, which the two points of the mode have in common.
     pub receptance: f64,
     /// Natural frequency ω_r, rad/s.
     pub omega: f64,
@@ -29,26 +29,26 @@ pub struct Linearized {
     pub modal_constant: Complex64,
 }
 
-/// value(F, X/F) = a(F)·(X/F)² + b(F)·(X/F) + c(F) with a, b, c polynomials in F: of degree 1 as eqs 4.8 and 4.9 print it, or
-/// of degree 2, which a cubic mode needs (its a is in proportion to F²).
+/// Empirical map value(F, X/F) = a(F)·(X/F)² + b(F)·(X/F) + c(F). The polynomials a, b, c in F have degree 1 as in thesis eqs 4.8
+/// and 4.9, or degree 2, which a cubic mode requires (its a is proportional to F²).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
     /// Coefficients of a from the highest power of F down, then those of b, then those of c.
     pub coefficients: Vec<f64>,
     /// Standard deviations of the coefficients.
     pub deviations: Vec<f64>,
-    /// NRMSE: root mean square of the residual over that of the values.
+    /// NRMSE of the map: RMS of the residual over RMS of the values.
     pub relative_error: f64,
-    /// Least and largest force, N, and receptance, m/N, of the data.
+    /// Smallest and largest force, N, and smallest and largest receptance, m/N, of the data.
     pub range: [[f64; 2]; 2],
 }
 
-/// Eq. 4.8 as printed: ω_r of the first mode in y, in Hz as Fig. 4.10 has it.
+/// Coefficients of thesis eq. 4.8 as printed: ω_r of the first mode in y, in Hz as in Fig. 4.10.
 pub const THESIS_FREQUENCY_HZ: [f64; 6] = [-3.7e8, 1.3e9, 5.6e3, -6.3, -0.036, 8.7];
-/// Eq. 4.9 as printed: η_r of the same mode.
+/// Coefficients of thesis eq. 4.9 as printed: loss factor η_r of the first mode in y.
 pub const THESIS_LOSS_FACTOR: [f64; 6] = [6.1e7, -2.4e8, -1.1e3, 2.1e3, 0.005, 0.039];
 
-/// The value of a map with these coefficients: three polynomials in F of one degree, see [`Map`].
+/// The value of a map with these coefficients: three polynomials in F of equal degree, see [`Map`].
 pub fn evaluate(coefficients: &[f64], force_n: f64, receptance: f64) -> f64 {
     let size = (coefficients.len() / 3).max(1);
     coefficients.chunks(size).fold(0.0, |value, polynomial| {
@@ -63,8 +63,8 @@ impl Map {
         evaluate(&self.coefficients, force_n, receptance)
     }
 
-    /// Eq. 4.7 for all forces at once, by least squares: `None` with fewer points than coefficients, or with as many
-    /// forces as the degree or fewer.
+    /// Fits thesis eq. 4.7 to all forces together by least squares. `None` if there are fewer points than coefficients, or no more
+    /// distinct forces than the degree.
     pub fn fit(points: &[Linearized], degree: usize, value: impl Fn(&Linearized) -> f64) -> Option<Self> {
         let size = degree + 1;
         let matrix = DMatrix::from_fn(points.len(), 3 * size, |row, column| {
@@ -99,10 +99,10 @@ impl Map {
 }
 
 impl Curve {
-    /// The modes of the pairs of points with the same |H| on both sides of the peak, down to `share` of the peak.
+    /// Linearized modes from pairs of points with equal |H| on both sides of the peak, down to `share` of the peak.
     ///
-    /// Each measured point on one side is paired with the interpolated one on the other; H between points is a cubic
-    /// through four of them in real and imaginary part.
+    /// Each measured point on one side is paired with an interpolated point on the other. Between points H is a cubic through four
+    /// of them, in real and imaginary part.
     pub fn linearized(&self, share: f64) -> Vec<Linearized> {
         let Some(peak) = self.peak() else {
             return Vec::new();
@@ -146,7 +146,7 @@ impl Curve {
         (peak > 0 && peak + 1 < self.points.len()).then_some(peak)
     }
 
-    /// First crossing of |H| with `level`, searched in the intervals that begin at `starts`: ω and H.
+    /// First crossing of |H| with `level` in the intervals that begin at `starts`: its ω and H.
     fn crossing(&self, level: f64, starts: Vec<usize>) -> Option<(f64, Complex64)> {
         let start = starts.into_iter().find(|&i| {
             let (a, b) = (
@@ -190,7 +190,7 @@ impl Curve {
 ///
 /// With p = ω_r² and g = η_r ω_r² the two complex equations H_j·(p − ω_j² + i·g) = A + iB are linear in p, g, A, B.
 pub fn two_points(points: [(f64, Complex64); 2]) -> Option<(f64, f64, Complex64)> {
-    // H and ω² are normalized, so that the linear system is well scaled.
+    // Scaling of H and ω² to the order of 1 keeps the linear system well conditioned.
     let size = points[0].1.norm();
     let scale = points[0].0 * points[0].0;
     let mut matrix = Matrix4::zeros();
@@ -220,21 +220,22 @@ mod tests {
         let constant = Complex64::new(5e-3, 2e-4);
         let h = |w: f64| constant / Complex64::new(omega * omega - w * w, eta * omega * omega);
         let (found, loss, residue) = two_points([(107.0, h(107.0)), (111.5, h(111.5))]).unwrap();
-        // Rounding, magnified by the closeness of the two points: 1/η.
+        // The error is rounding, multiplied by 1/η because the two points are close.
         assert!((found / omega - 1.0).abs() < 1e-12 && (loss / eta - 1.0).abs() < 1e-9);
         assert!((residue - constant).norm() < 1e-10 * constant.norm());
     }
 
     #[test]
     fn the_maps_of_the_thesis_are_as_printed() {
-        // Worked out by hand from eqs 4.8 and 4.9 at F = 4.2 N, X/F = 15 µm/N:
-        // (−3.7e8·4.2 + 1.3e9)·2.25e-10 + (5.6e3·4.2 − 6.3)·15e-6 + (−0.036·4.2 + 8.7).
+        // Worked out by hand from thesis eq. 4.8 at F = 4.2 N, X/F = 15 µm/N: (−3.7e8·4.2 + 1.3e9)·2.25e-10 + (5.6e3·4.2 −
+        // 6.3)·15e-6 + (−0.036·4.2 + 8.7).
         let omega = evaluate(&THESIS_FREQUENCY_HZ, 4.2, 15e-6);
         assert!(
             (omega - (-0.057150 + 0.352_705_5 + 8.5488)).abs() < 1e-9,
             "{omega}"
         );
-        // (6.1e7·4.2 − 2.4e8)·2.25e-10 + (−1.1e3·4.2 + 2.1e3)·15e-6 + (0.005·4.2 + 0.039).
+        // Worked out by hand from thesis eq. 4.9 at the same point: (6.1e7·4.2 − 2.4e8)·2.25e-10 + (−1.1e3·4.2 + 2.1e3)·15e-6 +
+        // (0.005·4.2 + 0.039).
         let eta = evaluate(&THESIS_LOSS_FACTOR, 4.2, 15e-6);
         assert!((eta - (0.003_645 - 0.0378 + 0.06)).abs() < 1e-9, "{eta}");
     }
@@ -257,7 +258,7 @@ mod tests {
         let frequency = Map::fit(&points, 1, |point| point.omega).unwrap();
         let loss = Map::fit(&points, 1, |point| point.loss_factor).unwrap();
         for i in 0..6 {
-            // Values are exact; the regression's condition is about 1e4.
+            // The data are exact; rounding is magnified by the condition number of the regression, about 1e4.
             assert!((frequency.coefficients[i] / THESIS_FREQUENCY_HZ[i] - 1.0).abs() < 1e-6);
             assert!((loss.coefficients[i] / THESIS_LOSS_FACTOR[i] - 1.0).abs() < 1e-6);
         }

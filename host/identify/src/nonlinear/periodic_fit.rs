@@ -1,8 +1,8 @@
-//! A law from whole periods of a periodic test (a multisine) by harmonic balance with every line of the period.
+//! Coefficients of a law from whole periods of a periodic test (a multisine), by harmonic balance with every line of the period.
 //!
-//! The balance Σ θ φ(x) = F is solved for the periodic x at the samples of a period, twice as dense as measured so that
-//! cubes of the measured band do not fold back into it; by Newton's method with linear systems solved iteratively
-//! (GMRES, preconditioned by the linear part). The motion is fitted to the measured one, with its exact derivatives.
+//! The balance Σ θ φ(x) = F is solved for the periodic x at the samples of a period, at twice the measured sample rate, so that
+//! cubes of the measured band do not alias into it. Newton's method solves its linear systems iteratively (GMRES, preconditioned by
+//! the linear part). The predicted motion is fitted to the measured one with exact derivatives.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -20,39 +20,39 @@ use crate::nonlinear::restoring_force::{Term, deviations};
 pub struct Period<'a> {
     /// Force, N.
     pub force: &'a [f64],
-    /// Displacement, m; its mean is left out.
+    /// Displacement, m; its mean is subtracted.
     pub displacement: &'a [f64],
 }
 
-/// A fitted law.
+/// A law fitted to the periods of a test.
 #[derive(Clone, Debug)]
 pub struct PeriodicFit {
-    /// The terms with their coefficients.
+    /// The terms of the law with their coefficients, SI.
     pub law: Vec<(Term, f64)>,
-    /// Standard deviations.
+    /// Standard deviations of the coefficients.
     pub deviations: Vec<f64>,
-    /// NRMSE of the motion.
+    /// NRMSE of the predicted motion.
     pub relative_error: f64,
 }
 
-/// Why there is no fit.
+/// Reason why the fit gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PeriodicError {
-    /// A term that is not smooth.
+    /// A term of the law is not smooth.
     #[error(
         "{0} is not smooth: harmonic balance of a multisine takes springs and dampers; use restoring-force"
     )]
     NotSmooth(&'static str),
-    /// Periods of different length, or none.
+    /// The periods differ in length, or are too short.
     #[error("periods of one length, at least 16 samples, are needed")]
     Length,
-    /// Mass and stiffness are needed for a periodic motion of its own.
+    /// The terms lack mass, damping or stiffness, without which the law has no periodic motion.
     #[error("mass, damping and stiffness are needed among the terms")]
     NoOscillator,
-    /// The balance or the fit does not converge.
+    /// The harmonic balance or the fit does not converge.
     #[error("the balance does not converge: the law has no periodic motion near the measured one")]
     NotConverged,
-    /// Data that do not determine the terms.
+    /// The periods do not determine all terms.
     #[error("the periods do not determine all terms")]
     Undetermined,
 }
@@ -65,7 +65,7 @@ struct Balance {
     rate_hz: f64,
     forward: Arc<dyn Fft<f64>>,
     inverse: Arc<dyn Fft<f64>>,
-    /// Frequencies of the lines, rad/s.
+    /// Angular frequencies of the lines of the transform, rad/s.
     omega: Vec<f64>,
 }
 
@@ -92,13 +92,13 @@ impl Balance {
         }
     }
 
-    /// Real samples through a filter over ω.
+    /// Real samples of a period, filtered with the frequency response `filter`(ω).
     fn filtered(&self, samples: &[f64], filter: impl Fn(f64) -> Complex64) -> Vec<f64> {
         let mut line: Vec<Complex64> = samples.iter().map(|x| Complex64::new(*x, 0.0)).collect();
         self.forward.process(&mut line);
         let half = line.len() / 2;
         for (index, (value, omega)) in line.iter_mut().zip(&self.omega).enumerate() {
-            // At half the sample rate a filter is real or not at all.
+            // At half the sample rate only the real part of a filter acts on real samples.
             let through = filter(*omega);
             *value *= if index == half {
                 Complex64::new(through.re, 0.0)
@@ -111,7 +111,7 @@ impl Balance {
         line.into_iter().map(|x| x.re * scale).collect()
     }
 
-    /// The period twice as dense, of the same band.
+    /// The samples of a period interpolated to the sample rate of the balance, with unchanged spectrum.
     fn dense(&self, samples: &[f64]) -> Vec<f64> {
         let count = samples.len();
         let mut planner = FftPlanner::new();
@@ -130,7 +130,7 @@ impl Balance {
         self.filtered(x, |omega| Complex64::new(0.0, omega).powi(order))
     }
 
-    /// φ of every term.
+    /// Regressor φ of every term at every sample, for the displacement x.
     fn features(&self, x: &[f64]) -> Vec<Vec<f64>> {
         let (v, a) = (self.derivative(x, 1), self.derivative(x, 2));
         self.terms
@@ -144,7 +144,7 @@ impl Balance {
         place.map_or(0.0, |index| theta[index])
     }
 
-    /// d(force)/dx and d(force)/dv of the nonlinear terms at every sample.
+    /// Derivatives of the nonlinear restoring force by x and by v at every sample.
     fn slopes(&self, theta: &DVector<f64>, x: &[f64]) -> [Vec<f64>; 2] {
         let v = self.derivative(x, 1);
         let (k2, k3) = (
@@ -171,7 +171,7 @@ impl Balance {
         move |omega: f64| Complex64::new(k + more[0] - m * omega * omega, (c + more[1]) * omega)
     }
 
-    /// Solves J δ = r, J the derivative of the balance at x.
+    /// Solves J δ = `right`, with J the derivative of the balance by the displacement.
     fn solve_linear(&self, theta: &DVector<f64>, slopes: &[Vec<f64>; 2], right: &[f64]) -> Option<Vec<f64>> {
         let mean = |values: &Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         let near = self.linear(theta, [mean(&slopes[0]), mean(&slopes[1])]);
@@ -189,7 +189,7 @@ impl Balance {
         gmres(apply, right).map(|y| precondition(&y))
     }
 
-    /// The periodic motion under `force` near `x`.
+    /// Periodic motion under `force`, by Newton's method from `x`; `None` without convergence.
     fn solve(&self, theta: &DVector<f64>, force: &[f64], mut x: Vec<f64>) -> Option<Vec<f64>> {
         for _ in 0..25 {
             let mut residual: Vec<f64> = force.iter().map(|f| -f).collect();
@@ -206,7 +206,7 @@ impl Balance {
             if !moved.is_finite() {
                 return None;
             }
-            // GMRES leaves 1e-9 of each step: this one is exact to what floating point and it allow.
+            // GMRES solves each step to a relative error of 1e-9, so a step of that size cannot be improved.
             if moved <= 1e-9 * size {
                 return Some(x);
             }
@@ -223,7 +223,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Solves A y = b without restart; `None` where a hundred directions are not enough for 1e-9.
+/// Solves A y = b by GMRES without restart; `None` if a hundred iterations do not reduce the residual to 1e-9.
 fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> {
     let size = norm(right);
     if size == 0.0 {
@@ -268,7 +268,7 @@ fn gmres(apply: impl Fn(&[f64]) -> Vec<f64>, right: &[f64]) -> Option<Vec<f64>> 
     None
 }
 
-/// The law with these terms that fits the periods.
+/// Fits the coefficients of the given terms to the periods of a test.
 ///
 /// # Errors
 /// See [`PeriodicError`].
@@ -307,7 +307,7 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[Term]) -> Result<Perio
         let step = scaled_least_squares(&slope, &left).ok_or(PeriodicError::Undetermined)?;
         theta += &step;
         let moved = step.component_div(&theta).amax();
-        // A millionth of every parameter is below any interval.
+        // The relative change of every coefficient is below a millionth: far below any interval.
         if moved < 1e-6 {
             let (slope, left) = balance.linearized(&theta, &forces, &measured, &mut motions)?;
             let all: f64 = measured.iter().map(|y| dot(y, y)).sum();
@@ -322,9 +322,9 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[Term]) -> Result<Perio
     Err(PeriodicError::NotConverged)
 }
 
-/// The balance with the measured motion in it, where the force has its lines.
+/// Coefficients by linear least squares on the balance of the measured motion, within the band of the force.
 fn first_guess(balance: &Balance, forces: &[Vec<f64>], motions: &[Vec<f64>]) -> Option<DVector<f64>> {
-    // Above the band of the force derivatives of the measured motion are noise.
+    // Above the band of the force the derivatives of the measured motion consist of noise.
     let limit = force_band(balance, forces);
     let keep = |x: &[f64]| {
         balance.filtered(x, |omega| {
@@ -343,7 +343,7 @@ fn first_guess(balance: &Balance, forces: &[Vec<f64>], motions: &[Vec<f64>]) -> 
     scaled_least_squares(&DMatrix::from_columns(&columns), &DVector::from_vec(right))
 }
 
-/// The frequency below which 99 % of the force's power lies, rad/s.
+/// Angular frequency below which 99 % of the force power lies, rad/s.
 fn force_band(balance: &Balance, forces: &[Vec<f64>]) -> f64 {
     let mut power = vec![0.0; balance.omega.len() / 2];
     for force in forces {
@@ -365,8 +365,8 @@ fn force_band(balance: &Balance, forces: &[Vec<f64>]) -> f64 {
 }
 
 impl Balance {
-    /// d(motion)/dθ at the measured samples of all periods, and measured less predicted motion; `motions` moves to the
-    /// predicted one.
+    /// Derivative of the motion by θ at the measured samples of all periods, and measured minus predicted motion. Replaces
+    /// `motions` by the predicted motion.
     fn linearized(
         &self,
         theta: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! Reciprocity: of a linear structure without gyroscopic forces H_ij = H_ji.
+//! Reciprocity test: H_ij = H_ji holds for a linear structure without gyroscopic forces.
 
 use num_complex::Complex64;
 
@@ -6,20 +6,20 @@ use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use quietcut_model::structure::Direction;
 
-/// How H_ij and H_ji compare.
+/// Comparison of the cross receptances H_ij and H_ji.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Reciprocity {
-    /// The two directions.
+    /// The directions i and j.
     pub directions: [&'static str; 2],
     /// Mean square of H_ij − H_ji over its variance: near 1 for a reciprocal structure.
     pub misfit: f64,
-    /// Largest difference relative to the largest receptance.
+    /// Largest difference of H_ij and H_ji, relative to the largest |H_ij|.
     pub largest_change: f64,
     /// True if the data are consistent with reciprocity.
     pub reciprocal: bool,
 }
 
-/// H of `to` under a force in `from` (m/N), its variance, and the force.
+/// Receptance in direction `to` under a force in direction `from`, m/N, its variance, and the force amplitude, N.
 fn receptance(dwell: &Dwell, from: Direction, to: Direction) -> Option<(Complex64, f64, f64)> {
     let force = dwell.force().filter(|line| line.direction == from)?;
     let motion = dwell.motions.iter().find(|line| line.direction == to)?;
@@ -29,12 +29,12 @@ fn receptance(dwell: &Dwell, from: Direction, to: Direction) -> Option<(Complex6
     let h = y / order / f;
     let own = motion.variance / (order * f).norm_sqr();
     let of_force = h.norm_sqr() * force.variance / f.norm_sqr();
-    // Real and imaginary part together.
+    // The variance is that of real and imaginary part together.
     Some((h, 2.0 * per_unit * (own + of_force), f.norm()))
 }
 
-/// Compares the two cross receptances at every frequency at which both were measured, each at its lowest force: there a
-/// nonlinear structure is closest to its linear part. `None` where there is no such frequency.
+/// Compares the two cross receptances at every frequency at which both were measured, each at its lowest force, where a nonlinear
+/// structure is closest to a linear one. `None` if there is no such frequency.
 pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> {
     let of = |from, to| -> Vec<(f64, Complex64, f64)> {
         let mut found: Vec<(f64, Complex64, f64, f64)> = dwells
@@ -81,7 +81,8 @@ pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> 
         directions: [i.name(), j.name()],
         misfit,
         largest_change,
-        // The mean of unit exponentials plus five standard deviations; 1 % is the accuracy of the position of a shaker.
+        // The mean of `count` exponential variables of mean 1 rarely exceeds 1 by five standard deviations; 1 % is the accuracy of
+        // the position of a shaker.
         reciprocal: misfit < 1.0 + 5.0 / f64::sqrt(count) || largest_change < 0.01,
     })
 }

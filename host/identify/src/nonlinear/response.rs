@@ -1,31 +1,31 @@
-//! Prediction of an identified law: its motion under a recorded force.
+//! Motion that an identified law predicts under a recorded force.
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use crate::nonlinear::restoring_force::Term;
 
-/// Instants between two samples at which the force is interpolated: even, two to a step of the integration.
+/// Number of instants per sample at which the force is interpolated; a Runge–Kutta step uses two of them, so it must be even.
 const FINER: usize = 8;
 
-/// Why a law gives no prediction.
+/// Reason why a law gives no prediction.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ResponseError {
-    /// No mass.
+    /// The law has no mass.
     #[error("a law without mass has no motion of its own")]
     NoMass,
     /// The motion grows without bound.
     #[error("the motion of the law grows without bound after {time_s:.3} s: it means nothing at this force")]
     Diverged {
-        /// When.
+        /// Time at which the displacement is no longer finite, s.
         time_s: f64,
     },
 }
 
-/// Displacement of the law Σ θ φ = F from rest, m, at the samples of `force` (N, at `rate_hz`).
+/// Displacement, m, that the law Σ θ φ = F predicts from rest, at the samples of `force` (N, at `rate_hz`).
 ///
-/// Between samples the force is interpolated without changing its band (sampled signals that came through an
-/// anti-aliasing filter have no other shape); the classical Runge–Kutta method takes four steps per sample.
+/// Between samples the force is interpolated without a change of its spectrum, as for a signal that passed an anti-aliasing filter.
+/// The classical Runge–Kutta method takes four steps per sample.
 ///
 /// # Errors
 /// No mass, or a motion without bound.
@@ -77,7 +77,7 @@ pub fn displacement(law: &[(Term, f64)], force: &[f64], rate_hz: f64) -> Result<
     Ok(found)
 }
 
-/// [`FINER`] times as many samples of the same band.
+/// The samples interpolated to [`FINER`] times their rate, with unchanged spectrum.
 fn finer(samples: &[f64]) -> Vec<f64> {
     let count = samples.len();
     let mut planner = FftPlanner::new();

@@ -1,9 +1,9 @@
-//! The restoring-force surface f_r(q̇, q) = f − m q̈ (thesis eq. 5.4), its slices, and the law that it follows.
+//! The restoring-force surface f_r(q̇, q) = f − m q̈ (thesis eq. 5.4), its slices, and the law fitted to it.
 //!
 //! The law is fitted by least squares between force and motion *within a band*. Force and every term of the law, nonlinear terms
 //! included, pass the same filter: the filtered signals satisfy the same equation, and noise of derivatives outside the band has no
-//! effect. If the law has a spring, the equation error is weighted by its receptance and becomes an error of the *motion*, where
-//! the noise is (Sanathanan–Koerner weighting). One motion channel is enough; the others are its derivatives or integrals.
+//! effect. If the law has a spring, the equation error is weighted by its receptance and becomes an error of the *motion*, which
+//! carries the noise (Sanathanan–Koerner weighting). One motion channel is sufficient; the others are its derivatives or integrals.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +15,7 @@ use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
 use crate::student::NINETY_PERCENT;
 use quietcut_recording::Quantity;
 
-/// A term of the law along one direction.
+/// A term of a force law along one direction q.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Term {
     /// m q̈.
@@ -34,12 +34,12 @@ pub enum Term {
     CubicDamping,
     /// fc sign(q̇).
     CoulombFriction,
-    /// A constant force.
+    /// A constant force, N.
     Offset,
 }
 
 impl Term {
-    /// Its key in answers and cases.
+    /// Key of the term in answers and cases.
     pub fn key(self) -> &'static str {
         match self {
             Self::Mass => "mass_kg",
@@ -54,7 +54,7 @@ impl Term {
         }
     }
 
-    /// Its regressor.
+    /// Regressor of the term at the displacement x, velocity v and acceleration a.
     pub fn value(self, x: f64, v: f64, a: f64) -> f64 {
         match self {
             Self::Mass => a,
@@ -81,85 +81,85 @@ impl Term {
 pub struct Record<'a> {
     /// Force on the structure, N.
     pub force: &'a [f64],
-    /// The measured motion, SI.
+    /// The measured motion, SI; its quantity is `quantity`.
     pub motion: &'a [f64],
-    /// Its quantity: displacement, velocity or acceleration.
+    /// Quantity of the motion: displacement, velocity or acceleration.
     pub quantity: Quantity,
     /// Samples per second.
     pub rate_hz: f64,
 }
 
-/// How to take a record.
+/// Settings of the fit of a restoring-force surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// The terms of the law.
     pub terms: Vec<Term>,
-    /// The mass if it is known, kg. Required without a force.
+    /// The mass if it is given, kg. Required for a record without force.
     pub mass_kg: Option<f64>,
-    /// The band, Hz; `None` takes the band in which the motion exceeds its noise.
+    /// Frequency band of the fit, Hz; `None` takes the band in which the motion exceeds its noise.
     pub band_hz: Option<[f64; 2]>,
-    /// Length left out at both ends, s.
+    /// Duration that is left out at both ends of the record, s.
     pub trim_s: f64,
 }
 
 /// Displacement, velocity and acceleration of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// m.
+    /// Displacement, m.
     pub x: Vec<f64>,
-    /// m/s.
+    /// Velocity, m/s.
     pub v: Vec<f64>,
-    /// m/s².
+    /// Acceleration, m/s².
     pub a: Vec<f64>,
 }
 
-/// The law that a record follows.
+/// Result of the fit: the force law of a record, and its restoring-force surface.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// The terms.
+    /// The fitted terms.
     pub terms: Vec<Term>,
-    /// Their coefficients, SI.
+    /// Coefficients of the terms, SI.
     pub theta: DVector<f64>,
-    /// Standard deviations from the residual, with its correlation in time.
+    /// Standard deviations of the coefficients, from the residual and its correlation in time.
     pub deviations: DVector<f64>,
-    /// NRMSE of the force (of m q̈ without a force) within the band.
+    /// NRMSE of the force within the band; without a force, of m q̈.
     pub force_error: f64,
-    /// The band used, Hz.
+    /// Frequency band of the fit, Hz.
     pub band_hz: [f64; 2],
-    /// Motion and f_r of the samples used.
+    /// Motion at the samples used.
     pub motion: Motion,
-    /// f_r = f − m q̈, N.
+    /// Restoring force f_r = f − m q̈ at the samples used, N.
     pub restoring_n: Vec<f64>,
 }
 
-/// Why there is no surface.
+/// Reason why the fit gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
-    /// No force and no mass.
+    /// The record has no force and the mass is not given.
     #[error(
         "no force acts in the record, so that only ratios to the mass can be found; give the mass (--mass-kg)"
     )]
     NoForce,
-    /// Too short.
+    /// The record is too short for the number of terms.
     #[error("{samples} samples are too few for {terms} terms; at least {needed} are needed")]
     TooShort {
-        /// Samples after trimming.
+        /// Number of samples after trimming.
         samples: usize,
-        /// Terms.
+        /// Number of terms.
         terms: usize,
-        /// Needed.
+        /// Number of samples needed.
         needed: usize,
     },
-    /// Data that do not determine the terms.
+    /// The data do not determine all terms.
     #[error("the record does not determine all terms; leave some out, or excite more strongly")]
     Undetermined,
 }
 
-/// Rounds of Sanathanan–Koerner weighting; the fourth changes nothing.
+/// Number of rounds of Sanathanan–Koerner weighting. A choice: the last round changes nothing noticeable.
 const REWEIGHTINGS: usize = 4;
 
 impl Record<'_> {
-    /// The motion within `band_hz`.
+    /// Displacement, velocity and acceleration within `band_hz`.
     pub fn motion(&self, band_hz: [f64; 2]) -> Motion {
         let spectral = Spectral::new(self.motion.len(), self.rate_hz);
         let measured = match self.quantity {
@@ -175,7 +175,7 @@ impl Record<'_> {
         }
     }
 
-    /// The law of the record.
+    /// Fits the force law to the record and computes its restoring-force surface.
     ///
     /// # Errors
     /// See [`SurfaceError`].
@@ -184,7 +184,7 @@ impl Record<'_> {
             .band_hz
             .unwrap_or_else(|| band_of(self.motion, self.rate_hz, BAND_SIGNAL_TO_NOISE));
         let dominant_hz = dominant_frequency_hz(self.motion, self.rate_hz);
-        // Noise that is integrated has no end towards frequency 0.
+        // Integration amplifies noise without limit towards frequency 0, so the band starts at a quarter of the dominant frequency.
         let integrated = matches!(self.quantity, Quantity::Velocity | Quantity::Acceleration);
         let lowest_hz = if integrated { 0.25 * dominant_hz } else { 0.0 };
         band_hz[0] = band_hz[0].max(lowest_hz);
@@ -192,10 +192,10 @@ impl Record<'_> {
         if !driven && options.mass_kg.is_none() {
             return Err(SurfaceError::NoForce);
         }
-        // Harmonics that a nonlinear term makes stand above the band of what is fitted, and belong to the surface.
+        // Nonlinear terms produce harmonics above the band of the fit; they belong to the surface, so the motion keeps them.
         let highest_hz = (1.5 * band_hz[1]).max(3.5 * dominant_hz).min(0.5 * self.rate_hz);
         let motion = self.motion([lowest_hz, highest_hz]);
-        // With a known mass the left side is f − m q̈, and mass is no term.
+        // With a given mass the left side of the equation is f − m q̈, and mass is not a term of the law.
         let mass = options.mass_kg.unwrap_or(0.0);
         let known: Vec<f64> = self
             .force
@@ -247,7 +247,7 @@ impl Record<'_> {
             right.norm()
         };
         let mut force_error = left.norm() / scale;
-        // A free decay is one transient. A weight as sharp as the resonance would smear it over the ends of the record.
+        // A free decay is a transient: a weight as narrow as the resonance would spread it over the ends of the record.
         if driven && terms.contains(&Term::Stiffness) {
             for _ in 0..REWEIGHTINGS {
                 let receptance = receptance(&terms, &theta, mass);
@@ -284,8 +284,8 @@ impl Record<'_> {
         })
     }
 
-    /// What a given law leaves of the force, ‖f − Σ θ·term‖/‖f‖ within `band_hz`: [`Surface::force_error`] of a law that was not
-    /// fitted here.
+    /// Relative residual force of a given law, ‖f − Σ θ·term‖/‖f‖ within `band_hz`: [`Surface::force_error`] of a law that was
+    /// fitted elsewhere.
     pub fn force_error(&self, law: &[(Term, f64)], band_hz: [f64; 2], trim_s: f64) -> f64 {
         let motion = self.motion([0.0, 0.5 * self.rate_hz]);
         let left: Vec<f64> = (0..self.motion.len())
@@ -311,7 +311,7 @@ impl Record<'_> {
     }
 }
 
-/// |H(f)| of the linear part, of size 1 at its largest over the band of a spring and a mass.
+/// Magnitude of the receptance of the linear terms over frequency in Hz, relative to the static compliance.
 fn receptance(terms: &[Term], theta: &DVector<f64>, mass: f64) -> impl Fn(f64) -> f64 + use<> {
     let of = |term: Term| {
         let place = terms.iter().position(|known| *known == term);
@@ -322,13 +322,14 @@ fn receptance(terms: &[Term], theta: &DVector<f64>, mass: f64) -> impl Fn(f64) -
     move |frequency: f64| {
         let omega = TAU * frequency;
         let stiff = stiffness - mass * omega * omega;
-        // A mode without damping would put all weight on one line.
+        // The damping has a lower bound, since a mode without damping would put all weight on one line.
         let lossy = (damping * omega).abs().max(1e-3 * stiffness.abs());
         stiffness.abs() / stiff.hypot(lossy)
     }
 }
 
-/// Standard deviations with the correlation of the residual in time: sums over blocks (Newey–West in its block form).
+/// Standard deviations of a least-squares solution whose residual is correlated in time: sandwich covariance with sums over blocks
+/// (the block form of Newey and West).
 pub(crate) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<DVector<f64>> {
     let inverse = scaled_inverse(&matrix.tr_mul(matrix))?;
     let blocks = 40.min(matrix.nrows() / (2 * matrix.ncols()).max(1)).max(1);
@@ -343,34 +344,36 @@ pub(crate) fn deviations(matrix: &DMatrix<f64>, left: &DVector<f64>) -> Option<D
     Some(covariance.diagonal().map(|variance| variance.max(0.0).sqrt()))
 }
 
-/// A polynomial in one variable along a slice of the surface.
+/// A polynomial in displacement or velocity, fitted along a slice of the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
-    /// (x or v, f_r) of the samples in the slice.
+    /// Samples of the slice: (x or v, f_r).
     pub points: Vec<(f64, f64)>,
-    /// Coefficient of the first power and its deviation.
+    /// Coefficient of the first power and its standard deviation.
     pub linear: (f64, f64),
-    /// Coefficient of the third power and its deviation.
+    /// Coefficient of the third power and its standard deviation.
     pub cubic: (f64, f64),
 }
 
 impl Surface {
-    /// The stiffness slice: f_r over x for |v| below `share` of its maximum. The remaining small velocity is regressed out.
+    /// The stiffness slice: f_r over x for |v| below `share` of its maximum. A linear term in v accounts for the remaining
+    /// velocity.
     pub fn stiffness_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.x, &self.motion.v, &self.restoring_n, share)
     }
 
-    /// The damping slice: f_r over v for |x| below `share` of its maximum.
+    /// The damping slice: f_r over v for |x| below `share` of its maximum. A linear term in x accounts for the remaining
+    /// displacement.
     pub fn damping_slice(&self, share: f64) -> Option<Slice> {
         slice(&self.motion.v, &self.motion.x, &self.restoring_n, share)
     }
 
-    /// Half the width of the 90 % interval of a term.
+    /// Half-width of the 90 % interval of the term with this index.
     pub fn half_width(&self, index: usize) -> f64 {
         NINETY_PERCENT * self.deviations[index]
     }
 
-    /// The coefficient of a term.
+    /// The coefficient of a term; `None` if the law does not have it.
     pub fn value(&self, term: Term) -> Option<f64> {
         self.terms
             .iter()

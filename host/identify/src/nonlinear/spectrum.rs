@@ -1,8 +1,8 @@
 //! Derivatives, integrals and weights of whole records by the discrete Fourier transform.
 //!
-//! A record is not periodic. The line through its ends is subtracted, and the rest is continued by point reflection about its end,
-//! so that value and slope are continuous. An error remains over about one period of the lowest frequency at both ends; callers
-//! leave it out.
+//! A record is not periodic. The straight line through its ends is subtracted, and the remaining signal is continued by point
+//! reflection about its end, so that value and slope are continuous. An error of the length of about one period of the lowest
+//! frequency remains at both ends; callers leave it out.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,29 +10,29 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
-/// Transforms of records of one length.
+/// Discrete Fourier transforms of records of one length.
 #[derive(Clone)]
 pub struct Spectral {
     forward: Arc<dyn Fft<f64>>,
     inverse: Arc<dyn Fft<f64>>,
     rate_hz: f64,
-    /// Samples of a record.
+    /// Number of samples of a record.
     length: usize,
-    /// Samples that are transformed: there and back, the ends once.
+    /// Number of samples that are transformed: the record forwards and backwards, with each end once.
     period: usize,
 }
 
 /// Continuation of a record beyond its ends.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    /// About its end points, the line through them taken off: value and slope are continuous.
+    /// Point reflection about its ends, after the straight line through them is subtracted: value and slope are continuous.
     Points,
-    /// Mirrored: the value is continuous. An integral of it has no line that would run away.
+    /// Mirror reflection: the value is continuous. The integral of such a record does not drift.
     Mirror,
 }
 
 impl Spectral {
-    /// For records of `length` samples at `rate_hz`; at least two.
+    /// Plans the transforms of records of `length` samples at `rate_hz`; at least two samples.
     pub fn new(length: usize, rate_hz: f64) -> Self {
         let period = (2 * length).saturating_sub(2).max(2);
         let mut planner = FftPlanner::new();
@@ -45,7 +45,7 @@ impl Spectral {
         }
     }
 
-    /// Frequency of a line, Hz; negative in the upper half.
+    /// Frequency of a line of the transform, Hz; negative in the upper half.
     fn frequency_hz(&self, line: usize) -> f64 {
         let signed = if 2 * line > self.period {
             line as f64 - self.period as f64
@@ -55,8 +55,8 @@ impl Spectral {
         signed * self.rate_hz / self.period as f64
     }
 
-    /// The record through the filter H(f), f in Hz. `of_line` says what becomes of the line that [`Turn::Points`] takes
-    /// off: from its value and slope per second in the middle of the record.
+    /// The record filtered with the frequency response `filter`(f), f in Hz. [`Turn::Points`] subtracts a straight line first;
+    /// `of_line` maps the value of that line at the middle of the record and its slope per second to those of the filtered line.
     fn through(
         &self,
         samples: &[f64],
@@ -96,8 +96,9 @@ impl Spectral {
             .collect()
     }
 
-    /// The record within `band_hz`, differentiated `order` times (integrated where it is negative). A band that begins at
-    /// 0 keeps level and slope of the record; another begins softly, and takes the record as mirrored at its ends.
+    /// The record within `band_hz`, differentiated `order` times, or integrated for a negative order. With a band from 0 the level
+    /// and slope of the record stay. With a band from above 0 the lower band edge is gradual, and the record is mirrored at its
+    /// ends.
     pub fn derivative(&self, samples: &[f64], order: i32, band_hz: [f64; 2]) -> Vec<f64> {
         let nyquist = 0.5 * self.rate_hz;
         let filter = |frequency: f64| {
@@ -106,7 +107,7 @@ impl Spectral {
             } else {
                 0.0
             };
-            // At half the sample rate an odd derivative has no value.
+            // At half the sample rate an odd derivative of real samples is zero.
             let edge = order % 2 != 0 && frequency.abs() >= nyquist * (1.0 - 1e-12);
             if within == 0.0 || edge || (frequency == 0.0 && order < 0) {
                 Complex64::ZERO
@@ -126,7 +127,7 @@ impl Spectral {
         })
     }
 
-    /// The record with every frequency (Hz) times a real weight: no phase, so nothing moves in time.
+    /// The record with its spectrum multiplied by a real `weight` of the frequency in Hz: without a phase shift.
     pub fn weighted(&self, samples: &[f64], weight: impl Fn(f64) -> f64) -> Vec<f64> {
         let still = weight(0.0);
         self.through(
@@ -138,7 +139,8 @@ impl Spectral {
     }
 }
 
-/// 1 from `low` on, 0 below half of it, half a cosine between: a sharp edge would ring on through the whole record.
+/// Gradual lower edge of a band: 1 above `low`, 0 below half of it, half a cosine between. A sharp edge would ring through the
+/// whole record.
 fn above(frequency: f64, low: f64) -> f64 {
     if frequency >= low {
         1.0
@@ -148,10 +150,10 @@ fn above(frequency: f64, low: f64) -> f64 {
     }
 }
 
-/// Power spectrum averaged over 1/400 of the record's lines, and the width of these intervals in Hz.
+/// Power spectrum averaged over intervals of 1/400 of the sample rate, and the width of these intervals, Hz.
 fn smooth_power(samples: &[f64], rate_hz: f64) -> (Vec<f64>, f64) {
     let length = samples.len();
-    // A Hann window: the ends of a record would else leak over the whole spectrum.
+    // A Hann window reduces the leakage from the ends of the record.
     let mut windowed: Vec<Complex64> = samples
         .iter()
         .enumerate()
@@ -177,16 +179,16 @@ fn loudest(smooth: &[f64]) -> usize {
     loudest
 }
 
-/// The dominant frequency of a record, Hz, to about 1/400 of half its sample rate.
+/// The frequency with the largest smoothed power, Hz, with a resolution of 1/400 of the sample rate.
 pub fn dominant_frequency_hz(samples: &[f64], rate_hz: f64) -> f64 {
     let (smooth, width_hz) = smooth_power(samples, rate_hz);
     (loudest(&smooth) as f64 + 0.5) * width_hz
 }
 
-/// Where a record stands out of its noise, Hz: from the lowest line that does to the highest of that contiguous stretch.
+/// Frequency band in which a record exceeds its noise, Hz: the contiguous intervals around the dominant frequency whose smoothed
+/// power exceeds the noise power by a factor of more than `margin`.
 ///
-/// The noise is the level that the quietest tenth of the smoothed spectrum below half the sample rate has; what stands
-/// `margin` times (in power) above it counts.
+/// The noise power is the 5 % quantile of the smoothed power spectrum.
 pub fn band_of(samples: &[f64], rate_hz: f64, margin: f64) -> [f64; 2] {
     let (smooth, width_hz) = smooth_power(samples, rate_hz);
     let mut sorted = smooth.clone();
@@ -213,7 +215,7 @@ mod tests {
     fn derivatives_and_integrals_are_those_of_the_sine() {
         let (rate, length) = (200.0, 2000);
         let omega = TAU * 3.07;
-        // On a slope, and no whole number of periods.
+        // The signal is a sine with a drift; the record does not hold a whole number of periods.
         let at = |i: usize| (omega * i as f64 / rate).sin();
         let x: Vec<f64> = (0..length).map(|i| at(i) + 0.2 * i as f64 / rate).collect();
         let spectral = Spectral::new(length, rate);
@@ -223,8 +225,8 @@ mod tests {
         let back = spectral.derivative(&spectral.derivative(&plain, 2, [0.0, 60.0]), -2, [1.0, 60.0]);
         for i in 500..length - 500 {
             let slope = omega * (omega * i as f64 / rate).cos() + 0.2;
-            // Two and a half seconds from the ends; what corners at the ends leave falls with the distance, and a mirrored
-            // record has its corners in the slope, which integration makes more of.
+            // The compared samples lie at least 2.5 s from the ends. The error from the corners of the continued record falls with
+            // the distance from the ends; a mirrored record has corners in its slope, which integration amplifies.
             assert!(
                 (twice[i] + omega * omega * at(i)).abs() < 2e-3 * omega * omega,
                 "{i}"
@@ -252,7 +254,7 @@ mod tests {
             })
             .collect();
         let [low, high] = band_of(&x, rate, 1e3);
-        // To one smoothed stretch: a four-hundredth of the sample rate.
+        // Accuracy of one smoothed interval: 1/400 of the sample rate, twice.
         assert!(
             (low - 20.0).abs() < 2.6 && (high - 60.0).abs() < 2.6,
             "{low} {high}"

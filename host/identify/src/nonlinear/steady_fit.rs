@@ -2,7 +2,7 @@
 //!
 //! The motion that the law predicts under the *measured* force is fitted to the measured motion. The residual is weighted with its
 //! covariance: noise of the motion, and noise of force and frequency propagated through the exact derivatives of the law. Intervals
-//! are those of the normal distribution. If the law does not fit down to the noise, they come from the scatter between dwells
+//! are those of the normal distribution. If the residual exceeds the noise, intervals come from the scatter between dwells
 //! (sandwich covariance).
 
 use nalgebra::{DMatrix, DVector};
@@ -17,31 +17,31 @@ use crate::nonlinear::whitening::Seen;
 use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::Direction;
 
-/// A fit of a law.
+/// Result of a fit of a law to steady motions.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The parameters.
+    /// The parameters θ of the law.
     pub theta: DVector<f64>,
-    /// Their covariance.
+    /// Covariance of the parameters.
     pub covariance: DMatrix<f64>,
     /// χ² per degree of freedom: near 1 if the law explains the data.
     pub misfit: f64,
-    /// NRMSE of the fundamental.
+    /// NRMSE of the fundamental of the predicted motion.
     pub relative_error: f64,
-    /// True where the covariance is the sandwich.
+    /// True if the covariance is the sandwich covariance, from the scatter between dwells.
     pub robust: bool,
 }
 
 /// Data of a fit: dwells and the directions that are the degrees of freedom of the law.
 #[derive(Clone, Copy)]
 pub struct Data<'a> {
-    /// The law.
+    /// The law whose parameters are fitted.
     pub law: &'a Law,
     /// Direction of each degree of freedom.
     pub directions: &'a [Direction],
-    /// The dwells, all with the grid's number of harmonics.
+    /// The dwells; every channel has the number of harmonics of the grid.
     pub dwells: &'a [Dwell],
-    /// The grid.
+    /// The harmonic-balance grid.
     pub grid: &'a Grid,
 }
 
@@ -52,7 +52,7 @@ impl Data<'_> {
             .position(|direction| *direction == line.direction)
     }
 
-    /// Every degree of freedom is the displacement in its direction.
+    /// Output matrix S of [`Seen`]: every degree of freedom is the displacement in one direction.
     fn unit(&self) -> DMatrix<f64> {
         DMatrix::identity(self.law.dofs, self.law.dofs)
     }
@@ -68,7 +68,7 @@ impl Data<'_> {
         self.seen(&self.unit()).force(dwell, self.grid.width())
     }
 
-    /// The measured displacement of every degree of freedom; `None` where one is not measured.
+    /// Fourier coefficients of the measured displacement of every degree of freedom; `None` if one of them is not measured.
     fn displacement(&self, dwell: &Dwell) -> Option<DVector<f64>> {
         let width = self.grid.width();
         let mut x = DVector::zeros(self.law.dofs * width);
@@ -84,7 +84,7 @@ impl Data<'_> {
         Some(x)
     }
 
-    /// Parameters of the balance at the fundamental with the measured motion in it: linear least squares.
+    /// First guess of the parameters: linear least squares on the harmonic balance of the measured motion at the fundamental.
     ///
     /// # Errors
     /// Too few dwells, or data that do not determine them.
@@ -121,7 +121,7 @@ impl Data<'_> {
         scaled_least_squares(&matrix, &right).ok_or(FitError::Undetermined)
     }
 
-    /// Residual of a dwell over its noise, and its derivative by θ.
+    /// Whitened residual of a dwell, and its derivative by θ; `None` if the law has no motion near the measured one.
     fn whitened(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let solution = self.solve(dwell, theta, &self.displacement(dwell)?)?;
         self.seen(&self.unit())
@@ -139,13 +139,14 @@ impl Data<'_> {
         self.grid.solve(problem, start).ok()
     }
 
-    /// The displacement that the law predicts at a dwell, near the measured one; degree after degree.
+    /// Fourier coefficients of the displacement predicted by the law near the measured motion of a dwell, one degree of freedom
+    /// after the other.
     pub fn predicted(&self, dwell: &Dwell, theta: &DVector<f64>) -> Option<DVector<f64>> {
         let start = self.displacement(dwell)?;
         Some(self.solve(dwell, theta, &start)?.x)
     }
 
-    /// NRMSE of the predicted fundamental.
+    /// NRMSE of the fundamental of the predicted motion over all dwells.
     pub fn relative_error(&self, theta: &DVector<f64>) -> f64 {
         let (mut left, mut all) = (0.0, 0.0);
         for dwell in self.dwells {
@@ -155,7 +156,7 @@ impl Data<'_> {
             let predicted = self.predicted(dwell, theta);
             for dof in 0..self.law.dofs {
                 for place in [1, 2].map(|part| dof * self.grid.width() + part) {
-                    // Without a periodic motion near the measured one the prediction is zero.
+                    // If the law has no periodic motion near the measured one, the prediction counts as zero.
                     let found = predicted.as_ref().map_or(0.0, |x| x[place]);
                     left += (found - measured[place]).powi(2);
                     all += measured[place].powi(2);
@@ -165,7 +166,7 @@ impl Data<'_> {
         if all > 0.0 { (left / all).sqrt() } else { 0.0 }
     }
 
-    /// The fit from a first guess.
+    /// Fits the parameters, from a first guess, by nonlinear least squares.
     ///
     /// # Errors
     /// See [`FitError`].
@@ -193,7 +194,7 @@ impl Data<'_> {
 }
 
 impl Fit {
-    /// Half the width of the 90 % interval of a parameter.
+    /// Half-width of the 90 % interval of the parameter with this index.
     pub fn half_width(&self, parameter: usize) -> f64 {
         NINETY_PERCENT * self.covariance[(parameter, parameter)].max(0.0).sqrt()
     }

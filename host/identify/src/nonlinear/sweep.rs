@@ -1,9 +1,9 @@
-//! Receptances of sweeps compared: forward against backward, and level against level.
+//! Receptances of two records compared: forward sweep with backward sweep, or one force level with another.
 //!
-//! The receptance of one record is estimated line by line with the local polynomial method: over 2R + 1 neighbouring lines
-//! Y = H·F + T with H and T parabolas of the frequency, T what starts and ends of the record leave. It does not depend on the
-//! rate or the direction of the sweep, as the ratio at the instantaneous frequency does: of a linear structure two sweeps give
-//! the same H within noise.
+//! The local polynomial method estimates the receptance of one record line by line. Over 2R + 1 neighbouring lines Y = H·F + T,
+//! with H and T parabolas in the frequency; T is the transient that the start and the end of the record cause. The estimate does
+//! not depend on the rate or the direction of the sweep, unlike the ratio at the instantaneous frequency: two sweeps of a linear
+//! structure give the same H within noise.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -11,41 +11,41 @@ use rustfft::FftPlanner;
 
 use crate::criteria::{LEAST_SWEEP_CHANGE, SWEEP_MISFIT};
 
-/// Lines on either side.
+/// Number of lines on each side of a local estimate.
 const R: i64 = 7;
-/// Complex unknowns of a fit.
+/// Number of complex unknowns of a local estimate: three coefficients of H and three of T.
 const UNKNOWNS: usize = 6;
 
 /// The spectra of force and motion of one record.
 pub struct Spectra {
     force: Vec<Complex64>,
     motion: Vec<Complex64>,
-    /// Hz per line.
+    /// Frequency difference of neighbouring lines, Hz.
     spacing_hz: f64,
 }
 
-/// How two records compare.
+/// Comparison of the receptances of two records.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Comparison {
     /// Mean square of the difference of the two receptances over its variance: 1 to 3 for a linear structure.
     pub misfit: f64,
-    /// Largest difference relative to the largest receptance.
+    /// Largest difference of the receptances, relative to the largest receptance of the first record.
     pub largest_change: f64,
     /// True if both records are consistent with one linear structure.
     pub same: bool,
 }
 
-/// A local estimate.
+/// Local estimate of the receptance at one frequency.
 struct Local {
     h: Complex64,
-    /// Variance of one line of the motion.
+    /// Noise variance of one line of the motion.
     noise: f64,
-    /// Variance of H over that.
+    /// Variance of H divided by the noise variance of a line.
     gain: f64,
 }
 
 impl Spectra {
-    /// The spectra of force (N) and displacement, velocity or acceleration, at `rate_hz`.
+    /// Spectra of a force, N, and a displacement, velocity or acceleration, sampled at `rate_hz`.
     pub fn new(force: &[f64], motion: &[f64], rate_hz: f64) -> Self {
         let mut planner = FftPlanner::new();
         let plan = planner.plan_fft_forward(force.len());
@@ -62,7 +62,7 @@ impl Spectra {
         }
     }
 
-    /// The excited band: frequencies at which the smoothed force spectrum exceeds a tenth of its maximum.
+    /// Lowest and highest frequency at which the smoothed force power exceeds a tenth of its maximum, Hz.
     fn band_hz(&self) -> Option<[f64; 2]> {
         let width = (2 * R + 1) as usize;
         let power: Vec<f64> = self
@@ -114,7 +114,8 @@ impl Spectra {
     }
 }
 
-/// Compares two records of one force direction and one motion; `None` where their bands do not overlap by ten estimates.
+/// Compares two records with the same direction of force and the same motion; `None` if their common band has too few independent
+/// estimates.
 pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
     let (of_a, of_b) = (a.band_hz()?, b.band_hz()?);
     let (low, high) = (of_a[0].max(of_b[0]), of_a[1].min(of_b[1]));
@@ -129,7 +130,8 @@ pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
             Some((a.local(frequency)?, b.local(frequency)?))
         })
         .collect();
-    // The noise of a sensor is the same at all lines; what a nonlinear structure adds near resonance is not noise.
+    // Sensor noise is equal at all lines. The residual of a nonlinear structure near resonance is not noise, so the median over the
+    // lines is used.
     let median = |of: &dyn Fn(&(Local, Local)) -> f64| {
         let mut values: Vec<f64> = pairs.iter().map(of).collect();
         values.sort_by(f64::total_cmp);

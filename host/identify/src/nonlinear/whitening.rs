@@ -1,4 +1,4 @@
-//! Whitened residuals: measured minus predicted steady motion, in units of its noise.
+//! Whitened residuals: measured minus predicted steady motion, divided by the root of its covariance.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -7,12 +7,12 @@ use crate::dwells::dwell::{Dwell, Line};
 use crate::nonlinear::harmonic_balance::Solution;
 use quietcut_model::structure::Direction;
 
-/// Output and input of the degrees of freedom q: u = S q in `directions`, and generalized forces Sᵀ F.
+/// Measured directions u = S q and generalized forces Sᵀ F of a structure with the degrees of freedom q.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen<'a> {
-    /// The directions of u.
+    /// The directions of the entries of u and F.
     pub(crate) directions: &'a [Direction],
-    /// S, a row for each direction.
+    /// The matrix S: a row for each direction, a column for each degree of freedom.
     pub(crate) shape: &'a DMatrix<f64>,
 }
 
@@ -23,7 +23,8 @@ impl Seen<'_> {
             .position(|direction| *direction == line.direction)
     }
 
-    /// Fourier coefficients of the force on every degree of freedom; its mean is left out, load cells do not have it.
+    /// Fourier coefficients of the generalized force on every degree of freedom, without the mean, which dynamic load cells do not
+    /// measure.
     pub(crate) fn force(&self, dwell: &Dwell, width: usize) -> DVector<f64> {
         let dofs = self.shape.ncols();
         let mut force = DVector::zeros(dofs * width);
@@ -40,7 +41,7 @@ impl Seen<'_> {
         force
     }
 
-    /// Motion in the direction of a row, from that of all degrees of freedom.
+    /// Fourier coefficients of the motion in one direction, from those of all degrees of freedom.
     fn moved(&self, row: usize, q: &DMatrix<f64>, width: usize) -> DMatrix<f64> {
         let mut moved = DMatrix::zeros(width, q.ncols());
         for (dof, share) in self.shape.row(row).iter().enumerate() {
@@ -53,8 +54,8 @@ impl Seen<'_> {
 
     /// The whitened residual, measured − predicted, and the Jacobian of the prediction with respect to θ.
     ///
-    /// The noise comprises that of the motion, and that of force and frequency propagated through the derivatives of the law.
-    /// `None` where the motion is singular, or nothing was measured.
+    /// The covariance comprises the noise of the motion, and the noise of force and frequency propagated through the derivatives of
+    /// the law. `None` if the balance or the covariance is singular.
     pub(crate) fn whitened(
         &self,
         dwell: &Dwell,
@@ -115,7 +116,7 @@ impl Seen<'_> {
     }
 }
 
-/// Takes coefficients 1, cos, sin, cos 2 … in every column to those of the derivative.
+/// Replaces the Fourier coefficients 1, cos, sin, cos 2 … in every column by those of the `order`-th time derivative.
 fn differentiate(x: &mut DMatrix<f64>, order: u8, omega: f64) {
     for _ in 0..order {
         for mut column in x.column_iter_mut() {
