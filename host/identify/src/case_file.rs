@@ -1,4 +1,4 @@
-//! The text of a case file from identified parameters.
+//! Writes identified parameters as the text of a case file.
 
 use nalgebra::{DMatrix, Vector3};
 use num_complex::Complex64;
@@ -10,41 +10,41 @@ use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Runout;
 use quietcut_model::structure::{Direction, Joint, Mode, Robot};
 
-/// One identified parameter with its interval.
+/// One identified parameter with its standard deviation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Its key: `mass_kg`, `k3_n_per_m3` …
+    /// Key of the parameter in a case: `mass_kg`, `k3_n_per_m3` …
     pub key: &'static str,
-    /// Its directions: one, or two for an off-diagonal entry and for a coupling.
+    /// Direction of the parameter; two for an off-diagonal entry and for a coupling.
     pub directions: Vec<Direction>,
-    /// Its value, SI.
+    /// Value, SI.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the value, SI.
     pub deviation: f64,
 }
 
-/// An identified model that no case file can hold.
+/// Reason why an identified model does not fit into a case file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CaseFileError {
-    /// A matrix is missing.
+    /// An entry of this name, which a case requires, was not identified.
     #[error("a case needs {0}, which this method does not give")]
     Missing(&'static str),
-    /// The same extension in two directions.
+    /// The same extension is needed in two directions.
     #[error(
         "[extension.{0}] is needed in two directions; a case holds one: identify the directions one by one"
     )]
     Twice(&'static str),
-    /// Modes without a direction that is both excited and measured.
+    /// No direction is both excited and measured.
     #[error(
         "no direction is both driven and measured, so the modes are not those of a tool; drive where the motion is measured"
     )]
     NoDirection,
 }
 
-/// The sections of a case that are not the machine's dynamics.
+/// Sections of a case that do not describe the dynamics of the machine.
 const OTHERS: [&str; 4] = ["tool", "material", "cut", "limits"];
 
-/// The text of a case with the tool, material, cut and limits of another one, as they stand there.
+/// The case `text` with the sections tool, material, cut and limits of the case `other`.
 pub fn with_sections(text: &str, other: &Table) -> String {
     let mut case: Table = text.parse().unwrap_or_default();
     for section in OTHERS {
@@ -55,7 +55,7 @@ pub fn with_sections(text: &str, other: &Table) -> String {
     toml::to_string(&case).unwrap_or_default()
 }
 
-/// The text of a case with complex modes, in the directions that are both excited and measured.
+/// Text of a case with complex modes, in the directions that are both excited and measured.
 ///
 /// # Errors
 /// There is no such direction.
@@ -116,7 +116,7 @@ pub fn modal(name: &str, directions: &[Direction], modes: &[IdentifiedMode]) -> 
     case
 }
 
-/// A case of a robot at its posture; `deviations` are those of what was identified.
+/// A case of a robot at its posture; `deviations` are the standard deviations of the identified parameters.
 pub fn robot(name: &str, robot: &Robot, deviations: &[(JointParameter, f64)]) -> Table {
     let place = |place: &Vector3<f64>| numbers(place.iter().copied());
     let joint = |joint: &Joint| {
@@ -170,7 +170,7 @@ fn numbers(values: impl Iterator<Item = f64>) -> Value {
     Value::Array(values.map(Value::Float).collect())
 }
 
-/// The text of a case with force coefficients, teeth, and the runout if it was identified.
+/// A case with force coefficients, number of teeth, and the runout if it was identified.
 ///
 /// # Errors
 /// A cutting coefficient is missing.
@@ -205,7 +205,7 @@ pub fn cutting(
     Ok(case)
 }
 
-/// The extension of a key.
+/// Name of the extension that contains the parameter `key`; `None` for a parameter of the structure.
 fn extension_of(key: &str) -> Option<&'static str> {
     let effect = match key {
         "k2_n_per_m2" => EffectName::QuadraticStiffness,
@@ -217,16 +217,16 @@ fn extension_of(key: &str) -> Option<&'static str> {
     Some(effect.name())
 }
 
-/// The text of a case with mass, damping, stiffness and cubic terms as matrices, and everything else as extensions.
+/// Text of a case with mass, damping, stiffness and cubic terms as matrices, and all other terms as extensions.
 ///
 /// # Errors
-/// No mass, or two of one extension.
+/// No mass, damping or stiffness; or one extension in two directions.
 pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Result<String, CaseFileError> {
     let mut structure = Table::new();
     structure.insert("kind".into(), "matrices".into());
     let names = directions.iter().map(|direction| Value::from(direction.name()));
     structure.insert("directions".into(), Value::Array(names.collect()));
-    // Where k5 is, k3 stands beside it.
+    // The extension with k5 contains k3 as well.
     let turned = estimates.iter().any(|estimate| estimate.key == "k5_n_per_m5");
     let matrices = [
         ("mass", "mass_kg", true),
@@ -259,7 +259,7 @@ pub fn text(name: &str, directions: &[Direction], estimates: &[Estimate]) -> Res
     if !extensions.is_empty() {
         case.insert("extension".into(), Value::Table(extensions));
     }
-    // A table of numbers and words is always TOML.
+    // A table of numbers and words always converts to TOML.
     Ok(toml::to_string(&case).unwrap_or_default())
 }
 
@@ -354,7 +354,7 @@ mod tests {
         assert_eq!(after.joints, before.joints);
         assert_eq!(after.tool_m, before.tool_m);
         assert_eq!(case.deviations.len(), 18);
-        // Degrees are rounded once.
+        // The angles in degrees are rounded once.
         for (a, b) in after.angles_rad.iter().zip(&before.angles_rad) {
             assert!((a - b).abs() < 1e-14);
         }

@@ -1,39 +1,39 @@
-//! Weighed least squares of steady motions, whose weights move with the parameters.
+//! Weighted least squares on steady motions; the weights depend on the parameters.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use quietcut_numerics::singular_values::{Vectors, decompose};
 
-/// Why no law can be fitted.
+/// Reason why a law cannot be fitted to dwells.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// Too few data for the parameters.
+    /// There are too few dwells for the number of parameters.
     #[error(
         "{found} dwells with motion in every direction are too few for {parameters} parameters; at least {needed} are needed"
     )]
     TooFew {
-        /// Dwells that can be used.
+        /// Number of usable dwells.
         found: usize,
-        /// Parameters.
+        /// Number of parameters.
         parameters: usize,
-        /// Dwells needed.
+        /// Number of dwells needed.
         needed: usize,
     },
-    /// Data that do not determine the parameters.
+    /// The data do not determine the parameters.
     #[error(
         "the data do not determine all parameters; more force levels, or frequencies on both sides of the resonance, are needed"
     )]
     Undetermined,
-    /// The law has no periodic motion near the measured one.
+    /// The law has no periodic motion near the measured one at some dwells.
     #[error(
         "the law has no periodic motion near the measured one at {failed} of {all} dwells; another law is needed, or steadier data"
     )]
     NoMotion {
-        /// Dwells without.
+        /// Number of dwells without a predicted motion.
         failed: usize,
-        /// All dwells.
+        /// Number of all dwells.
         all: usize,
     },
-    /// No minimum was found.
+    /// The iteration found no minimum of the sum of squares.
     #[error("the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}")]
     NotConverged(f64),
 }
@@ -41,7 +41,7 @@ pub enum FitError {
 /// Above this misfit the law does not explain the data, and the sandwich is taken.
 const MISFIT: f64 = 1.3;
 
-/// Sums over the dwells: residual r over its noise, its derivative S by the parameters.
+/// Normal equations summed over dwells, from the whitened residual r of each dwell and its derivative S by the parameters.
 pub(super) struct Normal {
     /// Σ SᵀS.
     matrix: DMatrix<f64>,
@@ -52,23 +52,23 @@ pub(super) struct Normal {
     /// Σ rᵀr.
     sum: f64,
     rows: usize,
-    /// Dwells at which the law has no motion near the measured one.
+    /// Number of dwells at which the law has no motion near the measured one.
     failed: usize,
     dwells: usize,
 }
 
-/// How well the parameters are known.
+/// Covariance and misfit of a fit.
 pub(super) struct Spread {
     /// Covariance of the parameters.
     pub(super) covariance: DMatrix<f64>,
-    /// χ² per degree of freedom.
+    /// χ² per degree of freedom: near 1 if the law explains the data.
     pub(super) misfit: f64,
-    /// True where the covariance is the sandwich.
+    /// True if the covariance is the sandwich covariance, from the scatter between dwells.
     pub(super) robust: bool,
 }
 
 impl Normal {
-    /// Of so many parameters, without any dwell.
+    /// Empty normal equations for `size` parameters.
     pub(super) fn new(size: usize) -> Self {
         Self {
             matrix: DMatrix::zeros(size, size),
@@ -81,7 +81,8 @@ impl Normal {
         }
     }
 
-    /// Adds measured − predicted of a dwell over its noise with the derivative of the predicted; `None` where there is no motion.
+    /// Adds the whitened residual (measured − predicted) of a dwell and the derivative of the whitened prediction; `None` counts
+    /// the dwell as one without a predicted motion.
     pub(super) fn add(&mut self, dwell: Option<(DVector<f64>, DMatrix<f64>)>) {
         self.dwells += 1;
         let Some((residual, slope)) = dwell else {
@@ -107,8 +108,10 @@ impl Normal {
         self.sum / self.rows.saturating_sub(self.gradient.len()).max(1) as f64
     }
 
+    /// Covariance and misfit of the parameters.
+    ///
     /// # Errors
-    /// A dwell has no motion, or the data do not determine the parameters.
+    /// The law has no motion at a dwell, or the data do not determine the parameters.
     pub(super) fn spread(&self) -> Result<Spread, FitError> {
         if self.failed > 0 {
             return Err(self.failure());
@@ -129,8 +132,8 @@ impl Normal {
     }
 }
 
-/// The parameters of the least sum, by Levenberg and Marquardt, from a start whose steps are damped by a share of the diagonal:
-/// 0 where it is near.
+/// Parameters with the smallest sum of squares, by Levenberg–Marquardt steps from `start`. The first step adds the fraction
+/// `damping` to the diagonal of the normal matrix; 0 for a start near the minimum.
 ///
 /// # Errors
 /// See [`FitError`].
@@ -145,7 +148,7 @@ pub(super) fn minimum(
     }
 }
 
-/// Parameters that are nearer to the minimum: as [`minimum`], but for a guess a few rounds are enough.
+/// Parameters nearer to the minimum than `start`: like [`minimum`], but with fewer steps and without a test of convergence.
 ///
 /// # Errors
 /// The data do not determine them, or too many dwells have no motion.
@@ -157,7 +160,7 @@ pub(super) fn nearer(
     descend(start, damping, 25, of).map(|(theta, ..)| theta)
 }
 
-/// Parameters, their sums, and whether the minimum was reached.
+/// Parameters after at most `rounds` steps, their normal equations, and whether the minimum was reached.
 fn descend(
     start: DVector<f64>,
     mut damping: f64,
@@ -167,7 +170,7 @@ fn descend(
     let mut theta = start;
     let mut normal = of(&theta);
     for _ in 0..rounds {
-        // A dwell or two without a motion near the measured one may be found once the parameters are better.
+        // Dwells without a predicted motion are tolerated up to one half: better parameters may give them one.
         if normal.failed * 2 > normal.dwells {
             return Err(normal.failure());
         }
@@ -176,7 +179,7 @@ fn descend(
             matrix[(i, i)] *= 1.0 + damping;
         }
         let Some(step) = scaled_solve(&matrix, &normal.gradient) else {
-            // Far from the minimum parameters may look alike that are not.
+            // Far from the minimum the normal matrix may be singular although the data determine the parameters.
             if damping >= 1.0 {
                 return Err(FitError::Undetermined);
             }
@@ -185,8 +188,8 @@ fn descend(
         };
         let next = &theta + &step;
         let tried = of(&next);
-        // The step in units of the interval that the parameters will get. Weights move with the parameters, so that
-        // the sum itself need not fall at the very end.
+        // Length of the step in standard deviations of the parameters. The weights depend on the parameters, so the sum of squares
+        // may rise slightly at convergence.
         let length = step.dot(&(&normal.matrix * &step)).sqrt();
         if length < 1e-3 && tried.failed == normal.failed {
             return Ok((next, tried, true));
@@ -206,7 +209,8 @@ fn descend(
     Ok((theta, normal, false))
 }
 
-/// Least squares with columns brought to length 1: parameters differ by many powers of ten.
+/// Least squares with columns scaled to length 1, because parameters differ by many powers of ten. `None` if the columns are
+/// linearly dependent.
 pub(super) fn scaled_least_squares(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let lengths = DVector::from_iterator(matrix.ncols(), matrix.column_iter().map(|column| column.norm()));
     if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
@@ -218,7 +222,7 @@ pub(super) fn scaled_least_squares(matrix: &DMatrix<f64>, right: &DVector<f64>) 
     }
     let svd = decompose(scaled, Vectors::Both).ok()?;
     let largest = svd.singular_values.max();
-    // Below the rounding of the data nothing is determined.
+    // Singular values below the rounding of the data do not determine the solution.
     if svd.singular_values.min() < 1e-12 * largest {
         return None;
     }

@@ -1,4 +1,4 @@
-//! Preparation of response-only records: removes the spindle harmonics, limits the band and decimates.
+//! Preparation of response-only records: removal of the spindle harmonics, band limit and decimation.
 
 use std::f64::consts::{PI, TAU};
 
@@ -18,17 +18,18 @@ pub struct Ambient {
     pub rate_hz: f64,
     /// Spindle frequency whose harmonics were removed, Hz; `None` if no speed is known.
     pub turn_hz: Option<f64>,
-    /// Why a recorded tachometer does not give the angle of the spindle; the stated speed was used instead, if there is one.
+    /// Reason why a recorded tachometer does not give the spindle angle; the stated speed is used instead, if there is one.
     pub tachometer_fault: Option<String>,
 }
 
-/// Fewest samples per period of the highest frequency after decimation.
+/// Smallest number of samples per period of the highest frequency after decimation.
 const PER_PERIOD: f64 = 3.0;
 
 impl Ambient {
-    /// All motions of one quantity of a recording up to `high_hz`: accelerations, else velocities, else displacements.
+    /// All motion channels of one quantity of a recording up to `high_hz`: accelerations if there are any, else velocities, else
+    /// displacements.
     ///
-    /// `None` where there is no motion.
+    /// `None` if the recording has no motion channel.
     pub fn new(recording: &Recording, high_hz: f64) -> Option<Self> {
         let of = |quantity: Quantity| -> Vec<_> {
             let motions = recording.channels.iter();
@@ -52,7 +53,7 @@ impl Ambient {
         })
     }
 
-    /// Length, s.
+    /// Duration of the record, s.
     pub fn seconds(&self) -> f64 {
         self.channels.first().map_or(0, Vec::len) as f64 / self.rate_hz
     }
@@ -119,8 +120,8 @@ fn without_harmonics(
     ((turn_hz > 0.0).then_some(turn_hz), fault)
 }
 
-/// Every so many samples, after a low-pass that is flat to a third of the new rate and closed from two thirds on (windowed sinc,
-/// Hann): what folds over falls above a third of the new rate.
+/// Decimates by the factor `every`, after a low-pass filter (windowed sinc, Hann) that passes up to a third of the new sample rate
+/// and blocks from two thirds on. Aliases fall above a third of the new rate.
 fn thinned(samples: &[f64], every: usize) -> Vec<f64> {
     if every == 1 {
         return samples.to_vec();

@@ -1,10 +1,11 @@
 //! Output-only modes: covariance-driven stochastic subspace identification (SSI-cov) with intervals.
 //!
-//! Of a structure that white noise drives the covariances R_k = E[y(t + k) y(t)ᵀ] = C A^(k−1) G are those of a free decay. Their
-//! block Hankel matrix is O·Γ; its left singular vectors are O in some basis, and A follows from its shift (Peeters and De
-//! Roeck 1999). White noise of sensors is in R₀ alone, which is not used. The covariance of the result is that of the record's
-//! blocks: each block moves the Hankel matrix, and along that move the poles are differentiated (Döhler and Mevel 2013 do the
-//! same by perturbation theory). Modes get no mass this way: force was not measured.
+//! The covariances R_k = E[y(t + k) y(t)ᵀ] = C A^(k−1) G of a structure under white noise are those of a free decay. Their block
+//! Hankel matrix is the product of an observability matrix O and a controllability matrix; its left singular vectors are O in some
+//! basis, and A follows from the shift of O (Peeters and De Roeck 1999). White sensor noise affects R₀ alone, which is not used.
+//! The covariance of the result comes from the blocks of the record: the poles are differentiated along the deviation of the Hankel
+//! matrix of each block from the mean (Döhler and Mevel 2013 do the same by perturbation theory). Modal masses are not identified,
+//! because the force is not measured.
 
 use std::f64::consts::TAU;
 
@@ -24,15 +25,15 @@ use crate::student::ninety_percent;
 pub struct AmbientMode {
     /// Natural frequency |λ|/2π, Hz.
     pub frequency_hz: f64,
-    /// Its deviation, Hz.
+    /// Standard deviation of the natural frequency, Hz.
     pub frequency_deviation_hz: f64,
     /// Damping ratio −Re λ/|λ|.
     pub damping_ratio: f64,
-    /// Its deviation.
+    /// Standard deviation of the damping ratio.
     pub damping_deviation: f64,
 }
 
-/// Modes of a record.
+/// Modes identified from a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AmbientModes {
     /// The modes within the band that are stable over the model order, by ascending frequency.
@@ -43,22 +44,22 @@ pub struct AmbientModes {
     pub blocks: usize,
 }
 
-/// Why the test gives no result.
+/// Reason why a record gives no modes.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum AmbientError {
-    /// Too short.
+    /// The record is too short for the band.
     #[error(
         "{seconds:.1} s are too short to tell modes from {low_hz} Hz on, and how well: {needed_s:.1} s are needed at least"
     )]
     TooShort {
-        /// Length, s.
+        /// Duration of the record, s.
         seconds: f64,
-        /// Lowest frequency, Hz.
+        /// Lowest frequency of the band, Hz.
         low_hz: f64,
-        /// Needed, s.
+        /// Duration needed, s.
         needed_s: f64,
     },
-    /// Nothing but noise.
+    /// No mode in the band exceeds the noise.
     #[error(
         "nothing between {0} and {1} Hz stands out of the noise: the data cannot tell; record longer, or shake it more"
     )]
@@ -71,19 +72,20 @@ pub enum AmbientError {
     Poles(#[from] EigenvalueError),
 }
 
-/// Fewest and most blocks of a record.
+/// Smallest and largest number of blocks of a record. A choice: the smallest number gives the covariance eleven degrees of freedom.
 const BLOCKS: [usize; 2] = [12, 40];
 
 /// Ratio of block length to longest lag. At this ratio the correlation between neighbouring blocks is negligible.
 const BLOCK_LENGTH: usize = 6;
 
-/// Periods of the lowest frequency that the lags span.
+/// Number of periods of the lowest frequency that the lags span. A choice.
 const PERIODS: f64 = 1.5;
 
-/// Step along the move of a block: small beside the scatter of the mean, large beside rounding.
+/// Step of the numerical derivative along the deviation of a block, relative to that deviation. A choice: far below the scatter of
+/// the mean, far above rounding.
 const STEP: f64 = 1e-3;
 
-/// The modes of a record in a band, Hz.
+/// Identifies the modes of a record in a frequency band, Hz.
 ///
 /// # Errors
 /// The record is too short, or nothing stands out.
@@ -138,7 +140,7 @@ pub fn modes(ambient: &Ambient, [low_hz, high_hz]: [f64; 2]) -> Result<AmbientMo
 }
 
 impl AmbientMode {
-    /// True if the 90 % interval of the damping ratio is wider than the ratio itself: it is not identifiable.
+    /// True if the 90 % interval of the damping ratio is wider than the ratio itself: the damping is not identifiable.
     pub fn is_vague(&self) -> bool {
         2.0 * NINETY_PERCENT * self.damping_deviation > self.damping_ratio
     }
@@ -152,7 +154,8 @@ struct Record {
     of_blocks: Vec<DMatrix<f64>>,
 }
 
-/// The block Hankel matrix of R_1 to R_(2i−1) over a range of t, i block rows and columns.
+/// Block Hankel matrix of the covariances R_1 to R_(2i−1), estimated over a range of samples, with i = `rows` block rows and
+/// columns.
 fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> DMatrix<f64> {
     let count = channels.len();
     let covariance = |lag: usize, i: usize, j: usize| -> f64 {
@@ -171,10 +174,10 @@ fn hankel(channels: &[Vec<f64>], range: std::ops::Range<usize>, rows: usize) -> 
 }
 
 impl Record {
-    /// Number of singular values above the scatter: even, since poles come in conjugate pairs.
+    /// Number of singular values that exceed the noise level; even, since poles come in conjugate pairs.
     fn order(&self) -> Result<usize, AmbientError> {
         let values = singular_values(self.mean.clone())?;
-        // The mean of two halves that alternate, one taken from the other: noise of the size of that of the mean.
+        // Difference of the means of the even and of the odd blocks, halved: pure noise of the size of the noise of the mean.
         let count = self.of_blocks.len() as f64;
         let mut noise = DMatrix::zeros(self.mean.nrows(), self.mean.ncols());
         for (index, block) in self.of_blocks.iter().enumerate() {
@@ -182,11 +185,11 @@ impl Record {
         }
         let level = singular_values(noise)?.max();
         let above = values.iter().filter(|value| **value > level).count();
-        // With as many states as rows there is no shift.
+        // The shift requires fewer states than rows.
         Ok((above.div_ceil(2) * 2).min(self.mean.nrows() - self.channels - 4) & !1)
     }
 
-    /// Poles of a Hankel matrix above the real axis, rad/s; `None` where there is no such model.
+    /// Poles of a Hankel matrix in the upper half-plane, rad/s; `None` if the model of this order does not exist.
     fn poles(&self, hankel: &DMatrix<f64>, order: usize) -> Result<Option<Vec<Complex64>>, AmbientError> {
         let Some(u) = decompose(hankel.clone(), Vectors::Left)?.u else {
             return Ok(None);
@@ -212,7 +215,7 @@ impl Record {
         ))
     }
 
-    /// Modes within the band, with deviations by the moves of the blocks.
+    /// Modes within the band, with standard deviations from the deviations of the blocks.
     fn modes(&self, order: usize) -> Result<Vec<AmbientMode>, AmbientError> {
         let [low_hz, high_hz] = self.band_hz;
         let is_mode = |pole: &Complex64| {

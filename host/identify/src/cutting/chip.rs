@@ -1,24 +1,24 @@
-//! Chip thickness of every tooth in a recorded cut, from the surface that all earlier passes left.
+//! Chip thickness of every tooth in a recorded cut, from the surface that earlier tooth passings left.
 
 use nalgebra::Vector3;
 
 use crate::cutting::force_test::CuttingTest;
 
-/// The chip of one tooth at one sample.
+/// Chip of one tooth at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chip {
     /// Immersion angle, rad.
     pub phi: f64,
-    /// Chip thickness, m, positive.
+    /// Chip thickness, m; positive.
     pub thickness_m: f64,
-    /// The tooth, from 0.
+    /// Index of the tooth that cuts the chip, from 0.
     pub tooth: usize,
-    /// The tooth that left the surface which it cuts.
+    /// Index of the tooth that left the surface which the chip is cut from.
     pub ahead: usize,
 }
 
-/// A point of the surface, as far along the chip thickness as a tooth without runout would stand that has the feed of
-/// this pass.
+/// A point of the surface. `reach_m` is its height along the chip thickness direction, relative to a tooth without runout, in the
+/// feed position of the current tooth passing.
 #[derive(Clone, Copy)]
 struct Point {
     phi: f64,
@@ -26,11 +26,11 @@ struct Point {
     owner: usize,
 }
 
-/// The chips cut at every sample; `runout_m` is the radial offset of each tooth.
+/// The chips cut at every sample; `runout_m` is the radial offset r of each tooth.
 ///
-/// On pass k tooth (−k mod N) runs over the arc; the edge stands at p(φ) = (sin φ, cos φ, 0)·u sin γ − z cos γ + r sin γ (eq. 3.1)
-/// before the feed, the surface S_k = max(p_k, S_(k−1) − f sin φ sin γ), and the chip is p_k − S_(k−1) + f sin φ sin γ where that
-/// is positive.
+/// In tooth passing k the tooth (−k mod N) moves over the arc of engagement. Without feed its edge stands at p(φ) = (sin φ, cos φ,
+/// 0)·u sin γ − z cos γ + r sin γ (thesis eq. 3.1). The surface is S_k = max(p_k, S_(k−1) − f sin φ sin γ), and the chip thickness
+/// p_k − S_(k−1) + f sin φ sin γ where that is positive.
 pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     let mut chips = vec![Vec::new(); test.angle.len()];
     let (Some(&first), Some(&last)) = (test.angle.first(), test.angle.last()) else {
@@ -52,7 +52,7 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
             let u = test.displacement.as_ref().map_or(Vector3::zeros(), |u| u[sample]);
             let own = (sin * u.x + cos * u.y) * sin_edge - u.z * cos_edge;
             let recession = test.feed_per_tooth_m * sin * sin_edge;
-            // Where nothing is known of the pass before, it was one without vibration.
+            // Where no earlier tooth passing is recorded, the surface is that of a tooth passing without vibration.
             let before = at(&surface, phi, &mut place).unwrap_or(Point {
                 phi,
                 reach_m: 0.0,
@@ -85,8 +85,8 @@ pub fn chips(test: &CuttingTest, runout_m: &[f64]) -> Vec<Vec<Chip>> {
     chips
 }
 
-/// The surface at an angle, by the cubic through four neighbours that one tooth has left, else along a straight line;
-/// `place` moves on with the angle.
+/// The surface at the angle `phi`: by the cubic through four neighbouring points that one tooth left, else by a straight line.
+/// `place` is the index of the last point before `phi` and only grows.
 fn at(surface: &[Point], phi: f64, place: &mut usize) -> Option<Point> {
     while *place + 1 < surface.len() && surface[*place + 1].phi <= phi {
         *place += 1;
@@ -101,7 +101,7 @@ fn at(surface: &[Point], phi: f64, place: &mut usize) -> Option<Point> {
     Some(Point { reach_m, ..left })
 }
 
-/// The polynomial through all points (Lagrange).
+/// Value at `phi` of the polynomial through all points (Lagrange).
 fn interpolated(points: &[Point], phi: f64) -> f64 {
     let weight = |i: usize| -> f64 {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);

@@ -1,10 +1,10 @@
 //! Force coefficients from cutting tests.
 //!
-//! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ} over the teeth that
-//! cut (eqs 3.2 to 3.4), with the chip thickness h of [`chips`], and the runout of each tooth in it: least squares over all
-//! samples, each channel weighted with its residual variance. For comparison the mean-force method (Altintas): forces averaged over
-//! a revolution, regressed on the feed. Runout and stable vibration do not affect it as long as every tooth stays in contact.
-//! Intervals come from the scatter between revolutions.
+//! At every instant F = Σ a {(K_tc e_t + K_rc e_r + K_ac e_a)(φ) h + (K_te e_t + K_re e_r + K_ae e_a)(φ)/sin γ}, summed over the
+//! engaged teeth (thesis eqs 3.2 to 3.4). The chip thickness h comes from [`chips`] and contains the runout of each tooth. Least
+//! squares over all samples, each channel weighted with its residual variance. For comparison the mean-force method (Altintas):
+//! forces averaged over a revolution, regressed on the feed. Runout and stable vibration do not affect it as long as every tooth
+//! stays in contact. Intervals come from the scatter between revolutions.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
 use quietcut_model::milling::Runout;
 
-/// Keys of the coefficients in a case: MPa, and N/mm.
+/// Keys of the coefficients in a case: three cutting coefficients in MPa, three edge coefficients in N/mm.
 pub const KEYS: [&str; 6] = [
     "ktc_mpa",
     "krc_mpa",
@@ -33,24 +33,25 @@ pub const KEYS: [&str; 6] = [
 /// A value with its standard deviation; the half-width of the 90 % interval is 1.645 standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Value {
-    /// The value.
+    /// The estimated value.
     pub value: f64,
-    /// The deviation.
+    /// Standard deviation of the value.
     pub deviation: f64,
 }
 
-/// Largest length of the last step, in standard deviations.
+/// Length of the last step below which the fit has converged, in standard deviations. A choice.
 const SETTLED: f64 = 1e-2;
 
-/// The same for fits in which chips at the edge of contact change with every step.
+/// Length of the last step, in standard deviations, up to which a fit is accepted if chips at the edge of contact change with every
+/// step. A choice.
 const SETTLED_ENOUGH: f64 = 0.3;
 
-/// Force coefficients from a set of cutting tests.
+/// Result of the fit: force coefficients from a set of cutting tests.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// The coefficients in the order of [`KEYS`]; `None` for the axial ones where no axial force was measured.
+    /// The coefficients in the order of [`KEYS`]; `None` for the axial ones if no axial force was measured.
     pub coefficients: [Option<Value>; 6],
-    /// The same from forces averaged over revolutions; `None` if all feeds are equal.
+    /// The coefficients from forces averaged over revolutions; `None` if all feeds are equal.
     pub averaged: Option<[Option<Value>; 6]>,
     /// Radial offset of each tooth from the mean of all teeth, m.
     pub runout_m: Vec<Value>,
@@ -58,16 +59,16 @@ pub struct Fit {
     pub relative_error: f64,
     /// Number of revolutions used.
     pub revolutions: usize,
-    /// Number of different feeds.
+    /// Number of different feeds per tooth.
     pub feeds: usize,
-    /// Feed per tooth, mean of the tests, m.
+    /// Mean feed per tooth of the tests, m.
     pub feed_per_tooth_m: f64,
 }
 
-/// Why the fit gives no result.
+/// Reason why the fit gives no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ForceCoefficientError {
-    /// Tests of different tools.
+    /// The tests have different numbers of teeth.
     #[error("the tests have tools with {0} and {1} teeth; tests of one tool are needed")]
     Teeth(usize, usize),
     /// Radial and axial coefficients are not separately identifiable.
@@ -85,21 +86,21 @@ pub enum ForceCoefficientError {
     NotConverged,
 }
 
-/// The coefficients and the radial offsets of the teeth.
+/// Parameters of the fit: coefficients, and radial offsets of the teeth.
 #[derive(Clone)]
 struct State {
-    /// In the order of [`KEYS`].
+    /// Coefficients in the order of [`KEYS`].
     coefficients: [f64; 6],
     runout_m: Vec<f64>,
 }
 
-/// Sums over samples.
+/// Normal equations and residuals, summed over samples.
 struct Sums {
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// Σ g gᵀ over revolutions.
+    /// Σ g gᵀ over revolutions, with g the gradient of one revolution.
     scatter: DMatrix<f64>,
-    /// Of squares, of each direction.
+    /// Sum of squared residuals in each direction, N².
     left: Vector3<f64>,
     all: f64,
     samples: usize,
@@ -131,7 +132,7 @@ impl Sums {
     }
 }
 
-/// The coefficients of tests with one tool.
+/// Fits the force coefficients to tests with one tool.
 ///
 /// # Errors
 /// See [`ForceCoefficientError`].
@@ -155,11 +156,11 @@ pub fn fit(tests: &[CuttingTest]) -> Result<Fit, ForceCoefficientError> {
         coefficients: [0.0; 6],
         runout_m: vec![0.0; first.teeth],
     };
-    // Without coefficients runout has no effect: the first step finds the coefficients alone.
+    // With zero coefficients runout has no effect, so the first step fits the coefficients alone.
     let linear = fitter.step(&start, &fitter.sums(&start))?.0;
     fitter.weigh(&linear);
     let state = fitter.settle(linear)?;
-    // The residual variances are known better now.
+    // The residual variances of the converged fit give better weights.
     fitter.weigh(&state);
     let state = fitter.settle(state)?;
     Ok(fitter.finish(&state))
@@ -172,17 +173,18 @@ struct Fitter<'a> {
 }
 
 impl Fitter<'_> {
-    /// Which coefficients are fitted.
+    /// Indices of the fitted coefficients.
     fn active(&self) -> Vec<usize> {
         (0..6).filter(|index| self.has_axial || index % 3 != 2).collect()
     }
 
-    /// Coefficients, then the runout of all teeth but the last.
+    /// Number of parameters: coefficients, then the radial offset of every tooth but the last.
     fn size(&self) -> usize {
         self.active().len() + self.teeth - 1
     }
 
-    /// Force of a sample, and its derivative by coefficients and the runout of every tooth.
+    /// Force on the tool at one sample, N; `slopes` receives its derivatives by the coefficients and by the radial offset of every
+    /// tooth.
     fn model(
         &self,
         prepared: &Prepared<'_>,
@@ -245,7 +247,7 @@ impl Fitter<'_> {
                     for (place, index) in active.iter().enumerate() {
                         row[place] = slopes[*index][axis];
                     }
-                    // The last tooth stands out by less the sum of the others.
+                    // The radial offset of the last tooth is minus the sum of the others.
                     for tooth in 0..self.teeth - 1 {
                         row[active.len() + tooth] =
                             slopes[6 + tooth][axis] - slopes[6 + self.teeth - 1][axis];
@@ -261,10 +263,10 @@ impl Fitter<'_> {
         sums
     }
 
-    /// The next state, and the length of the step in deviations.
+    /// The parameters after a Gauss–Newton step, and the length of the step in standard deviations.
     fn step(&self, state: &State, sums: &Sums) -> Result<(State, f64), ForceCoefficientError> {
         let active = self.active();
-        // Without any coefficient runout has no effect yet.
+        // With zero coefficients the radial offsets have no effect and are not fitted.
         let known = if state.coefficients == [0.0; 6] {
             active.len()
         } else {
@@ -310,7 +312,7 @@ impl Fitter<'_> {
             .iter()
             .map(|prepared| {
                 let sums = self.sums_of(prepared, state);
-                // A channel that is fitted exactly is no better than rounding.
+                // An exact fit would give an infinite weight; the variance is at least that of rounding.
                 let least = 1e-20 * sums.all / sums.samples.max(1) as f64;
                 (sums.left / sums.samples.max(1) as f64).map(|variance| variance.max(least))
             })
@@ -383,7 +385,8 @@ impl Fitter<'_> {
         feeds.len()
     }
 
-    /// The coefficients by mean forces: three equations for each revolution.
+    /// The coefficients from mean forces, by least squares on two or three equations per revolution; `None` if the tests do not
+    /// determine them.
     fn averaged(&self) -> Option<[Option<Value>; 6]> {
         let active = self.active();
         let directions = if self.has_axial { 3 } else { 2 };
@@ -423,8 +426,8 @@ impl Fitter<'_> {
 }
 
 impl Fit {
-    /// The coefficients whose values from mean forces and from instantaneous forces differ by more than the sum of both half-widths
-    /// and by more than 1/20 of the largest chip force.
+    /// Keys of the coefficients whose values from mean forces and from instantaneous forces differ by more than the sum of both
+    /// half-widths and by more than 1/20 of the largest coefficient of their kind.
     pub fn apart(&self) -> Vec<&'static str> {
         let averaged = self.averaged.unwrap_or_default();
         let largest = |values: &[Option<Value>]| {
@@ -432,7 +435,7 @@ impl Fit {
             sizes.fold(0.0, f64::max)
         };
         let cutting = largest(&self.coefficients[..3]);
-        // N/mm, from MPa and m.
+        // Largest edge coefficient or chip force per depth, N/mm: MPa times m gives 10³ N/mm.
         let edge = largest(&self.coefficients[3..]).max(1e3 * self.feed_per_tooth_m * cutting);
         let differs = |&(index, _): &(usize, &'static str)| {
             let (Some(one), Some(other)) = (self.coefficients[index], averaged[index]) else {
@@ -449,10 +452,10 @@ impl Fit {
     }
 }
 
-/// The offset of the tool axis that explains the radial offsets of the teeth: r_j = e cos(ψ + 2πj/N).
+/// Offset of the tool axis that explains the radial offsets of the teeth: r_j = e cos(ψ + 2πj/N).
 ///
-/// `None` for one tooth, and where the offset lies within its 90 % interval of zero. Two teeth show the offset along their own
-/// line alone.
+/// `None` for one tooth, or if the offset lies within its 90 % interval of zero. Two teeth show only the component of the offset
+/// along the line through them.
 pub fn runout(fit: &Fit) -> Option<Runout> {
     let teeth = fit.runout_m.len();
     let (mut cosine, mut sine) = (0.0, 0.0);
@@ -475,7 +478,8 @@ pub fn runout(fit: &Fit) -> Option<Runout> {
     })
 }
 
-/// Ratio of Student's to the normal 90 % quantile for this number of revolutions and parameters.
+/// Factor on standard deviations for few revolutions: ratio of Student's 90 % quantile to the normal one, times the correction for
+/// the number of fitted parameters.
 fn few(revolutions: usize, parameters: usize) -> f64 {
     let count = revolutions as f64;
     let taken = count / (count - parameters as f64).max(1.0);

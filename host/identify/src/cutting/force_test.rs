@@ -1,4 +1,4 @@
-//! A cutting test: forces, and motion where it was measured, over the angle of the tool.
+//! A cutting test: forces, and displacements where they were measured, over the spindle angle.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use crate::criteria::{ENGAGED_SHARE, LEAST_REVOLUTIONS};
 use quietcut_model::structure::feed_axes;
 use quietcut_recording::{Quantity, Recording, RecordingError, SpindleAngle};
 
-/// A recorded cut, everything in feed, normal and axial direction and SI units. Sample 0 is the first that has an angle.
+/// A recorded cut in feed, normal and axial direction, in SI units. Sample 0 is the first sample with a spindle angle.
 #[derive(Clone, Debug)]
 pub struct CuttingTest {
     /// Axial depth, m.
@@ -31,7 +31,7 @@ pub struct CuttingTest {
     pub has_axial_force: bool,
     /// Displacement of the tool, m; `None` where none was measured.
     pub displacement: Option<Vec<Vector3<f64>>>,
-    /// First and end sample of full engagement, whole revolutions.
+    /// First sample and end sample of full engagement; whole revolutions.
     pub full_cut: [usize; 2],
 }
 
@@ -42,12 +42,12 @@ pub struct Setup {
     pub edge_angle_deg: f64,
     /// Angle from the machine's x to the feed, degrees.
     pub feed_direction_deg: f64,
-    /// Begin and end of full engagement, s; `None` derives them from the force.
+    /// Start and end of full engagement, s; `None` derives them from the force.
     pub full_cut_s: Option<[f64; 2]>,
 }
 
 impl CuttingTest {
-    /// The test of a recording.
+    /// The cutting test in a recording.
     ///
     /// # Errors
     /// No tachometer, no fx or fy, a cut that the sidecar does not describe completely, or too few revolutions of full engagement.
@@ -124,8 +124,8 @@ impl CuttingTest {
         self.angle.partition_point(|&known| known < angle)
     }
 
-    /// Whole revolutions of full engagement, as ranges of samples. The first revolution of the recording only generates the
-    /// surface.
+    /// Whole revolutions of full engagement, as ranges of samples. The first revolution of the recording does not count: it only
+    /// generates the surface that the second one cuts.
     pub fn revolutions(&self) -> Vec<[usize; 2]> {
         let [from, to] = self.full_cut;
         if to <= from {
@@ -139,10 +139,10 @@ impl CuttingTest {
             .collect()
     }
 
-    /// Finds the revolutions of full engagement, within `window` if it is given.
+    /// Finds the revolutions of full engagement; within `window` if it is given. `None` if there are too few.
     fn find_full_cut(&mut self, window: Option<[usize; 2]>) -> Option<()> {
         let (first, last) = (*self.angle.first()?, *self.angle.last()?);
-        // The first turn in view leaves the surface that the second one cuts.
+        // The first revolution generates the surface that the second one cuts.
         let warm = self.sample_at(TAU * (first / TAU).ceil() + TAU);
         self.full_cut = [warm, self.sample_at(TAU * (last / TAU).floor())];
         if let Some([from, to]) = window {
@@ -156,12 +156,13 @@ impl CuttingTest {
             let sizes: Vec<f64> = revolutions.iter().map(size).collect();
             let mut sorted = sizes.clone();
             sorted.sort_by(f64::total_cmp);
-            // Most of a test is full cut: the upper quartile belongs to it, and growing vibration hardly moves it.
+            // More than a quarter of the revolutions are in full engagement, so the upper quartile of the forces belongs to it.
             let full = *sorted.get(3 * sorted.len() / 4)?;
             let above = |share: f64| sizes.iter().position(|size| *size > share * full);
             let below = |share: f64| sizes.iter().rposition(|size| *size > share * full);
             let (rise, fall) = (above(ENGAGED_SHARE)?, below(ENGAGED_SHARE)?);
-            // From a tenth to nine tenths; half of that again takes the last tenth four times over, on a straight way.
+            // Revolutions from a tenth to nine tenths of the full force. Half as many more are left out after them: with a linear
+            // rise, the last tenth would take an eighth as many.
             let way_in = rise - above(1.0 - ENGAGED_SHARE)?;
             let way_out = below(1.0 - ENGAGED_SHARE)? - fall;
             let beyond = |way: usize| if way > 0 { way / 2 + 2 } else { 0 };

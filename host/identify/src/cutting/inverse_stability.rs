@@ -1,10 +1,10 @@
-//! Modes from cuts that chattered and cuts that did not: inverse stability, without a force sensor.
+//! Modes from trial cuts that chattered or stayed stable (inverse stability), without a force sensor.
 //!
 //! The mode shapes are those of a first guess; natural frequencies, damping ratios and stiffnesses are unknown. At every cut the
 //! structure has a dominant Floquet multiplier μ (characteristic multiplier): the cut chatters if |μ| > 1, at the frequency given
-//! by μ. With known errors of the set depth and the read frequency every structure has a likelihood. The posterior distribution,
+//! by μ. With the errors of the set depth and the measured frequency every structure has a likelihood. The posterior distribution,
 //! with a log-uniform prior within [`Before`], is sampled by sequential Monte Carlo (Del Moral, Doucet and Jasra 2006). With few
-//! cuts the intervals are wide. Several separate regions that explain the cuts are all kept.
+//! cuts the intervals are wide. If several separate regions explain the cuts, the sample contains all of them.
 
 use std::f64::consts::TAU;
 
@@ -23,14 +23,14 @@ use crate::student::NINETY_PERCENT;
 use quietcut_model::structure::{Direction, FirstOrder, Mode};
 use quietcut_stability::{Problem, StabilityError, point};
 
-/// The prior: factors up and down from the first guess.
+/// Width of the prior: largest factor, up or down, between a parameter and its first guess.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Before {
-    /// Of natural frequencies.
+    /// Largest factor of natural frequencies.
     pub frequency: f64,
-    /// Of damping ratios.
+    /// Largest factor of damping ratios.
     pub damping: f64,
-    /// Of stiffnesses.
+    /// Largest factor of stiffnesses.
     pub stiffness: f64,
 }
 
@@ -44,19 +44,19 @@ impl Default for Before {
     }
 }
 
-/// Errors of the trial cuts.
+/// Measurement errors of the trial cuts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// Standard deviation of depths, relative.
+    /// Relative standard deviation of depths.
     pub depth: f64,
-    /// Standard deviation of chatter frequencies, relative.
+    /// Relative standard deviation of chatter frequencies.
     pub frequency: f64,
 }
 
-/// Prior and posterior of a quantity.
+/// Prior and posterior distribution of a modal parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// Median.
+    /// Median of the posterior.
     pub value: f64,
     /// 5 % and 95 % quantiles of the posterior.
     pub ci90: [f64; 2],
@@ -65,36 +65,36 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Standard deviation of the logarithm, if it were normal.
+    /// Standard deviation of the logarithm, from the posterior interval of a normal distribution.
     pub fn deviation(&self) -> f64 {
         (self.ci90[1] / self.ci90[0]).ln() / (2.0 * NINETY_PERCENT)
     }
 
-    /// True if the posterior interval is wider than half of the prior on a logarithmic scale: the cuts do not identify the
-    /// quantity.
+    /// True if the posterior interval is wider than half of the prior interval on a logarithmic scale: the cuts do not identify the
+    /// parameter.
     pub fn is_vague(&self) -> bool {
         let width = |[low, high]: [f64; 2]| (high / low).ln();
         width(self.ci90) > 0.5 * width(self.before)
     }
 }
 
-/// Posterior of one mode.
+/// Posterior distribution of the parameters of one mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseMode {
     /// Natural frequency, Hz.
     pub frequency_hz: Spread,
     /// Damping ratio.
     pub damping_ratio: Spread,
-    /// Stiffness of the mode in its softest direction, N/m: force over displacement at rest, of this mode alone.
+    /// Static stiffness of this mode alone in its softest direction, N/m.
     pub stiffness_n_per_m: Spread,
-    /// That of the first guess, N/m.
+    /// Static stiffness of the mode in the first guess, N/m.
     pub start_stiffness_n_per_m: f64,
 }
 
-/// Why the test gives no result.
+/// Reason why the trial cuts give no result.
 #[derive(Debug, thiserror::Error)]
 pub enum InverseError {
-    /// The first guess has no modes that could move.
+    /// The first guess has no oscillating mode.
     #[error("the first guess has no modes: every pole is real, or without a shape of its own")]
     NoModes,
     /// No structure within the prior explains the cuts.
@@ -107,28 +107,29 @@ pub enum InverseError {
     Stability(#[from] StabilityError),
 }
 
-/// Number of particles (structures drawn).
+/// Number of particles, each of which is one structure. A choice.
 const PARTICLES: usize = 192;
 
-/// From step to step so much of the particles' weight stays effective.
+/// Effective sample size that a tempering step keeps, as a fraction of the particles. A choice.
 const EFFECTIVE: f64 = 0.5;
 
-/// Moves of every particle after each step, and after the last one.
+/// Number of Metropolis moves of every particle after a tempering step, and after the last step. A choice.
 const MOVES: [usize; 2] = [2, 4];
 
-/// The structures: logarithms of factors on the first guess, three for each mode.
+/// Family of structures over the vector θ: logarithms of factors on frequency, damping and stiffness of each mode of the first
+/// guess.
 struct Family<'a> {
     start: &'a Problem,
     /// Pole and projector of each mode.
     modes: Vec<(Complex64, DMatrix<Complex64>)>,
-    /// Those with a chatter frequency first: they tell the most.
+    /// The trial cuts, those with a chatter frequency first: they restrict the structure most.
     cuts: Vec<ObservedCut>,
     errors: Errors,
-    /// Logarithms of the factors of [`Before`], three for each mode.
+    /// Logarithms of the prior factors of [`Before`]: frequency, damping and stiffness for each mode.
     half_widths: Vec<f64>,
 }
 
-/// Modes from cuts; `start` has the first guess and the force coefficients. The result depends on the seed alone.
+/// Identifies modes from trial cuts; `start` contains the first guess and the force coefficients. Equal seeds give equal results.
 ///
 /// # Errors
 /// See [`InverseError`].
@@ -145,7 +146,7 @@ pub fn modes(
         .iter()
         .map(|part| {
             let (real, turned) = (part.moved(Complex64::ONE), part.moved(Complex64::I));
-            // 2 Re P and 2 Re iP = −2 Im P.
+            // 2 Re P and 2 Re(iP) = −2 Im P give the projector P.
             let projector = real.zip_map(&turned, |re, im| Complex64::new(0.5 * re, -0.5 * im));
             (part.pole, projector)
         })
@@ -163,7 +164,7 @@ pub fn modes(
         cuts: ordered,
         errors,
     };
-    // A first look says whether stability can be computed at all.
+    // Reports an error if stability cannot be computed for the first guess.
     for cut in cuts {
         point(start, cut.rpm, cut.depth_mm)?;
     }
@@ -172,11 +173,11 @@ pub fn modes(
     Ok(family.told(&particles))
 }
 
-/// The modes of `start`, in the machine's directions, with the medians that the cuts have left: for a case.
+/// The modes of `start` in the directions of the machine, with the posterior medians `found`, for a case file.
 ///
-/// Shapes are those of the first guess. Left shapes carry the residue, which is about ω/2ik, and its deviation. Deviations are
-/// those of the logarithms; that the cuts tie the parameters to each other is lost.
-/// Modes of one pole, as those of a round tool, become several of one frequency.
+/// Shapes are those of the first guess. Left shapes carry the residue, about ω/2ik, and its standard deviation. Standard deviations
+/// are those of the logarithms; the posterior correlation between parameters is lost. Two modes with one pole, as of a round tool,
+/// become two modes of equal frequency.
 pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direction>, Vec<IdentifiedMode>) {
     let axes: Vec<usize> = (0..3)
         .filter(|&axis| start.c.row(axis).amax() > 0.0 && start.b.column(axis).amax() > 0.0)
@@ -196,7 +197,7 @@ pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direc
         let all = rest.norm();
         while let Some((mut right, mut left, _)) = rank_one(&rest) {
             let taken = DMatrix::from_fn(axes.len(), axes.len(), |i, j| right[i] * left[j]);
-            // What is left of a residue that was taken whole is rounding.
+            // The residue is used up: the rest is rounding.
             if taken.norm() <= 1e-9 * all {
                 break;
             }
@@ -223,7 +224,7 @@ pub fn identified_modes(start: &FirstOrder, found: &[InverseMode]) -> (Vec<Direc
 }
 
 impl Family<'_> {
-    /// The problem of a structure.
+    /// The stability problem of the structure θ.
     fn problem(&self, theta: &[f64]) -> Problem {
         let mut problem = self.start.clone();
         for ((pole, projector), factors) in self.modes.iter().zip(theta.chunks_exact(3)) {
@@ -234,7 +235,7 @@ impl Family<'_> {
             );
             let moved = Complex64::new(-zeta, (1.0 - zeta * zeta).sqrt()) * omega;
             problem.structure.a += projector.map(|entry| 2.0 * ((moved - pole) * entry).re);
-            // The residue of a mode is about ω/2ik.
+            // The residue of a mode is about ω/2ik, so it scales with frequency over stiffness.
             let residue = frequency / stiffness;
             let part = projector.map(|entry| 2.0 * entry.re) * &self.start.structure.b;
             problem.structure.b += part * (residue - 1.0);
@@ -242,9 +243,9 @@ impl Family<'_> {
         problem
     }
 
-    /// Log-likelihood, and the number of misjudged cuts.
+    /// Log-likelihood of the structure θ, and the number of cuts that it misjudges.
     ///
-    /// No cut adds to the sum: once it has fallen to `least` it cannot rise above it again, and −∞ is the answer.
+    /// Every cut lowers the sum. Once the sum has fallen to `least`, the evaluation stops and returns −∞.
     fn likelihood(&self, theta: &[f64], least: f64) -> (f64, usize) {
         let problem = self.problem(theta);
         let mut sum = 0.0;
@@ -264,7 +265,7 @@ impl Family<'_> {
                 let Ok(low) = point(&problem, cut.rpm, cut.depth_mm / step) else {
                     return (f64::NEG_INFINITY, self.cuts.len());
                 };
-                // Depth as if growth were linear in it; a slope that vanishes says nothing about depth.
+                // Growth rate ln |μ| is interpolated linearly in depth; the bound on its slope keeps the deviation finite.
                 let low_growth = low.multiplier_abs.ln();
                 let slope = (0.5 * (high_growth - low_growth)).abs().max(1e-4);
                 0.5 * (low_growth + high_growth) / slope
@@ -289,7 +290,7 @@ impl Family<'_> {
             .all(|(value, half)| value.abs() <= *half)
     }
 
-    /// Equally weighted particles of the posterior.
+    /// Draws equally weighted particles from the posterior distribution.
     fn draw(&self, seed: u64) -> Vec<Vec<f64>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut particles: Vec<Vec<f64>> = (0..PARTICLES)
@@ -310,7 +311,7 @@ impl Family<'_> {
             let step = next_step(&sums, share);
             share += step;
             let weights: Vec<f64> = weights(&sums, step);
-            // Systematic: one random number for all.
+            // Systematic resampling uses one random number for all particles.
             let first: f64 = random.random_range(0.0..1.0);
             let chosen = systematic(&weights, first);
             particles = chosen.iter().map(|&index| particles[index].clone()).collect();
@@ -332,7 +333,7 @@ impl Family<'_> {
         particles
     }
 
-    /// Metropolis steps of several lengths.
+    /// Metropolis moves of a particle with alternating step lengths.
     fn walk(
         &self,
         (mut theta, mut sum): (Vec<f64>, f64),
@@ -370,7 +371,7 @@ impl Family<'_> {
             .map(|theta| self.likelihood(theta, f64::NEG_INFINITY).1)
             .min()
             .unwrap_or(0);
-        // One in twenty may be wrong for reasons of its own.
+        // One cut in twenty may be misjudged for reasons outside the model.
         if wrong > self.cuts.len() / 20 {
             Err(InverseError::Unexplained(wrong, self.cuts.len()))
         } else {
@@ -384,7 +385,7 @@ impl Family<'_> {
             .iter()
             .enumerate()
             .map(|(mode, (pole, projector))| {
-                // −2 Re(C P B/λ): what this mode gives way at rest.
+                // Static compliance of this mode: −2 Re(C P B/λ).
                 let at_rest = projector.map(|entry| -2.0 * (entry / pole).re);
                 let compliance = &structure.c * at_rest * &structure.b;
                 let stiffness = 1.0 / (0..3).map(|axis| compliance[(axis, axis)]).fold(0.0, f64::max);
@@ -411,12 +412,12 @@ impl Family<'_> {
     }
 }
 
-/// Standard normal distribution function.
+/// Cumulative distribution function of the standard normal distribution.
 fn normal_share(deviations: f64) -> f64 {
     0.5 * libm::erfc(-deviations * std::f64::consts::FRAC_1_SQRT_2)
 }
 
-/// Normalized weights after a step.
+/// Normalized particle weights after an increment `step` of the likelihood exponent.
 fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     let best = sums.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let raw: Vec<f64> = sums.iter().map(|sum| (step * (sum - best)).exp()).collect();
@@ -424,7 +425,7 @@ fn weights(sums: &[f64], step: f64) -> Vec<f64> {
     raw.iter().map(|weight| weight / total).collect()
 }
 
-/// Next increment of the exponent of the likelihood (tempering).
+/// Next increment of the likelihood exponent (tempering): the largest one that keeps the effective sample size.
 fn next_step(sums: &[f64], share: f64) -> f64 {
     let effective = |step: f64| 1.0 / weights(sums, step).iter().map(|w| w * w).sum::<f64>();
     let enough = EFFECTIVE * sums.len() as f64;
@@ -440,11 +441,11 @@ fn next_step(sums: &[f64], share: f64) -> f64 {
             high = middle;
         }
     }
-    // No step at all would go on for ever.
+    // A minimal increment guarantees that the tempering ends.
     low.max(1e-6).min(1.0 - share)
 }
 
-/// Parent of each new particle (systematic resampling).
+/// Index of the parent of each new particle (systematic resampling).
 fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
     let count = weights.len();
     let (mut index, mut below) = (0, weights[0]);
@@ -460,7 +461,7 @@ fn systematic(weights: &[f64], first: f64) -> Vec<usize> {
         .collect()
 }
 
-/// A square root of the covariance of the particles.
+/// Cholesky factor of the covariance of the particles.
 fn scatter_root(particles: &[Vec<f64>]) -> DMatrix<f64> {
     let size = particles.first().map_or(0, Vec::len);
     let count = particles.len() as f64;
@@ -476,7 +477,7 @@ fn scatter_root(particles: &[Vec<f64>]) -> DMatrix<f64> {
     Cholesky::new(covariance).map_or_else(|| DMatrix::identity(size, size) * 1e-3, |cholesky| cholesky.l())
 }
 
-/// The value below which a share of all lies, between neighbours.
+/// The value below which the fraction `share` of a sorted sample lies, by linear interpolation.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let position = (share * sorted.len() as f64 - 0.5).max(0.0);
     let (below, rest) = (position.floor() as usize, position.fract());

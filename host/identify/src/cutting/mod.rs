@@ -1,4 +1,4 @@
-//! Cutting tests: cutting force coefficients, and modes from stability limits.
+//! Cutting tests: force coefficients from measured forces, and modes from the outcome of trial cuts.
 
 pub mod chip;
 pub mod force_coefficients;

@@ -1,22 +1,22 @@
-//! Trial cuts whose side of the stability limit was observed.
+//! Trial cuts with the observed side of the stability limit.
 
 use quietcut_recording::cut_table::{Outcome, TriedCut};
 
-/// A trial cut.
+/// A trial cut with its observed outcome.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObservedCut {
     /// Spindle speed, rev/min.
     pub rpm: f64,
     /// Axial depth, mm.
     pub depth_mm: f64,
-    /// Whether it chattered.
+    /// True if the cut chattered.
     pub chatters: bool,
-    /// The chatter frequency, Hz; `None` for a stable cut or if it was not measured.
+    /// Chatter frequency, Hz; `None` for a stable cut, or if it was not measured.
     pub chatter_hz: Option<f64>,
 }
 
 impl ObservedCut {
-    /// The observation in a row of a table of tried cuts; `None` for a marginal cut, which may lie on either side of the limit.
+    /// The observation in a row of a table of trial cuts; `None` for a marginal cut, which may lie on either side of the limit.
     pub fn new(cut: &TriedCut) -> Option<Self> {
         Some(Self {
             rpm: cut.rpm,

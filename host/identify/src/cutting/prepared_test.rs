@@ -8,20 +8,22 @@ use nalgebra::Vector3;
 use crate::cutting::force_test::CuttingTest;
 use quietcut_model::milling::{Material, RotatingVector, Tool, ToothForce};
 
-/// A test with the quantities that stay constant during the fit.
+/// A cutting test with the quantities that stay constant during the fit.
 pub(super) struct Prepared<'a> {
     pub(super) test: &'a CuttingTest,
-    /// a e and a e/sin γ at an angle, N per unit of each coefficient and meter of chip; N per unit.
+    /// Force vectors over the angle. `cutting`: N per unit of each cutting coefficient and per meter of chip thickness. `edge`: N
+    /// per unit of each edge coefficient.
     pub(super) cutting: [RotatingVector; 3],
     pub(super) edge: [RotatingVector; 3],
-    /// Samples within one of an entry or exit: half of what they measure is another engagement.
+    /// Samples next to a tooth entry or exit: part of their sampling interval has another number of engaged teeth, so they are left
+    /// out.
     pub(super) switching: BTreeSet<usize>,
     pub(super) revolutions: Vec<[usize; 2]>,
-    /// 1/σ² of each direction.
+    /// Weight 1/σ² of each direction, 1/N².
     pub(super) weights: [f64; 3],
 }
 
-/// Vectors of a tool of depth `depth_m`: N per unit of a coefficient.
+/// Force per unit of each of the three coefficient pairs, for an axial depth of 1 m.
 fn vectors(test: &CuttingTest) -> [ToothForce; 3] {
     let tool = Tool {
         teeth: test.teeth,
@@ -71,9 +73,9 @@ pub(super) fn prepared(test: &CuttingTest) -> Prepared<'_> {
 }
 
 impl Prepared<'_> {
-    /// The mean force of a revolution without runout and vibration, N per unit of each coefficient; and the measured one, N.
+    /// Mean force of a revolution without runout and vibration, N per unit of each coefficient; and the measured mean force, N.
     ///
-    /// Both are those of the same samples, so that entry and exit between samples move neither against the other.
+    /// Both means are over the same samples, so that the sampling of entry and exit biases neither.
     pub(super) fn mean_forces(&self, [from, to]: [usize; 2]) -> ([Vector3<f64>; 6], Vector3<f64>) {
         let test = self.test;
         let mut sums = [Vector3::zeros(); 6];

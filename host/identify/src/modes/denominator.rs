@@ -1,8 +1,8 @@
-//! Poles of every order of model: least squares in frequency with a common denominator (LSCF).
+//! Poles of every model order by the least-squares complex frequency-domain method (LSCF) with a common denominator.
 //!
-//! Guillaume, Verboven and Vanlanduit (1998): H_k(f) = B_k(z)/A(z) with z = exp(i2π(f − f₁)T), complex coefficients, and
-//! the arc of the band nearly a whole turn. A(0) = 1: poles that only follow noise then lie outside the unit circle, that
-//! is, they have negative damping (Cauberghe, Guillaume, Verboven, Parloo and Vanlanduit, 2004).
+//! H_k(f) = B_k(z)/A(z) with z = exp(i2π(f − f₁)T) and complex coefficients (Guillaume, Verboven and Vanlanduit 1998). The band
+//! covers nearly the whole unit circle. With A(0) = 1 the spurious poles that fit noise lie outside the unit circle, that is, they
+//! have negative damping (Cauberghe, Guillaume, Verboven, Parloo and Vanlanduit 2004).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use num_complex::Complex64;
@@ -11,13 +11,14 @@ use std::f64::consts::TAU;
 use super::receptances::Receptances;
 use quietcut_numerics::eigenvalues::{EigenvalueError, of_complex};
 
-/// Part of the unit circle that the band takes: the receptances need not close to a circle.
+/// Fraction of the unit circle that the band covers. A choice: the gap lets receptances differ between the two ends of the band.
 const ARC: f64 = 0.9;
 
-/// What is added to the diagonal, as a part of it: powers of z on an arc are not quite independent.
+/// Ridge on the diagonal of the normal equations, relative to its mean: powers of z on an arc are nearly dependent. A choice, near
+/// the rounding error.
 const RIDGE: f64 = 1e-13;
 
-/// Sums Σ_f w² conj(z)^i z^j … of one receptance, which depend on j − i alone.
+/// Sums Σ_f w² conj(z)^i z^j of one receptance, weighted with w = 1/σ. They depend on m = j − i alone.
 struct Sums {
     /// Σ w² z^m, m = 0 … n.
     numerator: Vec<Complex64>,
@@ -27,7 +28,7 @@ struct Sums {
     denominator: Vec<Complex64>,
 }
 
-/// Poles λ in rad/s of the models of order 1 to `highest`, by order. An order whose equations break down has none.
+/// Poles λ in rad/s of the models of order 1 to `highest`, by order. An order with singular equations has none.
 ///
 /// # Errors
 /// The eigenvalue iteration of the companion matrix exceeds its bound.
@@ -57,7 +58,8 @@ pub(super) fn poles(data: &Receptances, highest: usize) -> Result<Vec<Vec<Comple
                 .into_iter()
                 .filter(|z| z.norm() > 0.0)
                 .map(|z| {
-                    // The band lies from angle 0 to ARC turns; what is beyond its middle gap is below the band.
+                    // The band covers the angles from 0 to 2π·ARC; angles beyond the middle of the remaining gap belong to
+                    // frequencies below the band.
                     let turn = z.arg().rem_euclid(TAU);
                     let turn = if turn > 0.5 * (1.0 + ARC) * TAU {
                         turn - TAU
@@ -91,7 +93,7 @@ fn sums(data: &Receptances, k: usize, powers: &[Vec<Complex64>], highest: usize)
     sums
 }
 
-/// a₀ = 1, a₁ … a_n of the common denominator; `None` where the equations break down.
+/// Coefficients a₀ = 1, a₁ … a_n of the common denominator; `None` if the normal equations are singular.
 fn denominator(sums: &[Sums], order: usize, highest: usize) -> Option<Vec<Complex64>> {
     let size = order + 1;
     let hermitian = |of: &[Complex64]| {

@@ -1,12 +1,12 @@
-//! Why no modes are identified.
+//! Reasons why no modes are identified.
 
 use quietcut_frf::rational_fit::RationalFitError;
 use quietcut_numerics::eigenvalues::EigenvalueError;
 
-/// Why no modes are identified.
+/// Reason why no modes are identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModesError {
-    /// The data cannot be fitted.
+    /// The data cannot be fitted, for the stated reason.
     #[error("{0}")]
     Data(String),
     /// No pole is stable over the model order.
@@ -14,9 +14,9 @@ pub enum ModesError {
         "no pole is stable over the model order from {from_hz:.2} to {to_hz:.2} Hz ({rejected} poles were rejected); a band with a resonance, or better receptances, are needed"
     )]
     NoMode {
-        /// First frequency, Hz.
+        /// Lowest frequency of the band, Hz.
         from_hz: f64,
-        /// Last frequency, Hz.
+        /// Highest frequency of the band, Hz.
         to_hz: f64,
         /// Number of rejected poles.
         rejected: usize,
@@ -24,12 +24,12 @@ pub enum ModesError {
     /// Fewer stable poles than requested modes.
     #[error("{found} poles are stable over the model order, but {wanted} modes are requested")]
     Fewer {
-        /// Modes found.
+        /// Number of stable poles.
         found: usize,
-        /// Modes requested.
+        /// Number of requested modes.
         wanted: usize,
     },
-    /// The fit does not converge.
+    /// The fit of this number of modes does not converge.
     #[error("the fit of {0} modes does not converge; fewer modes or another band are needed")]
     NotConverged(usize),
     /// The poles of the common denominator cannot be computed.

@@ -8,13 +8,13 @@ use super::pole_residue::PoleResidue;
 use super::receptances::Receptances;
 use super::weights::Weights;
 
-/// Derivatives of all values as they are weighed: parameters by lines, one matrix per receptance.
+/// Derivatives of the weighted receptances: one matrix per receptance, with a row per parameter and a column per line.
 pub(super) fn jacobian(data: &Receptances, fit: &PoleResidue, weights: &Weights) -> Vec<DMatrix<Complex64>> {
     let unknowns = fit.parameters().len();
     let mut row = vec![Complex64::ZERO; unknowns];
     let plain = (0..data.values.len())
         .map(|k| {
-            // A column per line: each is written as it comes.
+            // One column per line, because derivatives are computed line by line.
             let mut matrix = DMatrix::zeros(unknowns, data.frequency_hz.len());
             for (line, hertz) in data.frequency_hz.iter().enumerate() {
                 let s = Complex64::new(0.0, TAU * hertz);
@@ -27,7 +27,7 @@ pub(super) fn jacobian(data: &Receptances, fit: &PoleResidue, weights: &Weights)
     weights.mixed(plain)
 }
 
-/// Re(Jᴴ J) of all receptances.
+/// Normal matrix Re(Jᴴ J), summed over all receptances.
 pub(super) fn normal(jacobian: &[DMatrix<Complex64>]) -> DMatrix<f64> {
     let size = jacobian.first().map_or(0, DMatrix::nrows);
     jacobian.iter().fold(DMatrix::zeros(size, size), |sum, of| {

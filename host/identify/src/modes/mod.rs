@@ -1,10 +1,10 @@
-//! Complex modes through measured receptances, with left and right shapes (thesis eq. 7.15):
+//! Complex modes from measured receptances, with left and right shapes (thesis eq. 7.15).
 //!
-//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugate at the conjugate pole, λ = −ζω + iω√(1 − ζ²), s = iω; no conjugation and no
-//! further factor in the residue. Left and right shapes may differ: reciprocity is not assumed.
+//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugate at the conjugate pole, with λ = −ζω + iω√(1 − ζ²) and s = iω. The residue
+//! contains neither a conjugation nor a further factor. Left and right shapes may differ: reciprocity is not assumed.
 //!
-//! `denominator` gives the poles of every model order, [`stabilization`] selects those that are stable over the order, `refinement`
-//! fits the modes in pole–residue form and gives their covariance.
+//! `denominator` computes the poles of every model order, [`stabilization`] selects those that are stable over the order, and
+//! `refinement` fits the modes in pole–residue form with their covariance.
 
 mod covariance;
 mod denominator;
@@ -41,12 +41,12 @@ use rejected::reject;
 
 use crate::criteria::{LEAST_RESIDUE_SIGNIFICANCE, OVERDAMPED};
 
-/// Options of the identification.
+/// Options of the modal identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Highest model order of the stabilization diagram.
     pub highest_order: usize,
-    /// Number of modes if it is known: the strongest stable poles are taken.
+    /// Number of modes if it is given: the strongest stable poles are taken.
     pub modes: Option<usize>,
 }
 
@@ -59,7 +59,7 @@ impl Default for Options {
     }
 }
 
-/// Identifies the modes of receptances.
+/// Identifies the modes of measured receptances.
 ///
 /// # Errors
 /// Too few lines, no stable pole or fewer than wanted, a fit that does not converge.
@@ -98,7 +98,7 @@ pub fn identify(data: &Receptances, options: &Options) -> Result<ModalModel, Mod
     }
 }
 
-/// A spurious mode of the refined fit, and the reason.
+/// Index of a spurious mode of the refined fit and the reason; `None` if all modes are sound.
 fn spurious(refined: &Refined, [from_hz, to_hz]: [f64; 2]) -> Option<(usize, String)> {
     refined.fit.modes.iter().enumerate().find_map(|(index, mode)| {
         let (pole, hertz) = (mode.pole, mode.pole.norm() / std::f64::consts::TAU);

@@ -2,12 +2,12 @@
 
 use quietcut_model::structure::Mode;
 
-/// One mode with standard deviations.
+/// An identified mode with standard deviations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentifiedMode {
-    /// The mode; its left shape has an entry per driven direction, its right one per response.
+    /// The mode; its left shape has an entry per excited direction, its right shape an entry per response.
     pub mode: Mode,
-    /// Standard deviation of the frequency, Hz.
+    /// Standard deviation of the natural frequency, Hz.
     pub frequency_std_hz: f64,
     /// Standard deviation of the damping ratio.
     pub damping_ratio_std: f64,

@@ -9,31 +9,31 @@ use super::stabilization::Stabilization;
 use crate::criteria::{LARGEST_FIT_ERROR, LINES_PER_HALF_POWER_WIDTH};
 use quietcut_model::structure::Direction;
 
-/// The result.
+/// Result of the modal identification.
 #[derive(Clone, Debug)]
 pub struct ModalModel {
     /// Directions of the entries of the left shapes.
     pub forces: Vec<Direction>,
     /// Directions of the entries of the right shapes.
     pub responses: Vec<Direction>,
-    /// The modes by rising frequency.
+    /// The modes, sorted by frequency.
     pub modes: Vec<IdentifiedMode>,
-    /// For each receptance, by its directions of response and force: the compliance of modes above the band, m/N, and the
-    /// inertia of those below, the coefficient of 1/s², 1/kg.
+    /// For each pair of response and force direction: the compliance of the modes above the band, m/N, and the inertia term of the
+    /// modes below it, the coefficient of 1/s², in 1/kg.
     pub outside: Vec<(Direction, Direction, [f64; 2])>,
     /// NRMSE of the receptances, each receptance with equal weight.
     pub fit_error: f64,
     /// χ² per degree of freedom of the residual: near 1 if the residual is noise. `None` if the data state no variance.
     pub misfit: Option<f64>,
-    /// Poles of every order.
+    /// Poles of every model order.
     pub stabilization: Stabilization,
-    /// Rejected poles.
+    /// Poles that were rejected, with reasons.
     pub rejected: Vec<Rejected>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Warnings about quantities that lines of this spacing determine poorly.
+/// Warnings about a poor fit, and about quantities that receptances with this line spacing determine poorly.
 pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     let mut warnings = Vec::new();
     if model.fit_error > LARGEST_FIT_ERROR {
@@ -72,13 +72,14 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
 }
 
 impl ModalModel {
-    /// Directions that are both excited and measured: those of a case.
+    /// Directions that are both excited and measured; a case uses them.
     pub fn directions(&self) -> Vec<Direction> {
         let both = self.responses.iter().copied();
         both.filter(|direction| self.forces.contains(direction)).collect()
     }
 
-    /// The fitted receptance with the residual terms of modes outside the band, m/N; `None` if it was not measured.
+    /// The fitted receptance, including the terms of modes outside the band, m/N; `None` if the pair of directions was not
+    /// measured.
     pub fn receptance(&self, response: Direction, force: Direction, frequency_hz: f64) -> Option<Complex64> {
         let p = self.responses.iter().position(|known| *known == response)?;
         let q = self.forces.iter().position(|known| *known == force)?;

@@ -1,7 +1,7 @@
 //! Modes in pole–residue form.
 //!
-//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugates + U_pq + L_pq/s² with real U (compliance of modes above) and L (inertia
-//! of those below). Residues are of rank one throughout.
+//! H_pq(s) = Σ_r Ψᴿ_pr Ψᴸ_qr/(s − λ_r) + conjugates + U_pq + L_pq/s², with real U (compliance of the modes above the band) and real
+//! L (inertia of the modes below it). All residue matrices have rank one.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
@@ -13,7 +13,7 @@ use super::shape;
 use super::stabilization::matrix_of;
 use quietcut_frf::rational_fit::residues;
 
-/// A pole with its shapes.
+/// A pole with its right and left shape.
 #[derive(Clone, Debug)]
 pub(super) struct Shaped {
     pub(super) pole: Complex64,
@@ -22,22 +22,22 @@ pub(super) struct Shaped {
 }
 
 impl Shaped {
-    /// Number of real parameters: pole, right and left shape.
+    /// Number of real parameters of the mode: pole, right and left shape.
     pub(super) fn width(&self) -> usize {
         2 + 2 * (self.right.len() + self.left.len())
     }
 }
 
-/// The parameters of a fit.
+/// Parameters of the modal fit: modes, and terms of the modes outside the band.
 #[derive(Clone, Debug)]
 pub(super) struct PoleResidue {
     pub(super) modes: Vec<Shaped>,
-    /// U and L of each receptance.
+    /// U and L of each receptance: compliance, m/N, and inertia term, 1/kg.
     pub(super) outside: Vec<[f64; 2]>,
 }
 
 impl PoleResidue {
-    /// Residues of the poles by linear least squares, each cut to rank one.
+    /// Start of the fit: residues of the poles by linear least squares, each reduced to rank one.
     ///
     /// # Errors
     /// The residues cannot be computed, or have no rank-one part.
@@ -62,7 +62,7 @@ impl PoleResidue {
         Ok(start)
     }
 
-    /// U and L by linear least squares on the residual of the modes.
+    /// Fits U and L to the residual of the modes by linear least squares.
     fn fit_outside(&mut self, data: &Receptances) {
         for k in 0..data.values.len() {
             let (mut gram, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
@@ -100,7 +100,8 @@ impl PoleResidue {
         self.of_modes(place, s) + above + below / (s * s)
     }
 
-    /// Each mode: Re λ, Im λ, right shape (real and imaginary parts in turn), left shape; then U and L of each receptance.
+    /// Parameters as a vector: for each mode Re λ, Im λ, right shape (real and imaginary parts in turn), left shape; then U and L
+    /// of each receptance.
     pub(super) fn parameters(&self) -> DVector<f64> {
         let modes = self.modes.iter().flat_map(|mode| {
             let numbers = std::iter::once(&mode.pole).chain(&mode.right).chain(&mode.left);
@@ -110,7 +111,7 @@ impl PoleResidue {
         DVector::from_vec(all)
     }
 
-    /// The fit after a step, in the order of [`Self::parameters`].
+    /// The parameters plus `step`, in the order of [`Self::parameters`].
     pub(super) fn moved(&self, step: &[f64]) -> Self {
         let mut moved = self.clone();
         let mut values = step.iter();
@@ -129,7 +130,7 @@ impl PoleResidue {
         moved
     }
 
-    /// Residual of receptance `k`, each value over its standard deviation.
+    /// Residual of receptance `k` at every line, divided by its standard deviation.
     pub(super) fn left_of(&self, data: &Receptances, deviation: &[Vec<f64>], k: usize) -> Vec<Complex64> {
         data.frequency_hz
             .iter()
@@ -141,7 +142,7 @@ impl PoleResidue {
             .collect()
     }
 
-    /// ∂H_k/∂parameters at a line over the deviation there, written into a row.
+    /// Writes ∂H_k/∂parameters at one line, divided by the standard deviation there, into `row`.
     pub(super) fn derivatives(
         &self,
         data: &Receptances,
@@ -171,7 +172,7 @@ impl PoleResidue {
     }
 }
 
-/// Directions both excited and measured, as indices of right and left shape.
+/// Directions that are both excited and measured, as pairs of indices in the right and in the left shape.
 pub(super) fn shared(data: &Receptances) -> Vec<(usize, usize)> {
     let of = |(p, direction)| Some((p, data.forces.iter().position(|force| force == direction)?));
     data.responses.iter().enumerate().filter_map(of).collect()

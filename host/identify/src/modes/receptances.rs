@@ -7,34 +7,36 @@ use crate::criteria::{LEAST_LINES, LEAST_RELATIVE_DEVIATION};
 use quietcut_frf::FrfTable;
 use quietcut_model::structure::Direction;
 
-/// Receptances over common frequencies, in a band.
+/// Receptances in a band, at common frequencies.
 #[derive(Clone, Debug)]
 pub struct Receptances {
-    /// Hz, ascending.
+    /// Frequencies, Hz, ascending.
     pub frequency_hz: Vec<f64>,
-    /// Directions of displacements.
+    /// Directions of the displacements.
     pub responses: Vec<Direction>,
-    /// Directions of forces.
+    /// Directions of the forces.
     pub forces: Vec<Direction>,
-    /// Response and force of each receptance, by index.
+    /// Index of response and force of each receptance.
     pub places: Vec<(usize, usize)>,
     /// The receptances, m/N.
     pub values: Vec<Vec<Complex64>>,
-    /// Standard deviation of real and of imaginary part of every value, m/N; up to a common factor where it comes from
-    /// coherence alone.
+    /// Standard deviation of the real and of the imaginary part of every receptance at every frequency, m/N. If only coherence is
+    /// measured, it is correct up to a common factor.
     pub deviation: Vec<Vec<f64>>,
-    /// Whether the deviations are stated, not only relative.
+    /// True if the data state standard deviations; false if coherence gives only relative ones.
     pub has_deviation: bool,
 }
 
-/// Lines on each side over which variances are averaged: one from a handful of averages scatters by half of itself.
+/// Number of lines on each side over which variances are averaged: a variance from a handful of averages scatters by half of
+/// itself.
 const NEIGHBOURS: usize = 4;
 
 impl Receptances {
-    /// The receptances of a table from `band_hz[0]` to `band_hz[1]`.
+    /// The receptances of a table between `band_hz[0]` and `band_hz[1]`.
     ///
-    /// `deviation` has the standard deviation of |H| of every value, as [`quietcut_frf::Measurement`] states it. Without it
-    /// the coherence of each response says how it goes over the lines, and how large it is what is left of the fit.
+    /// `deviation` holds the standard deviation of |H| of every value, as [`quietcut_frf::Measurement`] states it. Without it, the
+    /// coherence of each response gives the relative standard deviation over the lines, and the residual of the fit gives its
+    /// scale.
     ///
     /// # Errors
     /// Too few lines in the band, a receptance that is zero throughout or that is missing.
@@ -94,22 +96,22 @@ impl Receptances {
         Ok(data)
     }
 
-    /// First and last frequency, Hz.
+    /// Lowest and highest frequency of the band, Hz.
     pub fn band_hz(&self) -> [f64; 2] {
-        // There are at least LEAST_LINES lines.
+        // The band contains at least LEAST_LINES lines.
         [
             self.frequency_hz[0],
             self.frequency_hz[self.frequency_hz.len() - 1],
         ]
     }
 
-    /// Mean distance of the lines, Hz.
+    /// Mean frequency difference of neighbouring lines, Hz.
     pub fn spacing_hz(&self) -> f64 {
         let [from_hz, to_hz] = self.band_hz();
         (to_hz - from_hz) / (self.frequency_hz.len() - 1) as f64
     }
 
-    /// Residues have a rank only where every response has every force.
+    /// Checks that every response has its receptance from every force: rank-one residues require it.
     fn is_whole(&self) -> Result<(), ModesError> {
         for (p, response) in self.responses.iter().enumerate() {
             for (q, force) in self.forces.iter().enumerate() {
@@ -123,7 +125,7 @@ impl Receptances {
         Ok(())
     }
 
-    /// Directions in the order x, y, z.
+    /// Sorts the directions in the order x, y, z.
     fn sort_directions(&mut self) {
         let order = |directions: &[Direction]| {
             let mut sorted = directions.to_vec();
@@ -143,8 +145,8 @@ impl Receptances {
         (self.responses, self.forces) = (responses, forces);
     }
 
-    /// √((1 − γ²)/γ²) of the response's power under equal independent forces: with one force Bendat and Piersol's error
-    /// up to the number of averages.
+    /// Standard deviation √((1 − γ²)/γ²·P), with γ² the coherence and P the response power under equal independent forces. For one
+    /// force this is the error of Bendat and Piersol up to the number of averages.
     fn by_coherence(&self, index: usize, lines: &[usize], coherence: &[f64]) -> Vec<f64> {
         let response = self.places[index].0;
         let row = || (0..self.values.len()).filter(|&other| self.places[other].0 == response);

@@ -13,7 +13,7 @@ use super::shape;
 use super::weights::{Weights, root_mean_square};
 use quietcut_model::structure::Mode;
 
-/// A refined fit with covariance and residual.
+/// A refined modal fit with covariance and residual.
 pub(super) struct Refined {
     pub(super) fit: PoleResidue,
     /// Covariance of the parameters in the order of [`PoleResidue::parameters`].
@@ -22,18 +22,18 @@ pub(super) struct Refined {
     pub(super) misfit: f64,
 }
 
-/// Steps of Levenberg and Marquardt after which a fit is given up, and those without progress.
+/// Number of Levenberg–Marquardt steps after which the fit counts as not converged. A choice.
 const STEPS_MAX: usize = 200;
 
 const DAMPING_MAX: f64 = 1e12;
 
-/// Relative decrease of the squares below which they are least.
+/// Relative decrease of the sum of squares below which the iteration has converged. A choice.
 const SETTLED: f64 = 1e-10;
 
-/// Rounds of reweighting by the residual of each receptance.
+/// Number of times that the weights are updated from the residual. A choice.
 const ROUNDS: usize = 3;
 
-/// Weighted least squares from `start`; `None` if it does not converge.
+/// Weighted least-squares fit from `start`, with updated weights; `None` if it does not converge.
 pub(super) fn refine(data: &Receptances, start: PoleResidue) -> Option<Refined> {
     let mut weights = Weights::of(&data.deviation);
     let mut fit = least_squares(data, &weights, start)?;
@@ -98,7 +98,7 @@ fn least_squares(data: &Receptances, weights: &Weights, mut fit: PoleResidue) ->
     None
 }
 
-/// (N + μ diag N) step = gradient, in units in which the diagonal of N is one.
+/// Levenberg–Marquardt step: solution of (N + μ diag N) step = gradient, with N scaled to a unit diagonal.
 pub(super) fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
     let scale = normal
         .diagonal()
@@ -115,7 +115,7 @@ pub(super) fn step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64)
 }
 
 impl Refined {
-    /// Norm of the residues of a mode over its standard deviation.
+    /// Norm of the residue matrix of a mode divided by its standard deviation.
     pub(super) fn significance(&self, index: usize) -> f64 {
         let mode = &self.fit.modes[index];
         let width = 2 + 2 * (mode.right.len() + mode.left.len());
@@ -129,7 +129,7 @@ impl Refined {
         let (right, left) = (norm(&mode.right), norm(&mode.left));
         let of_right = variance(at, mode.right.len());
         let of_left = variance(at + 2 * mode.right.len(), mode.left.len());
-        // δ(right·leftᵀ)² = right²·δleft² + left²·δright².
+        // Variance of the residue matrix: |right|²·var(left) + |left|²·var(right).
         let deviation = (right * of_left + left * of_right).sqrt();
         if deviation > 0.0 {
             (right * left).sqrt() / deviation
@@ -138,7 +138,7 @@ impl Refined {
         }
     }
 
-    /// A mode with the deviations of its numbers.
+    /// A mode of the fit with its standard deviations.
     pub(super) fn mode(&self, index: usize) -> IdentifiedMode {
         let shaped = &self.fit.modes[index];
         let width = 2 + 2 * (shaped.right.len() + shaped.left.len());
@@ -166,7 +166,7 @@ impl Refined {
                 left: shaped.left.clone(),
                 right: shaped.right.clone(),
             },
-            // ω = |λ|, ζ = −Re λ/|λ|.
+            // Propagated from the pole: ω = |λ|, ζ = −Re λ/|λ|.
             frequency_std_hz: by([pole.re / omega / TAU, pole.im / omega / TAU]),
             damping_ratio_std: by([
                 -pole.im * pole.im / omega.powi(3),

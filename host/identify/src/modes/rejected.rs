@@ -2,14 +2,14 @@
 
 use num_complex::Complex64;
 
-/// A rejected pole.
+/// A pole that was not accepted as a mode.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Rejected {
-    /// Its frequency |λ|/2π, Hz.
+    /// Frequency |λ|/2π of the pole, Hz.
     pub frequency_hz: f64,
-    /// Its damping ratio.
+    /// Damping ratio of the pole.
     pub damping_ratio: f64,
-    /// Reason of the rejection.
+    /// Reason of the rejection, for the user.
     pub why: String,
 }
 

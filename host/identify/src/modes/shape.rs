@@ -1,14 +1,15 @@
-//! Residues of rank one, and their left and right shapes.
+//! Rank-one residues, and their left and right shapes.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-/// R/(s − λ) and its conjugate at the conjugate pole.
+/// Receptance of a residue R: R/(s − λ), plus its conjugate at the conjugate pole.
 pub(super) fn pair(residue: Complex64, s: Complex64, pole: Complex64) -> Complex64 {
     residue / (s - pole) + residue.conj() / (s - pole.conj())
 }
 
-/// The nearest right·leftᵀ to a matrix of residues (responses by forces), and how much of the matrix it leaves, as a part.
+/// The nearest rank-one matrix right·leftᵀ to a matrix of residues (responses by forces), and the norm of the difference relative
+/// to that of the matrix.
 pub(crate) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>, Vec<Complex64>, f64)> {
     let all = residues.norm();
     let svd = residues.clone().try_svd(true, true, f64::EPSILON, 0)?;
@@ -27,9 +28,9 @@ pub(crate) fn rank_one(residues: &DMatrix<Complex64>) -> Option<(Vec<Complex64>,
     Some((right, left, if all > 0.0 { rest.sqrt() / all } else { 0.0 }))
 }
 
-/// Scales right by c and left by 1/c, so that both have one norm over the `shared` entries (index in right, in left) and
-/// are as near to each other as can be: those of a reciprocal structure become equal. Without a shared entry the norms
-/// of the whole shapes become one. The largest entry of the right shape has a positive real part.
+/// Scales right by c and left by 1/c, so that the two shapes have equal norm over the `shared` entries (index in right, index in
+/// left) and differ as little as possible: the shapes of a reciprocal structure become equal. Without a shared entry the norms of
+/// the whole shapes become equal. The largest entry of the right shape gets a positive real part.
 pub(crate) fn normalize(right: &mut [Complex64], left: &mut [Complex64], shared: &[(usize, usize)]) {
     let norm = |shape: &[Complex64]| shape.iter().map(|entry| entry.norm_sqr()).sum::<f64>().sqrt();
     let pick = |shape: &[Complex64], of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<Complex64> {
@@ -43,7 +44,7 @@ pub(crate) fn normalize(right: &mut [Complex64], left: &mut [Complex64], shared:
     if !(norms.0 > 0.0 && norms.1 > 0.0) {
         return;
     }
-    // ‖c·right − left/c‖ is least where c²·Σ right·conj(left) is real and positive.
+    // ‖c·right − left/c‖ is smallest if c²·Σ right·conj(left) is real and positive.
     let inner: Complex64 = at_right.iter().zip(&at_left).map(|(r, l)| r * l.conj()).sum();
     let phase = if inner.norm() > 0.0 {
         -0.5 * inner.arg()

@@ -13,49 +13,50 @@ use crate::criteria::{
 };
 use quietcut_frf::rational_fit::{RationalFitError, residues};
 
-/// A pole of a model of some order.
+/// A pole of the model of one order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Order of the model.
+    /// Order of the model that the pole belongs to.
     pub order: usize,
-    /// λ, rad/s.
+    /// The pole λ, rad/s.
     pub pole: Complex64,
-    /// What it adds at its resonance: norm of its residues, each receptance counting by its root mean square, over −Re λ.
+    /// Contribution of the pole at its resonance: norm of its residues, with each receptance normalized by its RMS, divided by −Re
+    /// λ.
     pub height: f64,
-    /// Frequency, damping and shape are those of a pole of the order before.
+    /// True if frequency, damping and shape agree with those of a pole of the previous order.
     pub is_stable: bool,
-    /// The line of poles that it continues.
+    /// Index of the line of poles over the order that the pole continues.
     line: usize,
-    /// How far it is from the pole before, relative.
+    /// Distance to the previous pole of the line, in units of the stability criteria.
     change: f64,
-    /// All its residues as a vector of norm 1.
+    /// Residues of the pole in all receptances as a vector of norm 1.
     shape: Vec<Complex64>,
 }
 
 impl Candidate {
-    /// |λ|/2π, Hz.
+    /// Frequency |λ|/2π, Hz.
     pub fn frequency_hz(&self) -> f64 {
         self.pole.norm() / TAU
     }
 
-    /// ζ.
+    /// Damping ratio ζ = −Re λ/|λ|.
     pub fn damping_ratio(&self) -> f64 {
         -self.pole.re / self.pole.norm()
     }
 }
 
-/// Poles of all orders, and those that are modes.
+/// Poles of all model orders, and those that are modes.
 #[derive(Clone, Debug)]
 pub struct Stabilization {
-    /// Poles in the band with positive damping, by order.
+    /// Poles in the band with positive damping, by model order.
     pub candidates: Vec<Candidate>,
-    /// The highest order.
+    /// Highest model order.
     pub highest_order: usize,
-    /// Poles taken as modes, strongest first, rad/s.
+    /// Poles selected as modes, strongest first, rad/s.
     pub selected: Vec<Complex64>,
-    /// Poles of the highest order in the band that have no positive damping, rad/s.
+    /// Poles of the highest order in the band whose damping is not positive, rad/s.
     unstable: Vec<Complex64>,
-    /// Lines that end before they are long enough or are too weak: their pole and why.
+    /// Lines of poles that are too short or too weak: their pole, rad/s, and the reason.
     discarded: Vec<(Complex64, String)>,
 }
 
@@ -74,7 +75,8 @@ impl Stabilization {
     }
 }
 
-/// Compares the models of order 1 to `highest_order`, or as many as the lines allow.
+/// Computes the poles of the models of order 1 to `highest_order`, or to the highest order that the number of lines allows, and
+/// selects the stable ones.
 ///
 /// # Errors
 /// Fewer lines than three for each unknown of the lowest orders, or an iteration that exceeds its bound.
@@ -155,7 +157,7 @@ fn candidates(
     Ok(found)
 }
 
-/// Distance of two poles in units of the stability criteria: 1 and below is the same pole.
+/// Distance of two poles in units of the stability criteria: they count as the same pole up to 1.
 fn distance(a: &Candidate, b: &Candidate) -> f64 {
     let frequency = (a.frequency_hz() / b.frequency_hz() - 1.0).abs() / SAME_FREQUENCY;
     let damping = (a.damping_ratio() / b.damping_ratio() - 1.0).abs() / SAME_DAMPING;
@@ -171,7 +173,7 @@ fn assurance(a: &[Complex64], b: &[Complex64]) -> f64 {
         .norm_sqr()
 }
 
-/// Continues the lines of the order before; each by the nearest pole, a pole without one begins its own.
+/// Continues the lines of the previous order by their nearest pole; a pole without a previous one starts a new line.
 fn connect(now: &mut [Candidate], before: &[Candidate], lines: &mut usize) {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for (i, a) in now.iter().enumerate() {
@@ -198,7 +200,7 @@ fn connect(now: &mut [Candidate], before: &[Candidate], lines: &mut usize) {
     }
 }
 
-/// Takes the long and strong lines: of each the pole that moved least.
+/// Selects the lines of poles that are long and strong enough; each is represented by the pole that changed least.
 fn select(found: &mut Stabilization, lines: usize) {
     let needed = ((ORDERS_SHARE * found.highest_order as f64).ceil() as usize).max(LEAST_ORDERS);
     let mut of_line: Vec<Vec<&Candidate>> = vec![Vec::new(); lines];
@@ -226,7 +228,7 @@ fn select(found: &mut Stabilization, lines: usize) {
             ));
         }
     }
-    // Two lines of one pole, one broken off and begun again, are one mode: the longer stands for it.
+    // Two lines of one pole, one interrupted and continued later, are one mode, which the longer line represents.
     long.sort_by_key(|(_, length)| std::cmp::Reverse(*length));
     let mut kept: Vec<&Candidate> = Vec::new();
     for (candidate, _) in long {
@@ -256,7 +258,7 @@ fn select(found: &mut Stabilization, lines: usize) {
     found.discarded = discarded;
 }
 
-/// The residues of a pole as a matrix, responses by forces.
+/// Residues of one pole as a matrix, responses by forces.
 pub(super) fn matrix_of(data: &Receptances, residues: &[Vec<Complex64>], mode: usize) -> DMatrix<Complex64> {
     let mut matrix = DMatrix::zeros(data.responses.len(), data.forces.len());
     for (&place, row) in data.places.iter().zip(residues) {

@@ -14,7 +14,7 @@ use quietcut_testkit::case;
 
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
-/// H of a structure over `frequency_hz`, with noise of `noise` of each receptance's root mean square.
+/// Receptances of a structure at `frequency_hz`, with noise whose RMS is the fraction `noise` of the RMS of each receptance.
 fn table(
     structure: &Structure,
     frequency_hz: &[f64],
@@ -87,7 +87,7 @@ fn the_modes_of_table_7_1_come_back_from_their_receptances() {
     let truth = modes_of(&structure);
     assert_eq!(found.modes.len(), truth.len(), "{:?}", found.rejected);
     for (mode, truth) in found.modes.iter().zip(&truth) {
-        // Nothing but rounding, and the end of the iteration.
+        // The error is rounding and the termination of the iteration.
         assert!((mode.mode.frequency_hz / truth.frequency_hz - 1.0).abs() < 1e-6);
         assert!((mode.mode.damping_ratio / truth.damping_ratio - 1.0).abs() < 1e-5);
         let (right, left) = normalized(truth);
@@ -112,7 +112,7 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
     const SEEDS: u64 = 60;
     for seed in 0..SEEDS {
         let (table, deviation) = table(&structure, &grid(10.0, 28.0, 145), &AXES, 0.03, seed);
-        // Every second time the deviations are not stated.
+        // Every second seed leaves the standard deviations of the receptances unstated.
         let stated = (seed % 2 == 0).then_some(deviation.as_slice());
         let data = Receptances::new(&table, stated, None).unwrap();
         let found = identify(&data, &Options::default()).unwrap();
@@ -144,12 +144,12 @@ fn intervals_cover_the_truth_as_often_as_they_say() {
             }
         }
         if let Some(misfit) = found.misfit {
-            // 2 × 9 × 145 values: a standard deviation of 3 %.
+            // χ² per degree of freedom from 2 × 9 × 145 values has a standard deviation of 3 %.
             assert!((misfit - 1.0).abs() < 0.12, "seed {seed}: {misfit}");
         }
     }
     let share = f64::from(covered as u32) / f64::from(all as u32);
-    // The 28 numbers of a seed depend on each other; 60 seeds alone would scatter by 0.04.
+    // The 28 numbers of a seed are correlated: if they were one number, the share of 60 seeds would scatter by 0.04.
     assert!(
         missed <= 1 && (0.85..0.95).contains(&share),
         "{share} of {all}, {missed} missed"
@@ -179,7 +179,7 @@ fn structure(modes: Vec<Mode>) -> Structure {
 
 #[test]
 fn close_modes_are_told_apart_and_modes_outside_the_band_are_residuals() {
-    // A third of a width apart, the shapes of one neither left nor right those of the other; one far below, one far above.
+    // Two close modes a third of a half-power bandwidth apart with different shapes, one mode far below and one far above.
     let close = [
         mode(
             17.2,
@@ -210,7 +210,7 @@ fn close_modes_are_told_apart_and_modes_outside_the_band_are_residuals() {
         assert_eq!(found.modes.len(), 2, "seed {seed}: {:?}", found.modes);
         for (found, truth) in found.modes.iter().zip(&close) {
             let off = (found.mode.frequency_hz - truth.frequency_hz).abs();
-            // Five standard deviations, and what real constants leave of the modes outside.
+            // Five standard deviations, plus the error of two real constants for the modes outside the band.
             assert!(
                 off < 5.0 * found.frequency_std_hz + 1e-3,
                 "seed {seed}: {off} {found:?}"
@@ -296,7 +296,7 @@ fn what_holds_no_mode_is_refused() {
     let holed = FrfTable::new(Path::new("a.csv"), whole.frequency_hz().to_vec(), entries).unwrap();
     let said = refused(&holed, None, &Options::default());
     assert!(said.contains("hyy is missing"), "{said}");
-    // Far from any resonance there is nothing but noise on a constant.
+    // Far from any resonance the receptance is a constant with noise.
     let (far, _) = table(&structure, &grid(200.0, 220.0, 101), &AXES, 0.3, 3);
     let said = refused(&far, None, &Options::default());
     assert!(said.contains("no pole is stable"), "{said}");

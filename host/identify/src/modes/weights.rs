@@ -9,21 +9,24 @@ use num_complex::Complex64;
 use super::pole_residue::PoleResidue;
 use super::receptances::Receptances;
 
-/// Lines for each receptance from which on the correlation between receptances is known well enough to weigh by.
+/// Number of lines per receptance from which the correlation between receptances is estimated. A choice: with fewer, its estimate
+/// is too inaccurate for weights.
 const LINES_PER_RECEPTANCE: usize = 6;
 
-/// What is added to a correlation, as a part of it: directions in which less is left than that weigh no more.
+/// Ridge on the diagonal of the correlation matrix. A choice: it bounds the weight of combinations of receptances with almost no
+/// residual.
 const CORRELATION_RIDGE: f64 = 1e-5;
 
-/// A receptance of which less than this part is left weighs no more than if this much were.
+/// Lower bound of the residual of a receptance, relative to its RMS, which bounds the weight of an exact fit. A choice, above the
+/// rounding error.
 const LEAST_LEFT: f64 = 1e-6;
 
-/// Weights of the residual.
+/// Weights of the residual in a modal fit.
 #[derive(Clone)]
 pub(super) struct Weights {
-    /// Deviation of every value of every receptance.
+    /// Standard deviation of every receptance at every line, m/N.
     pub(super) deviation: Vec<Vec<f64>>,
-    /// Whitening matrix between the receptances of one line.
+    /// Whitening matrix between the receptances of one line; `None` without correlation.
     whitening: Option<DMatrix<Complex64>>,
 }
 
@@ -48,7 +51,7 @@ impl Weights {
         }
     }
 
-    /// Sums over the receptances by the rows of the whitening matrix, which is lower triangular.
+    /// Multiplies by the whitening matrix, which is lower triangular, across the receptances of every line.
     pub(super) fn mixed<C: nalgebra::Dim>(
         &self,
         plain: Vec<nalgebra::OMatrix<Complex64, nalgebra::Dyn, C>>,
@@ -70,13 +73,13 @@ impl Weights {
             .collect()
     }
 
-    /// The weights from the residual of a fit.
+    /// Updates the standard deviations and the whitening matrix from the residual of a fit.
     pub(super) fn again(&mut self, data: &Receptances, fit: &PoleResidue) {
         let mut left = Vec::with_capacity(data.values.len());
         for k in 0..data.values.len() {
             let values = fit.left_of(data, &self.deviation, k);
             let least = LEAST_LEFT * root_mean_square(&data.values[k]) / mean(&self.deviation[k]);
-            // Real and imaginary part have the stated deviation each.
+            // The standard deviation is that of the real and of the imaginary part, each half of the variance of the complex value.
             let scale = (root_mean_square(&values) / 2.0_f64.sqrt()).max(least);
             for value in &mut self.deviation[k] {
                 *value *= scale;
@@ -87,7 +90,7 @@ impl Weights {
     }
 }
 
-/// Root of the mean square of the absolute values.
+/// Root mean square of the magnitudes.
 pub(super) fn root_mean_square(values: &[Complex64]) -> f64 {
     (values.iter().map(|value| value.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
@@ -96,7 +99,8 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// L⁻¹ of the correlation L Lᴴ of the residual, with unit variance of real and imaginary part; `None` for too few lines.
+/// Inverse L⁻¹ of the Cholesky factor of the correlation L Lᴴ between receptances, with unit variance of real and of imaginary
+/// part; `None` with too few lines.
 fn whitening(left: &[DVector<Complex64>]) -> Option<DMatrix<Complex64>> {
     let (count, lines) = (left.len(), left.first().map_or(0, |left| left.len()));
     if lines < LINES_PER_RECEPTANCE * count {

@@ -1,4 +1,4 @@
-//! The data of a fit on whole records.
+//! Data of a modal fit to whole records.
 
 use num_complex::Complex64;
 
@@ -11,14 +11,14 @@ use crate::modes::pole_residue::{PoleResidue, Shaped};
 use quietcut_frf::{ChannelLines, RecordSpectra};
 use quietcut_model::structure::Direction;
 
-/// The data of a fit.
+/// Spectra of the records, and the assignment of their channels to directions.
 pub(super) struct Data<'a> {
     pub(super) records: &'a [RecordSpectra],
-    /// Response and force of each of the outside terms of the structure.
+    /// Response and force index of each term for modes outside the band.
     pub(super) places: Vec<(usize, usize)>,
-    /// Index in the right shape of each response, and in the left shape of each force, by record.
+    /// For each record: index in the right shape of each response, and index in the left shape of each force.
     pub(super) axes: Vec<(Vec<usize>, Vec<usize>)>,
-    /// 2π times the middle of the band, rad/s: the unit of the polynomials.
+    /// Angular frequency at the middle of the band, rad/s: the scale of s in the polynomials.
     pub(super) omega: f64,
 }
 
@@ -110,7 +110,7 @@ impl<'a> Data<'a> {
 }
 
 impl Data<'_> {
-    /// Mean square of the lines of each response of a record.
+    /// Mean square over the lines of each response of a record.
     pub(super) fn sizes(&self, record: usize) -> Vec<f64> {
         let of = |channel: &ChannelLines| {
             let power: f64 = channel.lines.iter().map(|line| line.norm_sqr()).sum();
@@ -119,7 +119,7 @@ impl Data<'_> {
         self.records[record].responses.iter().map(of).collect()
     }
 
-    /// Directions both excited and measured, as indices of right and left shape.
+    /// Directions that are both excited and measured, as pairs of indices in the right and in the left shape.
     pub(super) fn shared(&self, (rights, lefts): (usize, usize)) -> Vec<(usize, usize)> {
         let directions = |index: usize, of_response: bool| {
             self.axes.iter().zip(self.records).find_map(|(axes, record)| {

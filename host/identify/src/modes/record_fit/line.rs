@@ -26,7 +26,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Evaluates one line; `None` if the covariance is not positive definite.
+    /// Evaluates the residual at line `k` of a record; `None` if the covariance is not positive definite.
     pub(super) fn of(
         data: &Data<'_>,
         record: usize,

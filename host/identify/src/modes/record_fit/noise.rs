@@ -32,7 +32,7 @@ const RIDGE: f64 = 1e-12;
 /// Start value of the force noise variance, relative to the power of the force in the band. A choice.
 const FORCE_START: f64 = 1e-6;
 
-/// Start values: the whole residual is attributed to response noise.
+/// Start values of the noise variances: the whole residual is attributed to response noise.
 pub(super) fn start(data: &Data<'_>, record: usize, unknowns: &Unknowns) -> Variances {
     let spectra = &data.records[record];
     let mut variances = Variances {
@@ -64,7 +64,7 @@ fn least(channel: &ChannelLines) -> f64 {
     (LEAST_RELATIVE_NOISE * channel.root_mean_square).powi(2)
 }
 
-/// Lower bound of the force noise variance: the plateau of its spectrum, if there is one.
+/// Lower bound of the noise variance of a force channel: the plateau of its spectrum, or 0 without a plateau.
 fn lowest(channel: &ChannelLines) -> f64 {
     channel.plateau.unwrap_or(0.0).max(least(channel))
 }
@@ -79,7 +79,7 @@ pub(super) fn again(data: &Data<'_>, record: usize, unknowns: &Unknowns, varianc
     let responses = variances.responses.len();
     let spectra = &data.records[record];
     let values = 2.0 * (spectra.frequency_hz.len() * responses) as f64;
-    // Degrees of freedom used by the parameters of transient and structure.
+    // Number of parameters of transient and structure per record: they reduce the degrees of freedom of the residual.
     let unknown = unknowns.transients.iter().map(Transient::width).sum::<usize>() / data.records.len()
         + unknowns.structure.parameters().len() / data.records.len();
     let unbiased = values / (values - unknown as f64).max(1.0);
@@ -135,7 +135,7 @@ fn scored(normal: &DMatrix<f64>, right: &DVector<f64>, current: &[f64], bounds: 
     let mut next = current.to_vec();
     let mut free: Vec<usize> = (0..current.len()).collect();
     loop {
-        // Variances are scaled by their current values.
+        // The equations are scaled by the current variances, so that their unknowns are ratios near 1.
         let size = free.len();
         let mut scaled = DMatrix::from_fn(size, size, |i, j| {
             normal[(free[i], free[j])] * current[free[i]] * current[free[j]]
@@ -178,7 +178,7 @@ fn divide(data: &Data<'_>, record: usize, unknowns: &Unknowns, variances: &mut V
             let sum: Complex64 = lines.clone().map(|k| a[k] * b[k].conj()).sum();
             sum / (lines.len() as f64 * (variances.forces[i] * variances.forces[j]).sqrt())
         });
-        // Spectra that are not finite give no bound.
+        // A spectral matrix with non-finite entries bounds the measurement noise at zero.
         of_symmetric(power).map_or(0.0, |eigen| eigen.eigenvalues.min())
     };
     let least = (0..bands).map(eigenvalue).fold(f64::INFINITY, f64::min);
@@ -209,7 +209,7 @@ fn scores(
     let (mut normal, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
     for k in 0..data.records[record].frequency_hz.len() {
         let line = Line::of(data, record, unknowns, variances, k)?;
-        // Every B_c is the product of a column and its adjoint.
+        // Every matrix B_c of the likelihood is the product of a column and its adjoint.
         let column = |c: usize| -> Vector3<Complex64> {
             if c < responses {
                 Vector3::from_fn(|p, _| if p == c { Complex64::ONE } else { Complex64::ZERO })

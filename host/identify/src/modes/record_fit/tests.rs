@@ -1,4 +1,4 @@
-//! Modes of known structures from records with noise everywhere, and how often their intervals hold the truth.
+//! Modes of known structures from records with noise on all channels, and the share of intervals that contain the truth.
 
 use std::path::Path;
 
@@ -33,16 +33,16 @@ fn normals(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// Three forces, of which the third is nearly a mixture of the others, and displacements of modes that move as the record
-/// begins; `unmeasured` is a part of each force that its channel does not show.
+/// Record of three forces, the third of which is nearly a linear combination of the others, and of displacements of modes that move
+/// when the record begins. `unmeasured` is the fraction of each force that its channel does not contain.
 ///
-/// Modes are exact for forces that are linear between samples. Such have sinc² of the spectrum of their samples, which is
-/// that of samples smoothed by [1, 10, 1]/12 but for 1e-5 below 30 Hz.
+/// The displacements are exact for forces that are linear between samples. The spectrum of such forces differs from that of their
+/// samples by sinc², which equals a smoothing of the samples by [1, 10, 1]/12 to within 1e-5 below 30 Hz.
 fn record(modes: &[Mode], seconds: f64, seed: u64, unmeasured: f64) -> Recording {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let samples = (seconds * RATE_HZ) as usize;
     let mut band = || -> Vec<f64> {
-        // Five poles at 33 Hz: near half the rate nothing is left but the noise of the sensor.
+        // Five poles at 33 Hz limit the band of the forces: near half the sample rate only sensor noise remains.
         let mut poles = [0.0; 5];
         (0..samples)
             .map(|_| {
@@ -119,7 +119,7 @@ fn record(modes: &[Mode], seconds: f64, seed: u64, unmeasured: f64) -> Recording
     }
 }
 
-/// Noise of `percent` of the root mean square on every sample of every channel.
+/// Adds noise of `percent` of the RMS of every channel to each of its samples.
 fn noisy(clean: &Recording, percent: f64, seed: u64) -> Recording {
     let mut recording = clean.clone();
     let noise = Noise {
@@ -154,7 +154,7 @@ fn identified(
     (first, refined, noise)
 }
 
-/// How far each number of the modes is from the truth, in standard deviations, with its name.
+/// Deviation of each parameter of the modes from the truth, in standard deviations, with the name of the parameter.
 fn off(found: &ModalModel, truth: &[Mode]) -> Vec<(String, f64)> {
     let mut off = Vec::new();
     for (r, (found, truth)) in found.modes.iter().zip(truth).enumerate() {
@@ -194,7 +194,7 @@ fn off(found: &ModalModel, truth: &[Mode]) -> Vec<(String, f64)> {
     off
 }
 
-/// Tallies how far numbers are off, by name.
+/// Deviations from the truth in standard deviations, by name of the parameter.
 #[derive(Default)]
 struct Tally {
     rows: Vec<(String, Vec<f64>)>,
@@ -210,7 +210,7 @@ impl Tally {
         }
     }
 
-    /// Share of all numbers whose 90 % interval holds the truth; prints each.
+    /// Share of all parameters whose 90 % interval contains the truth; prints the share of each.
     fn covered(&self, what: &str) -> f64 {
         let mut pooled = (0, 0);
         for (name, values) in &self.rows {
@@ -249,7 +249,7 @@ fn neither_windows_nor_noise_on_nearly_dependent_forces_move_the_modes_of_record
             let frequency = found.mode.frequency_hz / truth.frequency_hz - 1.0;
             let damping = found.mode.damping_ratio / truth.damping_ratio - 1.0;
             println!("seed {seed}: frequency {frequency:+.2e}, damping ratio {damping:+.2e}");
-            // Frequencies and damping ratios have standard deviations of 2e-5 and 5e-4.
+            // The standard deviations of frequencies and damping ratios are 2e-5 and 5e-4.
             assert!(
                 frequency.abs() < 2e-4 && damping.abs() < 5e-3,
                 "seed {seed}: {frequency} {damping}"
@@ -258,7 +258,7 @@ fn neither_windows_nor_noise_on_nearly_dependent_forces_move_the_modes_of_record
     }
     tally.covered(&format!("seeds 0 to {}", SEEDS - 1));
     println!("damping ratio of the first mode by averaged receptances: {averaged:+.4}");
-    // Windows of 5 s widen a resonance of 1 Hz.
+    // Windows of 5 s widen a resonance of 1 Hz and bias the damping of averaged receptances.
     assert!(averaged > 0.01, "{averaged}");
 }
 
@@ -300,7 +300,7 @@ fn records_that_do_not_fit_the_receptances_are_refused() {
     assert!(spectra(&blows, BAND_HZ).is_none());
 }
 
-/// A porous cut as `simulate --experiment porous` records it, or a speed sweep, without noise.
+/// Record without noise of a porous cut, as `simulate --experiment porous` makes it, or of a speed sweep.
 fn cut(seconds: f64, rpm: [f64; 2], [start_deg, exit_deg]: [f64; 2], pores: Option<Pores>) -> Recording {
     let mut case = case("kuka-kr90-acetal");
     let limits = case.cut.as_mut().unwrap();
@@ -324,7 +324,7 @@ fn cut(seconds: f64, rpm: [f64; 2], [start_deg, exit_deg]: [f64; 2], pores: Opti
     recording
 }
 
-/// How often the intervals hold the truth in porous cuts with this many seeds of sensor noise, of `foams` materials.
+/// Deviations from the truth in porous cuts of `foams` materials with `seeds` seeds of sensor noise each.
 fn porous(foams: u64, seeds: u64) -> Tally {
     let truth = table_7_1();
     let mut tally = Tally::default();
@@ -345,7 +345,8 @@ fn porous(foams: u64, seeds: u64) -> Tally {
     tally
 }
 
-/// A slice of the campaign below: what is claimed, 90 %, lies in the 99.9 % interval of the share of each parameter.
+/// A seeded slice of the campaign: the claimed coverage of 90 % lies in the 99.9 % binomial interval of the share of each
+/// parameter.
 #[test]
 fn intervals_of_modes_from_a_porous_cut_hold_the_truth_as_often_as_they_say() {
     let tally = porous(1, 6);

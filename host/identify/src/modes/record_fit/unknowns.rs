@@ -1,31 +1,33 @@
-//! The unknowns of a fit on whole records.
+//! Unknowns of a modal fit to whole records.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
 
 use crate::modes::pole_residue::PoleResidue;
 
-/// Coefficients of the polynomial of a transient.
+/// Number of coefficients of the polynomial part of a transient.
 pub(super) const SMOOTH: usize = 3;
 
-/// The unknowns: the structure and the transient of each record.
+/// The unknowns: parameters of the structure, and the transient of each record.
 #[derive(Clone)]
 pub(super) struct Unknowns {
     pub(super) structure: PoleResidue,
     pub(super) transients: Vec<Transient>,
 }
 
-/// T_p(s) = Σ_r c_pr/(s − λ_r) + conjugate at the conjugate pole + Σ_j a_pj (s/i s₀)ʲ iʲ of the responses p of one record.
+/// Transient of one record at the response p: T_p(s) = Σ_r c_pr/(s − λ_r) + conjugate at the conjugate pole + Σ_j a_pj (s/i s₀)ʲ
+/// iʲ.
 #[derive(Clone)]
 pub(super) struct Transient {
-    /// c by response and mode.
+    /// Residues c_pr, by response and mode.
     pub(super) residues: Vec<Vec<Complex64>>,
-    /// a by response.
+    /// Polynomial coefficients a_pj, by response.
     pub(super) smooth: Vec<[f64; SMOOTH]>,
 }
 
 impl Unknowns {
-    /// Each record's transient after the structure: residues by response and mode, then polynomials.
+    /// The unknowns after a step of the structure and of each transient. The step of a transient lists its residues by response and
+    /// mode, then its polynomial coefficients.
     pub(super) fn moved(&self, structure: &DVector<f64>, transients: &[DVector<f64>]) -> Self {
         let mut moved = self.clone();
         moved.structure = self.structure.moved(structure.as_slice());
@@ -44,7 +46,7 @@ impl Unknowns {
 }
 
 impl Transient {
-    /// How many numbers it is.
+    /// Number of real parameters of the transient.
     pub(super) fn width(&self) -> usize {
         self.residues.iter().map(|row| 2 * row.len() + SMOOTH).sum()
     }

@@ -1,31 +1,31 @@
-//! Variances of the noise of a record.
+//! Noise variances of the channels of a record.
 
 use nalgebra::Matrix3;
 use num_complex::Complex64;
 use serde::Serialize;
 
-/// Noise that was found on a channel.
+/// Estimated noise of a channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelNoise {
-    /// The recording.
+    /// Name of the recording.
     pub recording: String,
-    /// The channel.
+    /// Name of the channel.
     pub channel: String,
-    /// Standard deviation of a sample, if it is white over all frequencies, SI.
+    /// Standard deviation of the noise of a sample, SI, if the noise is white up to half the sample rate.
     pub deviation: f64,
-    /// The same in percent of the channel's root mean square.
+    /// Standard deviation of the noise in percent of the RMS of the channel.
     pub percent: f64,
 }
 
-/// Noise variances per line of one record.
+/// Noise variances of one record, per frequency line.
 #[derive(Clone, Debug)]
 pub(super) struct Variances {
-    /// Of the sensors of responses.
+    /// Noise variances of the responses.
     pub(super) responses: Vec<f64>,
-    /// Of what looks like noise of the forces: V_f and V_d together.
+    /// Apparent noise variances of the forces, V_f + V_d: measurement noise and unmeasured forces.
     pub(super) forces: Vec<f64>,
-    /// The part that is in the measured forces: V_f; the rest is V_d.
+    /// Noise variances V_f of the measured forces; the rest of the apparent noise is V_d.
     pub(super) measured: Vec<f64>,
-    /// sⁿ H V_d Hᴴ s̄ⁿ by line, of the structure of the round before.
+    /// Covariance sⁿ H V_d Hᴴ s̄ⁿ of the response to unmeasured forces at each line, from the structure of the previous round.
     pub(super) disturbance: Vec<Matrix3<Complex64>>,
 }
