@@ -193,7 +193,8 @@ fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
         .iter()
         .filter(|entry| entry.response == entry.force)
     {
-        // At low frequency a receptance is close to a positive static compliance; otherwise a mode lies below the first line.
+        // A receptance far below all modes is nearly its positive static compliance; another phase indicates a mode below the first
+        // line.
         if let (Some(first), Some(hz)) = (entry.receptance.first(), table.frequency_hz().first())
             && first.im.abs() > first.re
         {

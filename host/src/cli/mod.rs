@@ -97,10 +97,10 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Exit status of a command that was interrupted, as shells have it: 128 and the number of the signal.
+/// Exit status after Ctrl-C, by the convention of shells: 128 plus the signal number 2.
 const INTERRUPTED: i32 = 130;
 
-/// Ctrl-C ends the command at once; files that are being written are removed first. `monitor` ends by itself.
+/// Makes Ctrl-C remove the files that are being written and end the command at once; `monitor` ends by itself.
 fn leave_nothing_half_written(verb: &Verb) -> Result<(), ctrlc::Error> {
     if matches!(verb, Verb::Monitor(_)) {
         return Ok(());
@@ -112,7 +112,7 @@ fn leave_nothing_half_written(verb: &Verb) -> Result<(), ctrlc::Error> {
 }
 
 impl Verb {
-    /// What the command does while it prints nothing; `None` where the verb shows its own progress or answers at once.
+    /// Activity for the progress line; `None` for a verb that shows its own progress or finishes at once.
     fn doing(&self) -> Option<&'static str> {
         match self {
             Self::Simulate(_) => Some("simulating"),

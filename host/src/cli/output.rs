@@ -21,7 +21,7 @@ impl Output {
         if self.json { Ok(()) } else { print(&text) }
     }
 
-    /// Prints the result of the verb: `object` as JSON with `--json`, else `text`.
+    /// Prints the result of the verb: with `--json` the JSON of `object`, otherwise `text`.
     pub fn answer(self, object: &impl Serialize, text: impl Display) -> Result<(), Error> {
         if self.json {
             print(&serde_json::to_string(object).map_err(Error::other)?)

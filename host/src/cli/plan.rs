@@ -142,7 +142,7 @@ fn request(args: &Args) -> Request {
     }
 }
 
-/// Instruction for one planned test.
+/// Sentence that tells the machinist how to carry out one planned test.
 fn instruction(step: &Step) -> String {
     match &step.test {
         Test::Hammer { direction, blows } => {

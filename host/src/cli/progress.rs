@@ -1,6 +1,6 @@
-//! Progress on a terminal: a line on standard error while a verb computes.
+//! Progress of a verb on a terminal: a line on standard error while it computes.
 //!
-//! The line is gone before anything else is printed. Without a terminal nothing is shown.
+//! The line is removed before anything else is printed. Without a terminal nothing is shown.
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
@@ -8,13 +8,13 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// The line moves this often, so that one sees that the command works.
+/// Period of the animation of the progress line: a choice, short enough to show that the command works.
 const TICK: Duration = Duration::from_millis(200);
 
-/// The line that is shown.
+/// The progress line on the terminal; `None` if there is none.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Shows that the command is `doing` something, and for how long, until [`clear`].
+/// Shows a progress line with the activity `doing` and the elapsed time, until [`clear`].
 pub(super) fn show(doing: &'static str) {
     let spinner = bar(None, "{spinner} {msg} {elapsed}");
     spinner.set_message(doing);
@@ -24,7 +24,7 @@ pub(super) fn show(doing: &'static str) {
     }
 }
 
-/// Takes the line away.
+/// Removes the progress line.
 pub(super) fn clear() {
     let mut shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(spinner) = shown.take() {
@@ -32,7 +32,7 @@ pub(super) fn clear() {
     }
 }
 
-/// A bar of `steps` on standard error, or of an unknown number; hidden where that is no terminal.
+/// A progress bar of `steps` on standard error, or a spinner without a number of steps; hidden if standard error is no terminal.
 pub(super) fn bar(steps: Option<u64>, template: &str) -> ProgressBar {
     let is_terminal = std::io::stderr().is_terminal();
     let target = if is_terminal {

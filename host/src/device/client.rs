@@ -255,7 +255,7 @@ impl Client {
                 Some(ReplyFrame::Unreadable(error)) => {
                     tracing::debug!("{}: request {number}: {error}", self.port.name());
                     *fault = Some(error);
-                    // The frame may have been a report with the reply behind it.
+                    // The unreadable frame may have been a report with the reply behind it.
                     deadline = deadline.min(Instant::now() + AFTER_NOISE);
                 }
                 Some(ReplyFrame::Again(error)) => {
@@ -312,7 +312,7 @@ impl Client {
                 return Some(ReplyFrame::Version(theirs));
             }
             Response::FrameRefused(error) => return Some(ReplyFrame::Again(error)),
-            // A second reply to a request that was repeated.
+            // Drops a second reply to a request that was repeated.
             Response::Reply { request, .. } if Some(request) != number => {}
             Response::Reply { reply, .. } => {
                 return Some(match order {

@@ -70,7 +70,7 @@ impl VirtualCell {
         )
     }
 
-    /// Start and end of full engagement of such a cut, s since the first sample.
+    /// Start and end of full engagement of the cut that [`cut`](Self::cut) simulates, s since the first sample.
     ///
     /// # Errors
     /// As [`cut`](Self::cut).
@@ -83,7 +83,7 @@ impl VirtualCell {
         virtual_cut(spindle_rpm, depth_mm, seconds).full_cut_s(&self.case)
     }
 
-    /// Repeats three cuts without end: period doubling, stable, Hopf. Each is computed while the previous one is played.
+    /// Endless sequence of three cuts: period doubling, stable, Hopf. Each cut is computed while the previous one is played.
     pub fn endless_cuts(self) -> Receiver<Heard> {
         const CUTS: [(f64, f64); 3] = [(1045.0, 2.0), (1045.0, 1.0), (900.0, 2.0)];
         const SECONDS: f64 = 12.0;
@@ -93,7 +93,7 @@ impl VirtualCell {
                 let Ok(heard) = self.cut(spindle_rpm, depth_mm, SECONDS, seed) else {
                     return;
                 };
-                // The receiver is gone.
+                // Sending fails after the device has been dropped.
                 if send.send(heard).is_err() {
                     return;
                 }

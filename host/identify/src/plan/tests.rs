@@ -1,4 +1,5 @@
-//! Promised intervals against machines that are drawn, tested and fitted; the search against all sets of tests.
+//! Tests of plans: the stated intervals against random machines that are measured and fitted, and the search against all sets of
+//! tests.
 
 use std::f64::consts::PI;
 
@@ -45,7 +46,7 @@ fn first_limit(case: &Case, rpm: f64, depth_mm: f64) -> SpeedLine {
     line(&problem, rpm, depth_mm, 40).unwrap()
 }
 
-/// The rows of a matrix of these columns.
+/// Rows of the matrix with these columns.
 fn rows(columns: &[Vec<f64>]) -> Vec<DVector<f64>> {
     let matrix = DMatrix::from_fn(columns[0].len(), columns.len(), |row, column| {
         columns[column][row]
@@ -53,7 +54,7 @@ fn rows(columns: &[Vec<f64>]) -> Vec<DVector<f64>> {
     matrix.row_iter().map(|row| row.transpose()).collect()
 }
 
-/// A campaign: what is measured is computed anew for a machine, in units of its noise.
+/// Oracle of a plan: computes all measured values of its tests for a given machine, each in units of its noise.
 struct Campaign<'a> {
     case: &'a Case,
     unknowns: &'a Unknowns,
@@ -66,7 +67,7 @@ impl Campaign<'_> {
         shifted(self.case, &self.unknowns.variables, u.as_slice())
     }
 
-    /// All that is measured, noise-free, with its slopes, and which of it are the middles of brackets.
+    /// All measured values without noise, their derivatives by the unknowns, and the indices of the bracketed limits among them.
     fn measured(&self, u: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>, Vec<usize>) {
         let (mut values, mut slopes): (Vec<f64>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
         let mut brackets = Vec::new();
@@ -80,7 +81,7 @@ impl Campaign<'_> {
                     slopes.push(&limit.gradient * scale);
                     if let Some((hz, gradient)) = &limit.chatter_hz {
                         let scale = 1.0 / (self.request.means.chatter_frequency * hz);
-                        // A frequency in units of its own deviation, which is relative: its logarithm.
+                        // Logarithm of the chatter frequency over its relative standard deviation.
                         values.push(hz.ln() / self.request.means.chatter_frequency);
                         slopes.push(gradient * scale);
                     }
@@ -106,7 +107,7 @@ impl Campaign<'_> {
         linearized.planes(&line).remove(0)
     }
 
-    /// The transform of the acceleration at the frequencies of a record of 12 s, in units of that of its noise.
+    /// Transform of the acceleration at the frequencies of a record of 12 s, in units of the transform of its noise.
     fn hammer(&self, u: &DVector<f64>, axis: usize, values: &mut Vec<f64>, slopes: &mut Vec<DVector<f64>>) {
         let means = &self.request.means;
         let inside = self.unknowns.variables.len();
@@ -129,10 +130,10 @@ impl Campaign<'_> {
             for bin in (8.495 * SECONDS) as usize..(highest_hz * SECONDS) as usize {
                 let hz = bin as f64 / SECONDS;
                 let omega = 2.0 * PI * hz;
-                // ∫₀^T F sin(πt/T) e^{−iωt} dt; its phase is that of the middle of the blow.
+                // Transform of the half-sine force, ∫₀^T F sin(πt/T) e^{−iωt} dt, with the phase of the middle of the impact.
                 let b = PI / pulse_s;
                 let force = means.peak_n * 2.0 * b * (0.5 * omega * pulse_s).cos() / (b * b - omega * omega);
-                // White noise of one-sided density S makes a line of length T of the variance S T/4 in each part.
+                // In a record of length T, white noise of one-sided density S gives each part of a line the variance S T/4.
                 let deviation = noise * (0.25 * SECONDS / means.blows as f64).sqrt();
                 let h = structure.receptance(omega).unwrap();
                 for output in 0..3 {
@@ -160,7 +161,7 @@ impl Campaign<'_> {
         slopes.extend(rows(&columns));
     }
 
-    /// Forces at 360 angles of a revolution, by the formulas of one tooth.
+    /// Forces at 360 angles of a revolution, computed tooth by tooth.
     fn force(&self, u: &DVector<f64>, depth_mm: f64, values: &mut Vec<f64>, slopes: &mut Vec<DVector<f64>>) {
         let means = &self.request.means;
         let forces = |u: &DVector<f64>| -> Vec<f64> {
@@ -177,7 +178,8 @@ impl Campaign<'_> {
                         continue;
                     }
                     let (sin, cos) = deg.to_radians().sin_cos();
-                    // Edge angle 90°: chip f sin φ; tangential against the turning, radial inward, axial.
+                    // Edge angle 90°: chip thickness f sin φ; tangential force against the rotation, radial force inward, axial
+                    // force along the tool.
                     let area = depth_mm * cut.feed_per_tooth_mm * sin;
                     let [tangential, radial, axial] = [material.ktc_mpa, material.krc_mpa, material.kac_mpa]
                         .map(|coefficient| coefficient * area);
@@ -207,7 +209,8 @@ impl Campaign<'_> {
         values.extend(now);
     }
 
-    /// A machine, its tests with noise, and the most probable machine after them; limits of both at the chart's speeds.
+    /// Errors of the limits of one random machine: it is drawn, its tests get noise, and its most probable parameters are fitted.
+    /// Each error is divided by the half-width that the plan states.
     fn errors(&self, plan: &Plan, seed: u64, stream: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
@@ -215,15 +218,15 @@ impl Campaign<'_> {
         let truth = DVector::from_fn(size, |_, _| StandardNormal.sample(&mut rng));
         let (mut seen, _, brackets) = self.measured(&truth);
         for (row, value) in seen.iter_mut().enumerate() {
-            // A bracket holds the limit anywhere; everything else has normal noise.
+            // A bracket contains the limit at a uniformly random position; all other values have normal noise.
             *value += if brackets.contains(&row) {
                 12.0_f64.sqrt() * (rng.random::<f64>() - 0.5)
             } else {
                 StandardNormal.sample(&mut rng)
             };
         }
-        // What is most probable lies within the deviations that are left; from farther away, where the peaks of two
-        // receptances hardly overlap, whole steps would lead elsewhere.
+        // Gauss–Newton starts at the true parameters: from farther away, where the resonance peaks of two receptances hardly
+        // overlap, full steps converge to other minima.
         let mut u = truth.clone();
         for _ in 0..12 {
             let (values, slopes, _) = self.measured(&u);
@@ -231,7 +234,7 @@ impl Campaign<'_> {
             let gradient = slopes.tr_mul(&(&seen - values)) - &u;
             let step = information.cholesky().unwrap().solve(&gradient);
             u += &step;
-            // In deviations of what was known before.
+            // Norm of the step in units of the prior standard deviations.
             if step.norm() < 1e-4 {
                 break;
             }
@@ -253,7 +256,7 @@ impl Campaign<'_> {
     }
 }
 
-/// Errors of limits over the promised half width, for `draws` machines.
+/// The plan for these speeds, and the errors of its limits for `draws` machines, divided by the stated half-widths.
 fn campaign(speeds_rpm: &[f64], width: f64, draws: u64) -> (Plan, Vec<f64>) {
     let seed = 20;
     println!("seed {seed}");
@@ -279,12 +282,12 @@ fn campaign(speeds_rpm: &[f64], width: f64, draws: u64) -> (Plan, Vec<f64>) {
 
 fn check(errors: &[f64], draws: u64) {
     let inside = errors.iter().filter(|error| error.abs() <= 1.0).count() as f64 / errors.len() as f64;
-    // Of a normal distribution the deviation is the half width over 1.645.
+    // Standard deviation of the errors over the stated one, which is the half-width divided by 1.645.
     let ratio =
         1.644_853_6 * (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
     println!("{inside:.3} of the limits inside, deviation {ratio:.3} times the promised one");
-    // Limits of one machine err together: as many independent ones as machines, at least. Three deviations of a share,
-    // and of a standard deviation.
+    // The errors of one machine are correlated: they count as one. The tolerance is three standard deviations of a share, and of a
+    // standard deviation.
     let n = draws as f64;
     assert!((inside - 0.9).abs() < 3.0 * (0.09 / n).sqrt(), "{inside}");
     assert!((ratio - 1.0).abs() < 3.0 / (2.0 * n).sqrt(), "{ratio}");
@@ -297,7 +300,7 @@ fn what_is_promised_of_a_few_machines_comes_true() {
     check(&errors, 16);
 }
 
-/// `cargo test --release -p quietcut --lib plan -- --ignored --nocapture`
+/// Run with `cargo test --release -p quietcut-identify --lib plan -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes: 400 machines"]
 fn what_is_promised_of_many_machines_comes_true() {
@@ -306,12 +309,12 @@ fn what_is_promised_of_many_machines_comes_true() {
     check(&errors, 400);
 }
 
-/// The cheapest of all sets of up to three tests.
+/// Cost of the cheapest of all sets of up to three tests that reach the width.
 fn cheapest_of_all(selection: &Selection<'_>, count: usize) -> Option<usize> {
     let none = count;
     let sets = (0..=count).flat_map(|a| (a..=count).flat_map(move |b| (b..=count).map(move |c| [a, b, c])));
     sets.filter_map(|set| {
-        // Once for all first: the order in which brackets are cheapest.
+        // Tests that inform about all limits come first: then brackets cost least.
         let mut order: Vec<usize> = set.into_iter().filter(|&index| index != none).collect();
         order.sort_by_key(|&index| selection.is_bracket(index));
         let priced = selection.priced(order);
@@ -371,8 +374,8 @@ fn what_belongs_to_a_mode_of_matrices_moves_that_mode_alone() {
             for (index, pole) in before.iter().enumerate() {
                 let moved = if index == mode { 1e-4 } else { 0.0 };
                 let relative = |after: &Complex64| after.norm() / pole.norm() - 1.0;
-                // Damping that couples modes, and parts that are not symmetric, are not seen by the modes of M and K:
-                // they turn a tenth of a change at most into another mode.
+                // Damping that couples modes and unsymmetric parts are not modelled by the modes of M and K: at most a tenth of a
+                // change affects another mode.
                 assert!(
                     (relative(&by_frequency[index]) - moved).abs() < 1e-5,
                     "{name} {mode} {index}"
@@ -426,7 +429,7 @@ fn the_lowest_of_several_lobes_is_distributed_as_draws_are() {
     lowest.sort_by(f64::total_cmp);
     let (five, ninety_five) = (lowest[10_000], lowest[190_000]);
     println!("{from} {five}, {to} {ninety_five}");
-    // 256 points in three dimensions: the ends are known to a twentieth of the width.
+    // 256 points in three dimensions determine the ends of the interval to a twentieth of its width.
     let near = 0.05 * (ninety_five - five);
     assert!((from - five).abs() < near && (to - ninety_five).abs() < near);
 }

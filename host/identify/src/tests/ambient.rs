@@ -1,4 +1,4 @@
-//! Modes from motion alone, of structures that white noise drives.
+//! Modes from motion alone, for structures under white noise.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -23,8 +23,8 @@ const MODES: [(f64, f64, [f64; 2]); 3] = [
 
 const RPM: f64 = 900.0;
 
-/// Displacements in x and y under white forces, exact from sample to sample; sensors with noise, and a spindle whose unbalance
-/// shakes at every harmonic, one of them within 0.4 Hz of the last mode.
+/// Displacements in x and y under white noise forces, integrated exactly from sample to sample. Sensors have noise, and the spindle
+/// unbalance excites every harmonic, one of them within 0.4 Hz of the last mode.
 fn recording(seconds: f64, seed: u64) -> Recording {
     const RATE_HZ: f64 = 256.0;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -35,7 +35,7 @@ fn recording(seconds: f64, seed: u64) -> Recording {
     for (mode, (hz, damping, _)) in MODES.iter().enumerate() {
         let omega = TAU * hz;
         let a = nalgebra::Matrix2::new(0.0, omega, -omega, -2.0 * damping * omega) / RATE_HZ;
-        // Van Loan: the covariance of what noise adds within a sample.
+        // Covariance of the noise that the forces add within a sample (Van Loan).
         let mut joint = DMatrix::zeros(4, 4);
         joint.view_mut((0, 0), (2, 2)).copy_from(&(-a));
         joint[(1, 3)] = 1.0;
@@ -51,7 +51,7 @@ fn recording(seconds: f64, seed: u64) -> Recording {
     let mut state = DVector::zeros(size);
     let count = (seconds * RATE_HZ) as usize;
     let mut samples = [Vec::with_capacity(count), Vec::with_capacity(count)];
-    // Ten seconds are let pass: then the motion is that of always.
+    // The first ten seconds are not recorded: they contain the transient.
     for sample in 0..count + 2560 {
         let kick = DVector::from_fn(size, |_, _| normal());
         state = &flow * &state + &root * kick;
@@ -96,7 +96,8 @@ fn recording(seconds: f64, seed: u64) -> Recording {
 
 const BAND_HZ: [f64; 2] = [5.0, 40.0];
 
-/// Of every mode the shares of seeds whose intervals hold frequency and damping ratio, and of seeds that found it at all.
+/// For each mode the share of seeds whose interval contains the frequency, the same for the damping ratio, and the share of seeds
+/// that found the mode.
 fn coverage(seconds: f64, seeds: u64) -> [[f64; 3]; 3] {
     let of_seed = |seed: u64| {
         let ambient = Ambient::new(&recording(seconds, seed), BAND_HZ[1]).unwrap();
@@ -137,7 +138,7 @@ fn check(seconds: f64, seeds: u64, pooled: std::ops::RangeInclusive<f64>) {
             100.0 * frequency,
             100.0 * damping
         );
-        // A minute may be too short to tell a mode from noise: then it is not told.
+        // A record of a minute may be too short to distinguish a mode from noise: then the mode is not reported.
         assert!(found >= 0.9, "{found}");
     }
     let mean = shares.iter().map(|[f, d, _]| 0.5 * (f + d)).sum::<f64>() / 3.0;
@@ -165,7 +166,7 @@ fn what_the_record_cannot_tell_is_said() {
     let short = Ambient::new(&recording(10.0, 1), BAND_HZ[1]).unwrap();
     let error = modes(&short, BAND_HZ).unwrap_err();
     assert!(matches!(error, AmbientError::TooShort { .. }), "{error}");
-    // Noise of sensors alone.
+    // A recording with sensor noise alone.
     let mut noise = recording(100.0, 2);
     let mut random = ChaCha8Rng::seed_from_u64(3);
     for sample in noise.channels.iter_mut().flat_map(|channel| &mut channel.samples) {
@@ -176,13 +177,13 @@ fn what_the_record_cannot_tell_is_said() {
         Err(error) => assert!(matches!(error, AmbientError::Nothing(..)), "{error}"),
         Ok(found) => assert!(found.modes.iter().all(|mode| mode.is_vague()), "{found:?}"),
     }
-    // A gap that a reader lets pass: the reason names the data.
+    // A recording with a gap: the reason names the data.
     let mut gap = ambient.clone();
     gap.channels[0][10] = f64::NAN;
     let error = modes(&gap, BAND_HZ).unwrap_err();
     assert!(matches!(error, AmbientError::SingularValues(_)), "{error}");
     assert!(error.to_string().contains("check the data"), "{error}");
-    // Intervals of a short record are wide.
+    // Mean interval width for a record of this length.
     let width = |seconds: f64| {
         let ambient = Ambient::new(&recording(seconds, 4), BAND_HZ[1]).unwrap();
         let found = modes(&ambient, BAND_HZ).unwrap().modes;
@@ -192,6 +193,6 @@ fn what_the_record_cannot_tell_is_said() {
         second.unwrap().frequency_deviation_hz
     };
     let (short, long) = (width(50.0), width(400.0));
-    // Eight times the length: 2.8 times the width, which a dozen blocks know to a quarter.
+    // An eightfold record length gives intervals narrower by √8 = 2.8; a dozen blocks determine the width to a quarter.
     assert!(short > 1.5 * long, "{short} {long}");
 }

@@ -1,4 +1,4 @@
-//! Two close modes, 9 Hz in y and 10.5 Hz in z, that share a nonlinear potential.
+//! Two close modes, 9 Hz in y and 10.5 Hz in z, coupled by a nonlinear potential.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use quietcut_simulate::rig::{Noise, Rig, Signal};
 
 const DIRECTIONS: [Direction; 2] = [Direction::Y, Direction::Z];
 
-/// The modes of chapter 5 at 9 and 10.5 Hz on one machine, linearly coupled a little.
+/// The modes of thesis chapter 5 at 9 and 10.5 Hz on one machine, with a weak linear coupling.
 fn structure() -> Structure {
     let text = r#"
         [structure]
@@ -54,7 +54,7 @@ fn step_sine(direction: Direction, level: f64) -> Recording {
     rig.record(&structure(), Path::new("a.csv")).unwrap().0
 }
 
-/// Dwells of the last 5 s; the 17 s before are e⁻¹⁴ of the slower mode.
+/// The last 5 s of every dwell; in the 17 s before them the slower mode decays to e⁻¹⁴.
 fn dwells(recording: &Recording, noise: f64, seed: u64, harmonics: usize) -> Vec<Dwell> {
     let mut noisy = recording.clone();
     Noise {
@@ -83,7 +83,7 @@ fn data<'a>(law: &'a Law, dwells: &'a [Dwell], grid: &'a Grid) -> Data<'a> {
     }
 }
 
-/// Largest |X/F| of the driven direction, measured and predicted.
+/// Largest |X/F| in the excited direction, measured and predicted.
 fn peaks(data: &Data<'_>, theta: &nalgebra::DVector<f64>, direction: usize) -> [f64; 2] {
     let width = data.grid.width();
     let mut peaks = [0.0_f64; 2];

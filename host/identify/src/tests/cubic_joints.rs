@@ -1,4 +1,4 @@
-//! Joints with cubic terms, from virtual step-sine tests at some postures, and what that says at others.
+//! Joints with cubic terms from virtual step-sine tests at some postures, and the predicted motion at other postures.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -21,18 +21,19 @@ use quietcut_testkit::robot;
 
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
-/// Levels of force, N.
+/// Force levels of the tests, N.
 const LEVELS: [f64; 2] = [4.2, 16.5];
 
 const HARMONICS: usize = 3;
 
-/// The robot of the cases with joints that soften by some percent, and damp more, in vibrations of half a milliradian.
+/// The robot of the cases, with joints whose stiffness falls and whose damping grows by some percent in vibrations of half a
+/// milliradian.
 fn softening() -> Robot {
     let mut robot = robot();
     for (joint, share) in robot.joints.iter_mut().zip([0.10, 0.10, 0.10, 0.10, 0.10, 0.10]) {
         let angle: f64 = 4e-4;
         joint.cubic_stiffness_nm_per_rad3 = -share * joint.stiffness_nm_per_rad / (0.75 * angle.powi(2));
-        // At 10 Hz.
+        // Angular velocity of that vibration at 10 Hz.
         let rate = TAU * 10.0 * angle;
         joint.cubic_damping_nms3_per_rad3 = share * joint.damping_nms_per_rad / (0.75 * rate.powi(2));
     }
@@ -46,7 +47,7 @@ fn structure(robot: &Robot) -> Structure {
     }
 }
 
-/// Natural frequencies, Hz.
+/// Natural frequencies of the robot, Hz, ascending.
 fn natural_hz(robot: &Robot) -> Vec<f64> {
     let first_order = structure(robot).first_order().unwrap();
     let poles = first_order.poles().into_iter().filter(|pole| pole.im > 0.0);
@@ -65,7 +66,7 @@ fn step_sine(robot: &Robot, direction: Direction, level: f64, frequencies: &[f64
     rig.record(&structure(robot), Path::new("steps.csv")).unwrap().0
 }
 
-/// Dwells of the last 3 s, with 1 % noise per sample: before them lie 13 s in which the slowest mode decays to e⁻¹¹.
+/// The last 3 s of every dwell, with 1 % noise per sample; in the 13 s before them the slowest mode decays to e⁻¹¹.
 fn dwells(recording: &Recording, seed: u64) -> Vec<Dwell> {
     let mut noisy = recording.clone();
     let noise = Noise {
@@ -87,7 +88,8 @@ fn dwells(recording: &Recording, seed: u64) -> Vec<Dwell> {
     dwells
 }
 
-/// Tests of a robot from rest to above its three lowest modes, finely about them, in every direction and at every level.
+/// Step-sine tests of a robot in every direction at every force level, from low frequency to above its three lowest modes, with
+/// fine steps around them.
 fn tested(robot: &Robot, seed: u64) -> PostureDwells {
     let mut frequencies: Vec<f64> = natural_hz(robot)[..3]
         .iter()
@@ -115,7 +117,7 @@ fn tested(robot: &Robot, seed: u64) -> PostureDwells {
     }
 }
 
-/// The fit of three postures that a seed draws, from a first guess that is wrong by up to a third.
+/// Fit to three postures that a seed draws, from a first guess with errors up to a third; and the random number generator.
 fn trained(seed: u64) -> (CubicJointFit, ChaCha8Rng) {
     let truth = softening();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -134,7 +136,7 @@ fn trained(seed: u64) -> (CubicJointFit, ChaCha8Rng) {
     (fit(&guess, &tests, &terms, false, HARMONICS).unwrap(), random)
 }
 
-/// Shares of parameters within their 90 % intervals, and within three times as much.
+/// Number of parameters within their 90 % intervals, and within three times these intervals.
 fn judged(fit: &CubicJointFit, seed: u64) -> [usize; 2] {
     let truth = softening();
     let mut held = [0; 2];
@@ -163,7 +165,7 @@ fn cubic_joints_come_back_and_tell_peaks_at_unseen_postures() {
     );
     println!("natural frequencies {:.2?}", natural_hz(&softening()));
     let [held, near] = judged(&fit, seed);
-    // Of 24 draws at 0.9 fewer than 17 come up four times in ten thousand; none is off by five deviations.
+    // Fewer than 17 of 24 draws at 0.9 have the probability 4e-4; no parameter is off by five standard deviations.
     assert!(held >= 17, "{held}");
     assert_eq!(near, fit.parameters.len());
     let truth = softening();
@@ -176,7 +178,7 @@ fn cubic_joints_come_back_and_tell_peaks_at_unseen_postures() {
         let mut force = Vector3::zeros();
         force[axis] = level;
         let predicted = |hz: f64| fit.response(&there.angles_rad, hz, force).unwrap().0[axis].norm();
-        // The peak of the receptance by the model that was fitted, and what the robot does around it.
+        // Peak of the receptance predicted by the fitted model, and the simulated motion of the robot near it.
         let lowest = natural_hz(&there);
         let around = |middle: f64, step: f64| -> Vec<f64> {
             (-12..=12).map(|k| middle * (1.0 + step * f64::from(k))).collect()
@@ -214,7 +216,7 @@ fn cubic_joints_come_back_and_tell_peaks_at_unseen_postures() {
         100.0 * softened
     );
     assert!(largest < 0.03, "{largest}");
-    // What the cubic terms do is told, not only what is small anyway.
+    // The softening at the peaks exceeds the prediction error, so the test is sensitive to the cubic terms.
     assert!(
         softened > 5e-3 && largest < 0.1 * softened,
         "{largest} {softened}"
@@ -251,7 +253,7 @@ fn one_posture_and_one_level_give_wide_intervals_and_no_wrong_numbers() {
     .unwrap();
     let [_, near] = judged(&few, 1);
     assert_eq!(near, few.parameters.len());
-    // Of the wrist, which hardly moves at these frequencies, the cubic terms cannot be told.
+    // The wrist hardly moves at these frequencies, so its cubic terms are not identifiable.
     for joint in 3..6 {
         let index = few
             .parameters
@@ -265,7 +267,8 @@ fn one_posture_and_one_level_give_wide_intervals_and_no_wrong_numbers() {
     }
 }
 
-/// What the rig does with joints is the equation of the tool, J⁻ᵀ M J⁻¹ ü + … + J⁻ᵀ K₃ (J⁻¹u)∘³ = F, by another integrator.
+/// The simulated rig with joints satisfies the equation of the tool, J⁻ᵀ M J⁻¹ ü + … + J⁻ᵀ K₃ (J⁻¹u)∘³ = F, solved by another
+/// integrator.
 #[test]
 fn a_cubic_joint_couples_the_directions_of_the_tool() {
     let robot = softening();
@@ -284,7 +287,7 @@ fn a_cubic_joint_couples_the_directions_of_the_tool() {
         right[0] += force * (TAU * hz * t).sin();
         mass.solve(&right).unwrap()
     };
-    // Runge and Kutta: 2e-5 s are a thousandth of the period of 50 Hz.
+    // Step of the Runge–Kutta method, s: a thousandth of the period of 50 Hz.
     let step = 2e-5;
     let (mut u, mut v) = (DVector::zeros(6), DVector::zeros(6));
     let mut places = vec![u.clone()];
@@ -322,7 +325,7 @@ fn a_cubic_joint_couples_the_directions_of_the_tool() {
     for (axis, name) in ["x", "y", "z"].iter().enumerate() {
         let samples = &recording.channel(name).unwrap().samples;
         for (k, (sample, u)) in samples.iter().zip(&places).enumerate() {
-            // The integrator of the rig is good to 1e-8 per step.
+            // The integrator of the rig has a relative error of 1e-8 per step.
             assert!(
                 (sample - u[axis]).abs() < 1e-5 * size,
                 "{name}, {k}: {sample} {}",

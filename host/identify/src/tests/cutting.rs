@@ -1,4 +1,4 @@
-//! Force coefficients from virtual cuts: the simulation has its own code for chips and forces.
+//! Force coefficients from virtual cuts; the simulation has its own code for chip thickness and forces.
 
 use std::path::Path;
 
@@ -12,8 +12,8 @@ use quietcut_recording::Recording;
 use quietcut_simulate::rig::Noise;
 use quietcut_simulate::{Entry, Recorder, TachometerModel, VirtualCut};
 
-/// A structure stiff enough to cut steel on, with two modes that vibrate by a share of the feed; a tool of which every
-/// coefficient acts on every direction.
+/// A case with a structure stiff enough for steel, whose two modes vibrate by a fraction of the feed, and a tool for which every
+/// coefficient contributes to every direction.
 const CASE: &str = r#"
 [structure]
 kind = "matrices"
@@ -94,7 +94,8 @@ fn coefficients_and_runout_come_back_from_virtual_cuts() {
     println!("left {:.1e} of the force", fit.relative_error);
     assert!(fit.relative_error < 6e-3, "{}", fit.relative_error);
     for ((key, found), truth) in KEYS.iter().zip(fit.coefficients).zip(truth()) {
-        // The surface between samples is a straight line, and edges are found to a tenth of a sample: a few thousandths of a chip.
+        // The surface is interpolated linearly between samples, and entry and exit are located to a tenth of a sample: errors of a
+        // few thousandths of a chip.
         let off = found.unwrap().value / truth - 1.0;
         println!("{key} {off:.2e}");
         assert!(off.abs() < 5e-3, "{key}: {off}");
@@ -117,7 +118,7 @@ fn mean_forces_of_a_tool_that_runs_true_give_the_same() {
     for ((key, found), truth) in KEYS.iter().zip(fit.averaged.unwrap()).zip(truth()) {
         let off = found.unwrap().value / truth - 1.0;
         println!("{key} by mean forces {off:.2e}");
-        // A stable vibration is the same at every tooth: it makes no chip, once it has settled.
+        // A settled stable vibration is equal at every tooth and does not change the chip thickness.
         assert!(off.abs() < 1e-4, "{key} by mean forces: {off}");
     }
     assert!(fit.apart().is_empty(), "{:?}", fit.apart());
@@ -159,12 +160,12 @@ fn what_the_tests_cannot_tell_is_refused() {
     };
     let error = CuttingTest::new(&recording, short).unwrap_err().to_string();
     assert!(error.contains("whole revolutions"), "{error}");
-    // One feed: the arc tells what the mean cannot.
+    // With one feed the variation over the arc of engagement determines the coefficients that the mean force cannot.
     let one = fit(&[CuttingTest::new(&recording, SETUP).unwrap()]).unwrap();
     assert!(one.averaged.is_none() && one.feeds == 1);
 }
 
-/// How often the 90 % intervals hold the truth, of each coefficient.
+/// Share of 90 % intervals that contain the truth, for each coefficient.
 fn coverage(seeds: u64) -> [f64; 6] {
     let clean: Vec<Recording> = [0.06, 0.12].map(|feed| record(feed, Entry::None, 0.5)).into();
     let of_seed = |seed: u64| {
@@ -194,7 +195,7 @@ fn coverage(seeds: u64) -> [f64; 6] {
     std::array::from_fn(|index| all.iter().filter(|held| held[index]).count() as f64 / seeds as f64)
 }
 
-/// Prints the shares and holds them to be near nine of ten, as near as so many seeds can tell.
+/// Prints the coverage of each coefficient and checks it against the given ranges, for each coefficient and pooled.
 fn check_coverage(seeds: u64, each: std::ops::RangeInclusive<f64>, pooled: std::ops::RangeInclusive<f64>) {
     let shares = coverage(seeds);
     let said: Vec<String> = KEYS
@@ -215,7 +216,7 @@ fn check_coverage(seeds: u64, each: std::ops::RangeInclusive<f64>, pooled: std::
 
 #[test]
 fn ninety_percent_intervals_hold_the_truth_nine_times_of_ten() {
-    // Of 20 draws at 0.9 fewer than 13 come up once in a hundred thousand times.
+    // Fewer than 13 of 20 draws at 0.9 have the probability 1e-5.
     check_coverage(20, 0.65..=1.0, 0.8..=0.98);
 }
 
@@ -225,6 +226,6 @@ fn coverage_of_force_coefficients() {
     let seeds = std::env::var("QUIETCUT_SEEDS")
         .ok()
         .and_then(|seeds| seeds.parse().ok());
-    // Of 100 draws at 0.9 fewer than 80 come up once in a thousand times.
+    // Fewer than 80 of 100 draws at 0.9 have the probability 1e-3.
     check_coverage(seeds.unwrap_or(100), 0.8..=0.98, 0.85..=0.95);
 }

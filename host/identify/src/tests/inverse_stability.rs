@@ -1,4 +1,4 @@
-//! Modes from chatter: cuts of a machine that nobody measured, judged by semi-discretization.
+//! Modes from chatter: trial cuts of a random machine, with the oracle of semi-discretization.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -19,7 +19,7 @@ const ERRORS: Errors = Errors {
     frequency: 0.003,
 };
 
-/// A tool that gives way in x, half immersion.
+/// A tool that is flexible in x, at half immersion.
 fn case(hz: f64, damping: f64, stiffness: f64) -> Case {
     let mass = stiffness / (TAU * hz).powi(2);
     let text = format!(
@@ -33,7 +33,7 @@ fn case(hz: f64, damping: f64, stiffness: f64) -> Case {
 
 const GUESS: (f64, f64, f64) = (900.0, 0.02, 1.5e6);
 
-/// The truth that a seed draws: within what is thought possible.
+/// True frequency, damping ratio and stiffness, drawn by a seed within the prior.
 fn truth(random: &mut ChaCha8Rng) -> (f64, f64, f64) {
     let Before {
         frequency,
@@ -48,8 +48,8 @@ fn truth(random: &mut ChaCha8Rng) -> (f64, f64, f64) {
     )
 }
 
-/// At each speed depths grow by an eighth until the cut chatters; the last two are written down. Depths are set, and
-/// frequencies read, with errors.
+/// Trial cuts: at each speed the depth grows by an eighth until the cut chatters, and the last two cuts are recorded. Depths and
+/// frequencies have errors.
 fn cuts(
     (hz, damping, stiffness): (f64, f64, f64),
     speeds: &[f64],
@@ -64,7 +64,7 @@ fn cuts(
     let mut cuts = Vec::new();
     for &rpm in speeds {
         let mut last = None;
-        // The first depth is anybody's.
+        // The first depth is random.
         let mut depth_mm = 0.02 * random.random_range(1.0..1.125);
         while depth_mm < 30.0 {
             let error: f64 = StandardNormal.sample(random);
@@ -98,7 +98,7 @@ fn told(cuts: &[ObservedCut], seed: u64) -> InverseMode {
 
 const SPEEDS: [f64; 5] = [9000.0, 11_000.0, 13_500.0, 17_000.0, 22_000.0];
 
-/// Of frequency, damping and stiffness the share of seeds whose interval holds the truth, and how wide it is on average.
+/// For frequency, damping and stiffness: share of seeds whose interval contains the truth, and mean width of the interval.
 fn coverage(speeds: &[f64], seeds: u64) -> [(f64, f64); 3] {
     let of_seed = |seed: u64| {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -150,7 +150,7 @@ fn a_few_cuts_tell_the_mode_and_one_does_not() {
         (truth.1, mode.damping_ratio),
         (truth.2, mode.stiffness_n_per_m),
     ] {
-        // Twice the half interval: once in a thousand times a right one misses.
+        // Twice the half-width: a correct interval misses the truth once in a thousand times.
         let [low, high] = spread.ci90;
         let (middle, half) = ((low * high).sqrt(), (high / low).sqrt());
         assert!(
@@ -162,7 +162,7 @@ fn a_few_cuts_tell_the_mode_and_one_does_not() {
         !mode.frequency_hz.is_vague() && !mode.damping_ratio.is_vague(),
         "{mode:?}"
     );
-    // One quiet cut says next to nothing, and the answer says so.
+    // One stable cut carries little information, and the answer reports vague parameters.
     let one = told(&all[..1], 7);
     assert!(
         one.damping_ratio.is_vague() && one.stiffness_n_per_m.is_vague(),
@@ -170,7 +170,7 @@ fn a_few_cuts_tell_the_mode_and_one_does_not() {
     );
 }
 
-/// A slice of the campaign below: what is claimed, 90 %, lies in the 99.9 % interval of each share.
+/// A seeded slice of the campaign: the claimed coverage of 90 % lies in the 99.9 % binomial interval of each share.
 #[test]
 fn intervals_of_a_few_machines_hold_the_truth_as_often_as_they_say() {
     let seeds = 10;

@@ -1,7 +1,6 @@
-//! A robot's joints from virtual hammer tests at some postures, and what that says at others.
+//! Joints of a robot from virtual hammer tests at some postures, and the predicted receptances at other postures.
 //!
-//! The truth is simulated with the tool-space matrices of thesis eq. 3.14, which exist away from straight wrists; what is fitted
-//! works in joint angles.
+//! The oracle simulates the tool-space matrices of thesis eq. 3.14, which exist for non-singular wrists; the fit uses joint angles.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -25,10 +24,10 @@ use quietcut_testkit::robot;
 
 const AXES: [Direction; 3] = [Direction::X, Direction::Y, Direction::Z];
 
-/// J, 6 × 6: displacement and turn of the tool per joint angle.
+/// Jacobian of all six directions, 6 × 6: displacement and rotation of the tool per joint angle.
 pub(super) fn whole_jacobian(robot: &Robot) -> DMatrix<f64> {
     let moved = robot.jacobian();
-    // What three more points of the tool do beyond the tool centre point.
+    // Jacobians of three more points of the tool, relative to that of the tool center point.
     let point = |offset: Vector3<f64>| {
         let mut other = robot.clone();
         other.tool_m += offset;
@@ -41,7 +40,7 @@ pub(super) fn whole_jacobian(robot: &Robot) -> DMatrix<f64> {
     );
     let mut j = DMatrix::zeros(6, 6);
     j.rows_mut(0, 3).copy_from(&moved);
-    // ω from three vectors e of the tool and their velocities ω × e: ω = ½ Σ e × ė.
+    // Rotation rate from three vectors e of the tool and their velocities ω × e: ω = ½ Σ e × ė.
     let place = |offset: Vector3<f64>| {
         let mut other = robot.clone();
         other.tool_m += offset;
@@ -59,8 +58,8 @@ pub(super) fn whole_jacobian(robot: &Robot) -> DMatrix<f64> {
     j
 }
 
-/// The robot in the six directions of the tool, by thesis eq. 3.14, without cubic terms; `more` is added to the stiffness of the
-/// joints.
+/// The structure in the six directions of the tool by thesis eq. 3.14, without cubic terms; `more` is added to the stiffness matrix
+/// of the joints.
 fn tool_space_with(robot: &Robot, more: &DMatrix<f64>) -> Structure {
     let inverse = whole_jacobian(robot).try_inverse().unwrap();
     let own = robot.matrices();
@@ -99,8 +98,8 @@ fn gravity(robot: &Robot) -> DVector<f64> {
     torque
 }
 
-/// The robot where it hangs: links sag by the torque of gravity over the stiffness of the joints, which their encoders on the
-/// motor's side do not see, and lifting the links is work, too.
+/// The structure of the robot in its sagged posture: gravity torques deflect the joints, which the encoders on the motor side do
+/// not measure, and the change of the gravity torque adds to the stiffness.
 fn sagged(robot: &Robot) -> Structure {
     let at = |angles: &DVector<f64>| robot.at(angles.as_slice());
     let commanded = DVector::from_column_slice(&robot.angles_rad);
@@ -121,7 +120,7 @@ fn sagged(robot: &Robot) -> Structure {
     tool_space_with(&at(&angles), &slope)
 }
 
-/// A posture in which a robot mills: the arm bent, the wrist not straight.
+/// A random posture in which a robot mills: the arm bent, the wrist not straight.
 pub(super) fn posture(random: &mut ChaCha8Rng) -> Vec<f64> {
     [
         (-40.0, 40.0),
@@ -135,7 +134,7 @@ pub(super) fn posture(random: &mut ChaCha8Rng) -> Vec<f64> {
     .into()
 }
 
-/// Hammer blows in x, y and z with sensors of 1 % noise, and the receptances that follow.
+/// Receptances from virtual hammer impacts in x, y and z with 1 % sensor noise.
 fn hammered(structure: &Structure, angles_rad: &[f64], seed: u64) -> PostureFrf {
     let recordings: Vec<Recording> = AXES
         .iter()
@@ -167,7 +166,7 @@ fn hammered(structure: &Structure, angles_rad: &[f64], seed: u64) -> PostureFrf 
     }
 }
 
-/// The fit of six postures that a seed draws, from a first guess that is wrong by up to a third; and the random source.
+/// Fit to six postures that a seed draws, from a first guess with errors up to a third; and the random number generator.
 fn trained(seed: u64, payload: bool, machine: fn(&Robot) -> Structure) -> (JointFit, ChaCha8Rng) {
     let truth = robot();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -188,7 +187,7 @@ fn trained(seed: u64, payload: bool, machine: fn(&Robot) -> Structure) -> (Joint
     (fit(&guess, &measured, payload).unwrap(), random)
 }
 
-/// Peak of a direct receptance, by its frequency and value.
+/// Frequency and value of the peak of a direct receptance.
 fn peak(of: impl Fn(f64) -> Complex64) -> (f64, f64) {
     (200..4000)
         .map(|step| 0.01 * f64::from(step))
@@ -197,8 +196,8 @@ fn peak(of: impl Fn(f64) -> Complex64) -> (f64, f64) {
         .unwrap()
 }
 
-/// Peaks of direct receptances at ten unseen postures: the largest error of the predicted ones, and how many of the 30 lie
-/// within their stated 90 % intervals.
+/// Prediction of the 30 peaks of direct receptances at ten unseen postures: the largest error, and the number of peaks within their
+/// 90 % intervals.
 fn unseen(fit: &JointFit, random: &mut ChaCha8Rng, machine: fn(&Robot) -> Structure) -> (f64, usize) {
     let (mut largest, mut held) = (0.0_f64, 0);
     for _ in 0..10 {
@@ -239,12 +238,12 @@ fn peaks_at_unseen_postures_are_within_three_percent() {
             100.0 * largest
         );
         assert!(largest < 0.03, "{largest}");
-        // Three peaks of one posture move together: 24 of 30 is two deviations of ten draws below nine tenths.
+        // The three peaks of one posture are correlated: 24 of 30 is two standard deviations of ten draws below 90 %.
         assert!(held >= 24, "{held}");
     }
 }
 
-/// Gravity is left out of what is fitted: joints sag by a milliradian or so, and links that are lifted store energy.
+/// The fit neglects gravity, which deflects the joints by about a milliradian and contributes to the stiffness of the oracle.
 #[test]
 fn peaks_at_unseen_postures_of_a_robot_that_sags_are_within_three_percent() {
     let (fit, mut random) = trained(3, false, sagged);
@@ -268,7 +267,7 @@ fn peaks_at_unseen_postures_of_a_robot_that_sags_are_within_three_percent() {
     assert!(largest < 0.03, "{largest}");
 }
 
-/// How often the intervals of peaks at unseen postures, and those of the joints, hold the truth.
+/// Coverage of the intervals of peaks at unseen postures, and of the joint parameters.
 #[test]
 #[ignore = "a campaign: QUIETCUT_SEEDS seeds, twenty without it"]
 fn coverage_of_joints() {
@@ -323,7 +322,7 @@ fn joint_angles_and_the_directions_of_the_tool_are_one_robot() {
                 own.receptance(TAU * f).unwrap(),
                 other.receptance(TAU * f).unwrap(),
             );
-            // Rounding times the condition of J, M and K.
+            // The tolerance is rounding times the condition of J, M and K.
             assert!((a - b).norm() < 1e-8 * a.norm(), "{f}");
         }
     }
@@ -340,7 +339,7 @@ fn limits_of_a_robot_are_those_of_its_tool_space_matrices() {
     };
     for rpm in [600.0, 1000.0] {
         let (a, b) = (limit(&robot_case, rpm), limit(&other, rpm));
-        // Rounding times the condition of J, M and K, and of the limit.
+        // The tolerance is rounding times the condition of J, M and K, and of the limit.
         assert!((a.depth_mm / b.depth_mm - 1.0).abs() < 1e-6, "{a:?} {b:?}");
         assert_eq!(a.kind, b.kind);
     }

@@ -1,4 +1,4 @@
-//! A linear rig is called linear, and each kind of nonlinear rig by its kind.
+//! A linear rig is recognized as linear, and each nonlinear rig by its kind of nonlinearity.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ fn linear() -> Structure {
     structure
 }
 
-/// Step-sine at five levels and five frequencies, without noise.
+/// Step-sine recordings at five force levels and five frequencies, without noise.
 fn steps(structure: &Structure, effects: &[&str], direction: Direction, center_hz: f64) -> Vec<Recording> {
     let frequencies: Vec<f64> = (0..5)
         .map(|k| center_hz * (0.97 + 0.015 * f64::from(k)))
@@ -70,7 +70,7 @@ fn verdict(recordings: &[Recording], seed: u64) -> Verdict {
 #[test]
 fn linear_rigs_are_called_linear_98_times_in_a_hundred() {
     let one = steps(&linear(), &[], Direction::Y, 17.45);
-    // Three complex modes, no mass matrix: the thesis's robot in process.
+    // Three complex modes without a mass matrix: the thesis's robot in process.
     let three = steps(
         &case("kuka-kr90-acetal").structure.unwrap(),
         &[],
@@ -130,7 +130,7 @@ fn nonlinear_rigs_are_called_by_their_kind() {
             }
         }
     }
-    // The mode of the thesis has both cubic terms.
+    // The mode of the thesis has cubic stiffness and cubic damping.
     let both = steps(
         &case("kuka-kr90-y17-low").structure.unwrap(),
         &[],
@@ -146,7 +146,7 @@ fn nonlinear_rigs_are_called_by_their_kind() {
 
 #[test]
 fn regions_and_jumps_of_a_rising_force_are_found() {
-    // Three regions, and a jump of a fifth between the second and the third.
+    // Simulated amplitudes in three regions, with a jump of a fifth between the second and the third.
     let points: Vec<(f64, f64)> = (0..60)
         .map(|k| {
             let f = 0.25 * f64::from(k + 1);
@@ -196,7 +196,7 @@ fn a_tone_of_rising_force_shows_homogeneity() {
         found[0].slope / found[found.len() - 1].slope
     };
     assert!((slopes(&points(&[])[10..]) - 1.0).abs() < 0.02);
-    // A damper that grows bends the line over.
+    // With cubic damping the response grows less than the force.
     assert!(slopes(&points(&["cubic-damping=3e7"])[10..]) > 1.3);
 }
 
@@ -204,7 +204,7 @@ fn a_tone_of_rising_force_shows_homogeneity() {
 fn forward_and_backward_sweeps_of_a_linear_rig_agree_and_of_others_do_not() {
     use crate::nonlinear::sweep::{Spectra, compare};
     let sweep = |effects: &[&str], ends: [f64; 2], amplitude_n: f64| {
-        // 6 Hz per minute, as in the thesis.
+        // Sweep rate of the thesis: 6 Hz per minute.
         let signal = Signal::Sweep {
             first_hz: ends[0],
             last_hz: ends[1],
@@ -249,7 +249,7 @@ fn forward_and_backward_sweeps_of_a_linear_rig_agree_and_of_others_do_not() {
         println!("{effects:?}: {found:?}");
         assert!(!found.same, "{effects:?}");
     }
-    // A softening spring shows in the direction alone.
+    // With a softening spring a forward sweep differs from a backward sweep.
     let (a, b) = (
         sweep(&["cubic-stiffness=-3e12"], up, 9.0),
         sweep(&["cubic-stiffness=-3e12"], down, 9.0),

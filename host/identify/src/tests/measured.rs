@@ -1,4 +1,4 @@
-//! Records that others measured: `QUIETCUT_DATA` names the folder.
+//! Identification from published measurements; `QUIETCUT_DATA` names their folder.
 
 use crate::nonlinear::periodic_fit::{self, Period};
 use crate::nonlinear::response;
@@ -28,7 +28,7 @@ fn silverbox() -> [Vec<f64>; 2] {
 
 const RATE_HZ: f64 = 610.35;
 
-/// RMSE on the arrow, V, and k3/k1 of a law.
+/// RMS prediction error on the arrow signal, V, and the ratio k3/k1 of a law.
 fn judge_silverbox(surface: &[(Term, f64)], [u, y]: &[Vec<f64>; 2], what: &str) -> (f64, f64) {
     let arrow = 40_585;
     let predicted = response::displacement(surface, &u[..arrow], RATE_HZ).unwrap();
@@ -82,7 +82,7 @@ fn silverbox_by_its_restoring_force() {
     let (rmse, ratio) = judge_silverbox(&law_of(&surface), &data, "restoring force");
     assert!(rmse <= 0.96e-3, "{rmse}");
     assert!((ratio / 3.99 - 1.0).abs() < 0.01, "{ratio}");
-    // A linear law is fifteen times worse.
+    // The linear law has a fifteen times larger prediction error.
     let linear: Vec<_> = law_of(&surface)
         .into_iter()
         .filter(|(term, _)| *term != Term::CubicStiffness)
@@ -94,7 +94,7 @@ fn silverbox_by_its_restoring_force() {
 #[ignore = "measured records: QUIETCUT_DATA names their folder"]
 fn silverbox_by_harmonic_balance() {
     let data = silverbox();
-    // Three realizations of the multisine; each ends here, and its last 8192 samples are one period.
+    // Ends of three realizations of the multisine; the last 8192 samples of each are one period.
     let periods: Vec<Period<'_>> = [57_877, 66_571, 75_264]
         .iter()
         .map(|end| Period {
@@ -122,7 +122,7 @@ fn the_positioning_stage_has_its_published_friction() {
         Err(error) => panic!("{error}"),
     };
     let samples = |name: &str| &recording.channel(name).unwrap().samples;
-    // gtau of the file.
+    // Force constant `gtau` from the data file.
     let force: Vec<f64> = samples("vir").iter().map(|volts| 35.150_651_88 * volts).collect();
     let surface = Record {
         force: &force,

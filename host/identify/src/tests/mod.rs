@@ -1,4 +1,4 @@
-//! Identification of what a virtual rig has measured, and of records that others measured.
+//! Identification from virtual rigs, and from published measurements.
 
 mod ambient;
 mod coupling;

@@ -1,4 +1,4 @@
-//! The modes of chapter 5 from virtual step-sine tests.
+//! Modes of thesis chapter 5 from virtual step-sine tests.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,7 @@ use quietcut_testkit::case;
 
 const EXTRAS: [Extra; 2] = [Extra::CubicStiffness, Extra::CubicDamping];
 
-/// The frequencies and levels of a mode: within ±4 % of its frequency, as in the thesis.
+/// Frequencies, within ±4 % of the natural frequency, and force levels of the test of a mode, as in the thesis.
 pub(crate) fn test_plan(name: &str) -> (Vec<f64>, Vec<f64>) {
     let (first, last, levels) = match name {
         "kuka-kr90-y17-low" => (16.6, 17.9, vec![1.8, 5.8, 9.5]),
@@ -33,7 +33,7 @@ pub(crate) fn test_plan(name: &str) -> (Vec<f64>, Vec<f64>) {
     (frequencies, levels)
 }
 
-/// One recording per level, without noise.
+/// Step-sine recordings without noise, one per force level.
 pub(crate) fn step_sine(
     structure: &Structure,
     frequencies: &[f64],
@@ -71,7 +71,7 @@ pub(crate) fn truth(structure: &Structure, law: &Law) -> DVector<f64> {
     )
 }
 
-/// A recording of the last `samples` samples of every dwell, one behind the other, and where they stand.
+/// A recording of the last `samples` samples of every dwell in sequence, and the segments of the dwells in it.
 fn last_of_each(recording: &Recording, dwells: usize, samples: usize) -> (Recording, Vec<DwellSegment>) {
     let found = dwell_segments(recording);
     assert_eq!(found.len(), dwells);
@@ -99,12 +99,12 @@ struct Campaign {
     fits: Vec<Fit>,
 }
 
-/// Fits of one mode with 1 % noise per time sample on force and motion, for every seed.
+/// Fits of one mode with 1 % noise per time sample on force and motion, one for each seed.
 fn campaign(name: &str, seeds: std::ops::Range<u64>) -> Campaign {
     let structure = case(name).structure.unwrap();
     let (frequencies, levels) = test_plan(name);
     let recordings = step_sine(&structure, &frequencies, &levels, 24.0);
-    // 4 s after 20 s: at 0.8 /s and more nothing of the transient is left beside 1 % noise.
+    // The dwell of 4 s follows 20 s of settling: at decay rates above 0.8 /s the transient is far below 1 % noise.
     let plain: Vec<_> = recordings
         .iter()
         .map(|recording| last_of_each(recording, frequencies.len(), 1024))
@@ -154,7 +154,7 @@ const MODES: [&str; 5] = [
     "kuka-kr90-z10",
 ];
 
-/// Worst relative error, covered and all intervals, and coverage by parameter of all modes.
+/// Over all modes: worst relative error, share of intervals that contain the truth, and this share by parameter.
 fn judge(seeds: std::ops::Range<u64>) -> (f64, f64, BTreeMap<String, f64>) {
     let count = (seeds.end - seeds.start) as f64;
     let law = Law::new(1, &EXTRAS);
@@ -187,17 +187,18 @@ fn judge(seeds: std::ops::Range<u64>) -> (f64, f64, BTreeMap<String, f64>) {
     (worst, pooled, by_parameter)
 }
 
-/// Every parameter within 2 %, intervals that cover what they say, with the thesis's levels and 1 % noise per sample.
+/// Every parameter lies within 2 % of the truth, and its intervals have the stated coverage, with the force levels of the thesis
+/// and 1 % noise per sample.
 #[test]
 fn modes_come_back_within_two_percent() {
     let (worst, pooled, _) = judge(0..12);
     assert!(worst < 0.02, "{worst}");
-    // 60 fits of 5 parameters that hang together: the share scatters by about 3 %, three times that is allowed.
+    // 60 fits of 5 correlated parameters: the standard deviation of the share is about 3 %; three standard deviations are allowed.
     assert!((0.81..=0.97).contains(&pooled), "{pooled}");
 }
 
-/// As above with 200 seeds, and each parameter for itself:
-/// `cargo test --release -p quietcut --lib intervals_cover -- --ignored --nocapture`
+/// Coverage of the intervals with 200 seeds, for each parameter: `cargo test --release -p quietcut-identify --lib intervals_cover
+/// -- --ignored --nocapture`.
 #[test]
 #[ignore = "half a minute; the command is in its documentation"]
 fn intervals_cover_the_truth_in_nine_of_ten_cases() {

@@ -1,4 +1,4 @@
-//! The restoring-force surface of virtual tests.
+//! Restoring-force surfaces from virtual tests.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ const TERMS: [Term; 5] = [
     Term::CubicStiffness,
     Term::CubicDamping,
 ];
-/// m, c, k, k3, c3 of the mode at 17.5 Hz, lower set.
+/// True m, c, k, k3, c3 of the mode at 17.5 Hz, the set for lower forces.
 const TRUTH: [f64; 5] = [188.0, 305.0, 2.26e6, -5.05e12, 2.53e6];
 
 fn recording(signal: Signal, noise: f64, seed: u64) -> Recording {
@@ -32,7 +32,7 @@ fn recording(signal: Signal, noise: f64, seed: u64) -> Recording {
     recording
 }
 
-/// Eleven tones from 16.8 to 17.8 Hz, as for Figs 5.1 and 5.2.
+/// Eleven tones from 16.8 to 17.8 Hz, as for thesis Figs 5.1 and 5.2.
 fn tones() -> Signal {
     let frequencies: Vec<f64> = (0..11).map(|k| 16.8 + 0.1 * f64::from(k)).collect();
     Signal::tones(&frequencies, [4.0, 4.0], 100.0, 3)
@@ -113,7 +113,7 @@ fn a_free_record_with_known_mass_gives_the_law() {
         seconds: 8.0,
     };
     let mut recording = recording(release, 0.0, 1);
-    // From 50 ms after the release on, when no force acts any more.
+    // The record starts 50 ms after the release, when the force is zero.
     let from = ((1.2 * 2.0 + 0.05) * 1024.0) as usize;
     for channel in &mut recording.channels {
         channel.samples.drain(..from);

@@ -1,4 +1,4 @@
-//! The thesis's own methods on its own modes: higher-order FRF and nonlinear complex modes.
+//! The methods of the thesis on the modes of the thesis: higher-order FRF and nonlinear complex modes.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +18,7 @@ use quietcut_recording::Quantity;
 use quietcut_simulate::rig::Noise;
 use quietcut_testkit::case;
 
-/// Exact steady motions of a mode by harmonic balance, frequency after frequency from below.
+/// Exact steady motions of a mode by harmonic balance, in order of rising frequency.
 fn exact(
     name: &str,
     frequencies: &[f64],
@@ -65,7 +65,7 @@ fn law() -> Law {
     Law::new(1, &[Extra::CubicStiffness, Extra::CubicDamping])
 }
 
-/// 16.6 to 17.9 Hz in steps of 0.05 Hz, as in section 5.2.3.
+/// Frequencies of thesis section 5.2.3: 16.6 to 17.9 Hz in steps of 0.05 Hz.
 fn thesis_frequencies() -> Vec<f64> {
     (0..27).map(|k| 16.6 + 0.05 * f64::from(k)).collect()
 }
@@ -87,12 +87,12 @@ fn higher_order_frf_have_the_bias_that_their_equations_have() {
         };
         let (c3, k3) = (bias(Role::CubicDamping(0)), bias(Role::CubicStiffness(0)));
         println!("{name}: c3 {:+.2} %, k3 {:+.2} %", 100.0 * c3, 100.0 * k3);
-        // Stated to a percent.
+        // The expected bias is given to a percent.
         assert!(
             (c3 - of_c3).abs() < 0.007 && (k3 - of_k3).abs() < 0.007,
             "{name}: {c3} {k3}"
         );
-        // And it mispredicts the data it comes from, which harmonic balance does not.
+        // The biased law also mispredicts the data that it was fitted to, which the law of harmonic balance does not.
         let directions = [Direction::Y];
         let data = Data {
             law: &law,
@@ -110,10 +110,11 @@ fn higher_order_frf_have_the_bias_that_their_equations_have() {
     }
 }
 
-/// All levels of section 5.2.3, N.
+/// All force levels of thesis section 5.2.3, N.
 const ALL_LEVELS: [f64; 6] = [1.8, 5.8, 9.5, 12.6, 15.6, 17.2];
 
-/// Recorded with 1 % noise per sample: at 9 and 10.5 Hz the upper levels jump, where the series of eq. 5.15 does not converge.
+/// Recordings with 1 % noise per sample: at 9 and 10.5 Hz the motion jumps at the upper force levels, where the series of thesis
+/// eq. 5.15 does not converge.
 #[test]
 fn with_all_levels_higher_order_frf_fail_at_the_softest_modes_and_harmonic_balance_does_not() {
     let law = law();
@@ -168,7 +169,7 @@ fn with_all_levels_higher_order_frf_fail_at_the_softest_modes_and_harmonic_balan
             by_series > 0.3 && by_balance < 0.01,
             "{name}: {by_series} {by_balance}"
         );
-        // Nothing but noise is left.
+        // The residual of harmonic balance consists of noise alone.
         assert!(balance.misfit < 1.3, "{name}: {}", balance.misfit);
     }
 }
@@ -186,7 +187,7 @@ fn higher_order_frf_are_exact_at_small_force() {
     );
     let fit = hfrf::fit(&hfrf::responses(&dwells, 1e-3)).unwrap();
     for p in 0..theta.len() {
-        // The series is cut after F⁵; the smallest levels see little of the cubic terms.
+        // The series ends with F⁵, and the smallest force levels hardly excite the cubic terms.
         assert!(
             (fit.theta[p] / theta[p] - 1.0).abs() < 5e-3,
             "{p}: {} {}",
@@ -239,7 +240,7 @@ fn complex_modes_over_amplitude_are_the_equivalent_linearization() {
         worst_omega < 0.01 && worst_eta < 0.05,
         "{worst_omega} {worst_eta}"
     );
-    // The empirical maps over force and receptance, too.
+    // Nonlinear complex modes: empirical maps over force and receptance.
     let frequency = Map::fit(&points, 2, |point| point.omega).unwrap();
     let loss = Map::fit(&points, 2, |point| point.loss_factor).unwrap();
     for point in &points {
