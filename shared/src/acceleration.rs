@@ -4,6 +4,9 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+use crate::criteria::{
+    LONGEST_COUNTED_GAP, SAMPLE_CLOCK_MEMORY_BLOCKS, SAMPLE_RATE_TOLERANCE, STAMP_JITTER_NS,
+};
 use crate::event_clock::{EventClock, EventClockState, Observation};
 use crate::units::{Hertz, Nanoseconds};
 
@@ -53,8 +56,8 @@ impl Sensor {
         SampleClock {
             nominal_period_ns: period_ns,
             line: EventClock {
-                memory: CLOCK_MEMORY_BLOCKS,
-                period_uncertainty: 0.5 * RATE_TOLERANCE * period_ns / STAMP_JITTER_NS,
+                memory: SAMPLE_CLOCK_MEMORY_BLOCKS,
+                period_uncertainty: 0.5 * SAMPLE_RATE_TOLERANCE * period_ns / STAMP_JITTER_NS,
             },
         }
     }
@@ -64,17 +67,6 @@ impl Sensor {
 pub fn is_clipped(counts: Counts) -> bool {
     counts.iter().any(|&c| c == i16::MAX || c == i16::MIN)
 }
-
-/// Largest relative deviation of the fitted sample rate from the nominal one. Data sheets allow 3 %; the bound is wider so that the
-/// fit does not end on it.
-const RATE_TOLERANCE: f32 = 0.05;
-/// Number of blocks after which the weight of a time stamp has decayed to 1/e: 0.6 s of full blocks at 26 667 Hz. That averages the
-/// jitter and follows the thermal drift of the sensor's oscillator. Unfounded.
-const CLOCK_MEMORY_BLOCKS: f32 = 256.0;
-/// Initial estimate of the time stamps' standard deviation: the latency of an interrupt. Unfounded.
-const STAMP_JITTER_NS: f32 = 10_000.0;
-/// Longest gap, in samples, whose length is estimated. After a longer one the stream starts again. Unfounded.
-const LONGEST_COUNTED_GAP: f32 = 20_000.0;
 
 /// Estimator of the time of each sample.
 ///
@@ -96,25 +88,25 @@ pub struct SampleClockState {
     block_samples: u32,
     /// Number of samples with a clipped axis since the start.
     clipped: u32,
-    /// Number of lost samples since the start, as far as countable.
+    /// Number of lost samples since the start, without those of gaps whose length is unknown.
     lost: u32,
-    /// Number of gaps in the stream.
+    /// Number of gaps in the stream of samples since the start.
     gaps: u32,
 }
 
 /// Relation of a block to the preceding one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuity {
-    /// No sample is missing between them.
+    /// No sample is missing between the two blocks.
     Contiguous,
-    /// This number of samples is missing between them.
+    /// This number of samples is missing between the two blocks.
     Gap(u32),
     /// The first block, or a block after a gap of unknown length.
     Restarted,
 }
 
 impl SampleClock {
-    /// Processes a block.
+    /// Processes a block: updates the fitted sample clock and the counts of clipped and lost samples.
     pub fn observe(&self, state: &mut SampleClockState, block: &Block) -> Continuity {
         let continuity = self.follow(state, block);
         match continuity {
@@ -133,7 +125,7 @@ impl SampleClock {
             }
         }
         if let Some(line) = &mut state.line {
-            let bound_ns = RATE_TOLERANCE * self.nominal_period_ns;
+            let bound_ns = SAMPLE_RATE_TOLERANCE * self.nominal_period_ns;
             line.limit_period(
                 self.nominal_period_ns - bound_ns,
                 self.nominal_period_ns + bound_ns,
@@ -145,7 +137,7 @@ impl SampleClock {
         continuity
     }
 
-    /// Continues the fitted line with a block, if the number of samples since the preceding one is known.
+    /// Updates the fitted line with the time stamp of a block, if the number of samples lost since the preceding block is known.
     fn follow(&self, state: &mut SampleClockState, block: &Block) -> Continuity {
         let Some(line) = &mut state.line else {
             return Continuity::Restarted;
@@ -153,8 +145,8 @@ impl SampleClock {
         let lost = if block.sequence == state.next_sequence {
             block.lost
         } else {
-            // The lengths of lost blocks are unknown. The fitted clock gives the number of samples, as long as its error is below half
-            // a sample.
+            // The number of samples in lost blocks is unknown. The fitted clock gives it, as long as the standard deviation of
+            // its time is below half a sample period.
             let samples = line.events_to(block.time) - state.block_samples as f32;
             let error_ns2 = line.variance_at_ns2(samples);
             let half_ns = 0.5 * line.period_ns();
@@ -175,7 +167,7 @@ impl SampleClock {
 }
 
 impl SampleClockState {
-    /// Before the first block.
+    /// The state before the first block.
     pub const fn new() -> Self {
         Self {
             line: None,
@@ -197,7 +189,7 @@ impl SampleClockState {
         self.line.map(|line| line.time_at(samples))
     }
 
-    /// Fitted sample rate against the device's clock.
+    /// Sample rate of the sensor, fitted to the time stamps of the device's clock.
     pub fn rate(&self) -> Option<Hertz> {
         self.line.map(|line| Hertz(1e9 / line.period_ns()))
     }
@@ -207,7 +199,7 @@ impl SampleClockState {
         self.clipped
     }
 
-    /// Number of lost samples since the start, as far as countable.
+    /// Number of lost samples since the start, without those of gaps whose length is unknown.
     pub fn lost(&self) -> u32 {
         self.lost
     }

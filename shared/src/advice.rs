@@ -17,12 +17,12 @@
 mod advise;
 mod cell;
 mod depth;
-mod margins;
 mod proposal;
 mod quiet_speed_search;
 mod rule;
 
 pub use advise::advise;
-pub use margins::{BETTER, DEPTH_MARGIN, SPEED_BAND};
 pub use proposal::{Action, Advice, Obstacle, Source};
-pub use rule::{MAX_LOBE, tooth_passing_speed};
+pub use rule::tooth_passing_speed;
+
+pub use crate::criteria::{BETTER, DEPTH_MARGIN, MAX_LOBE, SPEED_BAND};

@@ -32,12 +32,12 @@ impl Crc32 {
         Self(ENGINE.digest())
     }
 
-    /// Appends bytes.
+    /// Appends bytes to the data of the checksum.
     pub fn update(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
     }
 
-    /// The checksum of all bytes so far.
+    /// The checksum of all appended bytes.
     pub fn value(&self) -> u32 {
         self.0.clone().finalize()
     }

@@ -114,22 +114,25 @@ const SHARP_SIDE: usize = 15;
 const MEDIUM_SIDE: usize = 7;
 const EASY_SIDE: usize = 5;
 
-// For each length the β that gives the most rejection over the stated band, found by trying.
+// The argument of `half_band` is the β of the Kaiser window. For each filter length it is the value with the largest stop-band
+// attenuation, found by trial.
 
-/// Flat to 0.195 of the input rate, shut from 0.305: the last stage to the tool band.
+/// Sharp filter, pass band to 0.195 and stop band from 0.305 of its input rate: the last stage before the tool band.
 static SHARP: [i32; SHARP_SIDE] = half_band(10.3);
-/// Flat to 0.13 of the input rate, shut from 0.37: stages to the tool band at rates far above it; the last stage to the structure band.
+/// Medium filter, pass band to 0.13 and stop band from 0.37 of its input rate: the earlier stages before the tool band, and the
+/// last stage before the structure band.
 static MEDIUM: [i32; MEDIUM_SIDE] = half_band(10.6);
-/// Flat to 0.065 of the input rate, shut from 0.435: all other stages to the structure band.
+/// Easy filter, pass band to 0.065 and stop band from 0.435 of its input rate: all other stages before the structure band.
 static EASY: [i32; EASY_SIDE] = half_band(11.4);
 
-/// What a stage remembers: its last LENGTH samples, twice, so that they always lie in one piece.
+/// State of a filter stage: its last LENGTH input samples. They are stored twice in a row, so that every window of LENGTH
+/// samples is contiguous.
 #[derive(Clone, Debug)]
 struct Stage<const LENGTH: usize> {
     samples: [[Sample; LENGTH]; 2],
-    /// Where the next sample goes in both copies.
+    /// Index of the next sample within each of the two copies.
     next: usize,
-    /// The next sample is the second of a pair, which gives no output.
+    /// True if the next sample is the second of a pair, which gives no output.
     second: bool,
     filled: bool,
 }
@@ -144,10 +147,10 @@ impl<const LENGTH: usize> Stage<LENGTH> {
         }
     }
 
-    /// Takes a sample and returns the filtered one for the first of every two.
+    /// Takes an input sample. Returns a filtered sample for the first of every two inputs, `None` for the second.
     fn step<const SIDE: usize>(&mut self, taps: &[i32; SIDE], x: Sample) -> Option<Sample> {
         if !self.filled {
-            // As if the first sample had always been there: gravity makes no step.
+            // The filter starts as if all earlier samples equalled the first one, so that gravity causes no step response.
             self.samples.as_flattened_mut().fill(x);
             self.filled = true;
         }
@@ -178,7 +181,7 @@ fn filter<const LENGTH: usize, const SIDE: usize>(
     let middle = LENGTH / 2;
     let mut sum = (i64::from(window[middle][axis]) << 30) + (1 << 30);
     for (j, &tap) in taps.iter().enumerate() {
-        // Only every second neighbour of the middle has a non-zero tap.
+        // The taps at even distances from the middle are zero; those at the odd distance 2j + 1 are equal on both sides.
         let pair = window[middle - 1 - 2 * j][axis] + window[middle + 1 + 2 * j][axis];
         sum += i64::from(pair) * i64::from(tap);
     }
@@ -197,7 +200,7 @@ pub struct Decimation {
     structure_halvings: u8,
 }
 
-/// State of the cascade: the samples in its filters.
+/// State of the cascade: the samples stored in its filter stages.
 #[derive(Clone, Debug)]
 pub struct State {
     medium: [Stage<{ length(MEDIUM_SIDE) }>; 2],
@@ -207,7 +210,7 @@ pub struct State {
 }
 
 impl State {
-    /// The initial state.
+    /// The initial state, before the first sample.
     pub const fn new() -> Self {
         Self {
             medium: [const { Stage::new() }; 2],
@@ -217,7 +220,7 @@ impl State {
         }
     }
 
-    /// Resets to the initial state, after a gap.
+    /// Resets to the initial state. Used after a gap in the samples.
     pub fn reset(&mut self) {
         *self = Self::new();
     }
@@ -283,7 +286,7 @@ impl Decimation {
         medium + sharp
     }
 
-    /// Group delay of the structure band in input samples, as for [`tool_delay`](Self::tool_delay).
+    /// Group delay of the structure band in input samples, at all frequencies, counted as in [`tool_delay`](Self::tool_delay).
     pub fn structure_delay(&self) -> u32 {
         let Some(easy) = self.structure_halvings.checked_sub(1) else {
             return self.tool_delay();

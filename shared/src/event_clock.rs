@@ -6,6 +6,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::criteria::{
+    BIAS_BOUND, BIAS_GAIN, OUTLIER_DEVIATIONS, OUTLIERS_MAX, RATE_CHANGE_BIAS, STAMP_RESOLUTION_NS,
+    VARIANCE_MEMORY,
+};
 use crate::math::sqrt;
 use crate::units::Nanoseconds;
 
@@ -14,7 +18,7 @@ use crate::units::Nanoseconds;
 pub struct EventClock {
     /// Number of observations after which the weight of a stamp has decayed to 1/e. At least 2.
     pub memory: f32,
-    /// Standard deviation of the initial period, in units of the standard deviation of one stamp.
+    /// Standard deviation of the initial estimate of the period, in units of the standard deviation of one stamp.
     pub period_uncertainty: f32,
 }
 
@@ -23,53 +27,39 @@ pub struct EventClock {
 pub struct EventClockState {
     /// Number of the newest observed event.
     index: u64,
-    /// Fitted time of that event.
+    /// Fitted time of the newest observed event.
     time_ns: u64,
-    /// Time stamp of that event.
+    /// Time stamp of the newest observed event.
     stamp_ns: u64,
     /// Fitted time from one event to the next, in ns.
     period_ns: f32,
-    /// Covariance of (time, period) in units of the stamps' variance.
+    /// Covariance of the fitted time a and period b, in units of the stamps' variance: var a, cov(a, b), var b.
     covariance: [f32; 3],
     /// Variance of the stamps about the line, in ns².
     variance_ns2: f32,
-    /// The preceding deviation in ns, normalized to the variance of one stamp.
+    /// Deviation of the preceding stamp from its prediction in ns, scaled so that its standard deviation is that of one stamp.
     previous_ns: f32,
-    /// Running mean of the deviations; not zero if the rate changes.
+    /// Running mean of the scaled deviations in ns. It differs from zero if the rate changes.
     bias_ns: f32,
     /// Number of consecutive outliers.
-    strayed: u8,
-    /// Observations since the start.
+    outliers: u8,
+    /// Number of observations since the start.
     observations: u32,
 }
 
 /// Classification of one observation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Observation {
-    /// The stamp agrees with the line.
+    /// The stamp agrees with the fitted line.
     Fitted,
-    /// The last deviations have the same sign: the rate is changing. The line continues from this stamp with an uncertain period.
-    Bent,
-    /// An outlier. Its deviation is reduced below the largest plausible one.
-    Strayed,
-    /// Too many consecutive outliers: the line starts again through this stamp and the preceding one.
+    /// The recent deviations from the line have the same sign: the rate is changing. The line continues from this stamp with an
+    /// uncertain period.
+    RateChanged,
+    /// An outlier: a stamp too far from the line for jitter. The line is updated with a reduced deviation.
+    Outlier,
+    /// Too many consecutive outliers: the line starts again through this stamp and the preceding stamp.
     Restarted,
 }
-
-/// Threshold of outliers, in standard deviations. Normal jitter exceeds it once in 16 000 stamps.
-const BELIEVED_DEVIATIONS: f32 = 4.0;
-/// Number of consecutive outliers after which the line starts again. Unfounded.
-const STRAYED_AT_MOST: u8 = 4;
-/// Memory of the variance estimate, in observations. Unfounded.
-const VARIANCE_MEMORY: f32 = 96.0;
-/// Gain of the running mean of deviations. Its standard deviation is then √(0.25/1.75) = 0.38 of a single deviation's.
-const BIAS_FOLLOWS: f32 = 0.25;
-/// Bound of a deviation in the running mean, in standard deviations, so that one or two outliers are no rate change.
-const BIAS_BELIEVES: f32 = 3.0;
-/// Threshold of a rate change: running mean in standard deviations of one stamp. It is 5 of the mean's own standard deviations.
-const BENT: f32 = 2.0;
-/// Lower bound of the standard deviation in ns: the resolution of the clock.
-const RESOLUTION_NS: f32 = 20.0;
 
 impl EventClock {
     /// Starts at event 0 with time stamp `time`, and initial estimates of the period and of the stamps' standard deviation.
@@ -83,7 +73,7 @@ impl EventClock {
             variance_ns2: jitter_ns * jitter_ns,
             previous_ns: 0.0,
             bias_ns: 0.0,
-            strayed: 0,
+            outliers: 0,
             observations: 1,
         }
     }
@@ -92,7 +82,7 @@ impl EventClock {
         [1.0, 0.0, self.period_uncertainty * self.period_uncertainty]
     }
 
-    /// Processes the time stamp of the event that is `steps` after the newest one.
+    /// Processes the time stamp of the event whose number is `steps` above that of the newest event.
     pub fn observe(&self, state: &mut EventClockState, steps: u32, stamp: Nanoseconds) -> Observation {
         let dn = steps as f32;
         let predicted_ns = state.time_ns.saturating_add((dn * state.period_ns) as u64);
@@ -108,39 +98,39 @@ impl EventClock {
         state.index = state.index.saturating_add(u64::from(steps));
         state.observations = state.observations.saturating_add(1);
 
-        let bound_ns2 = BELIEVED_DEVIATIONS * BELIEVED_DEVIATIONS * state.variance_ns2 * scale;
+        let bound_ns2 = OUTLIER_DEVIATIONS * OUTLIER_DEVIATIONS * state.variance_ns2 * scale;
         let square_ns2 = deviation_ns * deviation_ns;
-        let strays = square_ns2 > bound_ns2;
-        // An outlier keeps its sign and is reduced to bound²/deviation, which is below the bound.
-        let believed_ns = if strays {
+        let is_outlier = square_ns2 > bound_ns2;
+        // The deviation of an outlier keeps its sign and is reduced to bound²/deviation, which is below the bound.
+        let reduced_ns = if is_outlier {
             deviation_ns * (bound_ns2 / square_ns2)
         } else {
             deviation_ns
         };
-        let bent = state.learn_jitter(believed_ns / sqrt(scale));
-        state.strayed = if strays { state.strayed + 1 } else { 0 };
+        let rate_changes = state.learn_jitter(reduced_ns / sqrt(scale));
+        state.outliers = if is_outlier { state.outliers + 1 } else { 0 };
         let before_ns = core::mem::replace(&mut state.stamp_ns, stamp.0);
-        let restarts = state.strayed >= STRAYED_AT_MOST;
-        if restarts || bent {
+        let restarts = state.outliers >= OUTLIERS_MAX;
+        if restarts || rate_changes {
             state.time_ns = stamp.0;
             if restarts {
                 state.period_ns = difference_ns(stamp.0, before_ns) / dn;
             }
-            // Uncertainty of a period that is estimated from two stamps only.
+            // The period is now as uncertain as one that is computed from two stamps only.
             state.covariance = [1.0, 0.0, 2.0 / (dn * dn)];
-            (state.strayed, state.bias_ns, state.previous_ns) = (0, 0.0, 0.0);
+            (state.outliers, state.bias_ns, state.previous_ns) = (0, 0.0, 0.0);
             return if restarts {
                 Observation::Restarted
             } else {
-                Observation::Bent
+                Observation::RateChanged
             };
         }
         let (gain_a, gain_b) = (aa / scale, ab / scale);
-        state.time_ns = offset_ns(predicted_ns, gain_a * believed_ns);
-        state.period_ns += gain_b * believed_ns;
+        state.time_ns = offset_ns(predicted_ns, gain_a * reduced_ns);
+        state.period_ns += gain_b * reduced_ns;
         state.covariance = [aa - gain_a * aa, ab - gain_a * ab, bb - gain_b * ab];
-        if strays {
-            Observation::Strayed
+        if is_outlier {
+            Observation::Outlier
         } else {
             Observation::Fitted
         }
@@ -148,27 +138,29 @@ impl EventClock {
 }
 
 impl EventClockState {
-    /// Updates the variance with a normalized deviation. Returns true if the last deviations show a rate change.
+    /// Updates the variance of the stamps with a deviation that is scaled as [`previous_ns`](Self::previous_ns). Returns true if
+    /// the recent deviations show a rate change.
     ///
-    /// The variance is half the mean square of the *differences* of consecutive deviations. During a rate change the deviations have a
-    /// bias, which the differences remove.
+    /// The variance is half the mean square of the *differences* of consecutive deviations. During a rate change the deviations
+    /// have a bias, which the differences remove.
     fn learn_jitter(&mut self, deviation_ns: f32) -> bool {
         let difference_ns = deviation_ns - self.previous_ns;
         self.previous_ns = deviation_ns;
-        let bound_ns = BIAS_BELIEVES * sqrt(self.variance_ns2);
-        self.bias_ns += (deviation_ns.clamp(-bound_ns, bound_ns) - self.bias_ns) * BIAS_FOLLOWS;
+        let bound_ns = BIAS_BOUND * sqrt(self.variance_ns2);
+        self.bias_ns += (deviation_ns.clamp(-bound_ns, bound_ns) - self.bias_ns) * BIAS_GAIN;
         let observations = self.observations as f32;
         let memory = if observations < VARIANCE_MEMORY {
             observations
         } else {
             VARIANCE_MEMORY
         };
-        // The gain 3/(n + 2) lets the initial estimate decay quickly.
+        // With n observations the gain is 3/(n + 2), larger than the 1/n of a mean, so that the initial estimate decays quickly.
         self.variance_ns2 += (0.5 * difference_ns * difference_ns - self.variance_ns2) * 3.0 / (memory + 2.0);
-        if self.variance_ns2 < RESOLUTION_NS * RESOLUTION_NS {
-            self.variance_ns2 = RESOLUTION_NS * RESOLUTION_NS;
+        if self.variance_ns2 < STAMP_RESOLUTION_NS * STAMP_RESOLUTION_NS {
+            self.variance_ns2 = STAMP_RESOLUTION_NS * STAMP_RESOLUTION_NS;
         }
-        self.observations > 4 && self.bias_ns * self.bias_ns > BENT * BENT * self.variance_ns2
+        self.observations > 4
+            && self.bias_ns * self.bias_ns > RATE_CHANGE_BIAS * RATE_CHANGE_BIAS * self.variance_ns2
     }
 
     /// Number of the newest observed event.
@@ -186,7 +178,7 @@ impl EventClockState {
         self.period_ns
     }
 
-    /// Number of observations since the start.
+    /// Number of observed stamps since the start.
     pub fn observations(&self) -> u32 {
         self.observations
     }
@@ -214,13 +206,13 @@ impl EventClockState {
         difference_ns(time.0, self.time_ns) / self.period_ns
     }
 
-    /// Clamps the period to given bounds.
+    /// Clamps the fitted period to these bounds in ns.
     pub fn limit_period(&mut self, least_ns: f32, most_ns: f32) {
         self.period_ns = self.period_ns.clamp(least_ns, most_ns);
     }
 }
 
-/// `a − b` of two instants, in ns.
+/// The difference a − b of two instants, in ns.
 fn difference_ns(a: u64, b: u64) -> f32 {
     if a >= b { (a - b) as f32 } else { -((b - a) as f32) }
 }

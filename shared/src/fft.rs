@@ -2,27 +2,29 @@
 //!
 //! Forward transform, X\[k\] = Σ x\[n\]·exp(−2πi·k·n/N), of N = 256 … 4096 real values, in place.
 //!
-//! The N real values are taken as N/2 complex ones. A radix-4 pass without multiplications transforms those a quarter
-//! apart; then they are sorted into bit-reversed order; where N/2 is no power of four a radix-2 pass follows; radix-4
-//! passes with twiddle factors do the rest, and the result is split into the spectrum of the real values.
+//! The N real values are packed into N/2 complex ones. The steps are, in order:
+//! 1. a radix-4 pass without multiplications, over values whose distance is a quarter of the block;
+//! 2. a sort into bit-reversed order;
+//! 3. a radix-2 pass, if N/2 is no power of four;
+//! 4. radix-4 passes with twiddle factors;
+//! 5. the split into the spectrum of the real values.
 //!
-//! **Scaling.** The input is shifted once, as a block, so that its largest value has just the room that the transform
-//! needs; no later pass looks at the data. A product with a Q31 factor keeps the high word, which halves it; the
-//! one leg of a radix-4 butterfly that has no factor is halved to match. So each radix-4 pass with factors doubles a tone
-//! and leaves white noise as it is, and the result of every size ends just below 2³¹.
+//! **Scaling.** The input is shifted once, as a block, so that its largest value just leaves the headroom that the transform
+//! needs. No later pass depends on the data. A product with a Q31 factor keeps its high word, which halves it. The input of a
+//! radix-4 butterfly that has no factor is halved too. So each radix-4 pass with factors doubles the amplitude of a tone and
+//! keeps the amplitude of white noise, and for every N the largest result is just below 2³¹.
 //!
-//! **Why nothing overflows.** Let p be the number of radix-4 passes with factors and M = 2^(31+p)/N; the shifted input lies in
-//! −M … M − 1.
-//! 1. Every value on the way to Z, the transform of the packed values, is a sum of some of them, of modulus ≤ √2·M, times unit
-//!    factors, halved in each pass with factors. All N/2 of them give at most |Z| ≤ √2·(N/2)·M/2^p = √½·2³¹; before
-//!    the last pass it is half of that at most, and the sums inside a butterfly have fewer terms than its results.
-//! 2. The split forms Z\[k\] ± Z*\[N/2 − k\], twice the transform of the even or the odd samples. Its real or imaginary part
-//!    is at most 2·(N/2)·M/2^p·c = 2³¹·c, where c is the mean of |cos| over the phases that the samples see: 1 for k = 0, which
-//!    is treated apart, and at most √½ for all other k < N/4 (four phases per turn).
-//! 3. X\[k\] itself is bounded by 2³¹·√½ for the same reason. Only X\[0\] and X\[N/2\] can reach 2³¹, for a block of −M,
-//!    and these two sums saturate.
+//! **No overflow.** Let p be the number of radix-4 passes with factors and M = 2^(31+p)/N. The shifted input lies in −M … M − 1.
+//! 1. Every intermediate value of Z, the transform of the packed values, is a sum of some packed values of modulus ≤ √2·M, times
+//!    factors of modulus 1, halved in each pass with factors. The sum of all N/2 gives |Z| ≤ √2·(N/2)·M/2^p = √½·2³¹. Before the
+//!    last pass the bound is half of that, and the sums inside a butterfly have fewer terms than its results.
+//! 2. The split forms Z\[k\] ± Z*\[N/2 − k\], twice the transform of the even or the odd samples. Its real or imaginary part is
+//!    at most 2·(N/2)·M/2^p·c = 2³¹·c, where c is the mean of |cos| over the phases of the samples: 1 for k = 0, which has its
+//!    own formula, and at most √½ for all other k < N/4 (four phases per period).
+//! 3. X\[k\] itself is bounded by 2³¹·√½ for the same reason. Only X\[0\] and X\[N/2\] can reach 2³¹, for a block of −M. These
+//!    two sums saturate.
 //!
-//! Rounding adds less than 2^(p+3) units to any of these, far inside the margins of 1 to 3.
+//! Rounding adds less than 2^(p+3) units to any of these values, far less than the margins in 1 to 3.
 //!
 //! **Cost and accuracy**, 1024 points, on an emulated Cortex-M4F, 16-bit tone between two bins at −1 and −40 dBFS against an exact
 //! transform:
@@ -36,13 +38,13 @@
 //! | CMSIS-DSP `arm_rfft_q15`, the same | 44 234 | 47 / 10 dB |
 //! | CMSIS-DSP `arm_rfft_q31`, the same | 87 025 | 139 / 100 dB |
 //!
-//! A test across crates counts the first two anew and holds them to these figures. Without `target-cpu=cortex-m4` the compiler
-//! does not mind its registers, and this transform takes 58 515.
+//! The test `signal_chain_on_target` counts the instructions of the first two rows and compares them with these figures. Without
+//! `target-cpu=cortex-m4` this transform takes 58 515 instructions.
 
 /// Complex number with integer parts: real, imaginary.
 pub type Complex = [i32; 2];
 
-/// High word of a product, rounded: a·b/2³². With b in Q31 that is half the product.
+/// Rounded high word of a product: a·b/2³². If b is a Q31 number, the result is half the product.
 #[inline(always)]
 fn multiply(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64 + 0x8000_0000) >> 32) as i32
@@ -54,7 +56,7 @@ fn multiply_add(sum: i32, a: i32, b: i32) -> i32 {
     ((((sum as i64) << 32) + a as i64 * b as i64 + 0x8000_0000) >> 32) as i32
 }
 
-/// Half the product of z and exp(−iφ), given as \[cos φ, sin φ\] in Q31.
+/// Half the product of z and exp(−iφ), for `factor` = \[cos φ, sin φ\] in Q31.
 #[inline(always)]
 fn turn(z: Complex, factor: Complex) -> Complex {
     let [cos, sin] = factor;
@@ -86,7 +88,8 @@ fn add_i(a: Complex, b: Complex) -> Complex {
     [a[0] - b[1], a[1] + b[0]]
 }
 
-/// First pass: transforms of the four values a quarter apart, each passed through `scale`; results in bit-reversed order.
+/// First pass: applies `scale` to every value, then transforms each four values whose distance is a quarter of the block. The
+/// results are in bit-reversed order.
 #[inline(always)]
 fn first_pass(data: &mut [Complex], scale: impl Fn(i32) -> i32) {
     let (lower, upper) = data.split_at_mut(data.len() / 2);
@@ -103,11 +106,11 @@ fn first_pass(data: &mut [Complex], scale: impl Fn(i32) -> i32) {
     }
 }
 
-/// Radix-2 pass over blocks of eight values, each two transforms of length 4.
+/// Radix-2 pass: joins two transforms of length 4 into one of length 8, in each block of eight values.
 #[inline(always)]
 fn radix2_pass(data: &mut [Complex]) {
     const SQRT_HALF: i32 = 0x5A82_799A;
-    // Hidden from the compiler, which takes a product with a known number apart into slower ones.
+    // `black_box` keeps the compiler from replacing the product with a constant by slower shifts and sums.
     let root = core::hint::black_box(SQRT_HALF);
     let sqrt_half = |v: i32| multiply(v << 1, root);
     for x in data.as_chunks_mut::<8>().0 {
@@ -120,11 +123,11 @@ fn radix2_pass(data: &mut [Complex]) {
     }
 }
 
-/// Radix-4 pass over blocks of 4·Q values, each four transforms of length Q; halves its results.
+/// Radix-4 pass: joins four transforms of length Q into one of length 4·Q, in each block of 4·Q values. The results are halved.
 #[inline(always)]
 fn radix4_pass<const Q: usize>(data: &mut [Complex], factors: &[[Complex; 3]; Q]) {
     for block in data.chunks_exact_mut(4 * Q) {
-        // The transforms stand in bit-reversed order too.
+        // The four transforms of a block are in bit-reversed order: 0, 2, 1, 3.
         let Some([x0, x2, x1, x3]) = quarters::<Q>(block) else {
             return;
         };
@@ -144,7 +147,7 @@ fn radix4_pass<const Q: usize>(data: &mut [Complex], factors: &[[Complex; 3]; Q]
     }
 }
 
-/// A block of 4·Q values in four.
+/// Splits a block of 4·Q values into its four quarters.
 #[inline(always)]
 fn quarters<const Q: usize>(block: &mut [Complex]) -> Option<[&mut [Complex; Q]; 4]> {
     let (first, rest) = block.split_first_chunk_mut()?;
@@ -153,7 +156,7 @@ fn quarters<const Q: usize>(block: &mut [Complex]) -> Option<[&mut [Complex; Q];
     Some([first, second, third, rest.first_chunk_mut()?])
 }
 
-/// Splits the transform of the packed complex values into the lower half of the spectrum of the real ones.
+/// Computes the spectrum of the real values from the transform of the packed complex values, in place.
 #[inline(always)]
 fn split(data: &mut [Complex], factors: &[Complex]) {
     let middle = data.len() / 2;
@@ -174,10 +177,10 @@ fn split(data: &mut [Complex], factors: &[Complex]) {
     }
 }
 
-/// Exchanges the values whose indices are each other's bit reversal.
+/// Sorts into bit-reversed order: exchanges each value with the one at the bit-reversed index.
 #[inline(always)]
 fn sort_bit_reversed<const M: usize>(data: &mut [Complex; M]) {
-    // An index is a high half, a middle bit where their number is odd, and a low half.
+    // The bits of an index: a high half, one middle bit if their number is odd, and a low half.
     let half = M.trailing_zeros() / 2;
     let odd = M.trailing_zeros() % 2;
     let reversed = |bits: usize| bits.reverse_bits() >> (usize::BITS - half);
@@ -192,7 +195,7 @@ fn sort_bit_reversed<const M: usize>(data: &mut [Complex; M]) {
     }
 }
 
-/// Bits that the largest value needs beside its sign.
+/// Number of bits of the largest magnitude in the block, without the sign bit.
 #[inline(always)]
 fn bits_used(data: &[Complex]) -> i32 {
     let magnitude = |v: i32| v ^ (v >> 31);
@@ -202,21 +205,22 @@ fn bits_used(data: &[Complex]) -> i32 {
     (i32::BITS - union.leading_zeros()) as i32
 }
 
-/// First pass on the block shifted so that it takes `bits` bits beside the sign; returns by how many it went left.
+/// First pass on the block, shifted so that its largest magnitude has `bits` bits without the sign bit. Returns the left shift
+/// in bits.
 #[inline(always)]
 fn normalized_first_pass(data: &mut [Complex], bits: i32) -> i32 {
     let left = bits - bits_used(data);
     if left >= 0 {
         first_pass(data, |v| v << left);
     } else {
-        // To round up may need one bit more: the largest value stays below.
+        // Rounding up may need one more bit, so the result is limited to `largest`.
         let (half, largest) = (1 << (-left - 1), (1 << bits) - 1);
         first_pass(data, |v| (v.saturating_add(half) >> -left).min(largest));
     }
     left
 }
 
-/// The spectrum of a block of N real values, a view into their memory.
+/// The spectrum of a block of N real values, stored in the memory of the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Transform<'a> {
     /// X\[k\] for k = 1 … N/2 − 1 in units of 2^[`exponent`](Self::exponent); the first entry holds the two real values X\[0\] and X\[N/2\].
@@ -225,9 +229,9 @@ pub struct Transform<'a> {
     pub exponent: i32,
 }
 
-/// cos and sin of 2π·`numerator`/`denominator` in Q31, rounded to nearest; +1 becomes the largest number there is.
+/// cos and sin of 2π·`numerator`/`denominator` as Q31 numbers, rounded to nearest. +1 becomes 1 − 2⁻³¹, the largest Q31 number.
 const fn cos_sin(numerator: u32, denominator: u32) -> Complex {
-    // Within an eighth of a turn of one of the axes the series converge fast.
+    // The angle is reduced to at most π/4 from the nearest axis, where the Taylor series converge fast.
     let quadrant = (8 * numerator + denominator) / (2 * denominator);
     let offset = (4 * numerator) as f64 - (quadrant * denominator) as f64;
     let angle = offset / denominator as f64 * core::f64::consts::FRAC_PI_2;
@@ -251,13 +255,13 @@ const fn cos_sin(numerator: u32, denominator: u32) -> Complex {
     }
 }
 
-/// Q31 of a number from −1 to 1; the cast saturates.
+/// The nearest Q31 number of a value from −1 to 1. The cast saturates.
 const fn q31(value: f64) -> i32 {
     let scaled = value * 2_147_483_648.0;
     (if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 }) as i32
 }
 
-/// exp(−2πi·j·r/4Q) for r = 1, 2, 3.
+/// Twiddle factors exp(−2πi·j·r/4Q) for j = 0 … Q − 1 and r = 1, 2, 3.
 const fn pass_factors<const Q: usize>() -> [[Complex; 3]; Q] {
     let mut table = [[[0; 2]; 3]; Q];
     let mut j = 0;
@@ -273,7 +277,7 @@ const fn pass_factors<const Q: usize>() -> [[Complex; 3]; Q] {
     table
 }
 
-/// exp(−2πi·k/N) for k = 1 … N/4 − 1 = COUNT.
+/// Factors exp(−2πi·k/N) of the split for k = 1 … N/4 − 1 = COUNT.
 const fn split_factors<const COUNT: usize>() -> [Complex; COUNT] {
     let mut table = [[0; 2]; COUNT];
     let mut k = 0;
@@ -327,14 +331,14 @@ real_transform!(rfft_4096, 4096, PASS_8, PASS_32, PASS_128, PASS_512);
 mod tests {
     use super::*;
 
-    /// Every factor is the rounded cosine and sine; 1 − 2⁻³¹ stands for 1.
+    /// Every factor is the rounded cosine and sine, where 1 − 2⁻³¹ replaces 1.
     #[test]
     fn factors_are_rounded_cosines_and_sines() {
         let check = |found: Complex, turns: f64| {
             let (sin, cos) = (core::f64::consts::TAU * turns).sin_cos();
             for (found, exact) in found.into_iter().zip([cos, sin]) {
                 let exact = (exact * 2f64.powi(31)).min(f64::from(i32::MAX));
-                // Half a unit, and the error of the double-precision reference.
+                // Half a Q31 unit of rounding, plus the error of the double-precision reference.
                 assert!(
                     (f64::from(found) - exact).abs() <= 0.5 + 1e-6,
                     "{turns} turns: {found} for {exact}"

@@ -49,6 +49,7 @@
 pub mod acceleration;
 pub mod advice;
 pub mod checksum;
+mod criteria;
 pub mod decimation;
 pub mod detector;
 pub mod event_clock;

@@ -47,9 +47,11 @@ mod shape;
 mod slopes;
 mod table;
 mod tabulated_stability;
-mod tolerance;
 mod validity;
 
+pub use crate::criteria::{
+    FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE,
+};
 pub use additions::{Additions, InterpolationError};
 pub use column::Column;
 pub use cut::CutLobes;
@@ -61,5 +63,4 @@ pub use interval::{Interval, IntervalKind};
 pub use slopes::{IntervalSlopes, LayerMode, Learned, MODES_MAX, Slopes, corrected_limit};
 pub use table::LobeTable;
 pub use tabulated_stability::{NotKnown, TabulatedStability};
-pub use tolerance::{FEED_DIRECTION_SPAN, FEED_DIRECTION_TOLERANCE, FEED_TOLERANCE, IMMERSION_TOLERANCE};
 pub use validity::Validity;

@@ -1,10 +1,10 @@
-//! Elementary functions: the only place that may approximate.
+//! Elementary functions: the only functions of this crate that may approximate.
 //!
-//! Every function is built from IEEE additions, multiplications and divisions in a fixed order, so that it returns the same
-//! bits on every target; only the sign and payload of a NaN are the processor's own. Each states its largest error; a test holds it over the whole domain.
-//! One ulp is the distance from the true value to its neighbour in `f32`.
+//! Every function consists of IEEE additions, multiplications and divisions in a fixed order, so that it returns the same bits
+//! on every target. Only the sign and payload of a NaN depend on the processor. Each function states its largest error, which a
+//! test checks over the whole domain. One ulp is the distance from the true value to the next `f32` number.
 //!
-//! The functions of `libm` used here work in single precision: on a Cortex-M4F double precision is software.
+//! The functions of `libm` used here compute in single precision, because a Cortex-M4F emulates double precision in software.
 
 use core::f32::consts::TAU;
 
@@ -15,17 +15,17 @@ pub fn floor(x: f32) -> f32 {
     libm::floorf(x)
 }
 
-/// Nearest integer, halves away from zero. Exact.
+/// Nearest integer; halves are rounded away from zero. Exact.
 pub fn round(x: f32) -> f32 {
     libm::roundf(x)
 }
 
-/// Square root, within 1 ulp; NaN below zero.
+/// Square root, within 1 ulp; NaN for negative numbers.
 ///
-/// Newton's iteration on the start value of micromath's inverse square root takes half the instructions of a root
-/// in integers; those at the ends of the range, where the iteration would leave it, are libm's.
+/// Newton's iteration from the initial value of micromath's inverse square root takes half the instructions of an integer square
+/// root. Numbers near the ends of the `f32` range, where the iteration would overflow, use libm.
 pub fn sqrt(x: f32) -> f32 {
-    // As bits, so that one comparison also keeps out zero, negative numbers and NaN.
+    // The comparison of bit patterns also excludes zero, negative numbers and NaN.
     let smallest = f32::MIN_POSITIVE.to_bits();
     let largest = exp2i(126).to_bits();
     if x.to_bits().wrapping_sub(smallest) >= largest - smallest {
@@ -33,16 +33,16 @@ pub fn sqrt(x: f32) -> f32 {
     }
     let half = 0.5 * x;
     let mut inverse = F32(x).invsqrt().0;
-    // The start is off by at most e = 0.036; each step makes it 1.5·e²: 2e-3, 6e-6.
+    // The relative error of the initial value is at most e = 0.036. Each step reduces it to 1.5·e²: 2e-3, then 6e-6.
     for _ in 0..2 {
         inverse *= 1.5 - half * inverse * inverse;
     }
-    // One more step on the root itself leaves its rounding only.
+    // One more Newton step on the root itself reduces the error to its rounding.
     let root = x * inverse;
     root + 0.5 * inverse * (x - root * root)
 }
 
-/// √(x² + y²) without overflow on the way, within 3 ulp.
+/// √(x² + y²) within 3 ulp, without overflow of the squares.
 pub fn hypot(x: f32, y: f32) -> f32 {
     let (x, y) = (x.abs(), y.abs());
     let (large, small) = if x > y { (x, y) } else { (y, x) };
@@ -53,14 +53,15 @@ pub fn hypot(x: f32, y: f32) -> f32 {
     large * sqrt(1.0 + ratio * ratio)
 }
 
-/// Sine and cosine of an angle in turns, within 1.2e-7 for every finite angle.
+/// Sine and cosine of an angle in revolutions, within 1.2e-7 for every finite angle.
 ///
-/// An angle in turns is reduced without any error, so the bound holds however large it is.
+/// The reduction of an angle in revolutions to one revolution is exact, so that the bound does not depend on the size of the
+/// angle.
 pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
     let fraction = turns - round(turns);
     let quadrant = round(4.0 * fraction);
     let x = fraction - 0.25 * quadrant;
-    // Taylor series in turns: |x| ≤ 1/8, the first terms left out are below 2e-9.
+    // Taylor series of sin and cos for |x| ≤ 1/8 revolution. The first omitted terms are below 2e-9.
     let square = x * x;
     let sin =
         x * (TAU + square * (-41.341_7 + square * (81.605_25 + square * (-76.705_86 + square * 42.058_69))));
@@ -72,17 +73,17 @@ pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
         0 => (sin, cos),
         1 => (cos, -sin),
         -1 => (-cos, sin),
-        // Two quadrants either way; a NaN ends here too, and stays one.
+        // Quadrants −2 and 2, half a revolution. A NaN takes this branch too and remains NaN.
         _ => (-sin, -cos),
     }
 }
 
-/// Sine of an angle in turns, within 1.2e-7.
+/// Sine of an angle in revolutions, within 1.2e-7.
 pub fn sin_turns(turns: f32) -> f32 {
     sin_cos_turns(turns).0
 }
 
-/// Cosine of an angle in turns, within 1.2e-7.
+/// Cosine of an angle in revolutions, within 1.2e-7.
 pub fn cos_turns(turns: f32) -> f32 {
     sin_cos_turns(turns).1
 }
@@ -92,7 +93,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     libm::atan2f(y, x)
 }
 
-/// Angle of the point (x, y) in turns, from −½ to ½, within 3 ulp.
+/// Angle of the point (x, y) in revolutions, from −½ to ½, within 3 ulp.
 pub fn atan2_turns(y: f32, x: f32) -> f32 {
     atan2(y, x) / TAU
 }
@@ -112,12 +113,12 @@ pub fn exp(x: f32) -> f32 {
     libm::expf(x)
 }
 
-/// A ratio of powers in decibel, within 1e-4 dB; what is below the smallest normal number, and NaN, count as that.
+/// A ratio of powers in decibel, within 1e-4 dB. Ratios below the smallest normal `f32` number, and NaN, count as that number.
 pub fn decibel(power_ratio: f32) -> f32 {
     10.0 * log10(power_ratio.max(f32::MIN_POSITIVE))
 }
 
-/// 2 to an integer power, exact from −126 to 127 and held to that range.
+/// 2 to the power of `exponent`, which is clamped to −126 … 127. Exact.
 pub const fn exp2i(exponent: i32) -> f32 {
     let held = if exponent < -126 {
         -126

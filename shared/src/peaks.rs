@@ -2,9 +2,14 @@
 
 use heapless::Vec;
 
+use crate::criteria::{
+    FLOOR_HALF_WIDTH, HARMONIC_BINS, HARMONIC_TOLERANCE_MAX, LOBE_HALF_WIDTH, MAXIMA_SEARCHED,
+};
 use crate::math;
 use crate::spectrum::{HANN_NOISE_BINS, PowerSpectrum};
 use crate::units::{Hertz, MetersPerSecond2};
+
+pub use crate::criteria::MIN_SNR;
 
 /// A tone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +27,7 @@ pub struct Peak {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotation {
-    /// Revolutions per second.
+    /// Revolutions of the spindle per second.
     pub frequency: Hertz,
     /// Largest error or change of that frequency within the spectrum.
     pub uncertainty: Hertz,
@@ -34,9 +39,9 @@ pub struct Rotation {
 pub struct NonHarmonic {
     /// The tone.
     pub peak: Peak,
-    /// Order of the nearest harmonic of the spindle.
+    /// Spindle order of the harmonic nearest to the tone.
     pub nearest_order: u32,
-    /// Signed distance from that harmonic, in revolutions: ½ for a tone halfway between two.
+    /// Signed distance of the tone from that harmonic, in spindle orders: ½ for a tone halfway between two harmonics.
     pub orders_off: f32,
 }
 
@@ -46,25 +51,15 @@ pub struct NonHarmonic {
 pub enum Search {
     /// A tone was found.
     Found(NonHarmonic),
-    /// No tone was found up to the given frequency.
+    /// No tone was found below the given frequency.
     Nothing {
-        /// Above this frequency harmonics and other tones cannot be distinguished.
+        /// Above this frequency, harmonics of the spindle and other tones cannot be distinguished.
         resolved_to: Hertz,
     },
-    /// The harmonics are too close for the resolution of this spectrum.
+    /// At the uncertainty of the spindle speed and the resolution of the spectrum, harmonics and other tones cannot be
+    /// distinguished.
     Unresolved,
 }
-
-/// Number of bins on each side of a peak whose median is the noise floor. Unfounded.
-const FLOOR_HALF_WIDTH: usize = 64;
-/// Number of bins on each side of a peak that belong to it: the main lobe of the Hann window and one more.
-const LOBE_HALF_WIDTH: usize = 3;
-/// Smallest ratio of a tone's power to the noise floor: 14 dB. A bin of white noise exceeds it once in 3·10⁷.
-pub const MIN_SNR: f32 = 25.0;
-/// Distance in bins within which a tone counts as the harmonic: closer main lobes cannot be separated.
-const HARMONIC_BINS: f32 = 1.0;
-/// Number of local maxima, strongest first, that the search considers. Unfounded.
-const CANDIDATES: usize = 32;
 
 impl PowerSpectrum<'_> {
     fn at(&self, k: usize) -> f32 {
@@ -73,9 +68,9 @@ impl PowerSpectrum<'_> {
 
     /// Frequency in bins and mean square of the tone whose highest bin is `k`.
     ///
-    /// With the amplitudes a, b, c of the bins below, at and above, the Hann window gives the offset δ = 2(c − a)/(a + 2b + c) from
-    /// the middle bin and the amplitude (a + 2b + c)·(1 − δ²)(4 − δ²)/12·πδ/sin πδ, both exact for a single tone
-    /// (Agrež, IEEE Trans. Instrum. Meas. 51, 2002). Noise of −20 dB against the peak moves δ by 0.05 rms.
+    /// With the amplitudes a, b, c of the bins below, at and above, the Hann window gives the offset δ = 2(c − a)/(a + 2b + c)
+    /// from the middle bin and the amplitude (a + 2b + c)·(1 − δ²)(4 − δ²)/12·πδ/sin πδ, both exact for a single tone (Agrež,
+    /// IEEE Trans. Instrum. Meas. 51, 2002). Noise 20 dB below the peak in its bin gives δ an error of 0.065 rms.
     fn interpolate(&self, k: usize) -> (f32, f32) {
         let [below, middle, above] = [k.wrapping_sub(1), k, k + 1].map(|i| math::sqrt(self.at(i)));
         let sum = below + 2.0 * middle + above;
@@ -103,7 +98,7 @@ impl PowerSpectrum<'_> {
         let bins = below.chain(above).filter_map(|i| self.power.get(i));
         let mut count = 0;
         for (slot, power) in around.iter_mut().zip(bins) {
-            // The bit patterns of non-negative floats sort like the floats.
+            // Non-negative floats have the same order as their bit patterns.
             *slot = power.to_bits();
             count += 1;
         }
@@ -124,10 +119,10 @@ impl PowerSpectrum<'_> {
         }
     }
 
-    /// Local maxima between two frequencies, strongest first, at most [`CANDIDATES`].
-    fn maxima(&self, from: Hertz, to: Hertz) -> Vec<usize, CANDIDATES> {
-        let mut found: Vec<usize, CANDIDATES> = Vec::new();
-        // Bins 0 and 1 hold the residual of the mean removal.
+    /// Local maxima between two frequencies, strongest first, at most [`MAXIMA_SEARCHED`].
+    fn maxima(&self, from: Hertz, to: Hertz) -> Vec<usize, MAXIMA_SEARCHED> {
+        let mut found: Vec<usize, MAXIMA_SEARCHED> = Vec::new();
+        // After removal of the rounded mean, bins 0 and 1 contain its residual.
         let first = ((from.0 / self.bin.0) as usize).max(2);
         let end = ((to.0 / self.bin.0) as usize)
             .saturating_add(2)
@@ -139,7 +134,7 @@ impl PowerSpectrum<'_> {
                     .iter()
                     .position(|&other| power > self.at(other))
                     .unwrap_or(found.len());
-                if found.is_full() && place < CANDIDATES {
+                if found.is_full() && place < MAXIMA_SEARCHED {
                     found.pop();
                 }
                 // If the list is full, a weaker maximum is dropped.
@@ -149,7 +144,8 @@ impl PowerSpectrum<'_> {
         found
     }
 
-    /// Mean square in (m/s²)² within the main lobe around a frequency: that of an isolated tone there.
+    /// Mean square in (m/s²)² of the five bins around a frequency. It equals the mean square of a tone at this frequency, if no
+    /// other tone is within the main lobe of the window.
     pub fn mean_square_near(&self, frequency: Hertz) -> f32 {
         let centre = math::round(frequency.0 / self.bin.0).max(0.0) as usize;
         let lobe = centre.saturating_sub(2)..=centre + 2;
@@ -172,8 +168,9 @@ impl PowerSpectrum<'_> {
             uncertainty,
         } = rotation;
         let width = HARMONIC_BINS * self.bin.0;
-        // A quarter of the distance between two harmonics must remain outside their tolerances.
-        let highest_order = (0.375 * frequency.0 - width) / uncertainty.0.max(1e-6 * frequency.0.abs());
+        // At this order the tolerance around a harmonic reaches its largest share of the distance between two harmonics.
+        let highest_order =
+            (HARMONIC_TOLERANCE_MAX * frequency.0 - width) / uncertainty.0.max(1e-6 * frequency.0.abs());
         let resolved_to = Hertz((highest_order * frequency.0).min(to.0));
         if !(highest_order >= 1.0 && resolved_to.0 > from.0) {
             return Search::Unresolved;
@@ -202,14 +199,15 @@ impl PowerSpectrum<'_> {
         Search::Nothing { resolved_to }
     }
 
-    /// True if side lobes of stronger maxima explain at least half of the amplitude in bin `k`.
+    /// True if the side lobes of the stronger maxima amount to at least half of the amplitude in bin `k`.
     fn is_side_lobe(&self, k: usize, stronger: &[usize]) -> bool {
         let leaked: f32 = stronger
             .iter()
             .map(|&other| {
                 let (bins, mean_square) = self.interpolate(other);
                 let distance = (k as f32 - bins).abs();
-                // Envelope of |sinc(d)/(1 − d²)|; within the main lobe it is that of the tone itself.
+                // Envelope of the Hann window's transform |sinc(d)/(1 − d²)| at a distance of d bins. Within the main lobe it is
+                // taken as 1.
                 let envelope = if distance < 2.0 {
                     1.0
                 } else {

@@ -55,8 +55,7 @@ impl<const N: usize> Overlap<N> {
         (self.next, self.missing) = (0, N);
     }
 
-    /// Takes a sample. Returns true if a block of N samples is complete and at least `hop` samples have come since the preceding
-    /// block.
+    /// Takes a sample. Returns true if N samples are stored and at least `hop` of them came after the preceding block.
     pub fn push(&mut self, sample: Sample, hop: usize) -> bool {
         if let Some(slot) = self.ring.get_mut(self.next) {
             *slot = sample;
@@ -102,8 +101,8 @@ pub struct PowerSpectrum<'a> {
 
 /// Spectrum of the tool band: the sum over the axes whose numbers `axes` gives.
 ///
-/// `sample_rate` is that of the tool band, as fitted; `unit` the acceleration in m/s² of one unit of a [`Sample`];
-/// `work` is scratch memory.
+/// `sample_rate` is the fitted rate of the tool band, `unit` the acceleration in m/s² of one unit of a [`Sample`], and `work`
+/// scratch memory.
 pub fn tool_spectrum<'a>(
     block: &Overlap<TOOL_POINTS>,
     axes: &[usize],
@@ -157,7 +156,7 @@ pub fn structure_spectrum<'a>(
 /// `bins` are the N/2 entries of a packed spectrum, of which the first holds the real values at 0 Hz and half the sample rate.
 fn add_power(bins: impl Iterator<Item = [f32; 2]>, unit: f32, power: &mut [f32]) {
     let points = (2 * power.len() - 2) as f32;
-    // A tone of amplitude A is A·N/4 after the window: its mean square takes (4/N)²/2.
+    // After the window, the bin of a tone of amplitude A has the value A·N/4. The factor (4/N)²/2 gives its mean square A²/2.
     let amplitude_scale = unit * 4.0 / points;
     let scale = 0.5 * amplitude_scale * amplitude_scale;
     let conjugate = |z: [f32; 2]| [z[0], -z[1]];
@@ -167,14 +166,14 @@ fn add_power(bins: impl Iterator<Item = [f32; 2]>, unit: f32, power: &mut [f32])
     let (mut before, mut here) = ([0.0; 2], [dc, 0.0]);
     let last = power.len() - 1;
     for (k, slot) in power.iter_mut().enumerate() {
-        // Beyond its ends the spectrum of a real signal is mirrored and conjugate.
+        // The spectrum of a real signal continues beyond both ends as its mirrored conjugate.
         let after = following.next().unwrap_or(conjugate(before));
         if k == 0 {
             before = conjugate(after);
         }
         let re = 0.5 * here[0] - 0.25 * (before[0] + after[0]);
         let im = 0.5 * here[1] - 0.25 * (before[1] + after[1]);
-        // The bins at 0 Hz and at half the sample rate have no mirrored partner.
+        // The bins at 0 Hz and at half the sample rate occur once in the two-sided spectrum, all others twice.
         let fold = if k == 0 || k == last { 0.5 } else { 1.0 };
         *slot += fold * scale * (re * re + im * im);
         (before, here) = (here, after);

@@ -28,13 +28,13 @@ pub type Passing = [f32; CHANNELS];
 pub enum Method {
     /// The mean from the angle of the slot to that of the next: its bandwidth is about SLOTS/2 cycles per tooth period, with the least noise.
     ///
-    /// The mean is that of the straight lines through the samples. The amplitude of a tone with n samples per cycle is too low by the relative
-    /// amount π²/(3n²): 0.3 % for 33 samples.
+    /// The samples are joined by straight lines. A tone with n samples per cycle gets an amplitude that is too small by the
+    /// relative amount π²/(3n²): 0.3 % for 33 samples.
     Mean,
     /// The value at the angle of the slot, with the bandwidth of the samples.
     ///
-    /// It is that of the cubic through the four nearest samples. The relative error of a tone with n samples per cycle is at most
-    /// 36.5/n⁴: 0.06 % for 16, 1 % for 8 samples.
+    /// A cubic through the four nearest samples gives the value. The relative error of a tone with n samples per cycle is at
+    /// most 36.5/n⁴: 0.06 % for 16, 1 % for 8 samples.
     Value,
 }
 
@@ -52,19 +52,19 @@ pub struct Sampler {
 pub struct SamplerState {
     /// The last four samples, newest last.
     samples: [[f32; 3]; 4],
-    /// Angles of the last two samples but one: the second and third of the four.
+    /// Spindle angles of the second and third of the four samples.
     angles: [Turns; 2],
-    /// Angle of the newest sample.
+    /// Spindle angle of the newest sample.
     angle: Turns,
     /// Samples taken since the start, up to 4.
     filled: u8,
-    /// The slot whose angle comes next, counted from angle 0; `None` before the first.
+    /// Number of the next slot to fill, counted from angle 0; `None` before the first.
     next_slot: Option<u64>,
     /// Number of consecutive slots filled without a gap.
     unbroken: u8,
-    /// Integral of the signal since the angle of the last slot, in m/s² · sample periods.
+    /// Integral of the signal over time since the angle of the last slot, in m/s² times sample periods.
     integral: [f32; 3],
-    /// Sample periods since the angle of the last slot.
+    /// Time since the angle of the last slot, in sample periods.
     span: f32,
     passing: Passing,
 }
@@ -76,7 +76,7 @@ impl Default for SamplerState {
 }
 
 impl SamplerState {
-    /// Before the first sample.
+    /// The state before the first sample.
     pub const fn new() -> Self {
         Self {
             samples: [[0.0; 3]; 4],
@@ -102,14 +102,14 @@ pub struct Passed {
 }
 
 impl Sampler {
-    /// Angle of a slot.
+    /// Spindle angle at which a slot begins.
     fn angle_of(&self, slot: u64) -> Turns {
         let per_turn = u64::from(self.teeth) * SLOTS as u64;
         let part = ((slot % per_turn) << 32) / per_turn;
         Turns(((slot / per_turn) << 32) | part)
     }
 
-    /// The first slot at or after `angle`.
+    /// Number of the first slot that begins at or after `angle`.
     fn slot_from(&self, angle: Turns) -> u64 {
         let per_turn = u64::from(self.teeth) * SLOTS as u64;
         let part = u64::from(angle.fraction()) * per_turn;
@@ -133,7 +133,7 @@ impl Sampler {
         }
         let [from, to] = state.angles;
         if to.0.saturating_sub(from.0) > Turns::ONE.0 / u64::from(self.teeth) {
-            // A tooth period within one sample: the angle has jumped.
+            // The angle has moved by more than a tooth period within one sample: a jump of the tachometer's estimate.
             *state = SamplerState::default();
             return None;
         }
@@ -158,8 +158,8 @@ impl Sampler {
         passed
     }
 
-    /// Fills a slot whose angle lies at the fraction `part` between the two middle samples. The integral is already computed up to the
-    /// fraction `done`.
+    /// Fills a slot whose angle lies between the two middle samples, at the fraction `part` of their distance. The integral
+    /// already covers the distance up to the fraction `done`.
     fn fill(&self, state: &mut SamplerState, slot: u64, done: f32, part: f32) -> Option<Passed> {
         let value = match self.method {
             Method::Mean => {
@@ -170,7 +170,7 @@ impl Sampler {
             Method::Value => cubic(&state.samples, part),
         };
         (state.integral, state.span) = ([0.0; 3], 0.0);
-        // A mean is complete at the end of its slot.
+        // The mean over a slot is known at the beginning of the next slot.
         let slot = match self.method {
             Method::Mean => slot.checked_sub(1)?,
             Method::Value => slot,
@@ -179,7 +179,7 @@ impl Sampler {
         if let Some(values) = state.passing.get_mut(3 * place..3 * place + 3) {
             values.copy_from_slice(&value);
         }
-        // The first mean does not cover its whole slot.
+        // The integral of the first mean began within its slot, so that this mean is not used.
         let partial = self.method == Method::Mean && state.unbroken == 0;
         state.unbroken = state.unbroken.saturating_add(1).min(SLOTS as u8 + 1);
         let whole = usize::from(state.unbroken) >= SLOTS + usize::from(self.method == Method::Mean);
@@ -191,7 +191,8 @@ impl Sampler {
 }
 
 impl SamplerState {
-    /// Adds the integral of the straight line between the two middle samples, from the fraction `from` to the fraction `to`.
+    /// Adds the integral of the straight line between the two middle samples, from the fraction `from` to the fraction `to` of
+    /// their distance.
     fn integrate(&mut self, from: f32, to: f32) {
         let [_, a, b, _] = &self.samples;
         let (length, middle) = (to - from, 0.5 * (to + from));
@@ -202,7 +203,7 @@ impl SamplerState {
     }
 }
 
-/// The cubic through four equally spaced values, at the fraction `part` between the second and the third.
+/// Value of the cubic through four equally spaced samples, at the fraction `part` between the second and the third sample.
 fn cubic(samples: &[[f32; 3]; 4], part: f32) -> [f32; 3] {
     let (before, after) = (part + 1.0, part - 1.0);
     let beyond = part - 2.0;
@@ -221,32 +222,32 @@ fn cubic(samples: &[[f32; 3]; 4], part: f32) -> [f32; 3] {
     value
 }
 
-/// Mean of each class, and the mean square of the residual.
+/// Mean of the passings of each class, and the mean square of the residual.
 ///
-/// Over the first [`MEMORY`](Self::MEMORY) revolutions it is the arithmetic mean, later an exponentially weighted one. After a change of
-/// the cutting conditions, [`reset`](Self::reset) discards the past.
+/// Over the first [`MEMORY`](Self::MEMORY) revolutions the mean of a class is the arithmetic mean, later an exponentially
+/// weighted mean. After a change of the cutting conditions, [`reset`](Self::reset) discards the past.
 #[derive(Clone, Copy, Debug)]
 pub struct Average {
     means: [Passing; MAX_CLASSES],
-    /// Number of passings of each class since the reset, up to the memory.
+    /// Number of passings of each class since the reset, at most `MEMORY` − 1.
     counts: [u8; MAX_CLASSES],
     classes: u8,
     /// Mean square of the residual, over all channels.
     residual: f32,
-    /// Number of passings in the residual, up to the memory.
+    /// Number of passings in the mean square of the residual, at most `MEMORY` per class.
     residual_count: u16,
 }
 
-/// Levels: root mean squares over slots and axes, in m/s².
+/// Levels of the parts of the vibration: root mean squares over slots and axes, in m/s².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Levels {
-    /// Forced vibration: common to all teeth, without its mean over the tooth period.
+    /// Forced vibration: the part common to all teeth, without its mean over the tooth period.
     pub forced: f32,
-    /// Runout: differs from tooth to tooth and repeats with each revolution.
+    /// Runout: the part that differs from tooth to tooth and repeats with each revolution.
     pub runout: f32,
     /// Part of the runout that changes sign from tooth to tooth; 0 for odd numbers of teeth.
     pub alternating: f32,
-    /// Residual: not periodic with the revolution.
+    /// Residual: the part that is not periodic with the revolution.
     pub residual: f32,
 }
 
@@ -254,7 +255,7 @@ impl Average {
     /// Memory of the means, in revolutions.
     pub const MEMORY: u8 = 8;
 
-    /// The initial state; `classes` from 1 to [`MAX_CLASSES`].
+    /// The initial state for a number of classes, from 1 to [`MAX_CLASSES`].
     pub const fn new(classes: u8) -> Self {
         Self {
             means: [[0.0; CHANNELS]; MAX_CLASSES],
@@ -265,7 +266,7 @@ impl Average {
         }
     }
 
-    /// True if it was created for this number of classes.
+    /// True if the average was created for this number of classes.
     pub fn is_for(&self, classes: u8) -> bool {
         self.classes == clamp_classes(classes)
     }
@@ -289,7 +290,8 @@ impl Average {
             square += difference * difference;
         }
         if *count > 0 {
-            // White noise of variance s deviates from a mean of c passings by s·(1 + 1/c). The factor (1 − gain) removes that excess.
+            // White noise of variance s deviates from the mean of c passings with the variance s·(1 + 1/c). The factor (1 −
+            // gain) removes this excess.
             let power = square * (1.0 - gain) / CHANNELS as f32;
             let memory = u16::from(Self::MEMORY) * u16::from(self.classes);
             self.residual_count = (self.residual_count + 1).min(memory);
@@ -298,7 +300,7 @@ impl Average {
         *count = (*count + 1).min(Self::MEMORY - 1);
     }
 
-    /// True once every class was seen at least twice.
+    /// True once every class has had at least two passings.
     pub fn is_filled(&self) -> bool {
         self.counts
             .iter()
@@ -306,7 +308,7 @@ impl Average {
             .all(|&count| count >= 2)
     }
 
-    /// The present levels.
+    /// The present levels of forced vibration, runout and residual.
     pub fn levels(&self) -> Levels {
         let classes = usize::from(self.classes);
         let share = 1.0 / classes as f32;
@@ -353,7 +355,7 @@ pub(crate) const fn clamp_classes(classes: u8) -> u8 {
     }
 }
 
-/// Σ (a − b)² over all channels.
+/// Sum of the squared differences of two passings over all channels.
 pub(crate) fn distance_square(a: &Passing, b: &Passing) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
@@ -362,7 +364,7 @@ pub(crate) fn distance_square(a: &Passing, b: &Passing) -> f32 {
 mod tests {
     use super::*;
 
-    /// Passings of a signal of the angle in turns, sampled so often per turn.
+    /// Passings of a signal that is a function of the spindle angle in revolutions, with this number of samples per revolution.
     fn sampled(method: Method, samples_per_turn: f64, signal: impl Fn(f64) -> f64) -> std::vec::Vec<Passed> {
         let sampler = Sampler { teeth: 2, method };
         let mut state = SamplerState::new();
@@ -382,7 +384,8 @@ mod tests {
     #[test]
     fn values_and_means_stand_at_their_angles() {
         let tau = std::f64::consts::TAU;
-        // Three cycles per turn, at 100.3 samples per turn: 33 per cycle, which bounds the error of both methods by 0.3 %.
+        // Three cycles per revolution at 100.3 samples per revolution are 33 samples per cycle, which bounds the error of both
+        // methods by 0.3 %.
         let value = |turns: f64| (tau * 3.0 * turns).sin();
         let mean = |turns: f64| {
             let integral = |t: f64| -(tau * 3.0 * t).cos() / (tau * 3.0);
@@ -423,7 +426,7 @@ mod tests {
             average.update(tooth, &passing);
         }
         let levels = average.levels();
-        // What changes sign with each turn leaves about 1/(2·memory) of itself in the means.
+        // A vibration that changes sign with each revolution leaves a share of about 1/(2·memory) in the means.
         assert!((levels.forced - 2.0).abs() < 1e-3, "{levels:?}");
         assert!(
             (levels.runout - 0.5).abs() < 0.02 && (levels.alternating - 0.5).abs() < 0.02,

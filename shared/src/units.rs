@@ -54,7 +54,7 @@ impl Rpm {
 }
 
 impl Hertz {
-    /// The spindle speed with this many revolutions per second.
+    /// The spindle speed in rev/min of a rotation with this frequency.
     pub fn to_rpm(self) -> Rpm {
         Rpm(self.0 * 60.0)
     }

@@ -40,7 +40,7 @@ pub fn advise(
     if !judgement.verdict.is_chatter() {
         return keep;
     }
-    // Written so that NaN is refused too.
+    // The negated comparison also refuses a NaN speed.
     if !(speed.0 > 0.0 && speed.0.is_finite()) {
         return Advice {
             action: Action::NotKnown,
@@ -83,7 +83,7 @@ pub fn advise(
     }
 }
 
-/// A table, and a working point for which it has a layer.
+/// A lobe table with the cut for which advice is given: the table has a layer for it.
 struct Cut<'t> {
     table: &'t LobeTable<'t>,
     at: WorkingPoint,

@@ -1,11 +1,12 @@
-//! Stability of a whole cell of the table, the speeds between two neighbouring grid speeds, without interpolation.
+//! Stability of a whole cell of the table, without interpolation. A cell is the speed range between two neighbouring grid
+//! speeds.
 
 use heapless::Vec;
 
-use super::margins::DEPTH_MARGIN;
+use crate::criteria::DEPTH_MARGIN;
 use crate::lobes::{CutLobes, FEW, Interval};
 
-/// Stability of a cell at one depth, with the depth margin.
+/// Stability of a cell at one depth, including the depths within the depth margin around it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cell {
     /// Stable at every speed of the cell.
@@ -16,17 +17,18 @@ pub(super) enum Cell {
     Mixed,
 }
 
-/// Stability at one grid speed and one depth, with the depth margin, over the layers that the cut interpolates between.
+/// Stability at one grid speed and one depth, including the depths within the depth margin, over all layers from which the cut
+/// is interpolated.
 #[derive(Clone, Copy)]
 pub(super) struct Node {
-    /// All depths within the margin are stable in all layers.
+    /// True if all depths within the margin are stable in all layers.
     is_stable: bool,
     /// For the depths `(1 − DEPTH_MARGIN)·d`, `d` and `(1 + DEPTH_MARGIN)·d`: true if the depth is unstable in every layer.
     is_unstable: [bool; 3],
 }
 
 impl Node {
-    /// The node at a grid speed of a table whose largest depth is `depth_to_mm`.
+    /// Stability at the grid speed with this index and the depth `depth_mm`. `depth_to_mm` is the largest depth of the table.
     ///
     /// `None` if the entries alone do not decide the stability between this grid speed and the next.
     pub(super) fn at(
@@ -59,7 +61,7 @@ impl Node {
 }
 
 impl Cell {
-    /// The cell between two nodes.
+    /// The stability of the cell between two neighbouring grid speeds.
     pub(super) fn between(a: Option<Node>, b: Option<Node>) -> Self {
         let (Some(a), Some(b)) = (a, b) else {
             return Self::Mixed;

@@ -3,59 +3,53 @@
 use heapless::{Deque, Vec};
 
 use super::cell::largest_possible_mm;
-use super::margins::{BETTER, DEPTH_MARGIN, SPEED_BAND};
 use super::quiet_speed_search::{Direction, QuietSpeedSearch};
 use super::rule::ratio;
+use crate::criteria::{BETTER, CANDIDATE_SPEEDS, DEPTH_MARGIN, EQUAL_DEPTHS, SPEED_BAND};
 use crate::units::{Millimeters, Rpm};
 
-/// Two depths within this factor count as equal; the one at the nearer speed is then preferred. Unfounded.
-const WORTH: f32 = 1.02;
-
-/// Number of speeds whose quiet depth is computed exactly. Each has the largest bound within its speed band. It limits the
-/// computing time.
-const PROMISES: usize = 8;
-
-/// Quiet depth ranges (from, to) in mm at one speed. Ranges beyond the capacity are dropped, which is conservative.
+/// Quiet depth ranges (from, to) in mm at one speed. Ranges beyond the capacity are dropped, so that their depths are not
+/// advised.
 type Ranges = Vec<(f32, f32), 24>;
 
-/// A speed, and an upper bound of the quiet depth there.
+/// A candidate speed with an upper bound of its quiet depth.
 #[derive(Clone, Copy)]
-struct Promise {
+struct Candidate {
     rpm: f32,
     depth_mm: f32,
 }
 
 impl QuietSpeedSearch<'_> {
-    /// The largest quiet depth up to the depth of the cut, and its speed: the present speed, unless another speed is better by
-    /// the factor `BETTER`.
+    /// The largest quiet depth that does not exceed the depth of the cut, and its speed. This is the present speed, unless the
+    /// quiet depth of another speed is larger by the factor [`BETTER`].
     ///
-    /// The entries at the grid speeds give an upper bound of the quiet depth at every speed. The speeds with the
-    /// largest bounds are computed exactly, until no bound exceeds the best depth found.
+    /// The entries at the grid speeds give an upper bound of the quiet depth at every speed. For the speeds with the largest
+    /// bounds the quiet depth is computed exactly, until no bound exceeds the best quiet depth found.
     pub(super) fn largest_depth(&self, speed: Rpm) -> Option<(Rpm, Millimeters)> {
         let present_mm = self.largest_depth_mm(speed.0, 0.0);
         let mut best = present_mm.map(|depth_mm| (speed.0, depth_mm));
         let mut to_beat_mm = present_mm.map_or(0.0, |depth_mm| BETTER * depth_mm);
-        for promise in self.promises(speed, to_beat_mm) {
-            if promise.depth_mm <= to_beat_mm {
+        for candidate in self.candidates(speed, to_beat_mm) {
+            if candidate.depth_mm <= to_beat_mm {
                 break;
             }
-            if let Some(depth_mm) = self.largest_depth_mm(promise.rpm, to_beat_mm) {
-                best = Some((promise.rpm, depth_mm));
-                to_beat_mm = WORTH * depth_mm;
+            if let Some(depth_mm) = self.largest_depth_mm(candidate.rpm, to_beat_mm) {
+                best = Some((candidate.rpm, depth_mm));
+                to_beat_mm = EQUAL_DEPTHS * depth_mm;
             }
         }
         best.map(|(rpm, depth_mm)| (Rpm(rpm), Millimeters(depth_mm)))
     }
 
-    /// The speeds with the largest upper bounds above `to_beat_mm`, largest first.
-    fn promises(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Promise, PROMISES> {
-        let mut promises: Vec<Promise, PROMISES> = Vec::new();
+    /// The speeds whose upper bounds exceed `to_beat_mm`, in descending order of the bound.
+    fn candidates(&self, speed: Rpm, to_beat_mm: f32) -> Vec<Candidate, CANDIDATE_SPEEDS> {
+        let mut candidates: Vec<Candidate, CANDIDATE_SPEEDS> = Vec::new();
         let (low_rpm, high_rpm) = self.known_rpm;
         if low_rpm > high_rpm {
-            return promises;
+            return candidates;
         }
         let mut behind = Window::default();
-        // Two indices walk over the same speeds. `ahead_rpm` leads `rpm` by the upper half of the speed band.
+        // `rpm` and `ahead_rpm` step through the same speeds. `ahead_rpm` leads by the upper half of the speed band.
         let mut rpm = low_rpm;
         let mut ahead_rpm = low_rpm;
         loop {
@@ -70,10 +64,10 @@ impl QuietSpeedSearch<'_> {
             behind.drop_below(rpm * (1.0 - SPEED_BAND));
             let depth_mm = behind.least_mm(self.depth_mm);
             if depth_mm > to_beat_mm {
-                insert(&mut promises, Promise { rpm, depth_mm }, speed);
+                insert(&mut candidates, Candidate { rpm, depth_mm }, speed);
             }
             if rpm == high_rpm {
-                return promises;
+                return candidates;
             }
             rpm = self.next_point(rpm, high_rpm);
         }
@@ -85,7 +79,7 @@ impl QuietSpeedSearch<'_> {
         f32::min(rpm * (1.0 + 0.5 * SPEED_BAND), cell_end_rpm)
     }
 
-    /// Upper bound of the quiet depth at this speed, from the entries at this grid speed or at its two neighbours.
+    /// Upper bound in mm of the quiet depth at a speed, from the table entries at this grid speed or at its two neighbours.
     fn possible_mm(&self, rpm: f32) -> f32 {
         let index = self.table.speeds_up_to(Rpm(rpm)).saturating_sub(1);
         let is_on_grid = self.table.speed(index) == Some(Rpm(rpm));
@@ -132,37 +126,37 @@ impl QuietSpeedSearch<'_> {
     }
 }
 
-/// Inserts a promise in order of preference. Of promises within one speed band of each other only the best is kept.
-fn insert(promises: &mut Vec<Promise, PROMISES>, new: Promise, speed: Rpm) {
-    let is_better = |a: &Promise, b: &Promise| {
+/// Inserts a candidate in order of preference. Of candidates whose speeds lie within one speed band, only the best is kept.
+fn insert(candidates: &mut Vec<Candidate, CANDIDATE_SPEEDS>, new: Candidate, speed: Rpm) {
+    let is_better = |a: &Candidate, b: &Candidate| {
         let is_nearer = ratio(Rpm(a.rpm), speed) < ratio(Rpm(b.rpm), speed);
-        a.depth_mm > WORTH * b.depth_mm || (is_nearer && WORTH * a.depth_mm >= b.depth_mm)
+        a.depth_mm > EQUAL_DEPTHS * b.depth_mm || (is_nearer && EQUAL_DEPTHS * a.depth_mm >= b.depth_mm)
     };
-    if let Some(index) = promises
+    if let Some(index) = candidates
         .iter()
         .position(|old| ratio(Rpm(old.rpm), Rpm(new.rpm)) <= 1.0 + SPEED_BAND)
     {
-        match promises.get(index) {
-            Some(old) if is_better(&new, old) => promises.remove(index),
+        match candidates.get(index) {
+            Some(old) if is_better(&new, old) => candidates.remove(index),
             _ => return,
         };
     }
-    let place = promises
+    let place = candidates
         .iter()
         .position(|old| is_better(&new, old))
-        .unwrap_or(promises.len());
-    if promises.is_full() && place < promises.len() {
-        promises.pop();
+        .unwrap_or(candidates.len());
+    if candidates.is_full() && place < candidates.len() {
+        candidates.pop();
     }
-    // A full list drops the least preferred promise.
-    let _ = promises.insert(place, new);
+    // If the list is full, the least preferred candidate is dropped.
+    let _ = candidates.insert(place, new);
 }
 
-/// Minimum of the bounds within a moving band of speeds.
+/// Smallest of the depth bounds whose speeds lie within a moving speed band.
 #[derive(Default)]
 struct Window {
-    /// Pairs (rev/min, mm), ascending in both. A bound is removed once a later bound is smaller. If the list is full, the newest bound
-    /// is dropped: the minimum then is too large, which is still an upper bound.
+    /// Pairs (speed in rev/min, bound in mm), ascending in both. A bound is removed once a later bound is smaller. If the list
+    /// is full, the newest bound is dropped: the minimum is then too large, which is still an upper bound.
     bounds: Deque<(f32, f32), 32>,
 }
 
@@ -191,7 +185,7 @@ impl Window {
     }
 }
 
-/// Intersection of two ascending lists of ranges.
+/// Intersection of two ascending lists of depth ranges.
 fn intersection(a: &Ranges, b: &Ranges) -> Ranges {
     let mut common = Ranges::new();
     for &(a_from, a_to) in a {

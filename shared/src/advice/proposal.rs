@@ -63,7 +63,7 @@ pub struct Advice {
     pub depth: Option<Millimeters>,
     /// Source of the advice.
     pub source: Source,
-    /// The assumed working point, if none is set.
+    /// The assumed working point; `None` if a working point is set.
     pub assumed: Option<WorkingPoint>,
     /// The reason why no better source was used; `None` if there is no better source.
     pub obstacle: Option<Obstacle>,

@@ -1,14 +1,11 @@
 //! The search for quiet speeds: stable with the depth margin over the whole speed band.
 
 use super::cell::{Cell, Node};
-use super::margins::{DEPTH_MARGIN, SPEED_BAND};
 use super::rule::ratio;
+use crate::criteria::{DEPTH_MARGIN, QUIET_SPEED_STEP, SPEED_BAND};
 use crate::lobes::{CutLobes, LobeTable, NotKnown};
 use crate::units::{Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
-
-/// Relative speed step at which interpolated columns are checked: four steps per half of the speed band.
-const STEP: f32 = SPEED_BAND / 4.0;
 
 /// Direction of the search in spindle speed.
 #[derive(Clone, Copy)]
@@ -42,9 +39,9 @@ pub(super) struct QuietSpeedSearch<'t> {
     pub(super) cut: CutLobes<'t>,
     pub(super) depth_mm: f32,
     pub(super) depth_to_mm: f32,
-    /// Speed range of the spindle. The speed band around a speed is clipped to this range.
+    /// Speed range of the machine in rev/min. The speed band around a speed is clipped to this range.
     pub(super) machine_rpm: (f32, f32),
-    /// Intersection of the spindle's speed range with the speeds of the table.
+    /// Intersection of the machine's speed range with the speeds of the table, in rev/min.
     pub(super) known_rpm: (f32, f32),
 }
 
@@ -60,7 +57,7 @@ impl<'t> QuietSpeedSearch<'t> {
     ) -> Result<Self, NotKnown> {
         let first_rpm = table.speeds().next().map_or(f32::NAN, |speed| speed.0);
         let last_rpm = table.speeds().next_back().map_or(f32::NAN, |speed| speed.0);
-        // Written so that NaN, of a table that was damaged after it was checked, ends here.
+        // The negated comparison also refuses NaN, which a table damaged after its check may contain.
         if !(first_rpm > 0.0 && first_rpm <= last_rpm && last_rpm.is_finite()) {
             return Err(NotKnown::Damaged);
         }
@@ -85,9 +82,9 @@ impl<'t> QuietSpeedSearch<'t> {
         self.walk(Direction::Slower, speed, limit).or(faster)
     }
 
-    /// The first quiet speed from `speed` on, if its speed ratio is below `limit`.
+    /// The first quiet speed from `speed` on, if its ratio to `speed` (the larger over the smaller) is below `limit`.
     ///
-    /// The search steps from cell to cell. Only a cell of mixed stability is interpolated.
+    /// The search steps from cell to cell of the table. Only cells of mixed stability are interpolated.
     fn walk(&self, direction: Direction, speed: Rpm, limit: f32) -> Option<Rpm> {
         let (low_rpm, high_rpm) = self.known_rpm;
         let end_rpm = match direction {
@@ -109,7 +106,7 @@ impl<'t> QuietSpeedSearch<'t> {
         loop {
             let (index, cell_end_rpm) = self.cell_at(direction, rpm, end_rpm);
             let node = |index| match known {
-                // A cell shares a node with the cell before it.
+                // Two neighbouring cells share the grid speed between them, so that its node is computed once.
                 Some((known_index, node)) if known_index == index => node,
                 _ => Node::at(&self.cut, index, self.depth_mm, self.depth_to_mm),
             };
@@ -120,8 +117,8 @@ impl<'t> QuietSpeedSearch<'t> {
             };
             let found = match Cell::between(low, high) {
                 Cell::Unstable => run.end(),
-                Cell::Stable => run.go_on(rpm, cell_end_rpm),
-                Cell::Mixed => run.look_into(rpm, index, cell_end_rpm),
+                Cell::Stable => run.extend(rpm, cell_end_rpm),
+                Cell::Mixed => run.check_speeds(rpm, index, cell_end_rpm),
             };
             if found.is_some() {
                 return found.filter(|&found| ratio(found, speed) < limit);
@@ -135,7 +132,8 @@ impl<'t> QuietSpeedSearch<'t> {
         }
     }
 
-    /// The next cell in a direction: index of the grid speed at its lower end, and the speed at which the cell or the search ends.
+    /// The next cell in this direction from `rpm`: the index of its lower grid speed, and the speed at which the cell or the
+    /// search ends.
     pub(super) fn cell_at(&self, direction: Direction, rpm: f32, end_rpm: f32) -> (usize, f32) {
         let up_to = self.table.speeds_up_to(Rpm(rpm));
         let speed = |index: usize| self.table.speed(index).map_or(end_rpm, |speed| speed.0);
@@ -148,7 +146,7 @@ impl<'t> QuietSpeedSearch<'t> {
             }
             Direction::Slower => (below, speed(below)),
         };
-        // In a damaged table a speed may be NaN. The search must end nevertheless.
+        // In a damaged table a grid speed may be NaN. The search then still ends at `end_rpm`.
         let is_ahead = ahead_rpm != rpm && direction.is_beyond(ahead_rpm, rpm);
         let is_before_end = direction.is_beyond(end_rpm, ahead_rpm);
         (
@@ -161,9 +159,9 @@ impl<'t> QuietSpeedSearch<'t> {
         )
     }
 
-    /// The next speed to check within a cell: its middle, its end, or one `STEP` further, whichever comes first.
+    /// The next speed to check within a cell: its middle, its end, or one [`QUIET_SPEED_STEP`] further, whichever comes first.
     pub(super) fn next_rpm(&self, direction: Direction, rpm: f32, index: usize, cell_end_rpm: f32) -> f32 {
-        let step = rpm * (1.0 + direction.sign() * STEP);
+        let step = rpm * (1.0 + direction.sign() * QUIET_SPEED_STEP);
         let ends = self.table.speed(index).zip(self.table.speed(index + 1));
         let middle = ends.map_or(cell_end_rpm, |(low, high)| 0.5 * (low.0 + high.0));
         let is_within = |candidate: &f32| {
@@ -189,21 +187,22 @@ impl<'t> QuietSpeedSearch<'t> {
 struct Run<'q, 't> {
     quiet: &'q QuietSpeedSearch<'t>,
     direction: Direction,
-    /// The present speed; no speed before it is a candidate.
+    /// The present speed. Speeds before it in the direction of the search are no candidates.
     speed: Rpm,
-    /// First speed of the run; `None` outside a run.
+    /// First speed of the run in rev/min; `None` outside a run.
     start_rpm: Option<f32>,
 }
 
 impl Run<'_, '_> {
-    /// Ends the run at an unstable speed.
+    /// Ends the run, because a speed is unstable. Never returns a quiet speed.
     fn end(&mut self) -> Option<Rpm> {
         self.start_rpm = None;
         None
     }
 
-    /// Extends the run over the stable speeds `from_rpm` to `to_rpm`. Returns the quiet speed, once the run covers its band.
-    fn go_on(&mut self, from_rpm: f32, to_rpm: f32) -> Option<Rpm> {
+    /// Extends the run over the stable speeds from `from_rpm` to `to_rpm`. Returns the quiet speed once the run covers its speed
+    /// band.
+    fn extend(&mut self, from_rpm: f32, to_rpm: f32) -> Option<Rpm> {
         let start_rpm = *self.start_rpm.get_or_insert(from_rpm);
         let centre_rpm = self.centre_rpm(start_rpm);
         let QuietSpeedSearch {
@@ -219,15 +218,15 @@ impl Run<'_, '_> {
         (is_wide && is_known && self.quiet.is_stable(centre_rpm)).then_some(Rpm(centre_rpm))
     }
 
-    /// Steps through a cell of mixed stability.
-    fn look_into(&mut self, from_rpm: f32, index: usize, cell_end_rpm: f32) -> Option<Rpm> {
+    /// Checks the speeds of a cell of mixed stability one by one. Returns the quiet speed, if one is reached in this cell.
+    fn check_speeds(&mut self, from_rpm: f32, index: usize, cell_end_rpm: f32) -> Option<Rpm> {
         let mut rpm = from_rpm;
         let mut unstable_rpm: Option<f32> = None;
         loop {
             if self.quiet.is_stable(rpm) {
                 let onset_rpm = unstable_rpm.map_or(rpm, |unstable_rpm| self.onset_rpm(unstable_rpm, rpm));
                 unstable_rpm = None;
-                let found = self.go_on(onset_rpm, rpm);
+                let found = self.extend(onset_rpm, rpm);
                 if found.is_some() {
                     return found;
                 }
@@ -242,7 +241,8 @@ impl Run<'_, '_> {
         }
     }
 
-    /// Bisects for the stability boundary between an unstable and a stable speed, to 1/32 of their distance. Returns the stable side.
+    /// Bisects the boundary between an unstable and a stable speed, to 1/32 of their distance. Returns the stable end of the
+    /// last interval.
     fn onset_rpm(&self, mut unstable_rpm: f32, mut stable_rpm: f32) -> f32 {
         for _ in 0..5 {
             let middle_rpm = 0.5 * (unstable_rpm + stable_rpm);
@@ -255,7 +255,7 @@ impl Run<'_, '_> {
         stable_rpm
     }
 
-    /// The speed whose speed band begins at the start of the run, but not before the present speed.
+    /// The speed whose speed band begins at the start of the run. It is not before the present speed.
     fn centre_rpm(&self, start_rpm: f32) -> f32 {
         let machine_rpm = match self.direction {
             Direction::Faster => self.quiet.machine_rpm.0,

@@ -1,14 +1,8 @@
 //! The tooth-passing rule: a spindle speed from the chatter frequency alone.
 
-use super::margins::SPEED_BAND;
+use crate::criteria::{MAX_LOBE, SPEED_BAND};
 use crate::units::{Hertz, Rpm};
 use crate::working_point::Tool;
-
-/// The largest lobe number k (whole vibrations per tooth period) of the rule.
-///
-/// Pockets k and k + 1 differ in speed by the relative amount 1/k. Beyond k = 20 that is below 5 %, most of it unstable, so that no
-/// pocket is as wide as the ±1 % of the speed band.
-pub const MAX_LOBE: u16 = 20;
 
 /// The admissible speed, with the smallest relative change, at which the chatter frequency is a multiple of the tooth-passing
 /// frequency: n = 60·f_c/(N·k) rev/min, k = 1, 2, … [`MAX_LOBE`], with N teeth and f_c in Hz.
@@ -50,7 +44,7 @@ pub fn tooth_passing_speed(
         .min_by(|&a, &b| f32::total_cmp(&ratio(a, speed), &ratio(b, speed)))
 }
 
-/// Ratio of two speeds, the larger over the smaller: at least 1.
+/// Ratio of two speeds, the larger over the smaller, hence at least 1.
 pub(super) fn ratio(a: Rpm, b: Rpm) -> f32 {
     f32::max(a.0 / b.0, b.0 / a.0)
 }

@@ -6,12 +6,13 @@ use super::format::TURN;
 use super::slopes::{IntervalSlopes, LayerMode, MODES_MAX};
 use crate::units::{Degrees, Millimeters};
 
-/// Bound of the difference between the interpolated table and the stability method that computed it.
+/// Bound of the difference between the interpolated table and the stability method that computed the entries.
 ///
-/// *Unsafe side*: a depth that is stable in the table is stable for the method, or within `depth` of a depth that is.
+/// *Unsafe side*: a depth that is stable in the table is stable for the method, or lies within `depth` of a depth that is.
 ///
 /// *Safe side*: a depth that is unstable in the table but stable for the method lies within `depth` of a limit of the method, or
-/// within the relative speed `speed` of a limit at the same depth. The second case occurs on steep flanks and where intervals
+/// within the relative speed `speed` of a limit at the same depth. The second case occurs on steep flanks of the limit, and
+/// where the union of two columns replaces interpolation. Between layers the difference may be larger.
 /// are not interpolated but combined. Between layers the difference may be larger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InterpolationError {
@@ -42,7 +43,7 @@ impl Additions<'_> {
         self.modes.first().map_or(0, |modes| modes.len())
     }
 
-    /// True if schema 1 suffices.
+    /// True if there is no addition, so that schema 1 suffices.
     pub(super) fn is_empty(&self) -> bool {
         self.interpolation_error.is_none()
             && self.modes.is_empty()
@@ -92,7 +93,7 @@ pub(super) fn direction_code(direction: Degrees) -> Option<u16> {
     if !(-1.0e3..=1.0e3).contains(&turns) {
         return None;
     }
-    // The cast truncates towards zero, so a negative angle needs one more revolution.
+    // The cast truncates towards zero. For a negative angle `whole` is one less, so that the rest lies between 0 and 1.
     let whole = turns as i32 - i32::from(turns < 0.0);
     let hundredths = (turns - whole as f32) * f32::from(TURN) + 0.5;
     Some(hundredths as u16 % TURN)

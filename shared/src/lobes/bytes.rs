@@ -1,6 +1,6 @@
-//! Little-endian numbers at an offset of a byte slice, and counts for messages.
+//! Little-endian numbers at an offset of a byte slice, and conversion of counts for error messages.
 
-/// A count for a message; a larger one is shown as `u32::MAX`.
+/// A count for an error message; a count above `u32::MAX` is shown as `u32::MAX`.
 pub(super) fn saturate(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
 }

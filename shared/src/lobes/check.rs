@@ -122,7 +122,8 @@ pub(super) fn check_layers(
             // Layers with different feed directions do not overlap. A layer for any direction overlaps every other.
             true if direction.zip(other_direction).is_some_and(|(a, b)| a != b) => false,
             true => other.feed_from <= layer.feed_to && layer.feed_from <= other.feed_to,
-            // The immersion ranges, tolerance included, of two families must not overlap.
+            // Layers of equal immersion and posture form a family. The immersion ranges of two families, tolerance included,
+            // must not overlap.
             false => other.posture == layer.posture && is_near(&other, &layer),
         };
         if !is_range || layers.clone().take(index).any(clashes) {
@@ -140,7 +141,7 @@ pub(super) fn interval_order(layer: usize, speed: usize, interval: usize) -> Tab
     }
 }
 
-/// True if a cut could lie within the immersion tolerance of both.
+/// True if the immersion of a cut could lie within the tolerance of both layers.
 fn is_near(a: &Validity, b: &Validity) -> bool {
     let tolerance = 2.0 * IMMERSION_TOLERANCE.0;
     (a.start.0 - b.start.0).abs() <= tolerance && (a.exit.0 - b.exit.0).abs() <= tolerance

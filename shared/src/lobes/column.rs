@@ -223,7 +223,7 @@ impl Column {
     }
 }
 
-/// Numbers of leading intervals of two columns that form one group of overlapping or touching intervals.
+/// Numbers of leading intervals of columns `a` and `b` that form one group of overlapping or touching intervals.
 fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
     let (mut count_a, mut count_b) = (0, 0);
     let mut end_mm = f32::min(
@@ -238,7 +238,7 @@ fn group(a: &[Interval], b: &[Interval]) -> (usize, usize) {
             end_mm = f32::max(end_mm, i.to.0);
             count_b += 1;
         } else if count_a + count_b == 0 {
-            // Reached only with NaN entries. Consuming one interval keeps the caller from looping forever.
+            // Reached only with NaN entries. Consuming one interval of each column lets the caller's loop end.
             return (1, 1);
         } else {
             return (count_a, count_b);

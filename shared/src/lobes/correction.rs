@@ -17,7 +17,7 @@ impl LobeTable<'_> {
         })
     }
 
-    /// Derivatives of the interval with this index, of a layer at one grid speed. `None` if the table has no derivatives or no
+    /// Derivatives of the interval with this index, for a layer at one grid speed. `None` if the table has no derivatives or no
     /// such interval.
     pub fn slopes(&self, layer: usize, speed_index: usize, interval: usize) -> Option<IntervalSlopes> {
         let range = self.shape.column_range(self.bytes, layer, speed_index)?;
@@ -28,11 +28,11 @@ impl LobeTable<'_> {
         self.shape.interval_slopes(self.bytes, index)
     }
 
-    /// The entries of one layer at one grid speed, corrected for the parameter changes. Without derivatives they equal those of
-    /// [`entry`](Self::entry).
+    /// The entries of one layer at one grid speed, corrected for parameter changes. In a table without derivatives they equal
+    /// those of [`entry`](Self::entry).
     ///
-    /// Interval ends at the smallest or largest depth of the table are not shifted. An interval whose ends meet vanishes. An interval
-    /// that would overlap the preceding one begins at its end.
+    /// Interval ends at the smallest or largest depth of the table are not shifted. An interval is removed if its ends meet. An
+    /// interval that would overlap the preceding one begins where the preceding one ends.
     pub fn corrected_entry(&self, layer: usize, speed_index: usize, learned: &Learned) -> Option<Column> {
         let mut column = self.empty_column();
         let depths = self.depths();

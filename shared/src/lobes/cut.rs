@@ -7,9 +7,10 @@ use super::{
 use crate::units::{Degrees, Millimeters, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Largest number of intervals per stored column for which no combined column overflows.
+/// Largest number of intervals per stored column for which no combined column exceeds its capacity.
 ///
-/// Two columns of n and m intervals combine to at most 2n + m. Four columns of 3 combine to at most 27, which a [`Column`] holds.
+/// Two columns of n and m intervals combine to at most 2n + m intervals. Four columns of 3 combine to at most 27, and a
+/// [`Column`] holds 32.
 pub(crate) const FEW: usize = 3;
 
 /// Position of a speed between two grid speeds.
@@ -57,7 +58,7 @@ impl<'a> CutLobes<'a> {
         Ok(blended)
     }
 
-    /// The one or two layers that the cut is interpolated from.
+    /// Indices of the one or two layers from which the cut is interpolated.
     pub(crate) fn layers(&self) -> impl Iterator<Item = usize> + use<> {
         [Some(self.near), (self.far != self.near).then_some(self.far)]
             .into_iter()
@@ -152,7 +153,7 @@ fn bracket(table: &LobeTable<'_>, working_point: &WorkingPoint) -> Result<(usize
     let Some(first) = directions.next() else {
         return bracket_feed(table, working_point, &|_| true);
     };
-    let Some(asked) = table.asked_direction() else {
+    let Some(asked) = table.cut_direction() else {
         if directions.any(|other| other != first) {
             return Err(NotKnown::FeedDirectionNotTold);
         }
@@ -213,13 +214,14 @@ fn neighbours(
         }
     }
     let (below, above) = (below?, above?);
-    // A single direction is its own neighbour on both sides. It is valid only within the tolerance.
+    // If the table has one feed direction only, it is the neighbour below and above. It is then valid only within the tolerance.
     let (to_below, to_above) = (turn(below, asked), turn(asked, above));
     let is_there = f32::min(to_below, to_above) <= FEED_DIRECTION_TOLERANCE.0;
     (is_there || to_below + to_above <= FEED_DIRECTION_SPAN.0).then_some((below, above))
 }
 
-/// The angle in degrees from one direction to another, counter-clockwise, from 0 to below 360; NaN if one of them is no angle.
+/// The angle in degrees from one feed direction to another, counter-clockwise, from 0 to below 360; NaN if their difference is
+/// NaN or above 10⁶ degrees.
 #[inline(never)]
 fn turn(from: Degrees, to: Degrees) -> f32 {
     let mut turn = to.0 - from.0;
@@ -235,8 +237,8 @@ fn turn(from: Degrees, to: Degrees) -> f32 {
     turn
 }
 
-/// The two layers whose feeds enclose the feed of the working point, and the weight of the second. If one layer contains the
-/// feed, it is returned twice. `belongs` selects the layers.
+/// The two layers whose feeds per tooth enclose that of the working point, and the interpolation weight of the second layer. A
+/// layer that contains the feed is returned twice. `belongs` selects the layers to search.
 #[inline(never)]
 fn bracket_feed(
     table: &LobeTable<'_>,

@@ -110,7 +110,7 @@ fn shape_of(content: &Content<'_>, additions: &Additions<'_>) -> Shape {
         limits: content.limits,
         depth_from_mm: content.depth_from.0,
         depth_to_mm: content.depth_to.0,
-        // `f32::max` ignores NaN; `write_column` refuses it.
+        // `f32::max` ignores NaN. `write_column` refuses it later.
         chatter_max_hz: intervals().map(|i| i.chatter.0).fold(0.0, f32::max),
         layers: content.layers.len(),
         speeds: content.speeds.len(),
@@ -140,7 +140,7 @@ fn write_payload(
     if shape.error_given {
         flags |= ERROR_GIVEN;
     }
-    // At most `MODES_MAX`, as `Additions::check` has made sure.
+    // `Additions::check` has limited the number of modes to `MODES_MAX`.
     flags |= (shape.modes as u16) << MODES_SHIFT;
     writer.put(&flags.to_le_bytes());
     for value in [
@@ -263,7 +263,8 @@ fn write_column(
                 found: interval.chatter,
             });
         }
-        // Each interval, and each that follows, keeps at least one step of depth. So no thin interval is lost.
+        // The bounds leave at least one depth step for this interval and for each following one, so that rounding removes no
+        // interval.
         let following = (column.len() - 1 - index) as u16;
         let top = u16::MAX.saturating_sub(following);
         let from = depth_code_down(shape, from_mm)

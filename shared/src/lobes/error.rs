@@ -16,7 +16,7 @@ pub enum TableError {
         /// Bytes found.
         found: u32,
     },
-    /// The bytes do not begin with the magic number of a table.
+    /// The bytes do not begin with the magic number of a lobe table.
     Magic {
         /// The first four bytes found; a table begins with [`MAGIC`](super::format::MAGIC).
         found: [u8; 4],
@@ -30,16 +30,16 @@ pub enum TableError {
     },
     /// The length in the header differs from the number of bytes.
     Length {
-        /// What the header says.
+        /// Length in the header, in bytes.
         header: u32,
         /// Bytes found.
         found: u32,
     },
     /// Bytes have changed since the CRC was taken.
     Crc {
-        /// What the header says.
+        /// CRC-32 in the header.
         header: u32,
-        /// The CRC of the bytes found.
+        /// CRC-32 computed from the bytes.
         computed: u32,
     },
     /// The counts in the description do not match the length of the table.
@@ -110,7 +110,7 @@ pub enum TableError {
         layer: u32,
         /// Index of the speed.
         speed: u32,
-        /// Intervals found: in the column, or up to it in the layer.
+        /// Number of intervals: in the column, or from the first column of the layer up to this one.
         found: u32,
     },
     /// A column whose intervals do not follow those of the preceding column.
@@ -143,7 +143,7 @@ pub enum TableError {
     },
     /// A feed direction that is not an angle, or a number of directions that differs from the number of layers.
     FeedDirection {
-        /// Index of the layer, or the number of directions.
+        /// Index of the layer with an invalid direction, or the number of directions.
         layer: u32,
     },
     /// A mode whose frequency is not positive, or whose damping ratio is not in [0, 1).
@@ -155,15 +155,15 @@ pub enum TableError {
     },
     /// An interpolation error that is negative or not finite.
     InterpolationError {
-        /// In depth.
+        /// Stated error in depth.
         depth: Millimeters,
-        /// In speed, relative; below 1.
+        /// Stated error in speed, relative to the speed; it must be below 1.
         speed: f32,
     },
     /// A derivative that is not finite, a number of derivatives that differs from the number of intervals, or layers with different
     /// numbers of modes.
     Slopes {
-        /// Index of the interval in the table, or the number of derivatives.
+        /// Index of the interval in the table, or the number of sets of derivatives.
         index: u32,
     },
 }

@@ -3,13 +3,13 @@
 /// The largest finite binary16 number.
 pub(super) const MAX: f32 = 65_504.0;
 
-/// The value of a binary16 code, exactly; infinities and NaN are preserved.
+/// The exact value of a binary16 code. Infinities and NaN are preserved.
 pub(super) fn decode(code: u16) -> f32 {
     let sign = u32::from(code & 0x8000) << 16;
     let exponent = u32::from(code >> 10) & 0x1F;
     let fraction = u32::from(code & 0x3FF);
     match exponent {
-        // Multiples of 2⁻²⁴, exact in single precision.
+        // Zero and subnormal numbers are multiples of 2⁻²⁴, which are exact in single precision.
         0 => {
             let size = fraction as f32 * (1.0 / 16_777_216.0);
             f32::from_bits(size.to_bits() | sign)
@@ -19,7 +19,7 @@ pub(super) fn decode(code: u16) -> f32 {
     }
 }
 
-/// The nearest binary16 code, ties to even. Larger magnitudes saturate at [`MAX`]; NaN stays NaN.
+/// The nearest binary16 code, ties to even. Magnitudes above [`MAX`] saturate at it; NaN stays NaN.
 pub(super) fn encode(value: f32) -> u16 {
     let sign = ((value.to_bits() >> 16) & 0x8000) as u16;
     let size = f32::from_bits(value.to_bits() & 0x7FFF_FFFF);
@@ -31,7 +31,7 @@ pub(super) fn encode(value: f32) -> u16 {
     }
     // Below 2⁻¹⁴ (subnormal) a code is a multiple of 2⁻²⁴. Above, it is the upper bits of the f32 with the exponent rebased.
     let (bits, step) = if size < 1.0 / 16_384.0 {
-        // In [1/2, 1) the last bit of an f32 is worth 2⁻²⁴, so adding 1/2 rounds to a multiple of 2⁻²⁴.
+        // In [1/2, 1) the last bit of an f32 has the value 2⁻²⁴, so that adding 1/2 rounds to a multiple of 2⁻²⁴.
         return sign | ((size + 0.5).to_bits() - 0.5_f32.to_bits()) as u16;
     } else {
         (size.to_bits() - (112 << 23), 1_u32 << 13)
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn the_nearest_code_is_taken() {
-        // Known codes of the standard.
+        // Codes of known values from the IEEE 754 standard.
         for (value, code) in [
             (1.0, 0x3C00),
             (-2.0, 0xC000),
@@ -71,7 +71,7 @@ mod tests {
         let mut value = 1e-9_f32;
         while value < 6e4 {
             let back = decode(encode(value));
-            // Half a unit in the eleventh bit, or half of the smallest number.
+            // Half a unit in the last of 11 significant bits, or half of the smallest subnormal number.
             assert!(
                 (back - value).abs() <= (value / 2048.0).max(0.5 / 16_777_216.0),
                 "{value} {back}"

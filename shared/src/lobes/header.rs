@@ -11,13 +11,13 @@ use crate::checksum::{Crc32, crc32};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Schema; after [`read`](Self::read) one that this code [`knows`](Self::knows).
+    /// Schema of the table. After [`read`](Self::read) it is one that this code [`knows`](Self::knows).
     pub schema: u16,
-    /// Length of the table in bytes, header included.
+    /// Length of the whole table in bytes, header included.
     pub length: u32,
     /// Incremented by the device with each upload; 0 in a file.
     pub generation: u32,
-    /// CRC-32 of all bytes of the table except these four.
+    /// CRC-32 of all bytes of the table except the four of the CRC itself.
     pub crc: u32,
 }
 

@@ -28,7 +28,7 @@ pub enum IntervalKind {
 pub struct Interval {
     /// Smallest unstable depth.
     pub from: Millimeters,
-    /// Smallest depth above the interval that is stable, or the largest depth of the table.
+    /// Smallest stable depth above the interval, or the largest depth of the table.
     pub to: Millimeters,
     /// Kind of stability loss.
     pub kind: IntervalKind,

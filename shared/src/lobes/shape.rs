@@ -84,7 +84,7 @@ impl Shape {
         })
     }
 
-    /// Checks that all numbers are possible.
+    /// Checks that the counts, depths and limits of the description are possible values.
     pub(super) fn check(&self) -> Result<(), TableError> {
         if self.teeth == 0 {
             return Err(TableError::Teeth);
@@ -140,8 +140,9 @@ impl Shape {
             .unwrap_or_default()
     }
 
-    // With 16-bit counts the offsets of speeds and columns fit into 32 bits. The offset of the intervals may reach
-    // 24·65535 + 4·65535 + 2·65535·65536 and not fit. It saturates, and such a table does not fit into the memory either.
+    // With 16-bit counts the offsets of speeds and columns fit into 32 bits. The offset of the intervals may reach 24·65535 +
+    // 4·65535 + 2·65535·65536, which exceeds 32 bits. It then saturates; such a table exceeds the memory of a 32-bit device
+    // anyway.
     fn speeds_offset(&self) -> usize {
         LAYERS_OFFSET + LAYER_LENGTH * self.layers
     }
@@ -201,7 +202,8 @@ impl Shape {
         let entries = bytes.get(offset(range.start)?..offset(range.end)?)?;
         let (depth_from_mm, depth_to_mm) = (self.depth_from_mm, self.depth_to_mm);
         let (depth_step_mm, chatter_step_hz) = (self.depth_step_mm(), self.chatter_step_hz());
-        // The largest code must give exactly the largest depth, which marks an interval that reaches the end of the table.
+        // The largest code gives the largest depth of the table without rounding. An interval that ends there reaches the end of
+        // the table.
         let depth = move |code: u16| match code {
             u16::MAX => Millimeters(depth_to_mm),
             _ => Millimeters(depth_from_mm + f32::from(code) * depth_step_mm),

@@ -1,7 +1,8 @@
 //! Derivatives of the stability limits by modal parameters and cutting force, and the corrected limit.
 //!
 //! To first order, limit(p + Δp) = limit(p) + Σ ∂limit/∂ln p · Δp/p. The parameters p are the natural frequencies and damping
-//! ratios of a layer's modes, with fixed mode shapes, and the cutting force coefficient K_tc, with K_rc/K_tc and K_ac/K_tc fixed.
+//! ratios of a layer's modes, and the cutting force coefficient K_tc. Mode shapes and the ratios K_rc/K_tc and K_ac/K_tc are
+//! fixed.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +25,7 @@ pub struct LayerMode {
 pub struct Slopes {
     /// By the natural frequency of each mode; 0 for modes that the table does not contain.
     pub by_frequency: [f32; MODES_MAX],
-    /// By the damping ratio of each mode.
+    /// By the damping ratio of each mode; 0 for modes that the table does not contain.
     pub by_damping_ratio: [f32; MODES_MAX],
     /// By the cutting force coefficient.
     pub by_cutting_force: f32,
@@ -39,7 +40,7 @@ pub struct IntervalSlopes {
     pub to: Slopes,
 }
 
-/// Relative changes of parameters since the table was computed: 0.01 is an increase by 1 %.
+/// Relative changes of parameters since the table was computed. For example, 0.01 is an increase by 1 %.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Learned {
     /// Relative change of the natural frequency of each mode of the layer.
@@ -51,13 +52,14 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// The changes if only the mode with this index has new values. An index beyond the modes of the table gives no changes.
+    /// The relative changes if the mode with this index has the values `now` instead of `table`. They are 0 for an index beyond
+    /// the modes of the table.
     pub fn of_mode(index: usize, table: &LayerMode, now: &LayerMode) -> Self {
         let mut learned = Self::default();
         if let Some(slot) = learned.frequency.get_mut(index) {
             *slot = (now.frequency.0 - table.frequency.0) / table.frequency.0;
         }
-        // For zero damping the relative change is undefined.
+        // For a damping ratio of zero the relative change is undefined.
         if let Some(slot) = learned.damping_ratio.get_mut(index)
             && table.damping_ratio > 0.0
         {
@@ -68,7 +70,7 @@ impl Learned {
 }
 
 impl Slopes {
-    /// Shift of the depth, to first order: positive for a higher limit.
+    /// Shift of the interval end in depth, to first order. It is positive if the limit rises.
     pub fn shift(&self, learned: &Learned) -> Millimeters {
         let mut shift_mm = self.by_cutting_force * learned.cutting_force;
         for (slope, change) in self.by_frequency.iter().zip(&learned.frequency) {
@@ -80,7 +82,7 @@ impl Slopes {
         Millimeters(shift_mm)
     }
 
-    /// The derivatives in the order of the table's bytes, for this number of modes.
+    /// The derivatives in the order of their bytes in the table, for this number of modes.
     pub(super) fn numbers(&self, modes: usize) -> impl Iterator<Item = f32> + '_ {
         self.by_frequency
             .iter()
@@ -90,7 +92,7 @@ impl Slopes {
             .chain(core::iter::once(self.by_cutting_force))
     }
 
-    /// The reverse of [`numbers`](Self::numbers).
+    /// The derivatives from their numbers in the order of [`numbers`](Self::numbers).
     pub(super) fn of_numbers(mut numbers: impl Iterator<Item = f32>, modes: usize) -> Option<Self> {
         let mut slopes = Self::default();
         for slot in slopes.by_frequency.iter_mut().take(modes) {
@@ -104,7 +106,7 @@ impl Slopes {
     }
 }
 
-/// The limit corrected to first order, clamped to the depths `from` to `to`.
+/// The limit corrected to first order, clamped to the depths from `from` to `to`.
 ///
 /// The correction is valid while it is small against the distance to the next cusp of the lobes, which allows changes of a frequency by
 /// a few percent. A NaN correction leaves the limit unchanged.

@@ -39,12 +39,12 @@ impl<'a> LobeTable<'a> {
         Header::read(self.bytes)
     }
 
-    /// Name of the case the table was computed from.
+    /// Name of the case from which the table was computed.
     pub fn name(&self) -> &'a str {
         self.shape.name(self.bytes)
     }
 
-    /// Number of teeth of the tool.
+    /// Number of teeth of the tool for which the table was computed.
     pub fn teeth(&self) -> u8 {
         self.shape.teeth
     }
@@ -85,7 +85,7 @@ impl<'a> LobeTable<'a> {
         (index < self.shape.speeds).then(|| Rpm(self.speed_rpm(index)))
     }
 
-    /// Number of grid speeds that are at most `speed`: their indices are 0 up to this number, exclusive.
+    /// Number of grid speeds that are at most `speed`; their indices are 0 to this number − 1.
     pub fn speeds_up_to(&self, speed: Rpm) -> usize {
         let (mut low, mut high) = (0, self.shape.speeds);
         while low < high {
@@ -112,7 +112,7 @@ impl<'a> LobeTable<'a> {
         Some(column)
     }
 
-    /// The same table, with the feed direction of the cut set: the angle from the machine's x axis towards its y axis.
+    /// The same table for a cut with this feed direction: the angle from the machine's x axis towards its y axis.
     pub fn towards(self, feed_direction: Degrees) -> Self {
         Self {
             feed_direction: Some(feed_direction),
@@ -120,13 +120,13 @@ impl<'a> LobeTable<'a> {
         }
     }
 
-    /// The feed direction set by [`towards`](Self::towards).
-    pub fn asked_direction(&self) -> Option<Degrees> {
+    /// The feed direction of the cut, as set by [`towards`](Self::towards).
+    pub fn cut_direction(&self) -> Option<Degrees> {
         self.feed_direction
     }
 
     pub(super) fn speed_rpm(&self, index: usize) -> f32 {
-        // If the bytes were changed after the check, NaN fails every comparison and the lookup returns `NotKnown`.
+        // If the bytes were changed after the check, the speed is NaN: all comparisons fail, and the lookup returns `NotKnown`.
         self.shape.speed_rpm(self.bytes, index).unwrap_or(f32::NAN)
     }
 

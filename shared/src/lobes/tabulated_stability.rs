@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::IntervalKind;
 use crate::units::{Degrees, Hertz, Millimeters, Rpm};
 
-/// The reason why a lookup has no result.
+/// The reason why a lookup gives no stability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum NotKnown {
@@ -86,6 +86,6 @@ pub enum TabulatedStability {
         /// Distance to the nearest stable depth, or to the end of the table.
         margin: Millimeters,
     },
-    /// The table does not contain the point; the reason is given.
+    /// The stability is not known, for the given reason.
     NotKnown(NotKnown),
 }

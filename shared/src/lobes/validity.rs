@@ -21,13 +21,13 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// True if both have the same immersion and posture, so that the feed may be interpolated between them.
+    /// True if both layers have the same immersion and posture, so that they may be interpolated in feed.
     pub(super) fn is_family_of(&self, other: &Self) -> bool {
         self.posture == other.posture && self.start == other.start && self.exit == other.exit
     }
 }
 
-/// Placeholder for a layer that could not be read. Its NaN bounds contain no working point.
+/// Placeholder for a layer that cannot be read. No working point lies within its NaN bounds.
 pub(super) const NOWHERE: Validity = Validity {
     feed_from: Millimeters(f32::NAN),
     feed_to: Millimeters(f32::NAN),

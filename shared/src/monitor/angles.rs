@@ -17,7 +17,7 @@ pub(super) struct Angles {
 }
 
 impl Angles {
-    /// The angle `delay` samples before sample `n` of the block: compensates the group delay of a filter.
+    /// The spindle angle `delay` samples before sample `n` of the block. `delay` is the group delay of a filter.
     pub(super) fn at(&self, n: usize, delay: u32) -> Turns {
         let forward = self.per_sample.wrapping_mul(n as u64);
         let back = self.per_sample.wrapping_mul(u64::from(delay));
@@ -26,7 +26,7 @@ impl Angles {
 }
 
 impl Monitor {
-    /// The angles of the newest block; `None` while the tachometer has no lock.
+    /// The spindle angles of the newest block; `None` while the tachometer has no lock.
     pub(super) fn angles(&self, state: &State) -> Option<Angles> {
         let tachometer = self.tachometer.as_ref()?;
         let phase = tachometer.phase(&state.tachometer, state.sample_clock.time_of(0)?)?;

@@ -8,12 +8,13 @@ use crate::spectrum::{Overlap, PowerSpectrum};
 use crate::synchronous::SamplerState;
 use crate::units::Hertz;
 
-/// The state of one band: samples for the next spectrum, the newest spectrum, and the tooth periods.
+/// The state of one frequency band: samples for the next spectrum, the newest spectrum, background spectrum and tone, and the
+/// tooth periods.
 #[derive(Clone, Debug)]
 pub(super) struct BandState<const POINTS: usize, const BINS: usize> {
     pub(super) overlap: Overlap<POINTS>,
     pub(super) power: [f32; BINS],
-    /// Width of a bin of the newest spectrum; 0 before the first.
+    /// Width of a bin of the newest spectrum; 0 before the first spectrum.
     pub(super) bin: Hertz,
     /// True if the newest block completed a spectrum.
     pub(super) fresh: bool,
@@ -25,8 +26,8 @@ pub(super) struct BandState<const POINTS: usize, const BINS: usize> {
     pub(super) passed: bool,
     /// Root mean square of the sensor noise in one channel of a tooth period, in m/s².
     pub(super) floor: f32,
-    /// Samples of the band since growth was last evaluated.
-    pub(super) since_look: u32,
+    /// Number of samples of the band since growth was last evaluated.
+    pub(super) samples_since_growth: u32,
 }
 
 impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
@@ -42,7 +43,7 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
             growth: Growth::new(1),
             passed: false,
             floor: 0.0,
-            since_look: 0,
+            samples_since_growth: 0,
         }
     }
 
@@ -59,30 +60,30 @@ impl<const POINTS: usize, const BINS: usize> BandState<POINTS, BINS> {
             growth,
             passed,
             floor,
-            since_look,
+            samples_since_growth,
         } = self;
         overlap.reset();
         *bin = Hertz(0.0);
         background.reset();
         *sampler = SamplerState::new();
         growth.reset();
-        (*fresh, *tone, *passed, *floor, *since_look) = (false, None, false, 0.0, 0);
+        (*fresh, *tone, *passed, *floor, *samples_since_growth) = (false, None, false, 0.0, 0);
     }
 
     /// Takes a sample for the next spectrum; a spectrum is due every `hop` samples.
     pub(super) fn take(&mut self, sample: Sample, hop: usize) {
         self.fresh |= self.overlap.push(sample, hop);
-        self.since_look = self.since_look.saturating_add(1);
+        self.samples_since_growth = self.samples_since_growth.saturating_add(1);
     }
 
-    /// Discards samples and tone after a gap. The background spectrum is kept.
+    /// Discards samples, tone and tooth periods after a gap in the samples. The background spectrum is kept.
     pub(super) fn interrupt(&mut self) {
         self.overlap.reset();
         self.tone = None;
         self.interrupt_angles();
     }
 
-    /// Discards the tooth periods, after the tachometer lost its lock.
+    /// Discards the tooth periods and their growth, after the tachometer lost its lock.
     pub(super) fn interrupt_angles(&mut self) {
         self.sampler = SamplerState::new();
         self.growth.reset();

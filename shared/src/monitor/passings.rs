@@ -6,6 +6,9 @@ use super::band_state::BandState;
 use super::pipeline::Monitor;
 use super::state::State;
 use super::strobe::show;
+use crate::criteria::{
+    ANGLE_DEVIATION_MAX, GROWTH_INTERVAL_SAMPLES, STRUCTURE_SAMPLES_PER_TOOTH, TOOL_SAMPLES_PER_TOOTH,
+};
 use crate::decimation::Sample;
 use crate::detector::growth::Look;
 use crate::math;
@@ -16,19 +19,12 @@ use crate::synchronous::{Method, Passed, SLOTS, Sampler};
 const TOOL_HOP: usize = TOOL_POINTS / 2;
 /// Samples between two spectra of the structure band: an overlap of 3/4.
 const STRUCTURE_HOP: usize = STRUCTURE_POINTS / 4;
-/// Fewest samples per tooth period for resampling the structure band at fixed angles. Unfounded.
-const STRUCTURE_SAMPLES_PER_TOOTH: f32 = 8.0;
-/// Fewest samples per tooth period for resampling the tool band at fixed angles. Unfounded.
-const TOOL_SAMPLES_PER_TOOTH: f32 = 2.5;
-/// Largest standard deviation of the spindle angle for resampling, in tooth periods. Unfounded.
-const LARGEST_ANGLE_DEVIATION: f32 = 0.03;
-/// Fewest tool-band samples between two evaluations of growth: 4 ms. It limits the computing time.
-const LOOK_SAMPLES: u32 = 53;
 
 impl Monitor {
-    /// True if a band, decimated by `divisor`, has `least` samples per tooth period and the angle is known well enough.
+    /// True if a band, whose rate is the sensor's divided by `divisor`, has at least `least` samples per tooth period, and the
+    /// standard deviation of the spindle angle is small enough.
     fn can_sample(&self, angles: &Angles, divisor: u32, least: f32) -> bool {
-        angles.samples_per_tooth >= least * divisor as f32 && angles.deviation < LARGEST_ANGLE_DEVIATION
+        angles.samples_per_tooth >= least * divisor as f32 && angles.deviation < ANGLE_DEVIATION_MAX
     }
 
     pub(super) fn take_tool(&self, state: &mut State, sample: Sample, n: usize, angles: Option<&Angles>) {
@@ -50,9 +46,9 @@ impl Monitor {
         };
         let rate = self.settings.sensor.nominal_rate.0 / self.decimation.tool_divisor() as f32;
         let noise = self.noise_density() * 0.5 * rate;
-        // No evaluation of slow growth in this band. The error of cubic interpolation leaves a residual of the forced vibration, which
-        // beats with the ratio of tooth period to sample period and would look like slow growth.
-        let look = if band.since_look >= LOOK_SAMPLES {
+        // Slow growth is not evaluated in the tool band. The error of cubic interpolation leaves a residual of the forced
+        // vibration, which beats with the ratio of tooth period to sample period and would appear as slow growth.
+        let look = if band.samples_since_growth >= GROWTH_INTERVAL_SAMPLES {
             Look::Quick
         } else {
             Look::None
@@ -90,7 +86,8 @@ impl Monitor {
         let Some(passed) = sampler.step(&mut band.sampler, sample.map(|x| x as f32 * unit), angle) else {
             return;
         };
-        // A mean over w seconds has a noise bandwidth of 1/(2w) Hz.
+        // The mean of white noise over w seconds has the variance of its density over a bandwidth of 1/(2w) Hz; w is the
+        // duration of a slot.
         let rate = self.settings.sensor.nominal_rate.0;
         let bandwidth = 0.5 * rate * SLOTS as f32 / angles.samples_per_tooth;
         let noise = self.noise_density() * bandwidth.min(0.5 * rate / divisor as f32);
@@ -98,7 +95,7 @@ impl Monitor {
         show(&mut state.strobes, Band::Structure, &passed);
     }
 
-    /// Passes a complete tooth period to the growth estimators. `noise` is the variance in (m/s²)² of one channel.
+    /// Passes a complete tooth period to the growth estimators. `noise` is the noise variance in (m/s²)² of one channel.
     fn take_passing<const POINTS: usize, const BINS: usize>(
         &self,
         band: &mut BandState<POINTS, BINS>,
@@ -115,9 +112,9 @@ impl Monitor {
             look,
         );
         if look >= Look::Quick {
-            // Without an evaluation the detector has no new finding.
+            // Only an evaluation of growth gives the detector a new finding.
             band.passed = true;
-            band.since_look = 0;
+            band.samples_since_growth = 0;
         }
     }
 }

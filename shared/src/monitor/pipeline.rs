@@ -5,7 +5,7 @@ use crate::acceleration::SampleClock;
 use crate::decimation::{Decimation, FRACTION_BITS};
 use crate::tachometer::Tachometer;
 
-/// The configured signal chain. It is constant; everything learned is in [`State`](super::State).
+/// The configured signal chain. It is constant; everything learned from the blocks is in [`State`](super::State).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor {
     pub(super) settings: Settings,
@@ -40,7 +40,7 @@ impl Monitor {
         &self.settings
     }
 
-    /// One-sided white-noise density of the sensor and of its rounding, in (m/s²)² per Hz.
+    /// One-sided density of the sensor's white noise and of its rounding to counts, in (m/s²)² per Hz.
     pub(super) fn noise_density(&self) -> f32 {
         let sensor = &self.settings.sensor;
         let density = sensor.noise_meters_per_second2_per_root_hertz;

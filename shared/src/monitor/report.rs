@@ -13,7 +13,7 @@ pub struct Report {
     pub sequence: u32,
     /// Time of the last sample of the block.
     pub time: Nanoseconds,
-    /// Spindle speed: measured, else estimated from the spectrum, else assumed.
+    /// Spindle speed: measured by the tachometer, else estimated from the spectrum, else assumed.
     pub speed: Option<Rpm>,
     /// The verdict with its reason and estimates.
     pub judgement: Judgement,

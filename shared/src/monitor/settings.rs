@@ -39,9 +39,9 @@ pub enum SettingsError {
     CountScale(f32),
     /// The noise of the sensor is not a number of at least 0.
     Noise(f32),
-    /// The assumed speed is not a positive number.
+    /// The assumed spindle speed is not a positive number.
     AssumedSpeed(Rpm),
-    /// The slowest speed is not a positive number, or not below the fastest.
+    /// The slowest spindle speed is not a positive number, or not below the fastest.
     Limits(Limits),
 }
 
@@ -77,7 +77,7 @@ impl core::fmt::Display for SettingsError {
 
 impl core::error::Error for SettingsError {}
 
-/// Checks the settings. NaN fails every comparison, so each condition is written as what must hold.
+/// Checks the settings. Each condition states what must hold, because NaN fails every comparison.
 pub(super) fn check(settings: &Settings) -> Result<(), SettingsError> {
     let Settings {
         sensor,

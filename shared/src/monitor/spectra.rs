@@ -3,19 +3,14 @@
 use super::band_state::follow_tone;
 use super::pipeline::Monitor;
 use super::state::State;
+use crate::criteria::{
+    ASSUMED_SPEED_UNCERTAINTY, MEASURED_SPEED_UNCERTAINTY, SPEED_TONE_BINS, SPEED_TONE_SNR,
+};
 use crate::decimation::{STRUCTURE_BAND, TOOL_BAND};
 use crate::peaks::Rotation;
 use crate::spectrum::{PowerSpectrum, structure_spectrum, tool_spectrum};
 use crate::units::Hertz;
 
-/// Relative uncertainty of an assumed spindle speed. Unfounded.
-const ASSUMED_UNCERTAINTY: f32 = 0.005;
-/// Relative uncertainty of a spindle speed measured by the tachometer. Unfounded.
-const MEASURED_UNCERTAINTY: f32 = 5e-4;
-/// Uncertainty of a tooth-passing frequency read from a spectrum, in bins. Unfounded.
-const HEARD_BINS: f32 = 0.2;
-/// Smallest ratio of power to noise floor of a tone that is accepted as the tooth-passing tone: 20 dB. Unfounded.
-const HEARD_SNR: f32 = 100.0;
 /// Spectra are summed over all axes.
 const AXES: [usize; 3] = [0, 1, 2];
 /// Frequency range of the tone search in each band.
@@ -23,7 +18,8 @@ const STRUCTURE_TONES: (Hertz, Hertz) = (Hertz(5.0), STRUCTURE_BAND);
 const TOOL_TONES: (Hertz, Hertz) = (Hertz(150.0), TOOL_BAND);
 
 impl Monitor {
-    /// Computes the spectra that are due, and updates the background spectrum and the tracked tone of each band.
+    /// Computes the spectra of the bands that have a complete block, and updates the background spectrum and the tracked tone of
+    /// each band.
     pub(super) fn take_spectra(&self, state: &mut State, measured: Option<Hertz>) {
         let rate = state
             .sample_clock
@@ -44,7 +40,7 @@ impl Monitor {
             );
             band.bin = spectrum.bin;
             if measured.is_none() {
-                state.heard_speed = self.hear_speed(&spectrum);
+                state.tone_speed = self.speed_from_tone(&spectrum);
             }
         }
         if state.structure.fresh {
@@ -61,7 +57,7 @@ impl Monitor {
             band.bin = spectrum.bin;
         }
         if measured.is_some() {
-            state.heard_speed = None;
+            state.tone_speed = None;
         }
         let rotation = self.rotation(state, measured);
         if state.tool.fresh {
@@ -78,32 +74,33 @@ impl Monitor {
         }
     }
 
-    /// Revolutions per second, from a tone near the assumed tooth-passing frequency; `None` if there is no distinct tone.
-    fn hear_speed(&self, spectrum: &PowerSpectrum<'_>) -> Option<Hertz> {
+    /// Spindle speed in revolutions per second, from a tone near the assumed tooth-passing frequency; `None` if no tone there is
+    /// strong enough.
+    fn speed_from_tone(&self, spectrum: &PowerSpectrum<'_>) -> Option<Hertz> {
         let assumed = self.settings.assumed_speed?.to_hertz().0 * f32::from(self.settings.tool.teeth);
-        let reach = ASSUMED_UNCERTAINTY * assumed + spectrum.bin.0;
+        let reach = ASSUMED_SPEED_UNCERTAINTY * assumed + spectrum.bin.0;
         let peak = spectrum.dominant(Hertz(assumed - reach), Hertz(assumed + reach))?;
         let near = (peak.frequency.0 - assumed).abs() < reach;
-        (near && peak.snr > HEARD_SNR)
+        (near && peak.snr > SPEED_TONE_SNR)
             .then_some(Hertz(peak.frequency.0 / f32::from(self.settings.tool.teeth)))
     }
 
-    /// Rotation of the spindle with its uncertainty: measured, else from the spectrum, else assumed.
+    /// Spindle speed with its uncertainty: measured by the tachometer, else from the spectrum, else assumed.
     fn rotation(&self, state: &State, measured: Option<Hertz>) -> Option<Rotation> {
         let with = |frequency: Hertz, uncertainty: f32| Rotation {
             frequency,
             uncertainty: Hertz(uncertainty),
         };
         if let Some(measured) = measured {
-            return Some(with(measured, MEASURED_UNCERTAINTY * measured.0));
+            return Some(with(measured, MEASURED_SPEED_UNCERTAINTY * measured.0));
         }
-        if let Some(heard) = state.heard_speed {
+        if let Some(from_tone) = state.tone_speed {
             return Some(with(
-                heard,
-                HEARD_BINS * state.tool.bin.0 / f32::from(self.settings.tool.teeth),
+                from_tone,
+                SPEED_TONE_BINS * state.tool.bin.0 / f32::from(self.settings.tool.teeth),
             ));
         }
         let assumed = self.settings.assumed_speed?.to_hertz();
-        Some(with(assumed, ASSUMED_UNCERTAINTY * assumed.0))
+        Some(with(assumed, ASSUMED_SPEED_UNCERTAINTY * assumed.0))
     }
 }

@@ -20,23 +20,23 @@ use crate::working_point::WorkingPoint;
 pub struct State {
     pub(super) sample_clock: SampleClockState,
     pub(super) tachometer: TachometerState,
-    /// The tachometer's count of lost locks at the previous block.
+    /// Number of lost locks of the tachometer up to the preceding block.
     pub(super) losses: u32,
     pub(super) decimation: decimation::State,
     pub(super) structure: BandState<STRUCTURE_POINTS, STRUCTURE_BINS>,
     pub(super) tool: BandState<TOOL_POINTS, TOOL_BINS>,
     pub(super) tool_work: [i32; TOOL_POINTS],
     pub(super) work: [f32; STRUCTURE_POINTS],
-    /// Running mean of the share of clipped or lost samples.
+    /// Running mean of the share of samples that are clipped or lost.
     pub(super) damage: f32,
-    /// Spindle speed from the spectrum, in revolutions per second; used without a tachometer.
-    pub(super) heard_speed: Option<Hertz>,
+    /// Spindle speed estimated from the spectrum, in revolutions per second; `None` with a measured speed.
+    pub(super) tone_speed: Option<Hertz>,
     pub(super) detector: Detector,
     pub(super) advice: Option<Advised>,
     pub(super) strobes: Vec<Strobe, MAX_BLOCK_STROBES>,
 }
 
-/// Advice with the inputs from which it was computed.
+/// The newest advice with the inputs from which it was computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Advised {
     pub(super) advice: Advice,
@@ -46,7 +46,7 @@ pub(super) struct Advised {
     pub(super) working_point: Option<WorkingPoint>,
     /// CRC-32 of the lobe table.
     pub(super) table: Option<u32>,
-    /// Feed direction of the cut, if set.
+    /// Feed direction of the cut, if it is set.
     pub(super) feed_direction: Option<Degrees>,
 }
 
@@ -69,7 +69,7 @@ impl State {
             tool_work: [0; TOOL_POINTS],
             work: [0.0; STRUCTURE_POINTS],
             damage: 0.0,
-            heard_speed: None,
+            tone_speed: None,
             detector: Detector::new(),
             advice: None,
             strobes: Vec::new(),
@@ -88,7 +88,7 @@ impl State {
             tool_work: _,
             work: _,
             damage,
-            heard_speed,
+            tone_speed,
             detector,
             advice,
             strobes,
@@ -100,7 +100,7 @@ impl State {
         tool.reset();
         *detector = Detector::new();
         strobes.clear();
-        (*losses, *damage, *heard_speed, *advice) = (0, 0.0, None, None);
+        (*losses, *damage, *tone_speed, *advice) = (0, 0.0, None, None);
     }
 
     /// The points of the stroboscopic map from the newest block, oldest first. They come from the structure band if the tooth period is

@@ -1,21 +1,20 @@
-//! One step of the pipeline: takes a block of samples, returns a report.
+//! One step of the signal chain: takes a block of samples, returns a report.
 
 use super::pipeline::Monitor;
 use super::report::Report;
 use super::state::State;
 use crate::acceleration::{Block, Continuity};
+use crate::criteria::DAMAGE_MEMORY_BLOCKS;
 use crate::lobes::LobeTable;
 use crate::tachometer::Edge;
 use crate::units::{Hertz, Nanoseconds, Rpm};
 use crate::working_point::WorkingPoint;
 
-/// Time constant, in blocks, of the running mean of the damaged share of samples. Unfounded.
-const DAMAGE_MEMORY: f32 = 64.0;
-
 impl Monitor {
     /// Processes the next block and the new tachometer edges up to the end of the block.
     ///
-    /// Edges must be in order of time. An edge may come with a later block than its own, at most one revolution late.
+    /// Edges must be in order of time. An edge may be passed with a later block than the one in which it occurred, at most one
+    /// revolution late.
     pub fn step(
         &self,
         state: &mut State,
@@ -42,7 +41,7 @@ impl Monitor {
             }
         }
         let speed = measured
-            .or_else(|| state.heard_speed.map(Hertz::to_rpm))
+            .or_else(|| state.tone_speed.map(Hertz::to_rpm))
             .or(self.settings.assumed_speed);
         self.take_spectra(state, measured.map(Rpm::to_hertz));
         let judgement = self.judge(state, speed);
@@ -58,7 +57,7 @@ impl Monitor {
         }
     }
 
-    /// Numbers the samples of the block. Resets filters, spectra and the detector's history after lost samples.
+    /// Updates the sample clock with a block. After lost samples, resets filters, spectra and the detector's history.
     fn take_block(&self, state: &mut State, block: &Block) {
         let lost = match self.sample_clock.observe(&mut state.sample_clock, block) {
             Continuity::Contiguous => 0,
@@ -74,11 +73,11 @@ impl Monitor {
         let bad = f32::from(block.clipped) + lost as f32;
         let all = block.counts.len() as f32 + lost as f32;
         if all > 0.0 {
-            state.damage += (bad / all - state.damage) / DAMAGE_MEMORY;
+            state.damage += (bad / all - state.damage) / DAMAGE_MEMORY_BLOCKS;
         }
     }
 
-    /// Processes the tachometer edges up to `now` and returns the measured spindle speed.
+    /// Processes the tachometer edges up to `now`. Returns the measured spindle speed.
     fn take_edges(&self, state: &mut State, edges: &[Edge], now: Nanoseconds) -> Option<Rpm> {
         let tachometer = self.tachometer.as_ref()?;
         for &edge in edges {

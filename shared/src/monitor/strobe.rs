@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use super::Band;
 use crate::synchronous::Passed;
 
-/// A point of the stroboscopic map: the acceleration at a fixed angle of a tooth, once per tooth period.
+/// A point of the stroboscopic map: the acceleration at the same angle of each tooth period.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Strobe {
     /// The band of the acceleration.
     pub band: Band,
-    /// Tooth periods since the tachometer locked. Modulo the number of teeth it is the index of the tooth.
+    /// Number of tooth periods since the tachometer locked. Modulo the number of teeth it is the index of the tooth.
     pub tooth: u32,
     /// Acceleration along x, y and z, in m/s².
     pub meters_per_second2: [f32; 3],
@@ -20,7 +20,7 @@ pub struct Strobe {
 /// Largest number of [`Strobe`]s from one block.
 pub const MAX_BLOCK_STROBES: usize = 32;
 
-/// Adds the first slot of a tooth period to the stroboscopic map.
+/// Appends the acceleration at the first slot of a tooth period to the stroboscopic map.
 pub(super) fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, passed: &Passed) {
     let [x, y, z, ..] = passed.passing;
     let strobe = Strobe {
@@ -28,6 +28,6 @@ pub(super) fn show(strobes: &mut Vec<Strobe, MAX_BLOCK_STROBES>, band: Band, pas
         tooth: passed.tooth as u32,
         meters_per_second2: [x, y, z],
     };
-    // One block never gives more points than the capacity.
+    // The map of one block has fewer points than its capacity.
     let _ = strobes.push(strobe);
 }

@@ -4,6 +4,7 @@ use super::pipeline::Monitor;
 use super::settings::Settings;
 use super::state::{Advised, State};
 use crate::advice::{self, Advice};
+use crate::criteria::{ADVICE_FREQUENCY_STEP, ADVICE_SPEED_STEP, DAMAGE_MAX, SPEED_CHANGE_MAX};
 use crate::detector::Judgement;
 use crate::detector::evidence::Evidence;
 use crate::detector::finding::Finding;
@@ -12,17 +13,8 @@ use crate::lobes::LobeTable;
 use crate::units::Rpm;
 use crate::working_point::WorkingPoint;
 
-/// Largest relative change of speed per revolution for which tooth periods are comparable. Unfounded.
-const LARGEST_CHANGE_PER_TURN: f32 = 0.02;
-/// Largest share of clipped or lost samples that still allows a verdict. Unfounded.
-const LARGEST_DAMAGE: f32 = 0.05;
-/// Relative change of spindle speed after which advice is computed again. Unfounded.
-const ADVICE_SPEED_STEP: f32 = 0.002;
-/// Relative change of chatter frequency after which advice is computed again. Unfounded.
-const ADVICE_FREQUENCY_STEP: f32 = 0.005;
-
 impl Monitor {
-    /// Passes all findings, spectra and tones to the detector and returns its verdict.
+    /// Passes all findings, spectra and tones to the detector. Returns its verdict.
     pub(super) fn judge(&self, state: &mut State, speed: Option<Rpm>) -> Judgement {
         let change = state.tachometer.change_per_turn().unwrap_or(0.0);
         let sampled = self.tachometer.is_some();
@@ -32,8 +24,8 @@ impl Monitor {
         let (structure, tool) = (finding(&state.structure.growth), finding(&state.tool.growth));
         let evidence = Evidence {
             speed: speed.map(Rpm::to_hertz),
-            changing: change.abs() > LARGEST_CHANGE_PER_TURN,
-            damaged: state.damage > LARGEST_DAMAGE,
+            changing: change.abs() > SPEED_CHANGE_MAX,
+            damaged: state.damage > DAMAGE_MAX,
             teeth: self.settings.tool.teeth,
             findings: [structure.as_ref(), tool.as_ref()],
             new_passings: [state.structure.passed, state.tool.passed],
@@ -56,7 +48,7 @@ impl Monitor {
         working_point: Option<&WorkingPoint>,
     ) -> Option<Advice> {
         let table_crc = table.and_then(|table| Some(table.header().ok()?.crc));
-        let feed_direction = table.and_then(LobeTable::asked_direction);
+        let feed_direction = table.and_then(LobeTable::cut_direction);
         let moved = |a: f32, b: f32, step: f32| (a - b).abs() > step * b.abs();
         let same = state.advice.as_ref().filter(|advised| {
             let chatter = match (advised.chatter, judgement.chatter) {

@@ -42,9 +42,9 @@ pub enum FrameError {
         /// Largest length of a frame before COBS, in bytes.
         limit: u16,
     },
-    /// The bytes are not valid COBS.
+    /// The bytes are not valid COBS (consistent overhead byte stuffing).
     Cobs,
-    /// Fewer bytes than version, sequence number, one byte of body and CRC need.
+    /// Fewer bytes than the version, the sequence number, a body of one byte and the CRC take.
     TooShort {
         /// Bytes found.
         found: u8,
@@ -178,7 +178,7 @@ impl FrameErrors {
     }
 }
 
-/// A message is too large for a frame. The messages of this crate always fit, which a test checks for the largest of each kind.
+/// A message that is too large for a frame. All messages of this crate fit; a test checks the largest message of each variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge;
 
@@ -234,9 +234,9 @@ impl Frame<'_> {
     }
 }
 
-/// Decoder of frames from a stream of bytes.
+/// Decoder of a byte stream into frames.
 ///
-/// After invalid bytes it starts again after the next zero. Each run of invalid bytes gives one error.
+/// After invalid bytes, decoding resumes after the next zero byte. Each run of invalid bytes gives one error.
 #[derive(Debug)]
 pub struct Decoder {
     state: DecoderState,
@@ -263,7 +263,7 @@ impl Decoder {
         }
     }
 
-    /// Takes a byte. At the end of a frame it returns the frame or the reason of its refusal.
+    /// Takes a byte. At the end of a frame it returns the frame, or the reason why the frame is refused.
     pub fn push(&mut self, byte: u8) -> Option<Result<Frame<'_>, FrameError>> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -291,14 +291,14 @@ impl Decoder {
             },
             Ok(DecodeResult::DataComplete) => Some(open(self.raw.get(..self.length).unwrap_or_default())),
             Err(_) => {
-                // The state machine is idle again; it complains of a zero that came too soon, so the next byte begins a frame.
+                // The error is a zero byte within a frame. The COBS decoder is idle again, so the next byte begins a frame.
                 Some(Err(FrameError::Cobs))
             }
         }
     }
 }
 
-/// Checks length, CRC and version, in this order: the version of a damaged frame is meaningless.
+/// Checks length, CRC and version of a frame. The version comes last, because that of a damaged frame has no meaning.
 fn open(raw: &[u8]) -> Result<Frame<'_>, FrameError> {
     let too_short = FrameError::TooShort {
         found: raw.len() as u8,
@@ -324,14 +324,14 @@ fn open(raw: &[u8]) -> Result<Frame<'_>, FrameError> {
     })
 }
 
-/// The sequence numbers of one direction of the line.
+/// The sequence numbers of the frames in one direction of the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sequence {
     due: Option<u16>,
 }
 
 impl Sequence {
-    /// A sequence whose next number is `next`.
+    /// A sequence whose next frame has the number `next`.
     pub const fn from(next: u16) -> Self {
         Self { due: Some(next) }
     }
@@ -343,10 +343,9 @@ impl Sequence {
         number
     }
 
-    /// Checks the sequence number of a received frame. The first may have any.
+    /// Checks the sequence number of a received frame. The first frame may have any number.
     ///
-    /// # Errors
-    /// [`FrameError::OutOfOrder`]; the expected number stays the same.
+    /// # Errors [`FrameError::OutOfOrder`] if `found` is not the expected number, which then stays the same.
     pub fn check(&mut self, found: u16) -> Result<(), FrameError> {
         match self.due {
             Some(expected) if expected != found => Err(FrameError::OutOfOrder { expected, found }),
@@ -357,7 +356,7 @@ impl Sequence {
         }
     }
 
-    /// Accepts `found`: the number after it is expected next.
+    /// Accepts the sequence number `found`: the number after it is expected next.
     pub fn restart_after(&mut self, found: u16) {
         self.due = Some(found.wrapping_add(1));
     }

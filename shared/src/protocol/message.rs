@@ -1,4 +1,4 @@
-//! What host and device say to each other. The order of variants and fields is part of the protocol: see [`super::version`].
+//! The messages between host and device. The order of variants and fields is part of the protocol: see [`super::version`].
 
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ pub const SLOTS: usize = 2;
 
 /// A request of the host. Each gets one [`Reply`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-// The largest is what the link's buffers are made for; a box would need an allocator.
+// The buffers of the link have the size of the largest variant. Boxing its fields would need an allocator.
 #[allow(clippy::large_enum_variant)]
 pub enum Request {
     /// Begins a session and restarts the sequence numbers. Reply: [`Reply::Info`].
@@ -88,7 +88,7 @@ pub enum Response {
     Reply {
         /// Sequence number of the request.
         request: u16,
-        /// The reply.
+        /// The reply to that request.
         reply: Reply,
     },
     /// A frame was unreadable, or did not have the expected sequence number.
@@ -154,7 +154,7 @@ pub enum Refusal {
         /// Length of the table.
         length: u32,
     },
-    /// The table is incomplete.
+    /// The received table is incomplete.
     Incomplete {
         /// Bytes received.
         received: u32,
@@ -244,7 +244,7 @@ pub struct Info {
 pub enum Slot {
     /// The slot is empty.
     Empty,
-    /// An incomplete upload.
+    /// An incomplete upload, with its progress.
     Unfinished(Upload),
     /// Bytes that are not a valid table.
     Damaged(TableError),
@@ -308,7 +308,7 @@ pub struct Status {
     pub lost: u32,
     /// True if the samples come from the host, false if they come from the sensor.
     pub is_fed: bool,
-    /// The working point, if set.
+    /// The working point of the cut, if it is set.
     pub working_point: Option<WorkingPoint>,
     /// The messages that are sent without a request.
     pub subscription: Subscription,
@@ -345,7 +345,7 @@ pub struct Subscription {
     pub strobes: bool,
 }
 
-/// Progress of an upload.
+/// Progress of the upload of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Upload {
@@ -362,14 +362,15 @@ pub struct Feed {
     time: Nanoseconds,
     lost: u32,
     clipped: u16,
-    /// Six bytes per sample, little-endian. A fixed length keeps large values from exceeding the frame.
+    /// Counts of x, y and z as six bytes per sample, little-endian. With the variable-length integers of postcard, a block of
+    /// large counts would exceed the frame.
     counts: Vec<[u8; 6], MAX_BLOCK_SAMPLES>,
-    /// Tachometer edges up to the end of the block, after those of [`Request::FeedEdges`].
+    /// Tachometer edges up to the end of the block, in order of time. They follow those of [`Request::FeedEdges`].
     pub edges: Vec<Edge, MAX_FEED_EDGES>,
 }
 
 impl Feed {
-    /// The message with this block and these edges.
+    /// The message that feeds this block with these tachometer edges.
     pub fn new(block: &Block, edges: Vec<Edge, MAX_FEED_EDGES>) -> Self {
         Self {
             sequence: block.sequence,
@@ -409,7 +410,7 @@ fn counts_of([a, b, c, d, e, f]: [u8; 6]) -> Counts {
 /// A chunk of a spectrum. The chunks of one spectrum are sent in order and are not interleaved with those of another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpectrumChunk {
-    /// The band.
+    /// The frequency band of the spectrum.
     pub band: Band,
     /// Sequence number of the block that completed the spectrum.
     pub sequence: u32,
