@@ -4,5 +4,6 @@ pub mod crossing;
 pub mod dormand_prince;
 pub mod eigenvalues;
 pub mod least_squares;
+pub mod quadrature;
 pub mod singular_values;
 pub mod statistics;

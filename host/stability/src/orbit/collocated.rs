@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::problem::gauss::Gauss;
+use quietcut_numerics::quadrature::Gauss;
 
 /// Subinterval after one Newton step from its start.
 pub(super) struct Advanced {

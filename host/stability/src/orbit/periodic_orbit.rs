@@ -5,7 +5,7 @@ use num_complex::Complex64;
 
 use super::collocated::Advanced;
 use super::forced::ForcedProblem;
-use crate::problem::gauss::Gauss;
+use quietcut_numerics::quadrature::Gauss;
 
 /// Reason why no orbit was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

@@ -13,8 +13,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::collocated::Linearized;
 use super::forced::ForcedProblem;
-use crate::problem::gauss::Gauss;
 use quietcut_model::structure::FirstOrder;
+use quietcut_numerics::quadrature::Gauss;
 
 /// Largest phase angle, rad, of the fastest pole over a subinterval.
 const SUBINTERVAL_ANGLE: f64 = 4.0;

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, Matrix3xX, MatrixXx3, Vector3};
 
 use super::exponential::Exponential;
-use super::gauss::Gauss;
 use super::linear::Problem;
+use quietcut_numerics::quadrature::Gauss;
 
 /// Collocated element: p = E x + Q f and x⁺ = G x + T f, with x and x⁺ the states at its start and end, p the
 /// displacements along the chip normals at the nodes, and f = p − p_τ.

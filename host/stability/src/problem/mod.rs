@@ -2,7 +2,6 @@
 
 pub(crate) mod element;
 pub(crate) mod exponential;
-pub(crate) mod gauss;
 pub(crate) mod linear;
 pub(crate) mod period;
 pub(crate) mod pitched;

@@ -17,10 +17,10 @@ use nalgebra::DMatrix;
 
 use super::element::Step;
 use super::exponential::Exponential;
-use super::gauss::Gauss;
 use super::linear::Problem;
 use crate::criteria::ELEMENTS_MAX;
 use crate::error::StabilityError;
+use quietcut_numerics::quadrature::Gauss;
 
 pub(crate) use crate::problem::element::{Element, Port};
 

@@ -7,10 +7,10 @@
 //! to the next tooth one delay later, smoothed by the structure. Subintervals therefore end at all of these times, for
 //! several generations of kinks.
 
-use super::gauss::Gauss;
 use super::period::{DECAY_MAX, Rates};
 use super::pitched::Pitched;
 use super::tooth_passages::{ToothPassage, ToothPassages, distinct};
+use quietcut_numerics::quadrature::Gauss;
 
 /// Subinterval length, tolerance and number of kink generations of the mesh over a revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]

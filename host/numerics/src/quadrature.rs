@@ -1,4 +1,4 @@
-//! Gauss–Legendre nodes on [0, 1], for collocation.
+//! Gauss–Legendre quadrature on [0, 1], and the integrals that collocation on its nodes needs.
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -10,11 +10,21 @@ use nalgebra::DMatrix;
 ///
 /// Quadrature with b is exact for polynomials up to degree 2m − 1, integration with S up to degree m − 1. A collocation
 /// step on these nodes has order 2m (Hairer, Nørsett & Wanner, Solving ODEs I, II.7).
+///
+/// ```
+/// let gauss = quietcut_numerics::quadrature::Gauss::shared(3);
+/// let values = gauss.nodes.iter().map(|x| x.powi(5));
+/// let integral: f64 = gauss.weights.iter().zip(values).map(|(b, value)| b * value).sum();
+/// assert!((integral - 1.0 / 6.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug)]
-pub(crate) struct Gauss {
-    pub(crate) nodes: Vec<f64>,
-    pub(crate) weights: Vec<f64>,
-    pub(crate) integrals: DMatrix<f64>,
+pub struct Gauss {
+    /// Nodes c_i, in ascending order.
+    pub nodes: Vec<f64>,
+    /// Weights b_i.
+    pub weights: Vec<f64>,
+    /// Integrals S_ij, m × m.
+    pub integrals: DMatrix<f64>,
 }
 
 /// Number of cached rules: those with 0 to 40 nodes.
@@ -22,14 +32,14 @@ const SHARED: usize = 41;
 
 impl Gauss {
     /// Cached rule with `count` nodes, at most 40.
-    pub(crate) fn shared(count: usize) -> &'static Self {
+    pub fn shared(count: usize) -> &'static Self {
         static RULES: [OnceLock<Gauss>; SHARED] = [const { OnceLock::new() }; SHARED];
         let count = count.clamp(1, SHARED - 1);
         RULES[count].get_or_init(|| Self::new(count))
     }
 
     /// Computes the rule with `count` nodes, at least 1.
-    pub(crate) fn new(count: usize) -> Self {
+    pub fn new(count: usize) -> Self {
         let (points, weights): (Vec<f64>, Vec<f64>) = (0..count).map(|i| root(count, i)).unzip();
         // ℓ_j(x) = Σ_k (2k + 1)/2 w_j P_k(x_j) P_k(x) for k < m, exact since the rule integrates ℓ_j P_k exactly;
         // ∫_{−1}^x P_k = (P_{k+1} − P_{k−1})/(2k + 1), and x + 1 for k = 0.
@@ -46,11 +56,9 @@ impl Gauss {
             integrals,
         }
     }
-}
 
-impl Gauss {
     /// Values of the Lagrange polynomials of the nodes at the coordinate `place`; the nodes lie in (0, 1).
-    pub(crate) fn lagrange(&self, place: f64) -> Vec<f64> {
+    pub fn lagrange(&self, place: f64) -> Vec<f64> {
         let nodes = &self.nodes;
         let weight = |i: usize| -> f64 {
             let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
