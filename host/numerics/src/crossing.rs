@@ -1,5 +1,7 @@
 //! First zero crossing of a smooth function within a time step.
 
+use crate::roots::bisection;
+
 /// Fractions of the step at which the function is evaluated. They are dense at the start, since a contact that has just
 /// changed may change back there. Unfounded.
 const LOOKED_AT: [f64; 7] = [0.03, 0.12, 0.3, 0.5, 0.7, 0.85, 1.0];
@@ -41,12 +43,12 @@ fn dip(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<f64> {
 }
 
 /// Sign change between `above`, where `f` is not negative, and `below`, where `f` is negative, by bisection.
-fn last_not_below(f: &impl Fn(f64) -> f64, mut above: f64, mut below: f64) -> f64 {
-    while below - above > 1e-12 {
-        let u = 0.5 * (above + below);
-        if f(u) < 0.0 { below = u } else { above = u }
-    }
-    above
+fn last_not_below(f: &impl Fn(f64) -> f64, above: f64, below: f64) -> f64 {
+    let [last, _] = bisection([above, below], 1e-12, |u| {
+        let is_below = f(u) < 0.0;
+        !is_below
+    });
+    last
 }
 
 #[cfg(test)]

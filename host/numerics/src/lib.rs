@@ -1,9 +1,28 @@
 //! Numerical methods that know nothing of milling.
+//!
+//! | module | |
+//! |---|---|
+//! | [`eigenvalues`] | of real, complex, symmetric and companion matrices |
+//! | [`singular_values`] | decomposition A = U Σ Vᵀ |
+//! | [`least_squares`] | linear, robust, from normal equations, nonlinear |
+//! | [`newton`] | Newton's method for numbers and vectors |
+//! | [`roots`] | bisection, regula falsi, golden section |
+//! | [`crossing`] | the first zero crossing within a time step |
+//! | [`quadrature`] | Gauss–Legendre nodes and weights |
+//! | [`dormand_prince`] | one step of an integration in time |
+//! | [`statistics`] | quantiles of the usual distributions |
+//!
+//! `nalgebra` is the type of matrices at every border. Every iteration is bounded, and says why it stopped.
 
 pub mod crossing;
 pub mod dormand_prince;
 pub mod eigenvalues;
 pub mod least_squares;
+pub mod newton;
 pub mod quadrature;
+pub mod roots;
 pub mod singular_values;
 pub mod statistics;
+mod stop;
+
+pub use stop::Stop;

@@ -6,6 +6,8 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
+use crate::roots::bisection;
+
 /// Half the width of a two-sided 90 % interval of a normal distribution, in standard deviations: Φ⁻¹(0.95).
 pub const NINETY_PERCENT: f64 = 1.644_853_626_951_472_7;
 
@@ -148,20 +150,9 @@ fn quantile(share: f64, probability: impl Fn(f64) -> f64) -> f64 {
     bisect(share, [low, high], probability)
 }
 
-/// Halves a bracket of a rising function until neighbouring numbers are reached.
-fn bisect(share: f64, [mut low, mut high]: [f64; 2], probability: impl Fn(f64) -> f64) -> f64 {
-    // 1 100 halvings exhaust the range of exponents; 60 are usual.
-    for _ in 0..1100 {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            break;
-        }
-        if probability(middle) < share {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+/// The argument at which a rising function passes `share`, to neighbouring numbers.
+fn bisect(share: f64, ends: [f64; 2], probability: impl Fn(f64) -> f64) -> f64 {
+    let [low, high] = bisection(ends, 0.0, |x| probability(x) < share);
     0.5 * (low + high)
 }
 

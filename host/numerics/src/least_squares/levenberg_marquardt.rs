@@ -2,183 +2,208 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{invert_normal_equations, solve_normal_equations};
+use super::{Idle, NormalEquations};
+use crate::stop::Stop;
 
-/// A nonlinear sum of squares, linearized at some parameters.
-pub trait Linearization {
-    /// N = JᵀJ, n × n, of the residuals over their noise.
-    fn normal_matrix(&self) -> &DMatrix<f64>;
+/// A sum of squares ‖r(θ)‖² of residuals over their noise, r = measured − predicted, to be minimized.
+///
+/// The point θ is a type of the caller: a vector, or the parts of a model. Values and derivatives are separate, since most trial points
+/// need no derivatives.
+pub trait Objective {
+    /// The point θ.
+    type Point;
 
-    /// g = Jᵀr, n entries, r = measured − predicted and J the derivative of the predicted.
-    fn gradient(&self) -> &DVector<f64>;
+    /// The sum of squares at a point, with all that comparing and linearizing need.
+    type Value;
 
-    /// True where these parameters are no worse than those `before`.
-    fn is_no_worse_than(&self, before: &Self) -> bool;
+    /// The value at a point; `None` where the model does not hold there.
+    fn value(&mut self, point: &Self::Point) -> Option<Self::Value>;
 
-    /// True where the sums of both hold the same data; a step between others does not count as converged.
-    fn is_comparable_with(&self, _before: &Self) -> bool {
-        true
+    /// The normal equations at a point; `None` where they break down.
+    fn linearize(&mut self, point: &Self::Point, value: &Self::Value) -> Option<NormalSums>;
+
+    /// θ + δ, within the bounds of the parameters.
+    fn moved(&self, point: &Self::Point, step: &DVector<f64>) -> Self::Point;
+
+    /// The step, shortened where the parameters may not move so far at once.
+    fn limited(&self, step: DVector<f64>) -> DVector<f64> {
+        step
     }
 
-    /// False where the model holds for too few of the data to go on.
-    fn is_usable(&self) -> bool {
-        true
+    /// True where the value `next` is no worse than the value `now`.
+    fn is_no_worse(&self, next: &Self::Value, now: &Self::Value) -> bool;
+
+    /// True where a step of `length` = √(δᵀNδ) from `now` to `next` is the last one.
+    ///
+    /// The length is in standard deviations of the parameters. A step to a worse value may be the last one: weights that move with the
+    /// parameters keep the sum from falling at the very end.
+    fn has_converged(&self, length: f64, next: &Self::Value, now: &Self::Value) -> bool;
+
+    /// True where the value is not worth another linearization; `before` is the value at the linearization before.
+    fn gives_up(&self, _round: usize, _value: &Self::Value, _before: Option<&Self::Value>) -> bool {
+        false
+    }
+
+    /// True where the linearization promises too little for a step.
+    fn gives_up_linearized(&self, _round: usize, _value: &Self::Value, _sums: &NormalSums) -> bool {
+        false
     }
 }
 
-/// The reason for which an iteration stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
-    /// The step is below the tolerance: a minimum.
-    Converged,
-    /// No step of any damping makes the sum smaller.
-    Stagnated,
-    /// The data do not determine the parameters: N is singular even when damped.
-    Singular,
-    /// The model does not hold for enough of the data.
-    Unusable,
-    /// The bound of the iterations is reached.
-    Iterations,
+/// N = JᵀJ, n × n, and g = Jᵀr, n entries, of r = measured − predicted and J = ∂predicted/∂θ, both over the noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalSums {
+    /// N.
+    pub matrix: DMatrix<f64>,
+    /// g.
+    pub gradient: DVector<f64>,
 }
 
-/// Parameters where an iteration stopped, and why.
+/// The point where a minimization stopped.
 #[derive(Clone, Debug)]
-pub struct Minimum<L> {
-    /// θ, n entries.
-    pub parameters: DVector<f64>,
-    /// The sums there.
-    pub at: L,
+pub struct Minimum<P, V> {
+    /// θ.
+    pub point: P,
+    /// The value there.
+    pub value: V,
+    /// The sums of the last linearization, at θ or one step before; `None` if there was none.
+    pub sums: Option<NormalSums>,
     /// The reason.
     pub stop: Stop,
-    /// Steps that were tried.
+    /// Linearizations.
     pub iterations: usize,
 }
 
-/// The damped Gauss–Newton iteration (N + λ diag N) δ = g (Marquardt, J. SIAM 11 (1963) 431).
+/// The damping λ of (N + λ diag N) δ = g, and how it changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LevenbergMarquardt {
+pub struct Damping {
     /// λ of the first step: 0 near the minimum.
-    pub damping: f64,
-    /// The bound of the iterations.
-    pub iterations_max: usize,
-    /// √(δᵀNδ) of the last step: with residuals over their noise the step in standard deviations of the parameters.
-    pub tolerance: f64,
+    pub first: f64,
+    /// The factor of λ after an improvement, below 1.
+    pub shrink: f64,
+    /// The factor of λ after a step without improvement, above 1.
+    pub growth: f64,
+    /// The least λ after an improvement: above 0 where N is singular.
+    pub least: f64,
+    /// The least λ after a step without improvement.
+    pub least_retried: f64,
 }
 
-/// λ after the first step that makes the sum larger.
-const DAMPING_MIN: f64 = 1e-3;
-/// λ below which the next step is not damped.
-const DAMPING_NONE: f64 = 1e-6;
-/// λ beyond which no step makes the sum smaller.
-const DAMPING_MAX: f64 = 1e8;
+impl Damping {
+    /// λ falls and rises tenfold; undamped near the minimum.
+    pub fn tenfold(first: f64) -> Self {
+        Self {
+            first,
+            shrink: 0.1,
+            growth: 10.0,
+            least: 0.0,
+            least_retried: 1e-3,
+        }
+    }
+
+    fn shrunk(&self, damping: f64) -> f64 {
+        if self.least == 0.0 && damping < UNDAMPED {
+            0.0
+        } else {
+            (self.shrink * damping).max(self.least)
+        }
+    }
+
+    fn grown(&self, damping: f64) -> f64 {
+        (self.growth * damping).max(self.least_retried)
+    }
+}
+
+/// λ below which the next step is not damped: it changes the step by a millionth.
+const UNDAMPED: f64 = 1e-6;
+
+/// The damped Gauss–Newton iteration (Marquardt, J. SIAM 11 (1963) 431).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevenbergMarquardt {
+    /// The damping.
+    pub damping: Damping,
+    /// The bound of the linearizations.
+    pub iterations_max: usize,
+    /// The bound of the steps that are tried from one point.
+    pub trials_max: usize,
+    /// The treatment of parameters without effect.
+    pub idle: Idle,
+}
 
 impl LevenbergMarquardt {
-    /// The parameters of the least sum from `start`; `linearize` gives the sums at some parameters.
+    /// The parameters of the least sum near `start`; `None` where the model does not hold at the start.
     ///
-    /// Always returns: see [`Minimum::stop`] for the reason.
-    pub fn minimize<L: Linearization>(
+    /// Always returns: see [`Minimum::stop`].
+    pub fn minimize<O: Objective>(
         &self,
-        start: DVector<f64>,
-        linearize: impl Fn(&DVector<f64>) -> L,
-    ) -> Minimum<L> {
-        let mut damping = self.damping;
-        let at = linearize(&start);
+        objective: &mut O,
+        start: O::Point,
+    ) -> Option<Minimum<O::Point, O::Value>> {
+        let value = objective.value(&start)?;
         let mut here = Minimum {
-            parameters: start,
-            at,
+            point: start,
+            value,
+            sums: None,
             stop: Stop::Iterations,
             iterations: 0,
         };
-        for iteration in 0..self.iterations_max {
-            here.iterations = iteration;
-            if !here.at.is_usable() {
-                here.stop = Stop::Unusable;
-                return here;
+        let mut damping = self.damping.first;
+        let mut before: Option<O::Value> = None;
+        while here.iterations < self.iterations_max {
+            if objective.gives_up(here.iterations, &here.value, before.as_ref()) {
+                here.stop = Stop::GivenUp;
+                break;
             }
-            let mut matrix = here.at.normal_matrix().clone();
-            for i in 0..here.parameters.len() {
-                matrix[(i, i)] *= 1.0 + damping;
-            }
-            let Some(step) = solve_normal_equations(&matrix, here.at.gradient()) else {
-                // Far from the minimum parameters may look alike that are not.
-                if damping >= 1.0 {
-                    here.stop = Stop::Singular;
-                    return here;
-                }
-                damping = (10.0 * damping).max(DAMPING_MIN);
-                continue;
+            let Some(sums) = objective.linearize(&here.point, &here.value) else {
+                here.stop = Stop::LeftDomain;
+                break;
             };
-            let next = &here.parameters + &step;
-            let tried = linearize(&next);
-            // Weights may move with the parameters, so that the sum itself need not fall at the very end.
-            let length = step.dot(&(here.at.normal_matrix() * &step)).sqrt();
-            if length < self.tolerance && tried.is_comparable_with(&here.at) {
-                return Minimum {
-                    parameters: next,
-                    at: tried,
-                    stop: Stop::Converged,
-                    iterations: iteration + 1,
-                };
+            let gives_up = objective.gives_up_linearized(here.iterations, &here.value, &sums);
+            here.iterations += 1;
+            let sums = here.sums.insert(sums);
+            if gives_up {
+                here.stop = Stop::GivenUp;
+                break;
             }
-            if tried.is_no_worse_than(&here.at) {
-                (here.parameters, here.at) = (next, tried);
-                damping = if damping < DAMPING_NONE {
-                    0.0
-                } else {
-                    0.1 * damping
+            let mut moved = None;
+            for _ in 0..self.trials_max {
+                let Some(step) = self.step(sums, damping) else {
+                    // Far from the minimum parameters may look alike that are not.
+                    if damping >= 1.0 {
+                        here.stop = Stop::Singular;
+                        return Some(here);
+                    }
+                    damping = self.damping.grown(damping);
+                    continue;
                 };
-            } else {
-                damping = (10.0 * damping).max(DAMPING_MIN);
-                if damping > DAMPING_MAX {
-                    here.stop = Stop::Stagnated;
-                    return here;
+                let step = objective.limited(step);
+                let length = step.dot(&(&sums.matrix * &step)).max(0.0).sqrt();
+                let point = objective.moved(&here.point, &step);
+                if let Some(value) = objective.value(&point) {
+                    if objective.has_converged(length, &value, &here.value) {
+                        (here.point, here.value, here.stop) = (point, value, Stop::Converged);
+                        return Some(here);
+                    }
+                    if objective.is_no_worse(&value, &here.value) {
+                        moved = Some((point, value));
+                        break;
+                    }
                 }
+                damping = self.damping.grown(damping);
             }
+            let Some((point, value)) = moved else {
+                here.stop = Stop::Stagnated;
+                break;
+            };
+            here.point = point;
+            before = Some(std::mem::replace(&mut here.value, value));
+            damping = self.damping.shrunk(damping);
         }
-        here.iterations = self.iterations_max;
-        here
-    }
-}
-
-/// The sums of residuals and a Jacobian that are held whole.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Residuals {
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
-    sum: f64,
-}
-
-impl Residuals {
-    /// From r = measured − predicted, m entries, and J = ∂predicted/∂θ, m × n, both over the noise.
-    pub fn new(residual: &DVector<f64>, jacobian: &DMatrix<f64>) -> Self {
-        Self {
-            matrix: jacobian.tr_mul(jacobian),
-            gradient: jacobian.tr_mul(residual),
-            sum: residual.norm_squared(),
-        }
+        Some(here)
     }
 
-    /// rᵀr.
-    pub fn sum_of_squares(&self) -> f64 {
-        self.sum
-    }
-
-    /// (JᵀJ)⁻¹, the covariance of the parameters with unit-variance noise; `None` where the data do not determine them.
-    pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        invert_normal_equations(&self.matrix)
-    }
-}
-
-impl Linearization for Residuals {
-    fn normal_matrix(&self) -> &DMatrix<f64> {
-        &self.matrix
-    }
-
-    fn gradient(&self) -> &DVector<f64> {
-        &self.gradient
-    }
-
-    fn is_no_worse_than(&self, before: &Self) -> bool {
-        self.sum <= before.sum
+    fn step(&self, sums: &NormalSums, damping: f64) -> Option<DVector<f64>> {
+        let step = NormalEquations::new(&sums.matrix, damping, self.idle)?.solve(&sums.gradient);
+        step.iter().all(|entry| entry.is_finite()).then_some(step)
     }
 }

@@ -1,11 +1,9 @@
 //! Linear least squares with weights and a prior.
 
-use nalgebra::{ColPivQR, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::LeastSquaresError;
-
-/// Pivots below this share of the first one are rounding: nothing is determined below the rounding of the data.
-const RANK_TOLERANCE: f64 = 1e-12;
+use super::factored::Factored;
 
 /// min over x of Σᵢ wᵢ (aᵢᵀx − bᵢ)² + Σⱼ pⱼ (xⱼ − x₀ⱼ)², with A of m rows and n columns.
 ///
@@ -88,62 +86,13 @@ impl<'a> LinearProblem<'a> {
     /// See [`LeastSquaresError`].
     pub fn solve(&self) -> Result<LinearFit, LeastSquaresError> {
         self.check()?;
-        let (mut stacked, mut target) = self.rows();
-        let parameters = stacked.ncols();
-        if parameters == 0 {
+        let (stacked, target) = self.rows();
+        if stacked.ncols() == 0 {
             return Ok(self.fit(DVector::zeros(0), DMatrix::zeros(0, 0), 1.0));
         }
-        let lengths = DVector::from_iterator(parameters, stacked.column_iter().map(|column| column.norm()));
-        let empty: Vec<usize> = (0..parameters).filter(|&j| lengths[j] <= 0.0).collect();
-        if !empty.is_empty() || stacked.nrows() < parameters {
-            return Err(LeastSquaresError::RankDeficient {
-                rank: stacked.nrows().min(parameters - empty.len()),
-                parameters,
-                undetermined: empty,
-            });
-        }
-        for (mut column, length) in stacked.column_iter_mut().zip(lengths.iter()) {
-            column /= *length;
-        }
-        let decomposed = ColPivQR::new(stacked);
-        let triangle = decomposed.r();
-        let pivots = triangle.diagonal().abs();
-        let order = self.order_of(&decomposed, parameters);
-        let rank = pivots
-            .iter()
-            .take_while(|pivot| **pivot > RANK_TOLERANCE * pivots[0])
-            .count();
-        let deficient = || LeastSquaresError::RankDeficient {
-            rank,
-            parameters,
-            undetermined: order[rank.min(parameters)..].to_vec(),
-        };
-        if rank < parameters {
-            return Err(deficient());
-        }
-        decomposed.q_tr_mul(&mut target);
-        let head = target.rows(0, parameters).into_owned();
-        let solution = triangle.solve_upper_triangular(&head).ok_or_else(deficient)?;
-        let inverse = triangle
-            .solve_upper_triangular(&DMatrix::identity(parameters, parameters))
-            .ok_or_else(deficient)?;
-        let permuted = &inverse * inverse.transpose();
-        let mut x = DVector::zeros(parameters);
-        let mut covariance = DMatrix::zeros(parameters, parameters);
-        for (i, &row) in order.iter().enumerate() {
-            x[row] = solution[i] / lengths[row];
-            for (j, &column) in order.iter().enumerate() {
-                covariance[(row, column)] = permuted[(i, j)] / (lengths[row] * lengths[column]);
-            }
-        }
-        Ok(self.fit(x, covariance, pivots[0] / pivots[parameters - 1]))
-    }
-
-    /// The columns in the order of their pivots.
-    fn order_of(&self, decomposed: &ColPivQR<f64, nalgebra::Dyn, nalgebra::Dyn>, count: usize) -> Vec<usize> {
-        let mut indices = nalgebra::RowDVector::from_fn(count, |_, j| j);
-        decomposed.p().permute_columns(&mut indices);
-        indices.iter().copied().collect()
+        let factored = Factored::new(stacked)?;
+        let solution = factored.solve(target);
+        Ok(self.fit(solution, factored.covariance(), factored.condition()))
     }
 
     fn fit(&self, parameters: DVector<f64>, covariance: DMatrix<f64>, condition: f64) -> LinearFit {

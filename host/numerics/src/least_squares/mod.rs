@@ -4,20 +4,27 @@
 //! |---|---|---|
 //! | min ‖W(A x − b)‖² + ‖P(x − x₀)‖² | [`LinearProblem`] | column scaling, Householder QR with column pivoting |
 //! | min Σ ρ(rᵢ) with outliers | [`LinearProblem::solve_robust`] | iteratively reweighted, Huber or Tukey |
-//! | AᵀA x = Aᵀb that was summed | [`solve_normal_equations`] | diagonal scaling, Cholesky |
+//! | min ‖x‖ of all x of least ‖A x − b‖ | [`MinimumNorm`] | singular value decomposition |
+//! | min ‖A x + B y − b‖² without x | [`eliminated`] | column scaling, Householder QR |
+//! | AᴴA x = Aᴴb that was summed | [`NormalEquations`] | diagonal scaling, Cholesky |
 //! | min ‖r(θ)‖² | [`LevenbergMarquardt`] | Levenberg–Marquardt with the reason to stop |
 //!
 //! Columns are scaled to length 1 first: parameters of one fit differ by many powers of ten. A rank is therefore independent of
-//! the units of the parameters.
+//! the units of the parameters. Only [`MinimumNorm`] takes the columns as they are.
 
+mod elimination;
+mod factored;
 mod levenberg_marquardt;
 mod linear;
+mod minimum_norm;
 mod normal_equations;
 mod robust;
 
-pub use levenberg_marquardt::{LevenbergMarquardt, Linearization, Minimum, Residuals, Stop};
+pub use elimination::eliminated;
+pub use levenberg_marquardt::{Damping, LevenbergMarquardt, Minimum, NormalSums, Objective};
 pub use linear::{LinearFit, LinearProblem};
-pub use normal_equations::{invert_normal_equations, solve_normal_equations};
+pub use minimum_norm::{MinimumNorm, Tolerance};
+pub use normal_equations::{Idle, NormalEquations, invert_normal_equations, solve_normal_equations};
 pub use robust::{Loss, RobustFit};
 
 /// Why a least-squares problem has no solution.

@@ -1,36 +1,124 @@
-//! Normal equations that were summed: data too many to be held as a matrix.
+//! Normal equations N x = g of least squares: N = AᴴA and g = Aᴴb, summed over the rows.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, ComplexField, DMatrix, DVector, Dyn};
 
-/// x of N x = g with N = Σ aᵢaᵢᵀ (n × n, symmetric) and g = Σ aᵢbᵢ; `None` where N is not positive definite.
+/// The treatment of a parameter without effect, whose column of A is zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Idle {
+    /// The equations have no solution.
+    Refuse,
+    /// The parameter is zero, with a covariance of zero: it is fixed.
+    Hold,
+}
+
+/// Factored normal equations, for data too many to be held as a matrix, or given as sums.
 ///
-/// The diagonal is scaled to 1 first. The condition of N is the square of that of the data: a
-/// [`super::LinearProblem`] keeps twice the digits.
-pub fn solve_normal_equations(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (cholesky, lengths) = scaled(matrix)?;
-    Some(
-        cholesky
-            .solve(&right.component_div(&lengths))
-            .component_div(&lengths),
-    )
+/// D N D = L Lᴴ with D = diag(N)^(−1/2): parameters of one fit differ by many powers of ten. The condition of N is the square of that
+/// of A; a [`super::LinearProblem`] keeps twice the digits.
+///
+/// ```
+/// use nalgebra::{DMatrix, DVector};
+/// use quietcut_numerics::least_squares::{Idle, NormalEquations};
+///
+/// let normal = DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]);
+/// let equations = NormalEquations::new(&normal, 0.0, Idle::Refuse).ok_or("singular")?;
+/// let x: DVector<f64> = equations.solve(&DVector::from_vec(vec![10.0, 8.0]));
+/// assert!((x[0] - 1.75).abs() < 1e-14 && (x[1] - 1.5).abs() < 1e-14);
+/// # Ok::<(), &str>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct NormalEquations<T: ComplexField = f64> {
+    cholesky: Cholesky<T, Dyn>,
+    /// The diagonal of D; 0 for a parameter that is held.
+    scale: DVector<f64>,
 }
 
-/// N⁻¹, the covariance of the parameters where the rows are over their noise; `None` where N is not positive definite.
-pub fn invert_normal_equations(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let (cholesky, lengths) = scaled(matrix)?;
-    let inverse = cholesky.inverse();
-    Some(DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        inverse[(i, j)] / (lengths[i] * lengths[j])
-    }))
-}
-
-fn scaled(matrix: &DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
-    let lengths = matrix.diagonal().map(f64::sqrt);
-    if lengths.iter().any(|length| *length <= 0.0 || !length.is_finite()) {
-        return None;
+impl<T: ComplexField<RealField = f64>> NormalEquations<T> {
+    /// Factors N, n × n and Hermitian, of which only the lower triangle is read; `ridge` is added to its diagonal, scaled to 1.
+    ///
+    /// A ridge λ is the damping of Levenberg and Marquardt, or regularizes columns that depend on each other below the accuracy √λ.
+    /// `None` where N is not positive definite or not finite.
+    pub fn new(matrix: &DMatrix<T>, ridge: f64, idle: Idle) -> Option<Self> {
+        let size = matrix.nrows();
+        let mut scale = DVector::zeros(size);
+        for i in 0..size {
+            let square = matrix[(i, i)].clone().real();
+            scale[i] = if square > 0.0 && square.is_finite() {
+                square.sqrt().recip()
+            } else if idle == Idle::Hold {
+                0.0
+            } else {
+                return None;
+            };
+        }
+        // The Cholesky decomposition reads the lower triangle only.
+        let mut scaled = DMatrix::zeros(size, size);
+        for j in 0..size {
+            scaled[(j, j)] = T::from_real(1.0 + ridge);
+            for i in j + 1..size {
+                scaled[(i, j)] = matrix[(i, j)].clone().scale(scale[i] * scale[j]);
+            }
+        }
+        Some(Self {
+            cholesky: Cholesky::new(scaled)?,
+            scale,
+        })
     }
-    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        matrix[(i, j)] / (lengths[i] * lengths[j])
-    });
-    Some((Cholesky::new(scaled)?, lengths))
+
+    /// x of N x = g.
+    pub fn solve(&self, right: &DVector<T>) -> DVector<T> {
+        let mut solution = right.clone();
+        self.scaled(&mut solution);
+        self.cholesky.solve_mut(&mut solution);
+        self.scaled(&mut solution);
+        solution
+    }
+
+    /// X of N X = G, one right side per column.
+    pub fn solve_columns(&self, right: &DMatrix<T>) -> DMatrix<T> {
+        let mut solution = right.clone();
+        self.scaled(&mut solution);
+        self.cholesky.solve_mut(&mut solution);
+        self.scaled(&mut solution);
+        solution
+    }
+
+    /// N⁻¹: the covariance of the parameters where the rows are divided by their standard deviation.
+    pub fn inverse(&self) -> DMatrix<T> {
+        let mut inverse = self.cholesky.inverse();
+        for j in 0..self.scale.len() {
+            for i in 0..self.scale.len() {
+                let entry = inverse[(i, j)].clone();
+                inverse[(i, j)] = entry.scale(self.scale[i] * self.scale[j]);
+            }
+        }
+        inverse
+    }
+
+    /// gᴴ N⁻¹ g: the decrease of the sum of squares from x = 0 to the solution.
+    pub fn explained(&self, right: &DVector<T>) -> f64 {
+        let mut whitened = right.clone();
+        self.scaled(&mut whitened);
+        self.cholesky.l_dirty().solve_lower_triangular_mut(&mut whitened);
+        whitened.norm_squared()
+    }
+
+    fn scaled<C: nalgebra::Dim, S: nalgebra::StorageMut<T, Dyn, C>>(
+        &self,
+        rows: &mut nalgebra::Matrix<T, Dyn, C, S>,
+    ) {
+        for (mut row, scale) in rows.row_iter_mut().zip(self.scale.iter()) {
+            row.scale_mut(*scale);
+        }
+    }
+}
+
+/// x of N x = g without a ridge; `None` where N is not positive definite.
+pub fn solve_normal_equations(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    Some(NormalEquations::new(matrix, 0.0, Idle::Refuse)?.solve(right))
+}
+
+/// N⁻¹ without a ridge; `None` where N is not positive definite.
+pub fn invert_normal_equations(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    Some(NormalEquations::new(matrix, 0.0, Idle::Refuse)?.inverse())
 }

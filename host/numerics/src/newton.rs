@@ -1,0 +1,244 @@
+//! Newton's method x ← x − J⁻¹ r(x) for r(x) = 0, with a bound on the growth of its steps and the reason to stop.
+//!
+//! The caller computes the step J⁻¹ r and chooses how: by a quotient, by an LU decomposition, or by an iterative solver. [`Newton`]
+//! decides how far to go and when to stop, in the same way for numbers and vectors.
+
+use nalgebra::DVector;
+use num_complex::Complex64;
+
+use crate::stop::Stop;
+
+/// An unknown of Newton's method: a real or complex number, or a vector.
+pub trait Unknown {
+    /// Absolute value or Euclidean norm.
+    fn size(&self) -> f64;
+
+    /// x ← x − `share` · `step`.
+    fn subtract(&mut self, share: f64, step: &Self);
+}
+
+impl Unknown for f64 {
+    fn size(&self) -> f64 {
+        self.abs()
+    }
+
+    fn subtract(&mut self, share: f64, step: &Self) {
+        *self -= share * step;
+    }
+}
+
+impl Unknown for Complex64 {
+    fn size(&self) -> f64 {
+        self.norm()
+    }
+
+    fn subtract(&mut self, share: f64, step: &Self) {
+        *self -= step * share;
+    }
+}
+
+impl Unknown for DVector<f64> {
+    fn size(&self) -> f64 {
+        self.norm()
+    }
+
+    fn subtract(&mut self, share: f64, step: &Self) {
+        self.axpy(-share, step, 1.0);
+    }
+}
+
+impl Unknown for Vec<f64> {
+    fn size(&self) -> f64 {
+        self.iter().map(|x| x * x).sum::<f64>().sqrt()
+    }
+
+    fn subtract(&mut self, share: f64, step: &Self) {
+        for (x, step) in self.iter_mut().zip(step) {
+            *x -= share * step;
+        }
+    }
+}
+
+/// Newton's method with its bounds.
+///
+/// ```
+/// use quietcut_numerics::Stop;
+/// use quietcut_numerics::newton::Newton;
+///
+/// // x² = 2.
+/// let root = Newton::new(20, 1e-9).solve(1.0, |x: &f64| Ok((x * x - 2.0) / (2.0 * x)));
+/// assert_eq!(root.stop, Stop::Converged);
+/// assert!((root.x - 2.0_f64.sqrt()).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Newton {
+    iterations_max: usize,
+    tolerance: f64,
+    growth: f64,
+}
+
+/// The point where Newton's method stopped, and the reason.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Root<X> {
+    /// x after the last step.
+    pub x: X,
+    /// The reason.
+    pub stop: Stop,
+    /// Steps that were computed.
+    pub iterations: usize,
+}
+
+impl<X> Root<X> {
+    /// x, if the iteration has converged.
+    pub fn converged(self) -> Option<X> {
+        (self.stop == Stop::Converged).then_some(self.x)
+    }
+}
+
+impl Newton {
+    /// At most `iterations_max` full steps, until ‖step‖ ≤ `tolerance` · ‖x‖.
+    ///
+    /// Convergence is quadratic: after a step of 1e-9 · ‖x‖ the next one is rounding.
+    pub fn new(iterations_max: usize, tolerance: f64) -> Self {
+        Self {
+            iterations_max,
+            tolerance,
+            growth: f64::INFINITY,
+        }
+    }
+
+    /// Shortens each step to at most `factor` times the step before it, which keeps the iteration from jumping to a distant
+    /// solution.
+    #[must_use]
+    pub fn with_growth(self, factor: f64) -> Self {
+        Self {
+            growth: factor,
+            ..self
+        }
+    }
+
+    /// The root near `start`; `step` returns J⁻¹ r at a point, or the reason for which there is none.
+    ///
+    /// Always returns: see [`Root::stop`]. The last step is applied in full.
+    pub fn solve<X: Unknown>(&self, start: X, mut step: impl FnMut(&X) -> Result<X, Stop>) -> Root<X> {
+        let mut root = Root {
+            x: start,
+            stop: Stop::Iterations,
+            iterations: 0,
+        };
+        let mut longest = f64::INFINITY;
+        while root.iterations < self.iterations_max {
+            let size_before = root.x.size();
+            let found = match step(&root.x) {
+                Ok(found) => found,
+                Err(stop) => return Root { stop, ..root },
+            };
+            root.iterations += 1;
+            let length = found.size();
+            if !length.is_finite() {
+                return Root {
+                    stop: Stop::LeftDomain,
+                    ..root
+                };
+            }
+            if length <= self.tolerance * size_before.max(f64::MIN_POSITIVE) {
+                root.x.subtract(1.0, &found);
+                return Root {
+                    stop: Stop::Converged,
+                    ..root
+                };
+            }
+            let share = if longest.is_finite() {
+                (longest / length).min(1.0)
+            } else {
+                1.0
+            };
+            root.x.subtract(share, &found);
+            longest = self.growth * length * share;
+        }
+        root
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    #[test]
+    fn roots_of_unity_are_found_in_the_plane() {
+        let newton = Newton::new(50, 1e-9);
+        for k in 0..5 {
+            let exact = Complex64::cis(std::f64::consts::TAU * f64::from(k) / 5.0);
+            let found = newton.solve(exact * 1.1, |z: &Complex64| {
+                Ok((z.powi(5) - 1.0) / (5.0 * z.powi(4)))
+            });
+            assert_eq!(found.stop, Stop::Converged);
+            assert!((found.x - exact).norm() < 1e-15);
+            // From an error of 0.1: 0.02, 8e-4, 1e-6, 3e-12, and the step that confirms it.
+            assert!(found.iterations <= 5, "{}", found.iterations);
+        }
+    }
+
+    #[test]
+    fn a_random_system_meets_its_constructed_root() {
+        let seed = 11;
+        println!("seed {seed}");
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        for size in 1..8 {
+            // r(x) = A (x − s) + c ∘ (x − s)² has the root s.
+            let a = DMatrix::from_fn(size, size, |i, j| {
+                rng.random_range(-1.0..1.0) + if i == j { size as f64 } else { 0.0 }
+            });
+            let exact = DVector::from_fn(size, |_, _| rng.random_range(1.0..2.0));
+            let curvature = DVector::from_fn(size, |_, _| rng.random_range(-0.2..0.2));
+            let step = |x: &DVector<f64>| {
+                let off = x - &exact;
+                let residual = &a * &off + curvature.component_mul(&off).component_mul(&off);
+                let jacobian = &a + DMatrix::from_diagonal(&(2.0 * curvature.component_mul(&off)));
+                jacobian.lu().solve(&residual).ok_or(Stop::Singular)
+            };
+            let found = Newton::new(30, 1e-9)
+                .with_growth(2.0)
+                .solve(exact.add_scalar(0.3), step);
+            assert!((found.converged().unwrap() - &exact).norm() < 1e-13 * size as f64);
+            // A vector of another type takes the same way.
+            let as_list = |x: &Vec<f64>| {
+                step(&DVector::from_column_slice(x)).map(|step| step.iter().copied().collect::<Vec<f64>>())
+            };
+            let start: Vec<f64> = exact.iter().map(|x| x + 0.3).collect();
+            let again = Newton::new(30, 1e-9).solve(start, as_list);
+            assert_eq!(again.stop, Stop::Converged);
+        }
+    }
+
+    #[test]
+    fn the_growth_of_steps_is_bounded() {
+        // arctan diverges from 2 with full steps, which alternate with growing length.
+        let step = |x: &f64| Ok(x.atan() * (1.0 + x * x));
+        assert_ne!(Newton::new(50, 1e-9).solve(2.0, step).stop, Stop::Converged);
+        // A step of 1e-2 followed by one of 1: bounded to 2e-2.
+        let mut steps = [-1e-2, -1.0].into_iter();
+        let found = Newton::new(2, 1e-9)
+            .with_growth(2.0)
+            .solve(1.0, |_: &f64| steps.next().ok_or(Stop::Singular));
+        assert!((found.x - 1.03).abs() < 1e-15);
+    }
+
+    #[test]
+    fn every_reason_to_stop_is_met() {
+        let newton = Newton::new(10, 1e-9);
+        assert_eq!(
+            newton.solve(1.0, |_: &f64| Err(Stop::Singular)).stop,
+            Stop::Singular
+        );
+        assert_eq!(newton.solve(1.0, |_: &f64| Ok(f64::NAN)).stop, Stop::LeftDomain);
+        let slow = newton.solve(1.0, |x: &f64| Ok(0.5 * x));
+        assert_eq!((slow.stop, slow.iterations), (Stop::Iterations, 10));
+        assert_eq!(slow.converged(), None);
+        // A root at zero: relative to its size no step is short, but a step of zero is.
+        assert_eq!(newton.solve(0.0, |x: &f64| Ok(*x)).stop, Stop::Converged);
+    }
+}
