@@ -4,9 +4,12 @@
 //!
 //!   ẋ = A x + B F,   u = C x,   F = w K α(φ)(u − u_τ) − β(φ) u
 //!
-//! lie inside the unit circle. Here w is the axial depth, α the directional coefficients, β what edge and feed forces add, and τ
-//! the tooth period. F = w K_tc α (u − u_τ) with α as in eq. 6.7 is stable at small w. The default method collocates the map
-//! over one period; others are interchangeable behind [`Method`].
+//! lie inside the unit circle. Here x are the states of the structure, F the cutting force, u the displacement of the
+//! tool, w the axial depth, K the cutting coefficient K_tc, α the directional coefficients, φ the immersion angle, β
+//! the coefficients of edge and feed forces under axial-depth modulation, and τ the tooth period. With this sign of the
+//! force every cut is stable at a sufficiently small w. Equation numbers in this crate are those of the thesis on
+//! robotic milling from which the cases `kuka-*` and `staubli-*` come. The default method collocates the map over one
+//! period; others are interchangeable behind [`Method`].
 //!
 //! Main types: [`Problem`] is the linear delay equation of a case. A [`Method`] computes from it the stability of one cut
 //! ([`CutStability`]) or all limits at one speed ([`SpeedLine`]). [`chart()`] does so at many speeds, and
@@ -102,7 +105,7 @@ pub use limits::sensitivity::{Sensitivity, Slope, Tangent};
 pub use limits::speed_line::{Limit, SpeedLine, Switch};
 pub use limits::speeds::{default_speeds, spaced};
 pub use limits::spread::{LimitSpread, Percentile, Percentiles};
-pub use limits::uncertainty::{Maker, Uncertainty};
+pub use limits::uncertainty::{MethodOfCase, Uncertainty};
 pub use methods::collocation::Collocation;
 pub use methods::fdm::{Fdm, FullDiscretization};
 pub use methods::mode_coupling::ModeCoupling;

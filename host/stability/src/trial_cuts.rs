@@ -11,7 +11,8 @@ use quietcut_recording::cut_table::{self, CutTableError};
 
 pub use quietcut_recording::cut_table::Outcome;
 
-/// Number of steps in depth at which Floquet multipliers are computed. A choice: half more than the least of a chart.
+/// Number of steps in depth at which Floquet multipliers are computed. A choice: half more than the least number of a
+/// chart, 40.
 const SAMPLES: usize = 60;
 
 /// Trial cut: spindle speed, axial depth and observed outcome.
@@ -131,7 +132,7 @@ pub fn calls<M: Method + ?Sized>(method: &M, cuts: &[TestCut]) -> Result<Vec<Cal
 }
 
 /// Compares the prediction for one cut with its outcome. One of the lines must have the speed of the cut and reach its
-/// depth.
+/// depth; otherwise the cut counts as predicted unstable.
 pub fn call(lines: &[SpeedLine], cut: &TestCut) -> Call {
     let line = lines.iter().find(|line| line.rpm == cut.rpm);
     let within = |of: fn(&SpeedLine) -> &Vec<[f64; 2]>| {

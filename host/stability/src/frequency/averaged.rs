@@ -122,7 +122,8 @@ impl OpenLoop for AveragedLoop<'_> {
     }
 
     fn real_end(&self) -> Option<RealEnd> {
-        // With regeneration loci start at 0; without it, at the static compliance.
+        // At ω = 0 loci with regeneration are 0. Without regeneration they are real there: eigenvalues of the static
+        // compliance times α₀.
         if self.delay_s.is_some() {
             return None;
         }
@@ -144,7 +145,7 @@ impl OpenLoop for AveragedLoop<'_> {
         let lines = self.problem.lines();
         let mut end = lines.last().copied().unwrap_or(0.0).max(1.5 * fastest);
         let size = |omega: f64| Some(2.0 * self.matrix(Complex64::new(0.0, omega))?.norm());
-        // Receptances only decrease above all resonances.
+        // Above all resonances the loci decrease with the frequency: the grid ends where they fall below the floor.
         while end > 0.0 && size(end)? >= floor {
             end *= 1.4;
         }

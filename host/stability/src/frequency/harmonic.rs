@@ -201,8 +201,8 @@ impl<'a> HarmonicLoop<'a> {
                     }
                 }
                 let mut displacement = h * force;
-                // Recomputes the displacement from the forces, equal to rounding; a free vibration has no force and
-                // keeps the vector.
+                // The eigenvector contains the displacements in the directions `axes`; those in other directions follow
+                // from the forces.
                 for (i, &axis) in self.axes.iter().enumerate() {
                     displacement[axis] = vector[p * self.axes.len() + i];
                 }

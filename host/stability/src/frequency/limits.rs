@@ -4,16 +4,17 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::loci::{crossings, trace, turning};
+use super::loci::{argument_increase, crossings, trace};
 use super::open_loop::OpenLoop;
 use crate::criteria::{LEAST_ERROR, SAME_LIMIT};
 use crate::error::StabilityError;
 use crate::limits::speed_line::{SpeedLine, Switch};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Distance, as a share of the neighbouring frequency, from an end with real loci, at which the direction of the loci
-/// is evaluated. Unfounded: far above rounding, far below the width of a resonance.
-const BESIDE: f64 = 1e-5;
+/// Distance from an end of the frequency range with real loci at which their imaginary parts give the direction of
+/// crossings, as a share of the end frequency, or at ω = 0 of the first grid frequency. Unfounded: far above rounding,
+/// far below the width of a resonance.
+const REAL_END_OFFSET: f64 = 1e-5;
 
 /// Root on the imaginary axis at a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,19 +38,20 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
     let real_end = open_loop.real_end();
     let mut limits = Vec::new();
     if let Some(end) = &real_end {
-        // At an end with real loci crossings are exact; close to it, rounding would feign further crossings.
-        let beside = if end.omega > 0.0 {
-            let beside = end.omega * (1.0 - BESIDE);
-            grid.retain(|&omega| omega < beside);
-            grid.push(beside);
-            beside
+        // The real loci at this end are crossings themselves. Samples closer to the end are left out, where rounding of
+        // imaginary parts would show further crossings.
+        let next_to_end = if end.omega > 0.0 {
+            let next_to_end = end.omega * (1.0 - REAL_END_OFFSET);
+            grid.retain(|&omega| omega < next_to_end);
+            grid.push(next_to_end);
+            next_to_end
         } else {
-            let beside = grid.get(1)? * BESIDE;
-            grid.retain(|&omega| omega > beside);
-            grid.insert(0, beside);
-            beside
+            let next_to_end = grid.get(1)? * REAL_END_OFFSET;
+            grid.retain(|&omega| omega > next_to_end);
+            grid.insert(0, next_to_end);
+            next_to_end
         };
-        let loci = open_loop.loci(beside, floor * 0.1)?;
+        let loci = open_loop.loci(next_to_end, floor * 0.1)?;
         for &value in end.loci.iter().filter(|&&value| value >= floor) {
             let near = loci
                 .iter()
@@ -58,7 +60,8 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
                 depth_m: value.recip(),
                 omega: end.omega,
                 kind: end.kind,
-                // Beyond the end the locus continues as its conjugate and falls through the axis.
+                // Beyond the end of the range a locus continues as its mirror image in the real axis, so that it
+                // crosses the axis downward at ω > 0 if it lies above the axis next to the end.
                 outward: (near.im > 0.0) == (end.omega > 0.0),
             });
         }
@@ -72,7 +75,8 @@ pub(crate) fn limits(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Vec<Axis
                 depth_m: crossing.value.recip(),
                 omega: crossing.omega,
                 kind: StabilityLoss::Hopf,
-                // 1 − wλκ/w winds in the opposite direction to the locus.
+                // A root becomes unstable where its locus crosses the axis downward: 1 − w·locus then winds clockwise
+                // about 0.
                 outward: !crossing.rises,
             }),
     );
@@ -91,19 +95,20 @@ pub(crate) fn unstable_roots(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64
         let s = Complex64::new(sigma, omega);
         open_loop.determinant(s, open_loop.regeneration(s) * depth_m)
     };
-    let mut turned = turning(&determinant, &grid)?;
+    let mut increase = argument_increase(&determinant, &grid)?;
     if open_loop.real_end().is_none_or(|end| end.omega == 0.0) {
         // Beyond the grid the loop gain is below one, and the determinant goes straight to 1.
-        turned -= determinant(*grid.last()?)?.arg();
+        increase -= determinant(*grid.last()?)?.arg();
     }
-    let half_turns = turned / PI;
-    // Both ends are real to rounding, apart from the truncation of harmonics at 0.
+    let half_turns = increase / PI;
+    // At both ends of the path the determinant is real, apart from rounding and from the truncation of harmonics at ω =
+    // 0: the number of half revolutions is an integer.
     let rounded = half_turns.round();
     ((half_turns - rounded).abs() < 0.2).then_some(open_loop.problem().poles_right_of(sigma) - rounded as i32)
 }
 
 /// Error estimate of a limit, m: the change with other computations (every second line of a table, another number of
-/// harmonics), and at least the confirmed accuracy. `None` if another computation lacks the limit.
+/// harmonics), and at least [`LEAST_ERROR`] of the depth. `None` if another computation lacks the limit.
 fn error_m(limit: &AxisCrossing, others: &[Vec<AxisCrossing>]) -> Option<f64> {
     others.iter().try_fold(LEAST_ERROR * limit.depth_m, |sum, other| {
         let changes = other
@@ -161,7 +166,7 @@ pub(crate) fn outside_at_no_depth(open_loop: &impl OpenLoop) -> Option<i32> {
     }
 }
 
-/// Frequency ω of a limit, Hz.
+/// Chatter frequency ω/2π of a limit, Hz.
 pub(crate) fn hertz(limit: &AxisCrossing) -> Option<f64> {
     Some(limit.omega / TAU)
 }

@@ -5,11 +5,11 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-/// Number of halvings of a frequency interval in which loci cannot be told apart. Unfounded.
+/// Largest number of halvings of a frequency interval in which loci cannot be told apart. Unfounded.
 const LEVELS: u32 = 16;
 
-/// Largest deviation of the middle of a locus from the straight line between the ends of an interval, as a share of the
-/// locus. Unfounded.
+/// Largest deviation of a locus, at the middle of a frequency interval, from the straight line between its values at
+/// both ends, as a share of the larger of the two. Unfounded.
 const BEND: f64 = 0.1;
 
 /// Eigenvalues at one frequency.
@@ -60,7 +60,7 @@ pub(crate) fn trace(loci: &impl Loci, grid: &[f64], floor: f64, bend: f64) -> Op
     Some(samples)
 }
 
-/// Adds samples between two, where needed.
+/// Adds samples between two samples until every locus is straight and told apart from the others.
 fn divide(
     sample: &impl Fn(f64) -> Option<Sample>,
     low: &Sample,
@@ -289,11 +289,11 @@ pub(crate) fn zero(
     None
 }
 
-/// Increase of the argument of a function over a grid, rad. Steps are halved until each turns the argument by at most a
-/// fifth of π and agrees with the sum of its halves.
+/// Increase of the argument of a function over a grid, rad. Intervals are halved until the argument changes by less
+/// than π/5 in each half.
 ///
 /// `None` if the function returns `None` or vanishes.
-pub(crate) fn turning(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
+pub(crate) fn argument_increase(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]) -> Option<f64> {
     let mut sum = 0.0;
     let Some((&first, rest)) = grid.split_first() else {
         return Some(sum);
@@ -301,13 +301,13 @@ pub(crate) fn turning(function: &impl Fn(f64) -> Option<Complex64>, grid: &[f64]
     let mut low = (first, function(first)?);
     for &omega in rest {
         let high = (omega, function(omega)?);
-        sum += turning_between(function, low, high, 0)?;
+        sum += argument_increase_between(function, low, high, 0)?;
         low = high;
     }
     sum.is_finite().then_some(sum)
 }
 
-fn turning_between(
+fn argument_increase_between(
     function: &impl Fn(f64) -> Option<Complex64>,
     low: (f64, Complex64),
     high: (f64, Complex64),
@@ -319,13 +319,14 @@ fn turning_between(
     if !(first.is_finite() && second.is_finite()) {
         return None;
     }
-    // Twenty halvings reach a millionth of a step: a function that still turns has its zero on the path.
+    // Twenty halvings reach a millionth of the grid interval: if the argument still changes by π/5, the function has a
+    // zero on the path.
     if first.abs().max(second.abs()) < 0.2 * PI || level == 20 {
         return Some(first + second);
     }
     Some(
-        turning_between(function, low, middle, level + 1)?
-            + turning_between(function, middle, high, level + 1)?,
+        argument_increase_between(function, low, middle, level + 1)?
+            + argument_increase_between(function, middle, high, level + 1)?,
     )
 }
 
@@ -367,22 +368,22 @@ mod tests {
     }
 
     #[test]
-    fn a_polynomial_turns_by_half_a_turn_for_each_root_to_the_left() {
+    fn the_argument_grows_by_a_quarter_revolution_for_each_root_to_the_left() {
         // Polynomial (s + 1)(s² + 0.02 s + 4)(s − 3)(s² − 0.01 s + 9): three roots left, three right of the axis.
         let function = |omega: f64| {
             let s = Complex64::new(0.0, omega);
             Some((s + 1.0) * (s * s + s * 0.02 + 4.0) * (s - 3.0) * (s * s - s * 0.01 + 9.0))
         };
         let grid = [0.0, 1.9, 2.1, 2.95, 3.05, 1e4];
-        let turned = turning(&function, &grid).unwrap();
+        let increase = argument_increase(&function, &grid).unwrap();
         // From 0 to infinity each root on the left adds π/2, each on the right subtracts it; the remainder at 1e4 rad/s
         // is 1e-3.
-        assert!(turned.abs() < 1e-2, "{turned}");
+        assert!(increase.abs() < 1e-2, "{increase}");
         let stable = |omega: f64| {
             let s = Complex64::new(0.0, omega);
             Some((s + 1.0) * (s * s + s * 0.02 + 4.0))
         };
-        let turned = turning(&stable, &grid).unwrap();
-        assert!((turned - 1.5 * PI).abs() < 1e-2, "{turned}");
+        let increase = argument_increase(&stable, &grid).unwrap();
+        assert!((increase - 1.5 * PI).abs() < 1e-2, "{increase}");
     }
 }

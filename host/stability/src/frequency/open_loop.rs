@@ -63,7 +63,8 @@ pub(crate) trait OpenLoop: Sync {
     }
 }
 
-/// Grid about resonances up to `end`, ascending, with 0 and `end`: dense within the width, then with growing distances.
+/// Frequency grid from 0 to `end`, rad/s, ascending: dense within the half bandwidth of each resonance, then with
+/// growing distances from it.
 pub(crate) fn around(resonances: &[Resonance], end: f64) -> Vec<f64> {
     let mut grid = vec![0.0, end];
     for Resonance { omega, width } in resonances {

@@ -13,19 +13,20 @@ use crate::error::StabilityError;
 use crate::limits::point::CutStability;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Real parts of the lines along which roots are searched, as multiples of the slowest decay rate of a resonance.
-/// Unfounded.
+/// Values σ of the lines Re s = σ along which roots are searched, as multiples of the slowest decay rate of a
+/// resonance. Unfounded.
 const LINES: [f64; 14] = [
     0.0, -0.3, -0.6, -0.8, -0.9, -0.97, -1.2, -2.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0,
 ];
 
-/// Smallest locus, as a share of 1/w, that is traced for roots away from the line. Unfounded.
+/// Smallest locus, as a share of 1/w, that is traced along a line Re s = σ to predict roots away from the line.
+/// Unfounded.
 const REACH: f64 = 0.05;
 
 /// Rightmost root s, 1/s, with Im s ≥ 0, at an axial depth, m.
 ///
 /// First, roots are continued from depth 0, where they are poles of the structure. Then loci are traced along lines Re
-/// s = σ: if one passes near 1/w, its linear continuation beside the line predicts a root, which is then solved for.
+/// s = σ: if one passes near 1/w, its linear continuation away from the line predicts a root, which is then solved for.
 /// The rightmost root found is verified by counting the roots to its right. `None` if none is verified.
 pub(crate) fn rightmost(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
     let decay = open_loop
@@ -69,7 +70,7 @@ fn from_poles(open_loop: &impl OpenLoop, depth_m: f64) -> Option<Complex64> {
         .map(|root| Complex64::new(root.re, root.im.abs()))
 }
 
-/// Rightmost of the roots found beside a line Re s = `sigma`.
+/// Rightmost of the roots predicted from loci along a line Re s = `sigma`.
 fn from_line(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64, decay: f64) -> Option<Complex64> {
     let target = depth_m.recip();
     if !target.is_finite() {
@@ -101,10 +102,10 @@ fn from_line(open_loop: &impl OpenLoop, depth_m: f64, sigma: f64, decay: f64) ->
 
 /// True if no root lies further right.
 fn is_rightmost(open_loop: &impl OpenLoop, depth_m: f64, root: Complex64, decay: f64) -> bool {
-    // Counts from slightly right of the root.
-    let beside = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
+    // The roots are counted to the right of a line Re s = const slightly right of the given root.
+    let sigma = root.re + 1e-3 * (root.re.abs() + 1e-3 * decay);
     if open_loop.problem().band_hz().is_none() {
-        return unstable_roots(open_loop, depth_m, beside) == Some(0);
+        return unstable_roots(open_loop, depth_m, sigma) == Some(0);
     }
     // The poles of a table away from the axis are not known; only the number of roots right of the axis can be
     // verified.
@@ -169,8 +170,8 @@ pub(crate) fn polish(open_loop: &impl OpenLoop, depth_m: f64, guess: Complex64) 
 
 /// Dominant Floquet multiplier of a loop with averaged coefficients.
 ///
-/// With a table the error is the change with every second line. The error of a cubic through all lines is a sixteenth
-/// of that for dense lines, and no larger otherwise.
+/// With a table of receptances the stated error is the change of the multiplier when every second line is omitted.
+/// Cubic interpolation through all lines errs by a sixteenth of that where lines are dense, and by no more elsewhere.
 ///
 /// # Errors
 /// The root cannot be found or verified, or lies outside the measured frequencies.

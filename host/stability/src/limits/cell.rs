@@ -24,7 +24,7 @@ impl Cell {
         }
     }
 
-    /// Cell from a multiplier of the characteristic matrix, whose error is negligible.
+    /// Cell from a multiplier of the characteristic matrix, with the least error that is ever stated.
     pub(super) fn exact(multiplier_abs: f64) -> Self {
         Self::new(multiplier_abs, LEAST_ERROR * multiplier_abs.max(1.0))
     }

@@ -17,11 +17,13 @@ use crate::spectrum::along_depth::Spectrum;
 use crate::spectrum::root::Root;
 use crate::spectrum::verdict::Verdict;
 
-/// Number of intervals in depth at the start; if there are fewer cells, all are computed directly. A choice.
+/// Number of depth intervals whose ends are sampled first; if there are fewer cells, all are computed directly. A
+/// choice.
 const INTERVALS: usize = 10;
 
-/// Share of the depth range that is computed first; then ranges double.
-const FIRST_PART: f64 = 0.125;
+/// Share of the depth range for which the first mesh of the period is built; each further mesh covers twice the depth
+/// of the one before.
+const FIRST_SHARE: f64 = 0.125;
 
 /// Implements [`Method::cells`] for a method with a spectrum; `spectrum` returns the multipliers at this speed, valid
 /// for depths up to its argument, m.
@@ -40,7 +42,7 @@ pub(crate) fn cells_of<S: Spectrum>(
     let Some(&last_m) = depths_m.last() else {
         return Ok(Vec::new());
     };
-    let mut deepest_m = last_m * FIRST_PART;
+    let mut deepest_m = last_m * FIRST_SHARE;
     let mut column = Column {
         rpm,
         spectrum: spectrum(deepest_m),
@@ -110,7 +112,8 @@ impl Curve {
             + self.correction * (product * product)
     }
 
-    /// Sets the quartic from the error of the cubic at a fraction; returns the error that the cubic had half way.
+    /// Sets the quartic from the error of the cubic at the fraction `share` of the interval; returns the error of the
+    /// cubic at its middle.
     fn correct(&mut self, share: f64, error: Complex64) -> f64 {
         let product = share * (1.0 - share);
         self.correction = error / (product * product);
@@ -212,7 +215,8 @@ impl<S: Spectrum> Column<S> {
             roots: Some(roots),
         };
         self.cells[index] = Cell::exact(middle.largest());
-        // With the quartic the error is far below that of the cubic, less so over wide intervals.
+        // Stated error of the cells: a factor of two on the error of the cubic, although the quartic corrects it. Far
+        // outside the unit circle, where intervals are wide, a factor of four.
         let error = if least > CELL_FAR {
             4.0 * worst
         } else {
@@ -228,7 +232,7 @@ impl<S: Spectrum> Column<S> {
     /// The multiplier near a guess, with a second Newton step if the first was long.
     fn polished(&mut self, guess: Complex64, depth_m: f64) -> Option<Root> {
         let root = self.spectrum.root_near(guess, depth_m)?;
-        // The remaining error is about the square of the step.
+        // The remaining error is about the square of the relative step: 1e-10.
         if (root.multiplier - guess).norm() < 1e-5 * guess.norm() {
             return Some(root);
         }

@@ -15,10 +15,11 @@ use crate::spectrum::crossing::Crossing;
 use crate::spectrum::root::Root;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Share of the depth range that is scanned first; then ranges double.
-const FIRST_PART: f64 = 0.125;
+/// Share of the depth range for which the first mesh of the period is built; each further mesh covers twice the depth
+/// of the one before.
+const FIRST_SHARE: f64 = 0.125;
 
-/// Relative tolerance of the depth of a crossing.
+/// Relative error of the depth of a crossing on a given mesh, at which Newton's method stops.
 const ROOT: f64 = 1e-9;
 
 /// All crossings of the unit circle from depth 0 to `depth_mm`, sampled at `samples` equal steps and finer where
@@ -50,7 +51,7 @@ pub(crate) fn line_of<S: Spectrum>(
     check_depth(depth_mm)?;
     let depth_m = depth_mm * 1e-3;
     let samples = samples.max(1);
-    let mut deepest_m = depth_m * FIRST_PART;
+    let mut deepest_m = depth_m * FIRST_SHARE;
     let mut scan = Scan {
         rpm,
         spectrum: spectrum(deepest_m),

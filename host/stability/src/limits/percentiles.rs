@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn nine_of_ten_intervals_hold_the_percentile_also_beside_a_gap() {
+    fn nine_of_ten_intervals_contain_the_percentile_also_next_to_a_gap() {
         let seed = 20_261_121;
         println!("seed {seed}");
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);

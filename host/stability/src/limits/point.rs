@@ -27,12 +27,12 @@ pub struct CutStability {
     pub multiplier: Complex64,
     /// Absolute value |μ| of the multiplier.
     pub multiplier_abs: f64,
-    /// Error estimate of the multiplier, from a second, finer collocation. If too many multipliers have nearly one size
-    /// to tell which is the largest, the excess of the largest possible one over this, or, below 0.27, the largest
-    /// possible difference.
+    /// Error estimate of the multiplier, from a second, finer collocation. If the period map is not reliable, it is at
+    /// least the distance from |μ| to the radius beyond which a winding number counts no multiplier, since a larger
+    /// multiplier may lie between. If no multiplier above 0.25 was found then, it is that radius itself.
     pub error: f64,
-    /// Verdict from |μ| and its error. It is also unstable if this multiplier certainly lies outside and a larger one
-    /// is not excluded.
+    /// Verdict from |μ| and its error. It is also unstable if this multiplier certainly lies outside the unit circle,
+    /// even if a larger one may exist.
     pub verdict: Verdict,
     /// Kind of stability loss: how the dominant multiplier leaves, or would leave, the unit circle.
     pub kind: StabilityLoss,
@@ -113,7 +113,7 @@ struct Solution {
     error: f64,
     /// Mesh of the tooth period at the working resolution.
     period: Period,
-    /// Verdict, if more is known than follows from multiplier and error.
+    /// Verdict, if it is more certain than |μ| and its error show; otherwise `None`.
     verdict: Option<Verdict>,
 }
 
@@ -126,7 +126,8 @@ fn error(coarse: Complex64, fine: Complex64, least: f64) -> f64 {
 struct Rough {
     /// Multipliers; of a conjugate pair the upper one.
     multipliers: Vec<Complex64>,
-    /// Complex depth |w (1 − 1/μ)| of the smallest of them, m; near the unit circle it is at most twice the depth.
+    /// Largest complex depth |w (1 − 1/μ)| of these multipliers, m, and at least 2 w, which is its bound on the unit
+    /// circle.
     kappa_m: f64,
 }
 
@@ -194,7 +195,7 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
         return None;
     }
     let Some(coarse) = beyond.multiplier else {
-        // All multipliers are small; which of them is the largest may remain open.
+        // All multipliers lie within the radius. Which of the candidates is the largest may remain open.
         let within = |candidate: &&Complex64| candidate.norm() < beyond.radius;
         return Some(Solution {
             multiplier: *candidates.iter().find(within)?,
@@ -211,7 +212,7 @@ fn searched(problem: &Problem, rpm: f64, depth_m: f64, candidates: &[Complex64])
         // Another multiplier may lie between this one and the radius.
         error: own.max(beyond.radius - fine.norm()),
         period: working,
-        // If this multiplier lies outside, a larger one does as well.
+        // If this multiplier lies outside the unit circle, a larger one would lie outside as well.
         verdict: (fine.norm() - own > 1.0).then_some(Verdict::Unstable),
     })
 }

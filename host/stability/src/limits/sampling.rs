@@ -94,8 +94,8 @@ impl Basis {
                 }
             }
             let left = rest.norm();
-            // A unit vector keeps at least 1/√size of its length while directions are missing; the threshold lies far
-            // below.
+            // While directions are missing, some unit vector keeps at least 1/√size of its length after
+            // orthogonalization, far above the threshold of 1e-3.
             if vectors.len() < size && left > 1e-3 * length && left.is_finite() && left > 0.0 {
                 vectors.push(rest / left);
             }

@@ -69,7 +69,7 @@ impl Tangent {
     }
 
     /// Difference quotient between two problems that differ by `length` units of the parameter, with equal numbers of
-    /// teeth and states. It is a central difference if they lie on both sides of the problem.
+    /// teeth and states. It is a central difference if the point of differentiation is half way between the two.
     pub fn between(low: &Problem, high: &Problem, length: f64) -> Self {
         let (p, q) = (&low.structure, &high.structure);
         let (f, g) = (&low.process, &high.process);
@@ -150,7 +150,7 @@ impl<'a> Sensitivity<'a> {
                 let angle = std::f64::consts::TAU * (hz * problem.tooth_period_s(rpm)).fract();
                 Complex64::new(angle.cos(), angle.sin().abs())
             }
-            // At κ = 0 the depth has no influence, so that such a limit does not exist.
+            // At a fold μ = 1 and κ = w (1 − 1/μ) = 0: the depth has no influence, so that no such limit exists.
             _ => return Err(broke_down),
         };
         Self::of_crossing(problem, rpm, switch.depth_mm * 1e-3, multiplier).ok_or(broke_down)

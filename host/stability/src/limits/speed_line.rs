@@ -16,7 +16,8 @@ pub struct Switch {
     pub error_mm: Option<f64>,
     /// Kind of crossing.
     pub kind: StabilityLoss,
-    /// True if the multiplier moves inside: stability is gained, provided no other multiplier is outside.
+    /// True if the multiplier moves into the unit circle with growing depth: stability is gained, provided that no
+    /// other multiplier is outside.
     pub gain: bool,
     /// Frequency of the vibration that begins or ends there, Hz.
     pub chatter_hz: Option<f64>,

@@ -28,23 +28,23 @@ use crate::criteria::{BATCH, BATCHES, BATCHES_OF_CELLS, IMPOSSIBLE_MAX, PILOT};
 use crate::error::StabilityError;
 use quietcut_model::case::Case;
 
-/// Shares of machines at which percentiles are computed.
+/// Shares of the machines that define the percentiles: 5, 50 and 95 %.
 const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 
-/// Number of steps in depth up to the limit predicted by derivatives, with a margin; if no limit is found, the whole
-/// depth is searched.
+/// Number of depth steps of the first search for a machine's limit, from 0 to 1.2 times the limit predicted from
+/// derivatives. If it finds none, the whole depth is searched.
 const SAMPLES_NEAR: usize = 16;
 
-/// Number of steps over the whole depth, as in a chart.
+/// Number of depth steps of a search over the whole depth: the least number of a chart.
 const SAMPLES: usize = 40;
 
 /// Function that builds the method for a case; the reason if the case is not a valid machine.
-pub type Maker<'a> = dyn Fn(&Case) -> Result<Box<dyn Method>, String> + Sync + 'a;
+pub type MethodOfCase<'a> = dyn Fn(&Case) -> Result<Box<dyn Method>, String> + Sync + 'a;
 
 /// Case with deviations, and the method for its machines.
 pub struct Uncertainty<'a> {
     case: &'a Case,
-    maker: &'a Maker<'a>,
+    method_of: &'a MethodOfCase<'a>,
     variables: Vec<Variable>,
     /// Derivatives of limits along the variables, which give the directions of stratification.
     linear: Option<Linearized>,
@@ -53,12 +53,12 @@ pub struct Uncertainty<'a> {
 
 impl<'a> Uncertainty<'a> {
     /// Prepares the draws; `None` if the case has no deviations.
-    pub fn new(case: &'a Case, maker: &'a Maker<'a>, seed: u64) -> Option<Self> {
+    pub fn new(case: &'a Case, method_of: &'a MethodOfCase<'a>, seed: u64) -> Option<Self> {
         let variables = Variable::of_case(case);
         (!variables.is_empty()).then(|| Self {
             linear: Linearized::new(case, &variables),
             case,
-            maker,
+            method_of,
             variables,
             seed,
         })
@@ -192,7 +192,7 @@ impl<'a> Uncertainty<'a> {
         if !moves.all(|(variable, deviations)| variable.shift(&mut case, *deviations)) {
             return Ok(Err("a parameter lies outside of its bounds".into()));
         }
-        let method = match (self.maker)(&case) {
+        let method = match (self.method_of)(&case) {
             Ok(method) => method,
             Err(reason) => return Ok(Err(reason)),
         };
@@ -230,7 +230,7 @@ impl Batches {
             .filter_map(|drawn| drawn.line.as_ref().ok())
     }
 
-    /// Why the first machine that cannot exist does not.
+    /// Reason why the first drawn machine that is not physical is impossible.
     fn first_reason(&self) -> Option<&str> {
         let reasons = self
             .0

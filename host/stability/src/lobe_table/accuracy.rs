@@ -11,25 +11,26 @@ use crate::criteria::{CHECK_GROWTH, CHECK_STEP, LEAST_CHECKS, SUSPECT, TABLE_ROO
 use crate::error::StabilityError;
 use crate::limits::speed_line::SpeedLine;
 
-/// Position of the checked speeds within the parts of a gap, alternating from gap to gap. It avoids the middle, which
-/// refinement has tested, and is not symmetric, so that lobes symmetric about the gap are detected.
+/// Position of a checked speed within its share of a gap (0 to 1), alternating from gap to gap. It avoids the middle,
+/// which refinement has tested, and is not symmetric, so that lobes symmetric about the gap are detected.
 const OFFSETS: [f64; 2] = [0.38, 0.62];
 
-/// Largest number of doublings of the checked speeds in a suspect gap: from two to five, eleven, 23.
+/// Largest number of times that a suspect gap is checked at further speeds, half way between those checked before: two
+/// speeds become five, eleven, 23.
 const ROUNDS: usize = 3;
 
 /// Largest disagreement between table and method, as distance of a depth from the nearest limit of the method, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Miss {
+pub(super) struct Disagreement {
     /// Largest distance over depths that are stable in the table only (unsafe side).
     pub(super) unsafe_mm: f64,
     /// Largest distance over depths that are stable by the method only (cautious side).
     pub(super) cautious_mm: f64,
 }
 
-impl Miss {
+impl Disagreement {
     /// Disagreement of two sets of stable depths up to `depth_mm`; depth 0 counts as a limit if nothing is stable.
-    pub(super) fn between(truth: &[[f64; 2]], told: &[[f64; 2]], depth_mm: f64) -> Self {
+    pub(super) fn between(truth: &[[f64; 2]], tabulated: &[[f64; 2]], depth_mm: f64) -> Self {
         let ends = |set: &[[f64; 2]]| -> Vec<f64> { set.iter().flatten().copied().collect() };
         let mut limits: Vec<f64> = ends(truth)
             .into_iter()
@@ -39,7 +40,7 @@ impl Miss {
             limits.push(0.0);
         }
         let mut all = ends(truth);
-        all.extend(ends(told));
+        all.extend(ends(tabulated));
         all.extend([0.0, depth_mm]);
         // The last depth of a table is rounded and may lie beyond the last depth of the method.
         all.retain(|&end| end <= depth_mm);
@@ -53,7 +54,7 @@ impl Miss {
         for pair in all.windows(2).filter(|pair| pair[1] > pair[0]) {
             let middle = 0.5 * (pair[0] + pair[1]);
             let off = distance(pair[0]).max(distance(middle)).max(distance(pair[1]));
-            match (is_in(truth, middle), is_in(told, middle)) {
+            match (is_in(truth, middle), is_in(tabulated, middle)) {
                 (false, true) => miss.unsafe_mm = miss.unsafe_mm.max(off),
                 (true, false) => miss.cautious_mm = miss.cautious_mm.max(off),
                 _ => {}
@@ -63,7 +64,7 @@ impl Miss {
     }
 }
 
-impl Miss {
+impl Disagreement {
     /// The larger value on each side.
     fn max(self, other: Self) -> Self {
         Self {
@@ -80,17 +81,17 @@ impl Miss {
 
 /// Lines of the method at several speeds inside every gap of a table, in every layer and half way between layers.
 pub(super) struct Checks<'a> {
-    spans: &'a [CheckedLayers],
+    checked_layers: &'a [CheckedLayers],
     speeds: &'a [f64],
     depth_mm: f64,
-    /// Lines by layer span and gap, by ascending speed.
+    /// Lines by checked layers and gap, each by ascending speed.
     lines: Vec<Vec<Vec<SpeedLine>>>,
 }
 
 impl<'a> Checks<'a> {
     /// Computes lines at two speeds per gap, or more if the gap is wide.
     pub(super) fn new(
-        spans: &'a [CheckedLayers],
+        checked_layers: &'a [CheckedLayers],
         speeds: &'a [f64],
         depth_mm: f64,
     ) -> Result<Self, StabilityError> {
@@ -107,23 +108,23 @@ impl<'a> Checks<'a> {
             })
             .collect();
         let mut checks = Self {
-            spans,
+            checked_layers,
             speeds,
             depth_mm,
-            lines: vec![vec![Vec::new(); places.len()]; spans.len()],
+            lines: vec![vec![Vec::new(); places.len()]; checked_layers.len()],
         };
-        for span in 0..spans.len() {
-            checks.add(span, &places)?;
+        for layers in 0..checked_layers.len() {
+            checks.add(layers, &places)?;
         }
         Ok(checks)
     }
 
-    /// Adds the lines of a span at given speeds by gap.
-    fn add(&mut self, span: usize, places: &[Vec<f64>]) -> Result<(), StabilityError> {
+    /// Adds lines of checked layers at further speeds, given by gap.
+    fn add(&mut self, layers: usize, places: &[Vec<f64>]) -> Result<(), StabilityError> {
         let all: Vec<f64> = places.iter().flatten().copied().collect();
-        let lines = self.spans[span].family.lines(&all, self.depth_mm)?;
+        let lines = self.checked_layers[layers].family.lines(&all, self.depth_mm)?;
         let mut lines = lines.into_iter();
-        for (own, places) in self.lines[span].iter_mut().zip(places) {
+        for (own, places) in self.lines[layers].iter_mut().zip(places) {
             own.extend(lines.by_ref().take(places.len()));
             own.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
         }
@@ -135,13 +136,13 @@ impl<'a> Checks<'a> {
     /// # Errors
     /// As the method.
     pub(super) fn resolve(&mut self, table: &LobeTable<'_>, tolerance_mm: f64) -> Result<(), StabilityError> {
-        let least = Miss {
+        let least = Disagreement {
             unsafe_mm: SUSPECT * tolerance_mm,
             cautious_mm: SUSPECT * tolerance_mm,
         };
-        let misses = |checks: &Self| -> Vec<Vec<Miss>> {
-            (0..checks.spans.len())
-                .map(|span| checks.misses(table, span))
+        let misses = |checks: &Self| -> Vec<Vec<Disagreement>> {
+            (0..checks.checked_layers.len())
+                .map(|layers| checks.misses(table, layers))
                 .collect()
         };
         let mut worst = misses(self);
@@ -165,27 +166,32 @@ impl<'a> Checks<'a> {
     }
 
     /// Midpoints between the checked speeds of a gap, including its ends.
-    fn middles(&self, span: usize, gap: usize) -> Vec<f64> {
+    fn middles(&self, layers: usize, gap: usize) -> Vec<f64> {
         let mut known = vec![self.speeds[gap]];
-        known.extend(self.lines[span][gap].iter().map(|line| line.rpm));
+        known.extend(self.lines[layers][gap].iter().map(|line| line.rpm));
         known.push(self.speeds[gap + 1]);
         known.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
     }
 
-    /// Largest disagreement in every gap of a layer span.
-    fn misses(&self, table: &LobeTable<'_>, span: usize) -> Vec<Miss> {
-        let family = &self.spans[span].family;
+    /// Largest disagreement in every gap, for one of the checked layers.
+    fn misses(&self, table: &LobeTable<'_>, layers: usize) -> Vec<Disagreement> {
+        let family = &self.checked_layers[layers].family;
         let miss = |line: &SpeedLine| {
-            let told: Vec<[f64; 2]> = told(table, family, line.rpm).map_or(Vec::new(), |column| {
+            let tabulated: Vec<[f64; 2]> = column_of(table, family, line.rpm).map_or(Vec::new(), |column| {
                 let stable = column.stable();
                 stable
                     .map(|(from, to)| [f64::from(from.0), f64::from(to.0)])
                     .collect()
             });
-            Miss::between(&surely_stable(line, self.depth_mm), &told, self.depth_mm)
+            Disagreement::between(&surely_stable(line, self.depth_mm), &tabulated, self.depth_mm)
         };
-        let worst = |lines: &Vec<SpeedLine>| lines.iter().map(miss).fold(Miss::default(), Miss::max);
-        self.lines[span].iter().map(worst).collect()
+        let worst = |lines: &Vec<SpeedLine>| {
+            lines
+                .iter()
+                .map(miss)
+                .fold(Disagreement::default(), Disagreement::max)
+        };
+        self.lines[layers].iter().map(worst).collect()
     }
 
     /// Corrects gaps in which `table` calls depths stable that are unstable, by more than `tolerance_mm`. The entries
@@ -193,7 +199,7 @@ impl<'a> Checks<'a> {
     /// islands between entries.
     ///
     /// Lookups in such a gap, and in its neighbours, then err on the safe side. `entries` are by layer and speed.
-    /// Returns the corrected gaps by span: their lines have shaped entries and are no independent check, so that
+    /// Returns the corrected gaps by checked layers: their lines have shaped entries and are no independent check, so that
     /// [`check_again`](Self::check_again) adds others.
     pub(super) fn guard(
         &self,
@@ -202,8 +208,8 @@ impl<'a> Checks<'a> {
         tolerance_mm: f64,
     ) -> Vec<Vec<bool>> {
         let before = entries.to_vec();
-        let mut guarded = Vec::with_capacity(self.spans.len());
-        for (index, span) in self.spans.iter().enumerate() {
+        let mut guarded = Vec::with_capacity(self.checked_layers.len());
+        for (index, checked) in self.checked_layers.iter().enumerate() {
             let misses = self.misses(table, index);
             for (gap, _) in misses
                 .iter()
@@ -211,7 +217,8 @@ impl<'a> Checks<'a> {
                 .filter(|(_, miss)| miss.unsafe_mm > tolerance_mm)
             {
                 let corners = || {
-                    span.layers
+                    checked
+                        .layers
                         .iter()
                         .flat_map(|&layer| [(layer, gap), (layer, gap + 1)])
                 };
@@ -230,40 +237,41 @@ impl<'a> Checks<'a> {
         guarded
     }
 
-    /// Checks gaps (by span) at more speeds, half way between the checked ones.
+    /// Checks gaps (by checked layers) at more speeds, half way between the checked ones.
     ///
     /// # Errors
     /// As the method.
     pub(super) fn check_again(&mut self, gaps: &[Vec<bool>]) -> Result<(), StabilityError> {
-        for (span, gaps) in gaps.iter().enumerate() {
+        for (layers, gaps) in gaps.iter().enumerate() {
             let places = gaps.iter().enumerate();
             let places: Vec<Vec<f64>> = places
                 .map(|(gap, again)| {
                     if *again {
-                        self.middles(span, gap)
+                        self.middles(layers, gap)
                     } else {
                         Vec::new()
                     }
                 })
                 .collect();
-            self.add(span, &places)?;
+            self.add(layers, &places)?;
         }
         Ok(())
     }
 
     /// Error that the table states.
     ///
-    /// In depth: the largest distance of a stable depth of the table from the method's; in gaps where both have the
-    /// same limits also of the method's from the table's. It is multiplied by 1.5, plus the rounding of the entries. In
-    /// speed: the width of a gap, with its neighbours, in which a layer gives up more than twice the tolerance.
+    /// Error in depth: the largest distance by which stable depths of the table lie beyond limits of the method. In
+    /// gaps where the table is cautious by no more than twice the tolerance, that distance counts as well. The result
+    /// is multiplied by [`TABLE_ROOM`], plus the rounding of the entries. Error in speed: the largest width of a gap,
+    /// together with its neighbours, in which the table is cautious by more than twice the tolerance.
     pub(super) fn stated(&self, table: &LobeTable<'_>, tolerance_mm: f64) -> InterpolationError {
         let (mut depth, mut speed) = (0.0_f64, 0.0_f64);
-        for (index, span) in self.spans.iter().enumerate() {
+        for (index, checked) in self.checked_layers.iter().enumerate() {
             for (gap, miss) in self.misses(table, index).into_iter().enumerate() {
                 depth = depth.max(miss.unsafe_mm);
                 if miss.cautious_mm <= 2.0 * tolerance_mm {
                     depth = depth.max(miss.cautious_mm);
-                } else if span.layers.len() == 1 {
+                } else if checked.layers.len() == 1 {
                     let (low, high) = (gap.saturating_sub(1), (gap + 2).min(self.speeds.len() - 1));
                     speed = speed.max((self.speeds[high] - self.speeds[low]) / self.speeds[low]);
                 }
@@ -271,13 +279,13 @@ impl<'a> Checks<'a> {
         }
         InterpolationError {
             depth: Millimeters((TABLE_ROOM * depth + f64::from(table.depth_step().0)) as f32),
-            // A gap as wide as the speed itself is no bound; refinement never leaves one.
+            // A relative width of 1 would be no bound; refinement never leaves such a gap.
             speed: speed.min(0.999) as f32,
         }
     }
 }
 
-fn told(table: &LobeTable<'_>, family: &Family, rpm: f64) -> Option<Column> {
+fn column_of(table: &LobeTable<'_>, family: &Family, rpm: f64) -> Option<Column> {
     let point = WorkingPoint {
         axial_depth: Millimeters(0.0),
         start: family.validity.start,

@@ -6,7 +6,7 @@ use quietcut_core::working_point::WorkingPoint;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
-use super::accuracy::Miss;
+use super::accuracy::Disagreement;
 use super::build::build_table;
 use super::entries::surely_stable;
 use super::request::TableRequest;
@@ -76,16 +76,16 @@ fn trial(
         .map(|(truth, direct)| {
             let rpm = direct.rpm;
             let column = table.column(Rpm(rpm as f32), &at_no_depth(&case)).unwrap();
-            let told: Vec<[f64; 2]> = column
+            let tabulated: Vec<[f64; 2]> = column
                 .stable()
                 .map(|(from, to)| [f64::from(from.0), f64::from(to.0)])
                 .collect();
-            let miss = Miss::between(truth, &told, depth_mm);
+            let miss = Disagreement::between(truth, &tabulated, depth_mm);
             let is_in =
                 |set: &[[f64; 2]], depth: f64| set.iter().any(|&[from, to]| from <= depth && depth <= to);
             let mut given_up: Vec<f64> = (0..400)
                 .map(|index| depth_mm * (f64::from(index) + 0.5) / 400.0)
-                .filter(|&depth| is_in(truth, depth) && !is_in(&told, depth))
+                .filter(|&depth| is_in(truth, depth) && !is_in(&tabulated, depth))
                 .filter(|&depth| {
                     direct
                         .switches

@@ -22,8 +22,8 @@ const BYTES: usize = 32 * 1024;
 /// Default number of speeds before refinement. A choice.
 const SPEEDS: usize = 121;
 
-/// Number of corrections of entries. The lines of the first need not be the worst; corrections after the third change
-/// little.
+/// Largest number of corrections of entries to the safe side. The speeds checked in a correction need not be the worst
+/// of a gap; corrections after the third change little.
 const GUARDED: usize = 3;
 
 /// Bytes of a lobe table, header and CRC included: one layer per case, feed and feed direction.
@@ -94,8 +94,8 @@ pub fn build_table(cases: &[Case], request: &TableRequest) -> Result<Vec<u8>, Bu
         table.bytes(error)
     };
     let tolerance_mm = TABLE_TOLERANCE * depth_mm;
-    let spans = layers::spans(&families)?;
-    let mut checks = Checks::new(&spans, &speeds, depth_mm)?;
+    let checked_layers = layers::checked_layers(&families)?;
+    let mut checks = Checks::new(&checked_layers, &speeds, depth_mm)?;
     let mut written = bytes(&entries, None)?;
     let plain = LobeTable::parse(&written).map_err(BuildError::Format)?;
     checks.resolve(&plain, tolerance_mm)?;

@@ -20,7 +20,7 @@ pub(super) struct Derivatives {
     pub(super) by_speed: Vec<SlopesOfLine>,
 }
 
-/// Derivatives of the switches at one speed.
+/// Derivatives of the limits at one speed, each with the depth of its limit, mm.
 pub(super) struct SlopesOfLine(Vec<(f64, Slopes)>);
 
 impl SlopesOfLine {
@@ -53,7 +53,7 @@ pub(super) fn mode_count(families: &[Family]) -> Result<usize, BuildError> {
 }
 
 /// Derivatives of one switch by frequency and damping of each mode and by cutting force, mm per relative change.
-struct All {
+struct SwitchDerivatives {
     depth_mm: f64,
     by_mode: Vec<[f64; 2]>,
     by_force: f64,
@@ -63,7 +63,7 @@ impl Derivatives {
     /// Derivatives of all switches, for the `count` modes with the largest influence on limits.
     pub(super) fn new(family: &Family, lines: &[SpeedLine], count: usize) -> Result<Self, BuildError> {
         let parts = family.linear.structure.modal_parts();
-        let all: Vec<Vec<All>> = lines
+        let all: Vec<Vec<SwitchDerivatives>> = lines
             .par_iter()
             .map(|line| {
                 let switches = line.switches.iter();
@@ -74,7 +74,8 @@ impl Derivatives {
             .collect();
         let influence = |mode: usize| {
             let switches = all.iter().flatten();
-            // Influence as the mean of absolute values: a median would miss a mode that governs one lobe only.
+            // Influence of a mode: the sum of absolute derivatives over all limits. A median would miss a mode that
+            // governs one lobe only.
             switches.map(|switch| switch.by_mode[mode][0].abs()).sum::<f64>()
         };
         let mut chosen: Vec<usize> = (0..parts.len()).collect();
@@ -100,7 +101,7 @@ impl Derivatives {
     }
 }
 
-impl All {
+impl SwitchDerivatives {
     fn of_modes(&self, chosen: &[usize]) -> Slopes {
         let mut slopes = Slopes {
             by_cutting_force: self.by_force as f32,
@@ -117,7 +118,7 @@ impl All {
 
 /// Derivatives of one switch; `None` if the limit is not differentiable, at the tip of an island. The table then has
 /// zeros.
-fn of_switch(family: &Family, parts: &[ModalPart], rpm: f64, switch: &Switch) -> Option<All> {
+fn of_switch(family: &Family, parts: &[ModalPart], rpm: f64, switch: &Switch) -> Option<SwitchDerivatives> {
     let problem = &family.linear;
     let sensitivity = Sensitivity::new(problem, rpm, switch).ok()?;
     let by_mode = parts.iter().map(|part| {
@@ -128,7 +129,7 @@ fn of_switch(family: &Family, parts: &[ModalPart], rpm: f64, switch: &Switch) ->
             by_damping.depth_mm * part.damping_ratio(),
         ])
     });
-    Some(All {
+    Some(SwitchDerivatives {
         depth_mm: switch.depth_mm,
         by_mode: by_mode.collect::<Option<_>>()?,
         by_force: sensitivity.slope(&Tangent::cutting_force(problem))?.depth_mm,

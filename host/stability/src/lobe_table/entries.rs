@@ -66,7 +66,7 @@ pub(super) fn unstable(line: &SpeedLine, depth_mm: f64) -> Vec<Entry> {
     limited(entries)
 }
 
-/// Union of the entries with `others`; overlapping entries keep their kind.
+/// Union of the entries with `others`; where both overlap, the kind of stability loss is that of `entries`.
 pub(super) fn with_all_of(entries: &[Entry], others: &[Entry]) -> Vec<Entry> {
     let mut all = entries.to_vec();
     for other in others {

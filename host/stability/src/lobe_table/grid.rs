@@ -6,7 +6,9 @@ use crate::limits::chart::{Refinement, chart};
 use crate::limits::speed_line::SpeedLine;
 use crate::limits::speeds::spaced;
 
-/// Default largest depth: four times the lowest limit, found by doubling. Deeper pockets of stability are narrow.
+/// Default largest axial depth of a table, mm: four times the lowest first limit of all layers at 24 speeds, or 500 mm
+/// if no limit lies below about 330 mm. The search doubles the depth, from 0.01 mm, until a limit appears. The factor
+/// of four is a choice: stable pockets beyond it are narrow in speed.
 pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> Result<f64, StabilityError> {
     const SHALLOWEST_MM: f64 = 0.01;
     const DEEPEST_MM: f64 = 500.0;
@@ -29,7 +31,7 @@ pub(super) fn default_depth(families: &[Family], from_rpm: f64, to_rpm: f64) -> 
     Ok(DEEPEST_MM)
 }
 
-/// Speeds that any of the layers needs, ascending, with the lines of every layer at all of them.
+/// Union of the refined speeds of all layers, ascending, with the lines of every layer at all of these speeds.
 pub(super) fn lines_of_all(
     families: &[Family],
     coarse: &[f64],
@@ -51,7 +53,7 @@ pub(super) fn lines_of_all(
     speeds.dedup_by_key(|rpm| *rpm as f32);
     let lines = families.iter().zip(known);
     let lines = lines
-        .map(|(family, known)| family.lines_beside(known, &speeds, depth_mm))
+        .map(|(family, known)| family.lines_with_known(known, &speeds, depth_mm))
         .collect::<Result<_, _>>()?;
     Ok((speeds, lines))
 }

@@ -24,7 +24,8 @@ use quietcut_model::case::Case;
 /// Feed per tooth, mm, stated for a layer whose limits do not depend on the feed; larger than any feed.
 const ANY_FEED_MM: f32 = 100.0;
 
-/// Number of speeds at which the dependence of limits on feed and direction is probed. Unfounded.
+/// Number of speeds at which limits half way between two feeds, or two feed directions, are compared with the mean of
+/// both. Unfounded.
 pub(super) const PROBES: usize = 16;
 
 /// Seed of the draws for percentiles; fixed, so that a table can be reproduced.
@@ -116,11 +117,12 @@ impl Family {
 
     /// Lines at these speeds; with a percentile, lines of that percentile.
     pub(super) fn lines(&self, speeds_rpm: &[f64], depth_mm: f64) -> Result<Vec<SpeedLine>, StabilityError> {
-        self.lines_beside(Vec::new(), speeds_rpm, depth_mm)
+        self.lines_with_known(Vec::new(), speeds_rpm, depth_mm)
     }
 
-    /// The same lines, if those of the method at some of the speeds are known.
-    pub(super) fn lines_beside(
+    /// Lines at these speeds like [`lines`](Self::lines). `known` contains lines of the method at some of them, which
+    /// are not computed again.
+    pub(super) fn lines_with_known(
         &self,
         known: Vec<SpeedLine>,
         speeds_rpm: &[f64],
@@ -135,8 +137,8 @@ impl Family {
         let Some(percent) = self.percentile else {
             return Ok(lines);
         };
-        let maker = |case: &Case| collocation_of(case).map_err(|error| error.to_string());
-        let Some(uncertainty) = Uncertainty::new(&self.case, &maker, SEED) else {
+        let method_of = |case: &Case| collocation_of(case).map_err(|error| error.to_string());
+        let Some(uncertainty) = Uncertainty::new(&self.case, &method_of, SEED) else {
             return Ok(lines);
         };
         let limited: Vec<Result<SpeedLine, StabilityError>> = lines
@@ -212,16 +214,16 @@ pub(super) struct CheckedLayers {
 }
 
 /// All layers, and the middles of all neighbours in feed or in feed direction.
-pub(super) fn spans(families: &[Family]) -> Result<Vec<CheckedLayers>, BuildError> {
-    let mut spans = Vec::new();
+pub(super) fn checked_layers(families: &[Family]) -> Result<Vec<CheckedLayers>, BuildError> {
+    let mut checked_layers = Vec::new();
     for (index, family) in families.iter().enumerate() {
-        spans.push(CheckedLayers {
+        checked_layers.push(CheckedLayers {
             family: family.at(family.feed_mm(), family.direction_deg)?,
             layers: vec![index],
         });
         if let Some(next) = nearest(families, index, |other| other.feeds_beyond(family)) {
             let feed_mm = 0.5 * (family.feed_mm() + families[next].feed_mm());
-            spans.push(CheckedLayers {
+            checked_layers.push(CheckedLayers {
                 family: family.at(feed_mm, family.direction_deg)?,
                 layers: vec![index, next],
             });
@@ -229,13 +231,13 @@ pub(super) fn spans(families: &[Family]) -> Result<Vec<CheckedLayers>, BuildErro
         if let Some(next) = nearest(families, index, |other| other.turned_from(family)) {
             let turn = families[next].turned_from(family).unwrap_or(0.0);
             let degrees = family.direction_deg.map(|degrees| degrees + 0.5 * turn);
-            spans.push(CheckedLayers {
+            checked_layers.push(CheckedLayers {
                 family: family.at(family.feed_mm(), degrees)?,
                 layers: vec![index, next],
             });
         }
     }
-    Ok(spans)
+    Ok(checked_layers)
 }
 
 /// The family at the least distance from another; `None` if no distance is defined.

@@ -4,7 +4,7 @@ use quietcut_core::working_point::WorkingPoint;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
-use super::accuracy::Miss;
+use super::accuracy::Disagreement;
 use super::encoding::towards;
 use super::entries::{self, Entry};
 use super::*;
@@ -42,7 +42,7 @@ fn request(rpm: (f64, f64), depth_mm: f64) -> TableRequest {
 }
 
 /// First limit stated by a table, mm; the last depth if nothing is unstable.
-fn told_limit(table: &LobeTable, point: &WorkingPoint, direction_deg: Option<f64>, rpm: f64) -> f64 {
+fn tabulated_limit(table: &LobeTable, point: &WorkingPoint, direction_deg: Option<f64>, rpm: f64) -> f64 {
     let table = towards(table, direction_deg);
     let column = table.column(Rpm(rpm as f32), point).unwrap();
     let depths = table.depths();
@@ -62,7 +62,7 @@ fn is_stable(line: &SpeedLine, depth_mm: f64) -> bool {
 struct Trial<'a> {
     table: &'a LobeTable<'a>,
     depth_mm: f64,
-    largest: Miss,
+    largest: Disagreement,
 }
 
 impl<'a> Trial<'a> {
@@ -70,25 +70,30 @@ impl<'a> Trial<'a> {
         Self {
             table,
             depth_mm: f64::from(table.depths().1.0),
-            largest: Miss::default(),
+            largest: Disagreement::default(),
         }
     }
 
     /// Checks that every depth the table calls stable at the speed of a cut is so within the stated depth. `direct` is
     /// the line of the method.
-    fn check(&mut self, point: &WorkingPoint, direction_deg: Option<f64>, direct: &SpeedLine) -> Miss {
+    fn check(
+        &mut self,
+        point: &WorkingPoint,
+        direction_deg: Option<f64>,
+        direct: &SpeedLine,
+    ) -> Disagreement {
         let table = towards(self.table, direction_deg);
         let column = table.column(Rpm(direct.rpm as f32), point).unwrap();
-        let told: Vec<[f64; 2]> = column
+        let tabulated: Vec<[f64; 2]> = column
             .stable()
             .map(|(from, to)| [f64::from(from.0), f64::from(to.0)])
             .collect();
         let truth = entries::surely_stable(direct, self.depth_mm);
-        let miss = Miss::between(&truth, &told, self.depth_mm);
+        let miss = Disagreement::between(&truth, &tabulated, self.depth_mm);
         let stated = f64::from(self.table.interpolation_error().unwrap().depth.0);
         assert!(
             miss.unsafe_mm <= stated,
-            "{} rev/min, {point:?}, {direction_deg:?}: off by {} mm, stated {stated}; {truth:?}, told {told:?}",
+            "{} rev/min, {point:?}, {direction_deg:?}: off by {} mm, stated {stated}; {truth:?}, tabulated {tabulated:?}",
             direct.rpm,
             miss.unsafe_mm
         );
@@ -150,7 +155,7 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
         let around = [-1.0, -0.6, -0.3, 0.3, 0.6, 1.0].map(|share| direct(line.rpm + share * reach));
         for _ in 0..50 {
             let depth: f64 = rng.random_range(0.0..depth_mm);
-            let told = matches!(
+            let tabulated = matches!(
                 table.lookup(Rpm(line.rpm as f32), &point(&case, depth, 0.15)),
                 TabulatedStability::Stable { .. }
             );
@@ -160,7 +165,8 @@ fn stable_depths_between_the_entries_are_stable_within_the_stated_error() {
                 .map(|switch| (switch.depth_mm - depth).abs())
                 .fold(f64::INFINITY, f64::min);
             assert!(
-                told || !is_stable(line, depth)
+                tabulated
+                    || !is_stable(line, depth)
                     || near_mm <= allowed_mm
                     || around.iter().any(|line| !is_stable(line, depth)),
                 "{} rev/min, {depth} mm: given up, and stable within {reach} rev/min",
@@ -228,9 +234,9 @@ fn teeth_at_unequal_pitch_have_a_table_of_their_own() {
     for rpm in [1257.0, 1281.0, 1324.0] {
         let direct = method.line(rpm, 5.0, 40).unwrap();
         trial.check(&point(&uneven, 1.0, 0.15), None, &direct);
-        let told_mm = told_limit(&table, &point(&uneven, 1.0, 0.15), None, rpm);
+        let tabulated_mm = tabulated_limit(&table, &point(&uneven, 1.0, 0.15), None, rpm);
         let even_mm = limit(&line(&problem(&even), rpm, 5.0, 40).unwrap(), 5.0);
-        differs_mm = differs_mm.max((told_mm - even_mm).abs());
+        differs_mm = differs_mm.max((tabulated_mm - even_mm).abs());
     }
     trial.report();
     // The difference is forty times the stated error, so that the table is that of the tool with unequal pitch.
@@ -304,11 +310,11 @@ fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
         let direct = forced.line(rpm, depth_mm, 40).unwrap();
         trial.check(&point(&case, 1.0, feed_mm), None, &direct);
         // The limit is that with cubic terms, not the linear one.
-        let told_mm = told_limit(&table, &point(&case, 1.0, feed_mm), None, rpm);
+        let tabulated_mm = tabulated_limit(&table, &point(&case, 1.0, feed_mm), None, rpm);
         let linear_mm = limit(&line(&linear, rpm, depth_mm, 40).unwrap(), depth_mm);
         assert!(
-            told_mm < depth_mm && told_mm > 1.1 * linear_mm,
-            "{rpm}: {told_mm} {linear_mm}"
+            tabulated_mm < depth_mm && tabulated_mm > 1.1 * linear_mm,
+            "{rpm}: {tabulated_mm} {linear_mm}"
         );
     }
     trial.report();
@@ -316,8 +322,8 @@ fn cubic_terms_through_table_and_lookup_stay_within_the_stated_error() {
 
 #[test]
 fn a_miss_is_measured_from_the_limits_of_the_method() {
-    let miss = |truth: &[[f64; 2]], told: &[[f64; 2]]| {
-        let miss = Miss::between(truth, told, 5.0);
+    let miss = |truth: &[[f64; 2]], tabulated: &[[f64; 2]]| {
+        let miss = Disagreement::between(truth, tabulated, 5.0);
         [miss.unsafe_mm, miss.cautious_mm]
     };
     let close = |a: [f64; 2], b: [f64; 2]| (0..2).all(|i| a[i] == b[i] || (a[i] - b[i]).abs() < 1e-12);
@@ -349,12 +355,12 @@ fn entries_take_others_in_and_keep_their_kind() {
     let own = [entry(1.0, 2.0, Flip), entry(3.0, 4.0, Hopf)];
     let others = [entry(0.5, 3.5, Hopf), entry(4.5, 5.0, Flip)];
     let all = entries::with_all_of(&own, &others);
-    let told: Vec<_> = all
+    let tabulated: Vec<_> = all
         .iter()
         .map(|entry| (entry.from_mm, entry.to_mm, entry.interval.kind))
         .collect();
     assert_eq!(
-        told,
+        tabulated,
         [
             (0.5, 1.0, Hopf),
             (1.0, 2.0, Flip),
@@ -449,12 +455,12 @@ fn feed_layers_agree_with_the_direct_solution_between_them() {
             (grid[2], 7e-4),
         ] {
             let limit_mm = limit(&line(&direct, rpm, 2.0, 40).unwrap(), 2.0);
-            let told_mm = told_limit(&table, &point(&case, 1.0, feed_mm), None, rpm);
+            let tabulated_mm = tabulated_limit(&table, &point(&case, 1.0, feed_mm), None, rpm);
             assert!(
-                (told_mm - limit_mm).abs() <= allowed_mm,
-                "{feed_mm} mm, {rpm}: {told_mm} {limit_mm}"
+                (tabulated_mm - limit_mm).abs() <= allowed_mm,
+                "{feed_mm} mm, {rpm}: {tabulated_mm} {limit_mm}"
             );
-            change_mm = change_mm.max((told_mm - told_limit(&table, &at_least, None, rpm)).abs());
+            change_mm = change_mm.max((tabulated_mm - tabulated_limit(&table, &at_least, None, rpm)).abs());
         }
     }
     assert!(change_mm > 7e-3, "{change_mm}");
@@ -479,10 +485,10 @@ fn direction_layers_agree_with_the_direct_solution_between_them() {
         let direct = problem(&case);
         for rpm in [1261.0, 1333.0] {
             let limit_mm = limit(&line(&direct, rpm, 8.0, 40).unwrap(), 8.0);
-            let told_mm = told_limit(&table, &point(&case, 1.0, 0.15), Some(degrees), rpm);
+            let tabulated_mm = tabulated_limit(&table, &point(&case, 1.0, 0.15), Some(degrees), rpm);
             assert!(
-                (told_mm - limit_mm).abs() <= f64::from(error.depth.0),
-                "{degrees}, {rpm}: {told_mm} {limit_mm}, error {}",
+                (tabulated_mm - limit_mm).abs() <= f64::from(error.depth.0),
+                "{degrees}, {rpm}: {tabulated_mm} {limit_mm}, error {}",
                 error.depth
             );
         }
@@ -503,8 +509,11 @@ fn postures_are_layers_and_a_percentile_is_that_of_the_machines() {
     let table = LobeTable::parse(&bytes).unwrap();
     for case in [&case, &stretched] {
         let limit_mm = limit(&line(&problem(case), 1300.0, 5.0, 40).unwrap(), 5.0);
-        let told_mm = told_limit(&table, &point(case, 1.0, 0.15), None, 1300.0);
-        assert!((told_mm - limit_mm).abs() < 0.03, "{told_mm} {limit_mm}");
+        let tabulated_mm = tabulated_limit(&table, &point(case, 1.0, 0.15), None, 1300.0);
+        assert!(
+            (tabulated_mm - limit_mm).abs() < 0.03,
+            "{tabulated_mm} {limit_mm}"
+        );
     }
     assert!(build_table(&[case.clone(), case.clone()], &request((1200.0, 1400.0), 5.0)).is_err());
 
@@ -517,19 +526,19 @@ fn postures_are_layers_and_a_percentile_is_that_of_the_machines() {
         ..request((1290.0, 1310.0), 5.0)
     };
     let families = layers::families(std::slice::from_ref(&case), &request).unwrap();
-    let told = families[0].lines(&[1300.0], 5.0).unwrap();
+    let tabulated = families[0].lines(&[1300.0], 5.0).unwrap();
     // With one parameter on which the limit falls monotonically, the 5 % limit is that of the machine at the 95 %
     // quantile.
     let mut hard = case.clone();
     assert!(Parameter::Ktc.shift(&mut hard, 1.644_853_6 * 12.0));
     let expected_mm = limit(&line(&problem(&hard), 1300.0, 5.0, 40).unwrap(), 5.0);
-    let told_mm = limit(&told[0], 5.0);
+    let tabulated_mm = limit(&tabulated[0], 5.0);
     // Tolerance: slices of 1/256 of the machines, 0.04 standard deviations wide there.
     assert!(
-        (told_mm - expected_mm).abs() < 2e-3 * expected_mm,
-        "{told_mm} {expected_mm}"
+        (tabulated_mm - expected_mm).abs() < 2e-3 * expected_mm,
+        "{tabulated_mm} {expected_mm}"
     );
-    assert_eq!(told[0].stable_mm, [[0.0, told_mm]]);
+    assert_eq!(tabulated[0].stable_mm, [[0.0, tabulated_mm]]);
     case.deviations.clear();
     assert!(matches!(
         build_table(&[case], &request),

@@ -14,7 +14,7 @@ use crate::problem::pitched::Pitched;
 use crate::spectrum::krylov::Dominant;
 use crate::spectrum::map_spectrum::{MapSpectrum, PeriodMap};
 
-/// Relative rounding error of the multipliers of a period of some hundred steps. Unfounded: an estimate.
+/// Relative rounding error of a multiplier from the map of a period of some hundred steps. Unfounded: an estimate.
 const ROUNDING: f64 = 1e-9;
 
 /// Scheme of one time step, such as semi-discretization.

@@ -36,7 +36,8 @@ impl MultiFrequency {
         HarmonicLoop::new(&self.problem, rpm, harmonics)
     }
 
-    /// Limits with as many harmonics as they need, their loop, and the limits with another number of harmonics.
+    /// Loop with as many harmonics as the limits need to settle, its limits, and the limits with half as many
+    /// harmonics. If the number K is set: loop and limits with K, and the limits with 2K + 1.
     fn settled(&self, rpm: f64, depth_mm: f64) -> Result<Settled<'_>, StabilityError> {
         let broke_down = |what| StabilityError::BrokeDown { rpm, depth_mm, what };
         let find = |harmonics| {
@@ -129,7 +130,7 @@ impl Method for MultiFrequency {
             harmonics = 2 * harmonics + 1;
             let is_enough = change <= HARMONICS_SETTLED_MULTIPLIER * multiplier.norm().max(1.0);
             if self.harmonics.is_some() || is_enough || 2 * harmonics > HARMONICS_MAX {
-                return self.judged(&finer, rpm, depth_mm, root, change);
+                return self.stability_of_root(&finer, rpm, depth_mm, root, change);
             }
         }
     }
@@ -149,7 +150,7 @@ impl Method for MultiFrequency {
 
 impl MultiFrequency {
     /// Stability of a cut from a root s, with the error due to the truncated harmonics and to the table of receptances.
-    fn judged(
+    fn stability_of_root(
         &self,
         open_loop: &HarmonicLoop<'_>,
         rpm: f64,

@@ -14,8 +14,8 @@ use crate::spectrum::chatter_frequency::dominant_frequency_hz;
 use crate::spectrum::krylov::LinearMap;
 use crate::spectrum::map_spectrum::PeriodMap;
 
-/// Distance from a step, as a share of the step, within which a delayed time counts as the time of that step. Larger
-/// than rounding, far below the discretization error.
+/// Distance of a delayed time from the start or end of a step, as a share of the step, within which it counts as that
+/// start or end. Larger than rounding, far below the discretization error.
 const ON_STEP: f64 = 1e-9;
 
 /// Nodes and weights of the mean over a step: three Gauss nodes, exact for polynomial coefficients up to degree 5.

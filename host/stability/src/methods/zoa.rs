@@ -18,8 +18,9 @@ use crate::limits::point::CutStability;
 use crate::limits::speed_line::SpeedLine;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Largest deviation of a locus from a straight line between two sampled frequencies, relative to the default of locus
-/// tracing. A tenth keeps the phase between two samples monotone except for touching lobes. Unfounded.
+/// Largest deviation of a locus from a straight line between two sampled frequencies, as a factor on the tenth of its
+/// size that the tracing of loci allows for other methods. With it the phase between two samples is monotone, except
+/// where lobes touch. Unfounded.
 const STRAIGHT: f64 = 0.1;
 
 /// Tolerance, rad, to which the phase condition ωτ = π − 2 arg(1/λ) + 2πk is solved; depths have the same relative
@@ -93,7 +94,8 @@ impl Zoa {
         let loci = |omega: f64| open_loop.eigenvalues(Complex64::new(0.0, omega), 0.0);
         let mut limits = solve_steps(&loci, samples, &|[(low, from), (high, to)]: Step| {
             let mut limits = Vec::new();
-            // A depth requires a positive real part of λ, and a depth within range a large λ.
+            // A limit requires Re λ > 0, and a limit within the depth w requires |λ| ≥ 1/(2 w); the factor 0.45 leaves
+            // a margin.
             if from.re.max(to.re) <= 0.0 || from.norm().max(to.norm()) < 0.45 / depth_m {
                 return Some(limits);
             }

@@ -27,7 +27,8 @@ pub struct Event {
     pub depth_mm: f64,
     /// Error estimate of the depth, mm: within it |μ| differs from 1 by no more than the error of the multiplier.
     pub error_mm: f64,
-    /// Kind of crossing; at a fold the branch turns back in depth. With unequal teeth it refers to the revolution.
+    /// Kind of crossing; at a fold the branch turns back in depth. With unequal teeth the kind is that of the
+    /// multiplier over the revolution.
     pub kind: StabilityLoss,
     /// True if the number of multipliers outside the unit circle falls along the branch.
     pub gain: bool,

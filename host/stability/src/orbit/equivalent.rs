@@ -34,10 +34,11 @@ use quietcut_model::Term;
 use quietcut_model::case::Case;
 use quietcut_model::effects::{ALL, Treatment};
 
-/// Least number of steps in depth at which multipliers are counted. Unfounded.
+/// Least number of steps in depth at which the number of multipliers outside the unit circle is compared. Unfounded.
 const SAMPLES: usize = 32;
 
-/// Relative tolerance, on the stiffness of the structure, to which equivalent spring and orbit agree.
+/// Largest change of the equivalent springs in an iteration, in units of the static stiffness, at which springs and
+/// orbit count as agreeing.
 const SETTLED: f64 = 1e-7;
 
 /// Largest number of iterations of equivalent spring and orbit. A choice.
@@ -49,7 +50,8 @@ const REMEMBERED: usize = 5;
 /// Tolerance of the depth of a crossing, relative to the last depth.
 const CROSSING: f64 = 1e-6;
 
-/// Depth in place of 0, mm: at 0 the orbit is rest and has no amplitude to linearize about.
+/// Axial depth, mm, that replaces a depth of 0: there the tool is at rest, and equivalent stiffness and damping are not
+/// defined.
 const NONE_MM: f64 = 1e-4;
 
 /// Stability problem of a case with friction, backlash or hysteresis.
@@ -59,8 +61,9 @@ pub struct EquivalentProblem {
     smooth: ForcedProblem,
     terms: Vec<Box<dyn Term>>,
     feed_direction_deg: f64,
-    /// Matrix from states to displacement and velocity along the machine's axes.
+    /// Matrix from the states to the displacement along the machine's axes, 3 × n.
     displacement: DMatrix<f64>,
+    /// Matrix from the states to the velocity along the machine's axes, 3 × n.
     velocity: DMatrix<f64>,
     /// Static stiffness along each axis, N/m; 0 for a rigid axis.
     stiffness: [f64; 3],
@@ -194,7 +197,7 @@ impl<'a> Follower<'a> {
 
     fn samples(&self, orbit: &Orbit) -> Samples {
         let seen = [&self.problem.displacement, &self.problem.velocity];
-        Samples::new(&self.map.spans(), orbit, self.period_s, seen)
+        Samples::new(&self.map.subinterval_nodes(), orbit, self.period_s, seen)
     }
 
     /// Rest, with zero springs.
@@ -299,7 +302,7 @@ impl<'a> Follower<'a> {
             .iter()
             .map(|other| (other - root).norm())
             .fold(f64::INFINITY, f64::min);
-        // A multiplier that is no longer followed lies far inside the circle.
+        // If a small disturbance has no multiplier above [`EQUIVALENT_FOLLOWED`], the error is |μ| itself.
         Ok(nearest.min(root.norm()).max(LEAST_ERROR * root.norm().max(1.0)))
     }
 

@@ -16,8 +16,8 @@ use super::tooth_period::ToothPeriod;
 use crate::criteria::{BRANCH_STEP_MAX, BRANCH_STEP_MIN, LEAST_ERROR, ORBIT_ROOM};
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Largest number of steps of a branch. With the longest step a branch up and down takes about a hundred; the factor of
-/// ten is a choice.
+/// Largest number of steps of a branch: ten times the hundred that a branch up and down takes with the longest step. A
+/// choice.
 const STEPS_MAX: usize = 1000;
 
 /// Follows the forced orbits at one spindle speed from depth 0 until the depth exceeds `depth_mm` or returns to 0.
@@ -323,7 +323,8 @@ impl<M: PeriodMap> Follower<M> {
             rpm: self.rpm,
             scale: self.scale,
         };
-        // The normal uses the states of the structure alone, which both meshes have in common.
+        // Normal of the hyperplane in which the orbit is corrected on the finer mesh. It contains only the states of
+        // the structure and the depth, which both meshes have in common.
         let mut normal = DVector::zeros(finer.map.size() + 1);
         normal
             .rows_mut(0, order)
@@ -344,7 +345,8 @@ impl<M: PeriodMap> Follower<M> {
         let depth_m = at.orbit.depth_m;
         let shift_m = |step: f64| Some((self.depth_m(at, step).ok()? - depth_m).abs());
         let along_m = shift_m(reach)?.max(shift_m(-reach)?);
-        // At a fold the depth is stationary along the branch; the confirmed accuracy of orbits is then the least error.
+        // At a fold the depth is stationary along the branch, so that its change vanishes; the error is then at least
+        // [`LEAST_ERROR`] of the depth.
         Some(along_m.max(LEAST_ERROR * depth_m) + ORBIT_ROOM * (there.orbit.depth_m - depth_m).abs())
     }
 

@@ -42,7 +42,7 @@ pub struct ForcedProblem {
     chip: Option<ChipLaw>,
     /// Process damping; `None` if absent.
     flank: Option<Flank>,
-    /// Constant force times B; empty for none.
+    /// Input matrix B times a constant force along the machine's axes; `None` without such a force.
     push: Option<DVector<f64>>,
     /// True if a force does not make the velocity jump: the structure has a mass at the tool.
     inertial: bool,

@@ -4,7 +4,7 @@ use super::branch::Extent;
 use super::follower::{follow_depth, multiplier_at};
 use super::forced::ForcedProblem;
 use super::periodic_orbit::OrbitError;
-use crate::criteria::LEAST_ERROR;
+use crate::criteria::{LEAST_ERROR, ORBIT_ROOM};
 use crate::error::StabilityError;
 use crate::limits::method::Method;
 use crate::limits::point::CutStability;
@@ -32,8 +32,8 @@ impl Method for ForcedProblem {
         let [coarse, fine] = multiplier_at(self, rpm, depth_mm).map_err(fail)?;
         let multiplier = fine.multiplier;
         // The coarse mesh errs by far more than the fine one, so that their difference bounds the error of the latter.
-        let error =
-            (10.0 * (coarse.multiplier - multiplier).norm()).max(LEAST_ERROR * multiplier.norm().max(1.0));
+        let error = (ORBIT_ROOM * (coarse.multiplier - multiplier).norm())
+            .max(LEAST_ERROR * multiplier.norm().max(1.0));
         Ok(CutStability::new(
             rpm,
             depth_mm,

@@ -6,7 +6,8 @@ use num_complex::Complex64;
 use crate::criteria::MULTIPLIER_MOVE_MAX;
 use crate::spectrum::stability_loss::StabilityLoss;
 
-/// Size below which multipliers are not followed: they are more than two of the largest moves from the unit circle.
+/// Least |μ| of the multipliers that are followed along a branch. It lies two and a half of the largest moves in one
+/// step inside the unit circle.
 pub(super) const FOLLOWED: f64 = 1.0 - 2.5 * MULTIPLIER_MOVE_MAX;
 
 /// Pairs the multipliers of two samples; `None` if one near the unit circle cannot be identified.
@@ -19,8 +20,8 @@ pub(super) fn pair(
     anyhow: bool,
 ) -> Option<Vec<(Complex64, Complex64)>> {
     let (mut from, mut free) = (from.to_vec(), to.to_vec());
-    take_met(&mut from, &mut free);
-    take_met(&mut free, &mut from);
+    remove_met_pairs(&mut from, &mut free);
+    remove_met_pairs(&mut free, &mut from);
     let mut pairs = Vec::with_capacity(from.len());
     for root in from {
         let best = free
@@ -48,7 +49,7 @@ pub(super) fn pair(
 
 /// Removes conjugate pairs of one sample that are two real multipliers in the other, on the same side of the unit
 /// circle: they met on the real axis, and neither has crossed the circle.
-fn take_met(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
+fn remove_met_pairs(conjugate: &mut Vec<Complex64>, real: &mut Vec<Complex64>) {
     conjugate.retain(|&root| {
         let reach = MULTIPLIER_MOVE_MAX * root.norm().max(1.0);
         let is_near = |other: &Complex64| (other - root).norm() < reach;
@@ -88,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn multipliers_that_meet_inside_the_circle_cost_no_steps_and_on_it_they_do() {
+    fn pairs_that_meet_on_the_real_axis_are_recognized_unless_one_multiplier_crosses_the_circle() {
         let pair_before = [at(0.9, 0.05), at(0.3, 0.75)];
         let real_after = [at(0.95, 0.0), at(0.86, 0.0), at(0.31, 0.74)];
         let rest = vec![(at(0.3, 0.75), at(0.31, 0.74))];
@@ -101,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_too_far_near_the_circle_is_not_recognized() {
+    fn a_multiplier_that_moves_too_far_near_the_circle_is_not_paired() {
         assert_eq!(pair(&[at(0.0, 0.99)], &[at(0.2, 1.0)], false), None);
         let near = [(at(0.0, 0.99), at(0.05, 1.0))];
         assert_eq!(pair(&[near[0].0], &[near[0].1], false), Some(near.to_vec()));

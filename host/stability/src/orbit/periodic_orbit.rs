@@ -89,7 +89,7 @@ impl PeriodIntegration {
 /// Tangent of a branch at an orbit.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent {
-    /// Unit tangent in (start/size, depth/depth size).
+    /// Unit tangent of start and depth, each divided by its [`Scale`].
     pub(super) along: DVector<f64>,
     /// Change of the states at the nodes of each subinterval per unit of length, n × m.
     states: Vec<DMatrix<f64>>,
@@ -103,12 +103,11 @@ pub(super) struct SubintervalNodes<'a> {
     pub(super) gauss: &'a Gauss,
 }
 
-/// Size of the predicted next Newton step, relative to the orbit, at which the iteration stops.
-///
-/// Newton steps shrink as e' = C e², so that two successive steps e and e' predict the next: C e'² = e'³/e².
+/// Predicted size of the next Newton step, relative to the orbit, below which the iteration stops. Newton steps shrink
+/// as e' = C e², so that two successive steps e and e' predict the next one: C e'² = e'³/e².
 const SETTLED: f64 = 1e-12;
 
-/// Step size above which the quadratic prediction is not yet used. A choice.
+/// Size of a Newton step, relative to the orbit, above which the prediction of the next step is not used yet. A choice.
 const NEAR: f64 = 1e-3;
 
 /// Map of a forced problem over a period at one speed on one mesh; orbits are its fixed points.
@@ -120,7 +119,7 @@ pub(super) trait PeriodMap: Sized {
     fn size(&self) -> usize;
 
     /// Subintervals of the period, in order.
-    fn spans(&self) -> Vec<SubintervalNodes<'_>>;
+    fn subinterval_nodes(&self) -> Vec<SubintervalNodes<'_>>;
 
     /// Applies the map, with derivatives, linearized about the states at the nodes. The result is exact if `guess`
     /// contains the states of the motion from the start. `None` if a subinterval is singular.
@@ -148,31 +147,33 @@ impl Orbit {
     /// Rest: the orbit at depth 0.
     pub(super) fn rest(map: &impl PeriodMap) -> Self {
         let order = map.problem().order();
-        let states = map.spans().into_iter();
+        let states = map.subinterval_nodes().into_iter();
         Self {
             depth_m: 0.0,
             start: DVector::zeros(map.size()),
             states: states
-                .map(|span| DMatrix::zeros(order, span.gauss.nodes.len()))
+                .map(|subinterval| DMatrix::zeros(order, subinterval.gauss.nodes.len()))
                 .collect(),
         }
     }
 
     /// Transfers the orbit from the nodes of one mesh to those of another.
     pub(super) fn onto(&self, own: &impl PeriodMap, other: &impl PeriodMap) -> Self {
-        let spans = own.spans();
+        let subintervals = own.subinterval_nodes();
         let at = |time_s: f64| -> DVector<f64> {
-            let index = spans
-                .partition_point(|span| span.start_s <= time_s)
+            let index = subintervals
+                .partition_point(|subinterval| subinterval.start_s <= time_s)
                 .saturating_sub(1);
-            let span = &spans[index];
-            let weights = span.gauss.lagrange((time_s - span.start_s) / span.duration_s);
+            let subinterval = &subintervals[index];
+            let weights = subinterval
+                .gauss
+                .lagrange((time_s - subinterval.start_s) / subinterval.duration_s);
             &self.states[index] * DVector::from_vec(weights)
         };
-        let states = other.spans().into_iter().map(|span| {
-            let times = span.gauss.nodes.iter();
+        let states = other.subinterval_nodes().into_iter().map(|subinterval| {
+            let times = subinterval.gauss.nodes.iter();
             let columns: Vec<DVector<f64>> = times
-                .map(|node| at(span.start_s + span.duration_s * node))
+                .map(|node| at(subinterval.start_s + subinterval.duration_s * node))
                 .collect();
             DMatrix::from_columns(&columns)
         });

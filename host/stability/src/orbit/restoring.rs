@@ -9,8 +9,9 @@ use crate::criteria::{DISTURBANCE, DISTURBANCE_PERIODS};
 use quietcut_model::Term;
 use quietcut_model::path::{Motion, restoring_along, restoring_from};
 
-/// Samples per subinterval of the mesh, over which no motion exceeds a phase angle of a few radians. A choice.
-const PER_PIECE: usize = 128;
+/// Number of samples of the orbit in each subinterval of the mesh. The phase angle of the fastest motion over a
+/// subinterval is a few radians. A choice.
+const PER_SUBINTERVAL: usize = 128;
 
 /// Least number of samples in a period. A choice.
 const LEAST: usize = 1024;
@@ -42,22 +43,22 @@ pub(super) struct Samples {
 impl Samples {
     /// Samples the orbit from its states at the nodes; `seen` maps states to displacement and velocity.
     pub(super) fn new(
-        spans: &[SubintervalNodes<'_>],
+        subintervals: &[SubintervalNodes<'_>],
         orbit: &Orbit,
         period_s: f64,
         seen: [&DMatrix<f64>; 2],
     ) -> Self {
-        let count = (PER_PIECE * spans.len()).max(LEAST);
+        let count = (PER_SUBINTERVAL * subintervals.len()).max(LEAST);
         let step_s = period_s / count as f64;
         let (mut x, mut v) = ([(); 3].map(|()| Vec::new()), [(); 3].map(|()| Vec::new()));
         let mut index = 0;
-        for (place, (span, states)) in spans.iter().zip(&orbit.states).enumerate() {
+        for (place, (subinterval, states)) in subintervals.iter().zip(&orbit.states).enumerate() {
             let at_nodes = seen.map(|seen| seen * states);
-            let is_last = place + 1 == spans.len();
-            let end_s = span.start_s + span.duration_s;
+            let is_last = place + 1 == subintervals.len();
+            let end_s = subinterval.start_s + subinterval.duration_s;
             while index < count && (is_last || (index as f64 + 0.5) * step_s <= end_s) {
-                let share = ((index as f64 + 0.5) * step_s - span.start_s) / span.duration_s;
-                let weights = span.gauss.lagrange(share);
+                let share = ((index as f64 + 0.5) * step_s - subinterval.start_s) / subinterval.duration_s;
+                let weights = subinterval.gauss.lagrange(share);
                 for (signal, at_nodes) in [&mut x, &mut v].into_iter().zip(&at_nodes) {
                     for (signal, row) in signal.iter_mut().zip(at_nodes.row_iter()) {
                         signal.push(row.iter().zip(&weights).map(|(a, b)| a * b).sum());
@@ -88,7 +89,8 @@ impl Samples {
             x[axis][sample] += by_x;
             v[axis][sample] += by_v;
         }
-        // If the velocity changes sign within a step, friction acts with its mean over the step.
+        // Speed below which friction acts with its mean over a time step: half of the largest change of velocity in a
+        // step, within which the velocity may change sign.
         let rest_m_per_s = std::array::from_fn(|axis| {
             let velocity = &self.v[axis];
             let steps = (0..count).map(|n| (velocity[(n + 1) % count] - velocity[n]).abs());
@@ -135,7 +137,8 @@ impl Samples {
             });
             before = Some((from, to));
             start = own;
-            // A term with fading memory has a map with a slope between 0 and 1.
+            // Secant step to the fixed point of the map over a period. It is taken only where the slope of the map lies
+            // between 0 and 1, as for a term with fading memory.
             if term.states() == 1 && (0.0..0.999).contains(&slope) {
                 start[0] = from + (to - from) / (1.0 - slope);
             }
@@ -282,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn play_on_a_harmonic_orbit_has_its_describing_function() {
+    fn backlash_on_a_harmonic_orbit_has_its_describing_function() {
         let gap_mm = 0.02;
         let play = terms(&[
             "backlash=0.02",

@@ -270,7 +270,7 @@ impl PeriodMap for RevolutionPeriod<'_> {
         self.mesh.size
     }
 
-    fn spans(&self) -> Vec<SubintervalNodes<'_>> {
+    fn subinterval_nodes(&self) -> Vec<SubintervalNodes<'_>> {
         let subintervals = self.mesh.subintervals.iter();
         subintervals
             .map(|subinterval| SubintervalNodes {

@@ -19,18 +19,18 @@ impl PeriodMap for ToothPeriod<'_> {
         self.problem.order()
     }
 
-    fn spans(&self) -> Vec<SubintervalNodes<'_>> {
+    fn subinterval_nodes(&self) -> Vec<SubintervalNodes<'_>> {
         let mut start_s = 0.0;
-        let spans = self.subintervals.iter().map(|subinterval| {
-            let span = SubintervalNodes {
+        let nodes = self.subintervals.iter().map(|subinterval| {
+            let nodes_here = SubintervalNodes {
                 start_s,
                 duration_s: subinterval.duration,
                 gauss: &self.gauss,
             };
             start_s += subinterval.duration;
-            span
+            nodes_here
         });
-        spans.collect()
+        nodes.collect()
     }
 
     fn integrate(

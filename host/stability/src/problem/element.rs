@@ -7,16 +7,17 @@ use super::linear::Problem;
 use quietcut_numerics::quadrature::Gauss;
 
 /// Collocated element: p = E x + Q f and x⁺ = G x + T f, with x and x⁺ the states at its start and end, p the
-/// displacements along the chip normals at the nodes, and f = p − p_τ.
+/// displacements along the chip normals at the nodes, p_τ those of the preceding tooth, and f = w (p − p_τ) with the
+/// axial depth w.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
     /// State transition G without regenerative force, n × n.
     pub(crate) flow: DMatrix<f64>,
     /// Observation E of the state at the start, ports × n.
     pub(crate) observe: DMatrix<f64>,
-    /// Response Q of the ports to the regenerative chips f, ports × ports, per meter of axial depth.
+    /// Response Q of the displacements p to the regenerative chips p − p_τ, ports × ports, per meter of axial depth.
     pub(crate) kernel: DMatrix<f64>,
-    /// Response T of the state at the end to the regenerative chips f, n × ports, per meter of axial depth.
+    /// Response T of the state at the end to the regenerative chips p − p_τ, n × ports, per meter of axial depth.
     pub(crate) drive: DMatrix<f64>,
     /// Time, weight and force of each port, in the order of the rows of E.
     pub(crate) ports: Vec<Port>,
@@ -29,7 +30,8 @@ pub(crate) struct Element {
 pub(crate) struct Axial {
     /// Observation E_z of the state at the start, nodes × n.
     pub(crate) observe: DMatrix<f64>,
-    /// Response Q_z of the axial displacement to the regenerative chips f, nodes × ports, per meter of axial depth.
+    /// Response Q_z of the axial displacement to the regenerative chips p − p_τ, nodes × ports, per meter of axial
+    /// depth.
     pub(crate) kernel: DMatrix<f64>,
     /// Force per axial displacement at each node, N/m.
     pub(crate) ports: Vec<Port>,
@@ -208,7 +210,8 @@ impl Ports {
 
 /// Eliminates the axial displacement at the nodes, so that only the ports of teeth remain.
 ///
-/// With o all observed displacements and z their axial part, solves o = E x + Q_t f + Q_z z for o.
+/// With o all observed displacements, z their axial part, and Q_t and Q_z the columns of Q for teeth and axial
+/// displacement, solves o = E x + Q_t f + Q_z z for o.
 fn without_modulation(whole: &Element, nodes: usize, per_node: usize) -> Element {
     let axial: Vec<usize> = (0..nodes).map(|node| node * per_node + per_node - 1).collect();
     let teeth: Vec<usize> = (0..nodes * per_node)

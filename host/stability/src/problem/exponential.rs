@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-/// Largest norm ‖At‖ for which the Taylor series is summed directly. Larger arguments are halved first and the result
-/// squared. With 1/2 the truncation error of degree 16 is 2e-20.
+/// Largest norm ‖At‖ for which the Taylor series of e^{At} is summed directly. Larger arguments are halved until they
+/// lie below it, and the result is squared as often. With 1/2 the truncation error of degree 16 is 2e-20.
 const RADIUS: f64 = 0.5;
 
 /// Square matrix A whose exponential e^{At} is computed by a Taylor polynomial of degree 16 with scaling and squaring.
@@ -66,7 +66,8 @@ impl Exponential {
     }
 }
 
-/// Writes the product a b of two small square matrices into `out`; they are too small for a blocked product to pay.
+/// Writes the product a b of two small square matrices into `out`. Matrices of even size up to 8 use loops of fixed
+/// length, which are faster than a general product.
 fn multiply(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>) {
     match a.nrows() {
         2 => multiply_sized::<2>(a.as_slice(), b.as_slice(), out.as_mut_slice()),

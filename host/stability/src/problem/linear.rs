@@ -12,7 +12,8 @@ use quietcut_model::structure::FirstOrder;
 ///
 ///   ẋ = A x + B F,   u = C x,   F = w K α(φ)(u − u_τ) − (β_e + β_f)(φ) u   (eqs 3.7, 7.1).
 ///
-/// All vectors are in feed, normal and axial direction. The delay τ is the tooth period.
+/// All vectors are in feed, normal and axial direction. The delay τ is the tooth period, and u_τ the displacement one
+/// tooth period earlier. Signs of α and symbols are those of the page of the crate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     /// Structure in first-order form, rotated into the feed direction.
@@ -30,7 +31,8 @@ pub enum CubicTerms {
     Refuse,
     /// Cubic terms are omitted: the limits are those for vanishing feed.
     LeaveOut,
-    /// Only the linear part is requested: the caller treats cubic terms and other effects about a forced orbit itself.
+    /// Cubic terms and other smooth nonlinear effects are left to the caller, who treats them about a forced orbit; the
+    /// result is the linear part.
     Kept,
 }
 
@@ -109,7 +111,7 @@ pub(crate) fn cutting(case: &Case, treated: Treated) -> Result<(Process, usize),
     cutting_with_mean_pitch(case, treated)
 }
 
-/// Cutting process and number of teeth of a case, with unequal pitches replaced by their mean.
+/// Cutting process and number of teeth of a case; unequal pitches are replaced by their mean.
 fn cutting_with_mean_pitch(case: &Case, treated: Treated) -> Result<(Process, usize), StabilityError> {
     let (tool, cut) = (case.tool()?, case.cut()?);
     treatment::refuse_others(case, treated)?;

@@ -9,9 +9,9 @@
 //!   p = E x₀ + Q f,   x₁ = G x₀ + T f,
 //!
 //! with p and f the values of all cutting teeth at all nodes. The free motion of the structure is exact (matrix
-//! exponentials); only the product of motion and rotating directional coefficients is interpolated. Edge and feed terms
-//! −β(φ) u are eliminated within the element, so that the same four matrices describe it. In free flight (no tooth
-//! cuts) G = e^{Ah}.
+//! exponentials); only the product of motion and rotating directional coefficients is interpolated. The forces −β(φ) u
+//! of edge and feed are eliminated within the element, so that the same four matrices E, Q, G and T describe it. In
+//! free flight (no tooth cuts) G = e^{Ah}.
 
 use nalgebra::DMatrix;
 
@@ -24,7 +24,7 @@ use quietcut_numerics::quadrature::Gauss;
 
 pub(crate) use crate::problem::element::{Element, Port};
 
-/// Element length and tolerance of the mesh over a tooth period.
+/// Resolution of the mesh over a tooth period: length of its elements and error of collocation in each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Resolution {
     /// Largest phase angle, rad, of the fastest motion over one element.
@@ -34,28 +34,30 @@ pub(crate) struct Resolution {
 }
 
 impl Resolution {
-    /// Mesh to compute all Floquet multipliers along a line in depth: few nodes, since the whole map is diagonalized.
+    /// Coarse mesh, on which all Floquet multipliers are computed at many depths. Its elements are long and have few
+    /// nodes in all, since the eigenvalues of the whole map are computed.
     pub(crate) const SCAN: Self = Self {
         angle: 20.0,
         tolerance: 1e-8,
     };
-    /// Working mesh, for limits from the characteristic matrix, whose polynomials in κ need short elements.
+    /// Working mesh, on which single multipliers and limits are computed from the characteristic matrix. Its elements
+    /// are short, so that the polynomials in the complex depth κ converge.
     pub(crate) const WORKING: Self = Self {
         angle: 5.0,
         tolerance: 1e-13,
     };
-    /// Finer mesh: the change of a result from the working to this mesh estimates the error of the former.
+    /// Finer mesh: the change of a result from the working mesh to this one estimates the error of the working mesh.
     pub(crate) const FINE: Self = Self {
         angle: 3.0,
         tolerance: 1e-16,
     };
 }
 
-/// Largest decay of a mode within an element, as exponent of e. Collocation uses e^{−A t}, and a decay of e^{−5} costs
-/// two digits.
+/// Largest product of decay rate and duration of an element. Collocation uses e^{−A t}, which grows where the structure
+/// decays; the factor e⁵ = 148 between start and end of an element costs two digits.
 pub(crate) const DECAY_MAX: f64 = 5.0;
 
-/// Largest number of Gauss nodes in an element: the largest rule that is cached.
+/// Largest number of Gauss nodes in an element: the largest rule that [`Gauss::shared`] keeps.
 const NODES_MAX: u32 = 40;
 
 /// Refuses speeds and depths (mm) at which the motion oscillates too often within a tooth period.

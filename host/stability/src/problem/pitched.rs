@@ -8,11 +8,12 @@ use quietcut_model::case::Case;
 ///
 ///   ẋ = A x + B F,   u = C x,   F = Σ_j w K α(φ_j)(u − u(t − τ_j)) − β u,
 ///
-/// with the delay τ_j of each cutting tooth j. With unequal pitch the period of the equation is the revolution,
-/// otherwise the tooth period.
+/// with the delay τ_j of each cutting tooth j: the time since the preceding tooth had the same immersion angle. With
+/// unequal pitch the period of the equation is the revolution, otherwise the tooth period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pitched {
-    /// Problem with the mean pitch. If pitches differ, only its structure and cutting process are valid.
+    /// Problem with the mean pitch. If pitches differ, only its structure and cutting process are used, not its tooth
+    /// period.
     pub(crate) problem: Problem,
     /// Angles between the teeth as in [`Tool::pitch_deg`](quietcut_model::milling::Tool), rad; `None` for equal pitch
     /// with the tooth period as period.

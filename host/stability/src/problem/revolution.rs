@@ -1,7 +1,8 @@
-//! Collocation of one revolution of a tool with variable pitch, whose delays end between the nodes.
+//! Collocation of one revolution of a tool with variable pitch. The delayed displacement lies between nodes and is
+//! interpolated.
 //!
 //! The state of the delay equation is x at the start of the revolution, and the displacements p along the chip normals
-//! in those subintervals of the preceding revolution whose surface is still to be cut.
+//! in those subintervals of the preceding revolution whose surface the present revolution cuts.
 
 use nalgebra::DMatrix;
 

@@ -1,11 +1,11 @@
 //! Mesh of one revolution with several delays, and the location of the previously cut surface for every chip.
 //!
 //! Tooth j at an immersion angle observes p_j = nᵀ u; the preceding tooth observed p_{j−1} at the same angle, one pitch
-//! earlier. That value lies in another subinterval, between its nodes, in this revolution or the preceding one. It is
-//! interpolated by the polynomial through the nodes of that subinterval, which requires p to be smooth there. The
-//! displacement has a kink (a jump in some derivative) wherever a tooth enters or leaves. The surface passes the kink
-//! to the next tooth one delay later, smoothed by the structure. Subintervals therefore end at all of these times, for
-//! several generations of kinks.
+//! earlier. That displacement lies in another subinterval, between its nodes, of this revolution or the preceding one.
+//! It is interpolated by the polynomial through the nodes of that subinterval, which requires p to be smooth there. The
+//! displacement has a kink (a jump in some derivative) wherever a tooth enters or leaves. The cut surface carries the
+//! kink to the next tooth one delay later, where the structure smooths it. Subintervals therefore end at the entries
+//! and exits (generation 0), one delay after them (generation 1), and so on for several generations.
 
 use super::period::{DECAY_MAX, Rates};
 use super::pitched::Pitched;
@@ -30,7 +30,7 @@ impl Fineness {
         tolerance: 1e-9,
         generations: 3,
     };
-    /// Finer mesh: the change of a result from the working to this mesh estimates the error of the former.
+    /// Finer mesh: the change of a result from the working mesh to this one estimates the error of the working mesh.
     pub(crate) const FINE: Self = Self {
         angle: 4.0,
         tolerance: 1e-11,
@@ -47,8 +47,8 @@ pub(crate) enum Flight {
     Cut,
 }
 
-/// Number of kinks beyond which no further generation is added. Subintervals are then short, and kinks of later
-/// generations are smooth. Unfounded.
+/// Number of subinterval ends in a revolution beyond which no further generation of kinks is added. Subintervals are
+/// then short, and kinks of later generations are smooth. Unfounded.
 const KINKS_MAX: usize = 300;
 
 /// Displacements p of one tooth at all nodes of one subinterval.
@@ -60,20 +60,21 @@ pub(crate) struct Series {
     pub(crate) tooth: usize,
 }
 
-/// Location of the displacements of the preceding tooth.
+/// Location of the delayed displacements p_τ that the preceding tooth left on the surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Source {
-    /// In the present revolution.
+    /// In a subinterval of the present revolution.
     Own(Series),
-    /// In the preceding revolution: in the state vector, from this row on.
+    /// In the preceding revolution: in the state vector of the map, from this row on.
     Earlier(usize),
 }
 
-/// Displacement of the preceding tooth that left the surface at one port.
+/// Delayed displacement at one port: weighted sum over the nodes of the subinterval in which the preceding tooth cut
+/// the surface.
 #[derive(Clone, Debug)]
 pub(crate) struct Past {
     pub(crate) source: Source,
-    /// Values at that time of the Lagrange polynomials of the nodes.
+    /// Values of the Lagrange polynomials of those nodes at the delayed time.
     pub(crate) weights: Vec<f64>,
 }
 
@@ -87,7 +88,7 @@ pub(crate) struct Subinterval {
     pub(crate) gauss: &'static Gauss,
     /// Cutting teeth, in the order of the ports of a node.
     pub(crate) cutting: Vec<ToothPassage>,
-    /// Previously cut surface at each port, node by node.
+    /// Delayed displacement at each port, node by node.
     pub(crate) pasts: Vec<Past>,
 }
 
@@ -151,7 +152,7 @@ impl RevolutionMesh {
         Some(mesh)
     }
 
-    /// Finds the previously cut surface of every port; `None` if there is none.
+    /// Finds the delayed displacement of every port; `None` if the preceding tooth did not cut at that time.
     fn link(&mut self) -> Option<()> {
         let period_s = self.passages.period_s;
         let starts_s: Vec<f64> = self
@@ -188,7 +189,8 @@ impl RevolutionMesh {
         Some(())
     }
 
-    /// First row in the state of the displacements `series`; adds them to the state if missing.
+    /// First row, in the state vector of the map, of the displacements `series` of the preceding revolution; appends
+    /// them if they are missing.
     fn keep(&mut self, series: Series) -> usize {
         if let Some((_, first)) = self.kept.iter().find(|(known, _)| *known == series) {
             return *first;

@@ -19,7 +19,7 @@ pub(crate) struct ToothPassage {
     pub(crate) feed_m: f64,
     /// Index of the tooth; 0 if all teeth are alike.
     pub(crate) tooth: usize,
-    /// Index of the preceding tooth in the cut; 0 if all teeth are alike.
+    /// Index of the tooth that cut the surface in front of this one; 0 if all teeth are alike.
     pub(crate) before: usize,
 }
 
@@ -157,7 +157,7 @@ pub(crate) struct Coefficients {
 }
 
 impl Coefficients {
-    /// Mean over Gauss nodes (time, weight) of the passages that cut at the time `inside_s`.
+    /// Mean over nodes (time in s, weight) of the coefficients of those passages that cut at the time `inside_s`.
     pub(crate) fn mean(
         pitched: &Pitched,
         passages: &ToothPassages,
@@ -193,7 +193,8 @@ impl Coefficients {
         coefficients
     }
 
-    /// Force per present displacement, w Σ K α − β, N/m; the delayed displacement is excluded.
+    /// Force per present displacement, w Σ K α − β, N/m, at an axial depth w, m; the part of the delayed displacement
+    /// is excluded.
     pub(crate) fn present(&self, depth_m: f64) -> Matrix3<f64> {
         let regenerative: Matrix3<f64> = self.regenerative.iter().map(|(_, directional)| directional).sum();
         regenerative * depth_m - self.modulation

@@ -27,10 +27,7 @@ pub(super) fn wrong(case: &Case, cause: ModelError) -> StabilityError {
     }
 }
 
-/// Linear structure of a case with its extensions, in the machine's axes.
-///
-/// # Errors
-/// The case has no structure, the structure is indefinite, or an extension cannot be applied to it.
+/// First-order form of the linear structure of a case with its linear extensions, in the machine's axes.
 pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
     let structure = case.structure()?;
     let effects = effects(case, |spec| spec.treatment == Treatment::LinearStructure)?;
@@ -50,10 +47,7 @@ pub(crate) fn structure(case: &Case) -> Result<FirstOrder, StabilityError> {
     })
 }
 
-/// Cutting coefficients of a case with those set by extensions.
-///
-/// # Errors
-/// The case has no material.
+/// Cutting coefficients of a case, after its extensions of the cutting force.
 pub(crate) fn material(case: &Case) -> Result<Material, StabilityError> {
     let has_own =
         |spec: &EffectSpec| spec.treatment == Treatment::LinearProcess && spec.class == Class::CuttingForce;

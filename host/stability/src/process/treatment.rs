@@ -7,7 +7,7 @@ use quietcut_model::effects::{EffectSpec, Treatment};
 /// Set of extensions that a method treats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Treated {
-    /// Linear extensions of the cutting process alone; the structure is given by receptances.
+    /// Linear extensions of the cutting process only; measured receptances replace the structure.
     LinearProcess,
     /// Linear extensions of structure and cutting process.
     Linear,

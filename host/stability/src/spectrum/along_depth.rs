@@ -37,7 +37,7 @@ pub(crate) trait Spectrum {
     /// Chatter frequency at a crossing of the unit circle, Hz.
     fn chatter_hz(&self, crossing: &Crossing) -> Option<f64>;
 
-    /// Error estimate |error| of the multiplier at a crossing; `None` if the finer computation finds no such
-    /// multiplier.
+    /// Error estimate of the multiplier at a crossing, as an absolute value; `None` if the computation on a finer mesh
+    /// finds no multiplier near it.
     fn error(&mut self, crossing: &Crossing) -> Option<f64>;
 }

@@ -18,11 +18,12 @@ use crate::problem::period::{Element, Period};
 /// rounding.
 const TERM: f64 = 1e-17;
 
-/// Largest |κ|, as a factor on the scale of the polynomials, at which they are used: 1.5^20, for 20 terms, costs three
-/// more digits.
+/// Largest |κ|, in units of the depth by which the polynomials are scaled, at which they are evaluated. The 20th power
+/// of 1.5 is 3000, so that 20 terms lose three digits to rounding.
 const RADIUS: f64 = 1.5;
 
-/// Largest number of terms of a polynomial in κ; elements are so short that far fewer are needed.
+/// Largest number of terms of a polynomial in κ: a limit on computing time. Elements are so short that far fewer are
+/// needed.
 const TERMS_MAX: usize = 60;
 
 /// Transition matrix Φ(κ) over a tooth period at one spindle speed.
@@ -189,19 +190,20 @@ impl Characteristic {
     /// Its error is about the square of that of the guess. `None` if the relative step exceeds 0.01, or if κ is too
     /// large for the polynomials.
     pub(crate) fn root_near(&self, guess: Complex64, depth_m: f64, work: &mut Workspace) -> Option<Root> {
-        // Both logarithmic derivatives are infinite at the root itself, but their ratio is smooth beside it.
-        let beside = guess + Complex64::new(1e-7, 1e-7) * guess.norm();
-        if (Complex64::ONE - beside.inv()).norm() * depth_m > RADIUS * self.scale {
+        // Both logarithmic derivatives of F are infinite at a root of F. Close to it their ratio is smooth, so that
+        // they are evaluated 1e-7 away.
+        let nearby = guess + Complex64::new(1e-7, 1e-7) * guess.norm();
+        if (Complex64::ONE - nearby.inv()).norm() * depth_m > RADIUS * self.scale {
             return None;
         }
-        let logarithmic = self.logarithmic(beside, depth_m, work)?;
-        let mut multiplier = beside - inverse(logarithmic.by_multiplier);
+        let logarithmic = self.logarithmic(nearby, depth_m, work)?;
+        let mut multiplier = nearby - inverse(logarithmic.by_multiplier);
         let mut slope = -logarithmic.by_depth / logarithmic.by_multiplier;
         if guess.im == 0.0 {
             (multiplier.im, slope.im) = (0.0, 0.0);
         }
-        // Close to a second root the Newton step is too short, since the logarithmic derivative adds the terms of both
-        // roots.
+        // One Newton step is not enough if the guess is more than 1 % off. Near a second root, whose term is also in
+        // the logarithmic derivative, the step is too short as well.
         let step = (multiplier - guess).norm();
         (step < 0.01 * guess.norm() && slope.is_finite()).then_some(Root { multiplier, slope })
     }
@@ -213,9 +215,10 @@ impl Characteristic {
         depth_m: f64,
         work: &mut Workspace,
     ) -> Option<Complex64> {
-        // Both logarithmic derivatives are infinite at the root itself, but their ratio is smooth beside it.
-        let beside = multiplier + Complex64::new(1e-7, 1e-7) * multiplier.norm();
-        let logarithmic = self.logarithmic(beside, depth_m, work)?;
+        // Both logarithmic derivatives of F are infinite at a root of F. Close to it their ratio is smooth, so that
+        // they are evaluated 1e-7 away.
+        let nearby = multiplier + Complex64::new(1e-7, 1e-7) * multiplier.norm();
+        let logarithmic = self.logarithmic(nearby, depth_m, work)?;
         let ratio = -logarithmic.by_depth / logarithmic.by_multiplier;
         ratio.is_finite().then_some(ratio)
     }

@@ -10,11 +10,12 @@ use crate::problem::element::Port;
 use crate::problem::linear::Problem;
 use crate::problem::period::{Period, Rates};
 
-/// Largest growth of any motion over a part of the period, relative to that of the multiplier's own motion. Solving the
-/// system of parts loses as many digits, here three.
+/// Largest growth of any motion over a part of the period, as a factor on the growth of the Floquet mode over that
+/// part; beyond it the next part begins. The linear system of all parts then loses three digits.
 const GROWTH: f64 = 1e3;
 
-/// Largest number of unknowns in the cyclic system of the parts of a period: a limit on computing time. A choice.
+/// Largest number of unknowns (parts of a period times states) in the linear system for the states at the start of all
+/// parts: a limit on computing time. A choice.
 const CYCLIC_MAX: usize = 256;
 
 /// Vibration frequency, Hz, of the motion u(t) = e^{st} v(t), with v periodic in the tooth period τ and e^{sτ} = μ.
@@ -34,8 +35,8 @@ pub(crate) fn chatter_hz(
     if forces.iter().all(|(_, force)| force.norm() == 0.0) {
         return free_hz(problem, period_s, multiplier);
     }
-    // e^{−s t} at every node, and its factor from one exponent s to the next; computing all exponentials would take
-    // seconds.
+    // For each node: e^{−s t} at the present exponent s, and the factor that leads to the next exponent s + 2πi/T.
+    // Computing every exponential anew would take seconds.
     let mut factors: Vec<(Complex64, Complex64)> = Vec::new();
     dominant_frequency_hz(problem, depth_m, period_s, multiplier, |s| {
         let mut harmonic = Vector3::<Complex64>::zeros();
@@ -98,7 +99,8 @@ fn eigenfunction_forces(
     let mut seen_from = Vec::with_capacity(period.elements.len());
     let (mut length, share) = (0.0, 1.0 / period.elements.len().max(1) as f64);
     for element in &period.elements {
-        // Ends a part before some motion outgrows that of the multiplier and its rounding dominates.
+        // Ends the part before some motion has grown by the factor `GROWTH` more than the Floquet mode, whose share
+        // would then be rounding.
         if part.norm() > GROWTH * multiplier.norm().powf(length) {
             parts.push(std::mem::replace(&mut part, identity.clone()));
             length = 0.0;

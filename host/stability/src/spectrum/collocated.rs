@@ -23,7 +23,7 @@ pub(crate) struct Collocated<'a> {
     period: Period,
     characteristic: Characteristic,
     workspace: Workspace,
-    /// Characteristic matrix on the finer mesh, for error estimates; built on first use.
+    /// Characteristic matrix on the finer mesh, for error estimates of limits; built on first use.
     finer: Option<Characteristic>,
 }
 

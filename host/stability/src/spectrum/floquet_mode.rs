@@ -1,12 +1,14 @@
 //! Floquet mode of a multiplier and its adjoint, along one tooth period.
 //!
-//! With G(t) = A + B M(t) C and M = κ Σ cutting·normalᵀ − β of the characteristic matrix, the mode fulfils ẋ = G x with
-//! x(τ) = μ x(0). The adjoint fulfils ẏ = −Gᵀ y with y(τ) = l and lᵀΦ = μ lᵀ. Then lᵀ dΦ r = ∫ yᵀ dG x dt for any
-//! change of G: one pair of motions gives the derivatives with respect to all parameters.
+//! With G(t) = A + B M(t) C, M = κ Σ cutting·normalᵀ − β over the cutting teeth, and the complex depth κ = w (1 − 1/μ),
+//! the Floquet mode fulfils ẋ = G x with x(τ) = μ x(0). The adjoint fulfils ẏ = −Gᵀ y with y(τ) = l and lᵀΦ = μ lᵀ.
+//! Then lᵀ dΦ r = ∫ yᵀ dG x dt for any change of G: one pair of motions gives the derivatives with respect to all
+//! parameters.
 //!
-//! Both are computed on subintervals of the period with Gauss nodes, as in [`period`](super::period): the free motion
-//! of the structure by matrix exponentials, the force by collocation. The adjoint is the motion of the transposed
-//! structure in reversed time, with directions of observation and of force exchanged.
+//! Mode and adjoint are computed on subintervals of the period with Gauss nodes, as in
+//! [`period`](crate::problem::period): the free motion of the structure by matrix exponentials, the force by
+//! collocation. The adjoint is the motion of the transposed structure in reversed time, with directions of observation
+//! and of force exchanged.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
@@ -17,11 +19,12 @@ use crate::problem::period::{DECAY_MAX, Rates, degree};
 use quietcut_model::structure::FirstOrder;
 use quietcut_numerics::quadrature::Gauss;
 
-/// Largest phase angle of the fastest motion over a subinterval, rad. A choice: with it 40 nodes reach [`TOLERANCE`].
+/// Largest phase angle of the fastest motion over a subinterval, rad. A choice: eleven Gauss nodes then reach
+/// [`TOLERANCE`].
 const ANGLE: f64 = 3.0;
 
-/// Target for the collocation error of a subinterval. States at inner nodes are accurate to about its square root only;
-/// the quadrature of yᵀ dG x keeps that root times the length of the subinterval.
+/// Target for the relative collocation error at the end of a subinterval. At the inner nodes collocation has half the
+/// order, so that mode and adjoint, and integrals of yᵀ dG x, are accurate to about its square root, 1e-8.
 const TOLERANCE: f64 = 1e-16;
 
 type Matrix = DMatrix<Complex64>;
@@ -29,7 +32,8 @@ type Matrix = DMatrix<Complex64>;
 /// Mode x and adjoint y at one node of the quadrature.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    /// Quadrature weight, s; 0 at the entry and exit of a tooth, which are stored beside the nodes.
+    /// Quadrature weight, s; 0 for the two instants at which a tooth enters or leaves, which are no nodes of the
+    /// quadrature.
     pub(crate) weight_s: f64,
     /// Phase of the tooth period, rad.
     pub(crate) phase: f64,

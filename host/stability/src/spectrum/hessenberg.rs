@@ -20,7 +20,7 @@ pub(crate) struct Shifted {
 
 /// Relative distance of the shift from the eigenvalue. Each inverse iteration amplifies the eigenvector by its inverse,
 /// 1e8, and the matrix stays regular.
-const BESIDE: f64 = 1e-8;
+const SHIFT: f64 = 1e-8;
 
 impl Shifted {
     /// Factors H − s I for an eigenvalue of a matrix that is zero below its `band`-th lower diagonal.
@@ -29,7 +29,7 @@ impl Shifted {
         let shift = if eigenvalue == Complex64::ZERO {
             Complex64::from(1e-10 * matrix.amax())
         } else {
-            eigenvalue * (1.0 + BESIDE)
+            eigenvalue * (1.0 + SHIFT)
         };
         let mut upper = vec![Complex64::ZERO; size * size];
         for (j, column) in matrix.column_iter().enumerate() {

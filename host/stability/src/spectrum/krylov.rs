@@ -20,21 +20,23 @@ const BLOCK: usize = 3;
 /// there.
 const WHOLE: usize = 90;
 
-/// Number of blocks before eigenvalues are first computed. They are computed again whenever the space has grown by a
-/// third, by at least this number of blocks. A choice.
-const LOOK: usize = 10;
+/// Number of blocks after which eigenvalues are computed for the first time. They are computed again whenever the space
+/// has grown by a third, and at least by this number of blocks. A choice.
+const BLOCKS_BEFORE_EIGENVALUES: usize = 10;
 
-/// Residual ‖M v − μ v‖ with ‖v‖ = 1 below which an eigenvalue is accepted: rounding of a map of some hundred steps.
+/// Residual ‖M v − μ v‖ with ‖v‖ = 1, relative to max(1, |μ|), below which an eigenvalue is accepted: rounding of a map
+/// of some hundred steps.
 const RESIDUAL: f64 = 1e-11;
 
-/// Residual below which an eigenvalue is accepted as a starting value of Newton's method.
+/// Residual, relative to max(1, |μ|), below which an eigenvalue is accepted as a starting value of Newton's method.
 const ROUGH: f64 = 1e-7;
 
 /// Largest number of vectors of a Krylov space. One eigenvalue computation then takes one or two seconds; maps that
 /// need more have many eigenvalues of nearly one size.
 const SPACE_MAX: usize = 480;
 
-/// Largest number of vectors of a Krylov space if a search without the map can take over.
+/// Largest number of vectors of a Krylov space where the search by winding number replaces block Arnoldi if that does
+/// not converge.
 const ROUGH_SPACE_MAX: usize = 240;
 
 /// Largest map of which all eigenvalues are computed: about 10 n³ operations, some ten seconds.
@@ -71,7 +73,8 @@ impl Dominant {
         Self::kept(map, &|values| values.retain(|value| value.norm() > least))
     }
 
-    /// All eigenvalues larger than 0.25. If there is none, the largest ones, at most [`CROWD`].
+    /// All eigenvalues larger than 0.25. If there is none, those of at least half the size of the largest, at most
+    /// [`CROWD`] of them.
     pub(crate) fn any(map: &impl LinearMap) -> Option<Self> {
         Self::kept(map, &|values| {
             let largest = values.first().map_or(0.0, |value| value.norm());
@@ -173,7 +176,7 @@ fn arnoldi(
 ) -> Option<ArnoldiResult> {
     let size = map.size();
     // Arnoldi relation M V = V H + W K: V the blocks so far, W the next block, K in the lower rows of H.
-    let mut room = most.min(4 * LOOK * BLOCK);
+    let mut room = most.min(4 * BLOCKS_BEFORE_EIGENVALUES * BLOCK);
     let mut basis = DMatrix::zeros(size, room + BLOCK);
     let mut projected = DMatrix::zeros(room + BLOCK, room);
     let first = start(size);
@@ -181,10 +184,10 @@ fn arnoldi(
     let (first, _) = orthonormal(first, scale);
     basis.columns_mut(0, first.ncols()).copy_from(&first);
     let (mut done, mut width) = (0, first.ncols());
-    let mut look = LOOK;
+    let mut next_eigenvalues = BLOCKS_BEFORE_EIGENVALUES;
     for count in 1.. {
         if done + width > room {
-            // Storage grows by doubling: few maps need much of it, and filling it takes longer than the others need in
+            // Storage grows by doubling. Filling the largest storage at once would take longer than most maps need in
             // all.
             room = most.min(2 * room);
             basis = basis.resize_horizontally(room + BLOCK, 0.0);
@@ -207,8 +210,8 @@ fn arnoldi(
             .copy_from(&coupling);
         basis.columns_mut(end, next.ncols()).copy_from(&next);
         let is_full = next.ncols() == 0 || end + next.ncols() > most;
-        if is_full || count == look {
-            look += LOOK.max(look / 3);
+        if is_full || count == next_eigenvalues {
+            next_eigenvalues += BLOCKS_BEFORE_EIGENVALUES.max(next_eigenvalues / 3);
             let within = projected.view((0, 0), (end, end)).into_owned();
             let mut eigenvalues = larger(&within, 0.0)?;
             keep(&mut eigenvalues);
@@ -227,7 +230,8 @@ fn arnoldi(
     None
 }
 
-/// True if the residual ‖K y‖ of M at μ is small, with y the last block of the eigenvector, for every eigenvalue.
+/// True if every eigenvalue μ has a small residual ‖M v − μ v‖ = ‖K y‖, with K the coupling to the next block and y the
+/// last block of the eigenvector of the projected matrix.
 ///
 /// Eigenvalues smaller than the residual count as converged: compact maps have many of them near zero.
 fn are_settled(
@@ -242,7 +246,7 @@ fn are_settled(
         .iter()
         .filter(|value| value.im >= 0.0 && value.norm() > residual);
     of_interest.all(|&value| {
-        // A triangular block couples each block to the next.
+        // The blocks below the diagonal are triangular: the matrix has `BLOCK` diagonals below the main one.
         Shifted::new(projected, BLOCK, value)
             .right()
             .is_some_and(|vector| {

@@ -8,8 +8,8 @@ use super::krylov::{Dominant, LinearMap};
 use super::stability_loss::StabilityLoss;
 use crate::criteria::MAPPED;
 
-/// Step of the difference quotient dμ/dw, as a share of the largest depth. Truncation error, and rounding of
-/// multipliers divided by the step, are then both near 1e-6; derivatives serve as predictions only.
+/// Depth step of the difference quotient dμ/dw, as a share of the largest depth. Its truncation error, and the rounding
+/// of multipliers divided by the step, are then both near 1e-6. Derivatives serve as predictions only.
 const DIFFERENCE: f64 = 1e-6;
 
 /// Map over one period at one axial depth; its eigenvalues are the Floquet multipliers.
@@ -23,7 +23,7 @@ struct Known {
     depth_m: f64,
     dominant: Dominant,
     /// Multipliers at a slightly larger depth, for the difference quotient.
-    beside: Option<Vec<Complex64>>,
+    deeper: Option<Vec<Complex64>>,
 }
 
 /// Floquet multipliers of maps at any axial depth: `map` returns the map at a depth (m), `error` the error of a
@@ -52,7 +52,7 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
             self.known = Some(Known {
                 depth_m,
                 dominant: Dominant::of(&(self.map)(depth_m)?, MAPPED)?,
-                beside: None,
+                deeper: None,
             });
         }
         self.known.as_mut()
@@ -88,13 +88,13 @@ impl<M: PeriodMap, F: Fn(f64) -> Option<M>, E: Fn(Complex64, f64) -> Option<f64>
     fn sensitivity(&mut self, multiplier: Complex64, depth_m: f64) -> Option<Complex64> {
         let step_m = self.step_m;
         let own = self.nearest(multiplier, depth_m)?;
-        if self.at(depth_m)?.beside.is_none() {
-            let beside = Dominant::of(&(self.map)(depth_m + step_m)?, MAPPED)?.eigenvalues;
-            self.at(depth_m)?.beside = Some(beside);
+        if self.at(depth_m)?.deeper.is_none() {
+            let deeper = Dominant::of(&(self.map)(depth_m + step_m)?, MAPPED)?.eigenvalues;
+            self.at(depth_m)?.deeper = Some(deeper);
         }
-        let beside = self.at(depth_m)?.beside.as_deref()?;
+        let deeper = self.at(depth_m)?.deeper.as_deref()?;
         // If two real multipliers meet between both depths, the derivative does not exist.
-        Some((nearest(beside, own)? - own) / step_m)
+        Some((nearest(deeper, own)? - own) / step_m)
     }
 
     fn crossing_near(&mut self, guess: Crossing, low_m: f64, high_m: f64) -> Option<Crossing> {

@@ -14,7 +14,7 @@ use quietcut_numerics::eigenvalues;
 /// there.
 const WHOLE: usize = 110;
 
-/// Largest size for which all eigenvalues are computed if block Arnoldi does not converge: about one second.
+/// Largest size of a map for which all eigenvalues are computed if block Arnoldi does not converge: about one second.
 const UNSETTLED_WHOLE_MAX: usize = 400;
 
 /// Matrix of the map (x, p_τ) → (x⁺, p) over one tooth period at an axial depth, m.
@@ -90,7 +90,8 @@ pub(crate) fn largest(period: &Period, depth_m: f64, share: f64) -> Option<Candi
             is_certain: is_settled && norm <= NORMAL * largest.max(1.0),
         }
     };
-    // Without a previously cut surface κ = w, and the map from rest is Φ(w).
+    // Multipliers from the transition matrix Φ(w), which is the map without the surface of the preceding tooth (κ = w);
+    // `None` unless one is so large that this surface does not act.
     let grown = |transition: DMatrix<f64>| {
         let norm = transition.amax();
         let multipliers = of_matrix(transition)?;

@@ -23,9 +23,9 @@ impl Root {
         (self.multiplier.conj() * self.slope).re / self.multiplier.norm()
     }
 
-    /// Removes from `free` the multiplier, one step deeper, on the same branch as this one. Both must be real of equal
-    /// sign or both complex, and the tangents from both ends must meet half way to within a quarter of the distance
-    /// travelled.
+    /// Removes from `free`, the multipliers one step deeper, the one on the same branch as this multiplier, and returns
+    /// it. Both must be real of equal sign or both complex, and the tangents from both ends must meet half way to
+    /// within a quarter of the distance travelled. `None` if there is no such multiplier.
     pub(crate) fn take_next(&self, free: &mut Vec<Self>, step_m: f64) -> Option<Self> {
         let middle = self.multiplier + self.slope * (0.5 * step_m);
         let miss = |to: &Self| (middle - (to.multiplier - to.slope * (0.5 * step_m))).norm();

@@ -38,7 +38,7 @@ impl StabilityLoss {
         }
     }
 
-    /// Number of multipliers that cross together.
+    /// Number of Floquet multipliers that cross the unit circle together: 2 for a complex pair, else 1.
     pub(crate) fn count(self) -> i32 {
         match self {
             Self::Hopf => 2,

@@ -27,12 +27,12 @@ const CANDIDATES_MAX: usize = 6;
 /// Largest number of multipliers that are searched one by one: a limit on computing time.
 const ROOTS_MAX: usize = 12;
 
-/// Largest multiplier found, and a radius beyond which there is none.
+/// Largest multiplier found, and the radius beyond which the winding number counts none.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beyond {
     /// Largest multiplier found, if larger than [`WOUND`]; of a conjugate pair the upper one.
     pub(crate) multiplier: Option<Complex64>,
-    /// Proven bound: no multiplier has a larger absolute value. Infinite if no bound could be shown.
+    /// Radius beyond which the winding number counts no multiplier; infinite if no count converged.
     pub(crate) radius: f64,
 }
 
@@ -83,8 +83,8 @@ impl<'a> Search<'a> {
         while points <= POINTS_MAX {
             let mean = sum / points as f64;
             let whole = mean.round();
-            // The error falls exponentially with the number of points: three means in succession close to the same
-            // integer have converged.
+            // Once the points resolve the zero nearest to the circle, each doubling of their number squares the error
+            // of the mean. Three successive means close to the same integer are therefore taken as converged.
             if (mean - whole).abs() < 0.02 && (last - whole).abs() < 0.1 && (before - whole).abs() < 0.4 {
                 return (whole >= 0.0).then_some(whole as usize);
             }
@@ -128,7 +128,7 @@ impl<'a> Search<'a> {
             }
             let step = -z / slope;
             z += step;
-            // The polynomials of the elements are not valid for larger |z|.
+            // The polynomials in κ of the elements are valid for |z| up to 1/[`WOUND`] only.
             if !z.is_finite() || z.norm() > WOUND.recip() {
                 return None;
             }
@@ -142,8 +142,8 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Largest multiplier, and a radius beyond which there is none; `candidates` are starting values of Newton's
-    /// method.
+    /// Largest multiplier found, and the radius beyond which the winding number counts none; `candidates` are starting
+    /// values of Newton's method.
     pub(crate) fn largest(&mut self, candidates: &[Complex64]) -> Beyond {
         let mut known: Vec<Complex64> = Vec::new();
         let mut best: Option<Complex64> = None;

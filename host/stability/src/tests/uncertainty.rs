@@ -27,13 +27,13 @@ fn acetal() -> Case {
     case
 }
 
-fn maker(case: &Case) -> Result<Box<dyn Method>, String> {
+fn method_of(case: &Case) -> Result<Box<dyn Method>, String> {
     let problem = Problem::new(case, CubicTerms::LeaveOut).map_err(|error| error.to_string())?;
     Ok(Box::new(Collocation { problem }))
 }
 
 fn nominal(case: &Case, rpm: f64, depth_mm: f64) -> SpeedLine {
-    maker(case).unwrap().line(rpm, depth_mm, 40).unwrap()
+    method_of(case).unwrap().line(rpm, depth_mm, 40).unwrap()
 }
 
 /// The seed of the Monte Carlo; it differs from that of the draws.
@@ -91,7 +91,7 @@ impl<'a> MonteCarlo<'a> {
                 let deviations: f64 = StandardNormal.sample(&mut rng);
                 variable.shift(&mut machine, deviations)
             });
-            let method = maker(&machine).ok().filter(|_| is_possible)?;
+            let method = method_of(&machine).ok().filter(|_| is_possible)?;
             Some(self.first_limit(method.as_ref()))
         });
         let limits: Vec<f64> = limits.collect();
@@ -149,7 +149,7 @@ impl<'a> MonteCarlo<'a> {
 
 /// Compares at one speed with so many machines.
 fn compare<'a>(case: &'a Case, rpm: f64, depth_mm: f64, count: u64) -> (LimitSpread, MonteCarlo<'a>) {
-    let uncertainty = Uncertainty::new(case, &maker, 7).unwrap();
+    let uncertainty = Uncertainty::new(case, &method_of, 7).unwrap();
     let line = nominal(case, rpm, depth_mm);
     let began = std::time::Instant::now();
     let spread = uncertainty.spread(&line, depth_mm, &[]).unwrap();
@@ -302,7 +302,7 @@ fn the_force_coefficient_alone_gives_the_distribution_of_its_inverse() {
     }];
     let line = nominal(&case, 800.0, 10.0);
     let limit_mm = line.first_limit.unwrap().depth_mm;
-    let uncertainty = Uncertainty::new(&case, &maker, 1).unwrap();
+    let uncertainty = Uncertainty::new(&case, &method_of, 1).unwrap();
     let cells_mm = [0.5 * limit_mm, limit_mm, 1.5 * limit_mm];
     let spread = uncertainty.spread(&line, 10.0, &cells_mm).unwrap();
     let percentiles = spread.limit_percentiles_mm;
@@ -340,8 +340,8 @@ fn the_spread_is_the_same_for_any_number_of_threads() {
             .build()
             .unwrap();
         pool.install(|| {
-            let uncertainty = Uncertainty::new(&case, &maker, 3).unwrap();
-            let method = maker(&case).unwrap();
+            let uncertainty = Uncertainty::new(&case, &method_of, 3).unwrap();
+            let method = method_of(&case).unwrap();
             chart(method.as_ref(), &[900.0, 1300.0], 6.0, 40)
                 .unwrap()
                 .with_spread(&uncertainty, 6.0, &[1.0, 2.0])
@@ -358,7 +358,7 @@ fn deviations_that_make_most_machines_impossible_are_refused() {
         parameter: Parameter::DampingRatio(0),
         std: 0.1,
     }];
-    let uncertainty = Uncertainty::new(&case, &maker, 1).unwrap();
+    let uncertainty = Uncertainty::new(&case, &method_of, 1).unwrap();
     let error = uncertainty
         .spread(&nominal(&case, 900.0, 4.0), 4.0, &[])
         .unwrap_err();
@@ -369,5 +369,5 @@ fn deviations_that_make_most_machines_impossible_are_refused() {
         "{error}"
     );
     case.deviations.clear();
-    assert!(Uncertainty::new(&case, &maker, 1).is_none());
+    assert!(Uncertainty::new(&case, &method_of, 1).is_none());
 }
