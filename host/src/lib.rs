@@ -14,6 +14,7 @@ pub use quietcut_stability as stability;
 pub use quietcut_stability::{lobe_table, orbit, trial_cuts};
 
 pub mod cli;
+mod criteria;
 pub mod demo;
 pub mod device;
 pub mod report;

@@ -1,5 +1,6 @@
 //! Weighted least squares on steady motions; the weights depend on the parameters.
 
+use crate::criteria::{FULL_RANK, LARGEST_MISFIT};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use quietcut_numerics::singular_values::{Vectors, decompose};
 
@@ -37,9 +38,6 @@ pub enum FitError {
     #[error("the fit does not converge; its sum of squares over degrees of freedom is {0:.3e}")]
     NotConverged(f64),
 }
-
-/// Above this misfit the law does not explain the data, and the sandwich is taken.
-const MISFIT: f64 = 1.3;
 
 /// Normal equations summed over dwells, from the whitened residual r of each dwell and its derivative S by the parameters.
 pub(super) struct Normal {
@@ -118,7 +116,7 @@ impl Normal {
         }
         let inverse = scaled_inverse(&self.matrix).ok_or(FitError::Undetermined)?;
         let misfit = self.misfit();
-        let robust = misfit > MISFIT;
+        let robust = misfit > LARGEST_MISFIT;
         let covariance = if robust {
             &inverse * &self.scatter * &inverse
         } else {
@@ -223,7 +221,7 @@ pub(super) fn scaled_least_squares(matrix: &DMatrix<f64>, right: &DVector<f64>) 
     let svd = decompose(scaled, Vectors::Both).ok()?;
     let largest = svd.singular_values.max();
     // Singular values below the rounding of the data do not determine the solution.
-    if svd.singular_values.min() < 1e-12 * largest {
+    if svd.singular_values.min() < FULL_RANK * largest {
         return None;
     }
     let solution = svd.solve(right, 0.0).ok()?;

@@ -13,6 +13,7 @@ use crate::frf::{
     Estimator, Excitation, FrfError, FrfTable, HammerWindows, Measurement, MeasurementSettings, ModeRatio,
     Part, Window, calibrate, measure,
 };
+use crate::identify::student::NINETY_PERCENT;
 use crate::recording::UffForm;
 use crate::report::frf_chart::frf_chart;
 use crate::report::page::{figure, page};
@@ -295,9 +296,6 @@ struct RatioAnswer {
     misfit: f64,
 }
 
-/// Half width of the 90 % interval of a normal distribution, in standard deviations (the 95 % quantile of N(0, 1)).
-const NORMAL_90: f64 = 1.644_853_626_951_472_7;
-
 impl FrfOutput {
     fn new(args: &Args, measurement: &Measurement, table: &FrfTable, calibration: &[ModeRatio]) -> Self {
         let frequency_hz = table.frequency_hz();
@@ -404,7 +402,7 @@ impl ReceptanceAnswer {
         } else {
             0.0
         };
-        let half = NORMAL_90 * relative * size(at);
+        let half = NINETY_PERCENT * relative * size(at);
         Self {
             name: entry.name(),
             peak_hz: table.frequency_hz()[at],

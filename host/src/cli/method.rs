@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Error, non_negative};
 use crate::case::Case;
+use crate::criteria::COARSE_TABLE;
 use crate::frf::{FrfTable, Interpolation};
 use crate::orbit::collocation_of;
 use crate::stability::{
@@ -20,9 +21,6 @@ const STEPS_MAX: usize = 20_000;
 
 /// Upper bound of `--harmonics`, a choice: more harmonics make the truncated Hill matrix too large to be useful.
 const HARMONICS_MAX: usize = 400;
-
-/// Interpolation error of an FRF table, as a fraction of its peak, above which a warning is printed: a choice.
-const COARSE: f64 = 0.01;
 
 /// Stability method with its options.
 #[derive(Debug, clap::Args)]
@@ -208,7 +206,7 @@ fn warn_of_table(table: &FrfTable) -> Result<(), Error> {
         }
     }
     let error = Interpolation::new(table).map_err(Error::input)?.error();
-    if error > COARSE {
+    if error > COARSE_TABLE {
         tracing::warn!(
             "{file}: the interpolation error between the lines of the table is {:.1} % of its peak; a finer frequency resolution would help",
             100.0 * error

@@ -1,5 +1,6 @@
 //! Verdicts and advice as JSON objects: the output of `quietcut replay` and `quietcut monitor`.
 
+use crate::criteria::SAME_SPEED;
 use std::fmt;
 
 use quietcut_core::advice::Advice;
@@ -116,10 +117,6 @@ impl fmt::Display for Summary {
         )
     }
 }
-
-/// Largest relative change of the advised speed that counts as the same advice. It is a choice: the tooth-passing rule follows
-/// every small change of the estimated chatter frequency.
-const SAME_SPEED: f64 = 0.01;
 
 impl VerdictLog {
     /// Adds the next report; returns its verdict if verdict or advice differs from the previous one.

@@ -6,6 +6,7 @@ use super::PictureError;
 use super::lobe_chart::{Column, lobe_chart};
 use super::marks::Mark;
 use super::page::figure;
+use crate::criteria::UNCHANGED_LIMIT;
 use crate::diagnose::lobes::{Change, Chart, Lobes};
 
 /// Sentences about the change of the limits and of the predicted trial cuts.
@@ -16,7 +17,7 @@ pub fn sentences(lobes: &Lobes) -> Vec<String> {
         .map(|change| change.relative(lobes.searched_mm).abs());
     let most = changes.fold(0.0, f64::max);
     let mut all = Vec::new();
-    if most < UNCHANGED {
+    if most < UNCHANGED_LIMIT {
         all.push("the extension changes no stability limit".into());
     } else {
         all.extend(limits(lobes));
@@ -40,9 +41,6 @@ pub fn sentences(lobes: &Lobes) -> Vec<String> {
     }
     all
 }
-
-/// Relative change of a limit below which it counts as unchanged: a choice.
-const UNCHANGED: f64 = 1e-6;
 
 fn limits(lobes: &Lobes) -> Vec<String> {
     let mut all = vec![format!(

@@ -7,6 +7,7 @@ use super::comparison::{Line, LineRole, comparison};
 use super::page::figure;
 use super::stroboscope::samples_per_tooth;
 use super::time_signal::thinned;
+use crate::criteria::AMPLITUDE_RATIO;
 use crate::diagnose::{MissingForce, ResidualView, SpindleMotionView};
 
 /// Largest number of points of a scatter plot: a choice that limits the file size.
@@ -170,7 +171,7 @@ fn stroboscopic_map(samples: &[(u32, f64)], what: &str, view: &ResidualView) -> 
     samples_per_tooth("", &quantity, shown, None)
 }
 
-/// Missing stiffness and damping over amplitude; `None` if the largest amplitude is less than 1.2 times the smallest one.
+/// Missing stiffness and damping over amplitude; `None` if the amplitudes differ by less than [`AMPLITUDE_RATIO`].
 fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureError> {
     let rms = |a: &[f64]| (a.iter().map(|x| x * x).sum::<f64>() / a.len().max(1) as f64).sqrt();
     // Amplitude in µm, k/k_static and ω·c/k_static, where ω is the ratio of the root mean squares of velocity and displacement.
@@ -186,7 +187,7 @@ fn over_amplitude(records: &[&MissingForce]) -> Result<Option<String>, PictureEr
         }));
     }
     let extent = |pick: fn(f64, f64) -> f64, start: f64| all.iter().map(|at| at[0]).fold(start, pick);
-    if all.len() < 3 || extent(f64::max, 0.0) < 1.2 * extent(f64::min, f64::INFINITY) {
+    if all.len() < 3 || extent(f64::max, 0.0) < AMPLITUDE_RATIO * extent(f64::min, f64::INFINITY) {
         return Ok(None);
     }
     let every = all.len().div_ceil(POINTS / 2).max(1);

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
-use crate::criteria::SAME_FEED;
+use crate::criteria::{LEAST_METHOD_DIFFERENCE, SAME_FEED};
 use crate::cutting::chip::{Chip, chips};
 use crate::cutting::force_test::CuttingTest;
 use crate::cutting::prepared_test::{Prepared, prepared};
@@ -441,7 +441,7 @@ impl Fit {
             let (Some(one), Some(other)) = (self.coefficients[index], averaged[index]) else {
                 return false;
             };
-            let least = 0.05 * if index < 3 { cutting } else { edge };
+            let least = LEAST_METHOD_DIFFERENCE * if index < 3 { cutting } else { edge };
             (one.value - other.value).abs() > NINETY_PERCENT * (one.deviation + other.deviation) + least
         };
         KEYS.into_iter()

@@ -15,7 +15,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::criteria::{CERTAIN_DEVIATIONS, MISJUDGED_SHARE};
+use crate::criteria::{
+    CERTAIN_DEVIATIONS, CUTS_PER_MISJUDGED, MISJUDGED_SHARE, VAGUE_SHARE, WRONG_DEPTH_DEVIATIONS,
+    WRONG_FREQUENCY_DEVIATIONS,
+};
 use crate::cutting::observed_cut::ObservedCut;
 use crate::modes::IdentifiedMode;
 use crate::modes::shape::{normalize, rank_one};
@@ -74,7 +77,7 @@ impl Spread {
     /// parameter.
     pub fn is_vague(&self) -> bool {
         let width = |[low, high]: [f64; 2]| (high / low).ln();
-        width(self.ci90) > 0.5 * width(self.before)
+        width(self.ci90) > VAGUE_SHARE * width(self.before)
     }
 }
 
@@ -272,12 +275,13 @@ impl Family<'_> {
             };
             let toward = if cut.chatters { deviations } else { -deviations };
             sum += (MISJUDGED_SHARE + (1.0 - 2.0 * MISJUDGED_SHARE) * normal_share(toward)).ln();
-            wrong += usize::from(toward < -3.0);
+            wrong += usize::from(toward < -WRONG_DEPTH_DEVIATIONS);
             if let (Some(measured), Some(predicted)) = (cut.chatter_hz, high.chatter_hz) {
                 let off = (measured / predicted - 1.0) / self.errors.frequency;
                 let density = (-0.5 * off * off).exp();
                 sum += (MISJUDGED_SHARE * self.errors.frequency + (1.0 - MISJUDGED_SHARE) * density).ln();
-                wrong += usize::from(off.abs() > 4.0 && toward >= -3.0);
+                wrong +=
+                    usize::from(off.abs() > WRONG_FREQUENCY_DEVIATIONS && toward >= -WRONG_DEPTH_DEVIATIONS);
             }
         }
         (sum, wrong)
@@ -372,7 +376,7 @@ impl Family<'_> {
             .min()
             .unwrap_or(0);
         // One cut in twenty may be misjudged for reasons outside the model.
-        if wrong > self.cuts.len() / 20 {
+        if wrong > self.cuts.len() / CUTS_PER_MISJUDGED {
             Err(InverseError::Unexplained(wrong, self.cuts.len()))
         } else {
             Ok(())

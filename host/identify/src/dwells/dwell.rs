@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::criteria::{FORCE_ABOVE_NOISE, FORCE_BELOW_LARGEST, STEP_SCATTER, STEP_SHARE};
 use quietcut_model::structure::Direction;
 use quietcut_recording::{Channel, Quantity, Recording};
 
@@ -101,7 +102,9 @@ pub fn dwell_segments(recording: &Recording) -> Vec<DwellSegment> {
         return Vec::new();
     };
     // The threshold of the block level lies between the noise and the lowest force level.
-    let threshold = (3.0 * quietest).min(0.3 * loudest).max(0.02 * loudest);
+    let threshold = (FORCE_ABOVE_NOISE * quietest)
+        .min(FORCE_BELOW_LARGEST[1] * loudest)
+        .max(FORCE_BELOW_LARGEST[0] * loudest);
     let mut found = Vec::new();
     let mut start = None;
     for index in 0..=sizes.len() {
@@ -153,7 +156,8 @@ fn split(samples: &[f64], from: usize, rate_hz: f64, found: &mut Vec<DwellSegmen
         );
         // A step exceeds ten times the scatter of the local frequency, and a thousandth of the frequency, which is less than the
         // step of any test.
-        let stepped = end < local.len() && (local[end] - held).abs() > (10.0 * scatter).max(1e-3 * held);
+        let stepped =
+            end < local.len() && (local[end] - held).abs() > (STEP_SCATTER * scatter).max(STEP_SHARE * held);
         if stepped || end == local.len() {
             let last = if stepped { end } else { crossings.len() - 1 };
             if last > begin + 2 * PERIODS {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
-use crate::criteria::{LEAST_DWELL_PERIODS, STEADY_CHANGE, STEADY_DEVIATIONS};
+use crate::criteria::{LEAST_DWELL_PERIODS, NOISE_OVER_TRANSIENT, STEADY_CHANGE, STEADY_DEVIATIONS};
 use crate::dwells::dwell::{Dwell, DwellSegment, direction_of, dwell_segments, pool_variances};
 use quietcut_recording::Recording;
 
@@ -206,7 +206,7 @@ fn first_settled(
                 .iter()
                 .map(|line| line.amplitude(1) / (line.variance * first.gram_inverse[(1, 1)]).sqrt())
                 .fold(1.0, f64::max);
-            let needed = (5.0 * clearest.min(1e8)).ln() / rate;
+            let needed = (NOISE_OVER_TRANSIENT * clearest.min(1e8)).ln() / rate;
             match last(needed) {
                 Some(dwell) => Some((dwell, true)),
                 None => Some((last(0.7 * 2.0 * half).unwrap_or(first), false)),

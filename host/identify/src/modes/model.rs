@@ -6,7 +6,9 @@ use super::mode::IdentifiedMode;
 use super::rejected::Rejected;
 use super::shape;
 use super::stabilization::Stabilization;
-use crate::criteria::{LARGEST_FIT_ERROR, LINES_PER_HALF_POWER_WIDTH};
+use crate::criteria::{
+    LARGEST_DAMPING_DEVIATION, LARGEST_FIT_ERROR, LINES_PER_HALF_POWER_WIDTH, SEPARABLE_DEVIATIONS,
+};
 use quietcut_model::structure::Direction;
 
 /// Result of the modal identification.
@@ -51,7 +53,7 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
                 "{lines:.1} lines within the width of the mode at {hertz:.3} Hz ({width_hz:.3} Hz); a finer resolution is needed for its damping"
             ));
         }
-        if mode.damping_ratio_std > 0.1 * damping {
+        if mode.damping_ratio_std > LARGEST_DAMPING_DEVIATION * damping {
             warnings.push(format!(
                 "the standard deviation of the damping of the mode at {hertz:.3} Hz is {:.0} %",
                 100.0 * mode.damping_ratio_std / damping
@@ -61,7 +63,7 @@ pub(super) fn warnings(spacing_hz: f64, model: &ModalModel) -> Vec<String> {
     for pair in model.modes.windows(2) {
         let apart = pair[1].mode.frequency_hz - pair[0].mode.frequency_hz;
         let deviation = pair[0].frequency_std_hz.hypot(pair[1].frequency_std_hz);
-        if apart < 3.0 * deviation {
+        if apart < SEPARABLE_DEVIATIONS * deviation {
             warnings.push(format!(
                 "the modes at {:.3} and {:.3} Hz are not separable in the data",
                 pair[0].mode.frequency_hz, pair[1].mode.frequency_hz

@@ -9,7 +9,8 @@ use super::error::ModesError;
 use super::receptances::Receptances;
 use super::rejected::{Rejected, reject};
 use crate::criteria::{
-    LEAST_HEIGHT, LEAST_ORDERS, ORDERS_SHARE, OVERDAMPED, SAME_DAMPING, SAME_FREQUENCY, SAME_SHAPE,
+    LEAST_HEIGHT, LEAST_ORDERS, ORDERS_SHARE, OVERDAMPED, SAME_DAMPING, SAME_FREQUENCY, SAME_POLE_DISTANCE,
+    SAME_POLE_SHAPE, SAME_SHAPE,
 };
 use quietcut_frf::rational_fit::{RationalFitError, residues};
 
@@ -233,7 +234,8 @@ fn select(found: &mut Stabilization, lines: usize) {
     let mut kept: Vec<&Candidate> = Vec::new();
     for (candidate, _) in long {
         let is_known = |other: &&Candidate| {
-            distance(candidate, other) <= 3.0 && assurance(&candidate.shape, &other.shape) > 0.9
+            distance(candidate, other) <= SAME_POLE_DISTANCE
+                && assurance(&candidate.shape, &other.shape) > SAME_POLE_SHAPE
         };
         if !kept.iter().any(is_known) {
             kept.push(candidate);

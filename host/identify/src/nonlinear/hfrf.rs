@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use crate::criteria::LEAST_LEVELS;
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use crate::least_squares::{scaled_inverse, scaled_least_squares};
@@ -87,7 +88,7 @@ pub fn responses(dwells: &[Dwell], tolerance: f64) -> Vec<Response> {
 
 /// Higher-order FRF at one frequency: thesis eq. 5.15 by least squares; `None` with fewer than three force levels.
 pub fn higher_order(response: &Response) -> Option<HigherOrder> {
-    if response.levels.len() < 3 {
+    if response.levels.len() < LEAST_LEVELS {
         return None;
     }
     let count = response.levels.len();

@@ -1,6 +1,7 @@
 //! Homogeneity at constant frequency: whether the response is proportional to a rising force (thesis section 4.2.3).
 
-use crate::criteria::{LEAST_REGION_POINTS, REGION_EVIDENCE};
+use crate::criteria::{CURVATURE_SHARE, JUMP_DEVIATIONS, JUMP_SHARE, LEAST_REGION_POINTS, REGION_EVIDENCE};
+
 /// A range of force in which the response is a linear function of the force.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Region {
@@ -29,7 +30,7 @@ pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
     let noise = bends.get(bends.len() / 2).copied().unwrap_or(0.0) / (0.6745 * 6.0_f64.sqrt());
     // The curvature of X(F) within one region is not noise: deviations of 0.2 % of the largest response are allowed for.
     let largest = sorted.iter().fold(0.0_f64, |a, (_, x)| a.max(x.abs()));
-    let noise = noise.max(2e-3 * largest);
+    let noise = noise.max(CURVATURE_SHARE * largest);
     let mut cuts = vec![0, sorted.len()];
     split_line(&sorted, 0, sorted.len(), noise.max(f64::MIN_POSITIVE), &mut cuts);
     cuts.sort_unstable();
@@ -54,7 +55,7 @@ pub fn regions(points: &[(f64, f64)]) -> (Vec<Region>, Vec<f64>) {
             let value = |[level, slope]: [f64; 2]| level + slope * at;
             let miss = (value(pair[1].2) - value(pair[0].2)).abs();
             // A jump exceeds the noise, and 5 % of the response, which is more than a smooth curve changes between two windows.
-            (miss > 6.0 * noise && miss > 0.05 * value(pair[0].2).abs()).then_some(at)
+            (miss > JUMP_DEVIATIONS * noise && miss > JUMP_SHARE * value(pair[0].2).abs()).then_some(at)
         })
         .collect();
     (regions, jumps)

@@ -8,7 +8,10 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use crate::criteria::{EXPLAINED_SHARE, KIND_EVIDENCE};
+use crate::criteria::{
+    DIFFERENT_LEVELS, EXPLAINED_SHARE, FORCE_HARMONIC_DEVIATIONS, HARMONIC_DEVIATIONS, KIND_EVIDENCE,
+    LINEAR_DEVIATIONS, QUADRATIC_STIFFNESS_RATIO, SAME_STEP,
+};
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::{Dwell, Line};
 use crate::nonlinear::describing::{self, Nonlinearity};
@@ -92,7 +95,7 @@ pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
         sum: alone,
     };
     // χ² of a linear structure exceeds its degrees of freedom by more than this only by a rare chance.
-    let chance = free + 4.0 * (2.0 * free).sqrt();
+    let chance = free + LINEAR_DEVIATIONS * (2.0 * free).sqrt();
     let (second, third) = (harmonic(dwells, 2), harmonic(dwells, 3));
     if alone > chance {
         best = choose(&base, &points, best);
@@ -123,7 +126,7 @@ pub fn judge(dwells: &[Dwell]) -> Result<Verdict, LinearityError> {
 }
 
 fn differ(a: &Point, b: &Point) -> bool {
-    (a.amplitude / b.amplitude - 1.0).abs() > 0.05
+    (a.amplitude / b.amplitude - 1.0).abs() > DIFFERENT_LEVELS
 }
 
 fn pair(dwell: &Dwell) -> Option<(&Line, &Line)> {
@@ -159,7 +162,7 @@ fn points(dwells: &[Dwell]) -> Vec<Point> {
     let mut group = 0;
     for index in 1..points.len() {
         // Dwells within 0.1 % in frequency are repetitions of one frequency step.
-        if points[index].omega > points[index - 1].omega * 1.001 {
+        if points[index].omega > points[index - 1].omega * (1.0 + SAME_STEP) {
             group += 1;
         }
         points[index].group = group;
@@ -413,7 +416,8 @@ fn is_shadow_of_quadratic(points: &[Point], dwells: &[Dwell]) -> bool {
     }
     // The ratio is −30 for a quadratic spring; ±50 % allow for damping, other modes and the next order of the balance.
     let ratio = above / (below * stiffness);
-    (-45.0..-15.0).contains(&ratio)
+    let [least, most] = QUADRATIC_STIFFNESS_RATIO;
+    (-most..-least).contains(&ratio)
 }
 
 fn level_dependence(points: &[Point]) -> f64 {
@@ -449,12 +453,13 @@ fn harmonic(dwells: &[Dwell], h: usize) -> bool {
             continue;
         };
         // The receptance at hω, above resonance, is at most the receptance at ω near resonance.
-        let caused = (f - 3.0 * force_noise).max(0.0) * motion.amplitude(1) / force.amplitude(1);
+        let caused =
+            (f - FORCE_HARMONIC_DEVIATIONS * force_noise).max(0.0) * motion.amplitude(1) / force.amplitude(1);
         sum += ((x - caused).max(0.0) / noise).powi(2);
         count += 2.0;
     }
     // Significant if χ² exceeds the mean of its distribution by more than five of its standard deviations.
-    count > 0.0 && sum > count + 5.0 * (2.0_f64 * count).sqrt()
+    count > 0.0 && sum > count + HARMONIC_DEVIATIONS * (2.0_f64 * count).sqrt()
 }
 
 fn harmonics(dwells: &[Dwell]) -> Vec<Harmonics> {

@@ -7,6 +7,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use crate::criteria::LEAST_PERIOD_SAMPLES;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use quietcut_numerics::singular_values::{Vectors, decompose};
@@ -287,7 +288,7 @@ pub fn fit(periods: &[Period<'_>], rate_hz: f64, terms: &[Term]) -> Result<Perio
     }
     let samples = periods.first().map_or(0, |period| period.force.len());
     let even = |period: &Period<'_>| period.force.len() == samples && period.displacement.len() == samples;
-    if samples < 16 || !periods.iter().all(even) {
+    if samples < LEAST_PERIOD_SAMPLES || !periods.iter().all(even) {
         return Err(PeriodicError::Length);
     }
     let balance = Balance::new(terms, samples, rate_hz);

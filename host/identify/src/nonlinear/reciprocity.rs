@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use crate::criteria::{LEAST_RECIPROCITY_CHANGE, RECIPROCAL_DEVIATIONS, SAME_STEP};
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use quietcut_model::structure::Direction;
@@ -48,7 +49,7 @@ pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> 
         let mut lowest: Vec<(f64, Complex64, f64, f64)> = Vec::new();
         for point in found {
             match lowest.last_mut() {
-                Some(last) if point.0 <= last.0 * 1.001 => {
+                Some(last) if point.0 <= last.0 * (1.0 + SAME_STEP) => {
                     if point.3 < last.3 {
                         *last = point;
                     }
@@ -64,7 +65,7 @@ pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> 
     let (one, other) = (of(i, j), of(j, i));
     let (mut sum, mut count, mut change, mut largest) = (0.0, 0.0, 0.0_f64, 0.0_f64);
     for (omega, h, variance) in &one {
-        let Some((_, g, of_g)) = other.iter().find(|(w, ..)| (w / omega - 1.0).abs() < 1e-3) else {
+        let Some((_, g, of_g)) = other.iter().find(|(w, ..)| (w / omega - 1.0).abs() < SAME_STEP) else {
             continue;
         };
         sum += (h - g).norm_sqr() / (variance + of_g);
@@ -83,6 +84,7 @@ pub fn compare(dwells: &[Dwell], [i, j]: [Direction; 2]) -> Option<Reciprocity> 
         largest_change,
         // The mean of `count` exponential variables of mean 1 rarely exceeds 1 by five standard deviations; 1 % is the accuracy of
         // the position of a shaker.
-        reciprocal: misfit < 1.0 + 5.0 / f64::sqrt(count) || largest_change < 0.01,
+        reciprocal: misfit < 1.0 + RECIPROCAL_DEVIATIONS / f64::sqrt(count)
+            || largest_change < LEAST_RECIPROCITY_CHANGE,
     })
 }

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::criteria::BAND_SIGNAL_TO_NOISE;
+use crate::criteria::{BAND_SIGNAL_TO_NOISE, LEAST_SLICE_SAMPLES, SAMPLES_PER_TERM};
 use crate::least_squares::{scaled_inverse, scaled_least_squares};
 use crate::nonlinear::spectrum::{Spectral, band_of, dominant_frequency_hz};
 use crate::student::NINETY_PERCENT;
@@ -210,7 +210,7 @@ impl Record<'_> {
             .filter(|term| options.mass_kg.is_none() || *term != Term::Mass)
             .collect();
         let range = self.kept(options.trim_s);
-        let needed = 20 * terms.len();
+        let needed = SAMPLES_PER_TERM * terms.len();
         if range.len() < needed {
             return Err(SurfaceError::TooShort {
                 samples: range.len(),
@@ -387,7 +387,7 @@ fn slice(along: &[f64], across: &[f64], restoring: &[f64], share: f64) -> Option
     let chosen: Vec<usize> = (0..along.len())
         .filter(|&i| across[i].abs() <= share * largest)
         .collect();
-    if chosen.len() < 12 {
+    if chosen.len() < LEAST_SLICE_SAMPLES {
         return None;
     }
     let matrix = DMatrix::from_fn(chosen.len(), 3, |row, column| {

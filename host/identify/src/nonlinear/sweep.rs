@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use crate::criteria::{LEAST_SWEEP_CHANGE, SWEEP_MISFIT};
+use crate::criteria::{LEAST_SWEEP_CHANGE, LEAST_SWEEP_ESTIMATES, SWEEP_MISFIT};
 
 /// Number of lines on each side of a local estimate.
 const R: i64 = 7;
@@ -121,7 +121,7 @@ pub fn compare(a: &Spectra, b: &Spectra) -> Option<Comparison> {
     let (low, high) = (of_a[0].max(of_b[0]), of_a[1].min(of_b[1]));
     let step = (2 * R + 1) as f64 * a.spacing_hz.max(b.spacing_hz);
     let count = ((high - low) / step).floor();
-    if count.is_nan() || count < 10.0 {
+    if count.is_nan() || count < LEAST_SWEEP_ESTIMATES {
         return None;
     }
     let pairs: Vec<(Local, Local)> = (0..=count as usize)

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::criteria::LINEARIZATION_ERROR;
+use crate::criteria::{LINEARIZATION_ERROR, SAME_STEP};
 use crate::dwells::differentiation::derivative;
 use crate::dwells::dwell::Dwell;
 use crate::least_squares::{Normal, Spread, minimum, nearer};
@@ -194,7 +194,7 @@ fn lowest(posture: &PostureDwells, force: Direction) -> Option<PostureFrf> {
     for dwell in dwells {
         match kept.last_mut() {
             // Dwells within 0.1 % in frequency are repetitions of one frequency step.
-            Some(last) if dwell.omega < last.omega * (1.0 + 1e-3) => {
+            Some(last) if dwell.omega < last.omega * (1.0 + SAME_STEP) => {
                 if amplitude(dwell) < amplitude(last) {
                     *last = dwell;
                 }

@@ -13,7 +13,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 pub use super::joint_parameter::JointParameter;
-use crate::criteria::{LEAST_RELATIVE_ERROR, NEARLY_STATIC};
+use crate::criteria::{GUESSED_STIFFNESS_RATIO, LEAST_RELATIVE_ERROR, NEARLY_STATIC};
 use crate::least_squares::{FitError, scaled_inverse, scaled_least_squares, scaled_solve};
 use crate::student::NINETY_PERCENT;
 use crate::student::ninety_percent;
@@ -267,7 +267,8 @@ fn first_guess(robot: &mut Robot, placed: &[Placed<'_>]) {
             let guess = 1.0 / compliance;
             // A compliance with little effect on the receptances may come out negative or far off; then the first guess stays.
             let known = joint.stiffness_nm_per_rad;
-            if guess > 0.1 * known && guess < 10.0 * known {
+            let [least, most] = GUESSED_STIFFNESS_RATIO;
+            if guess > least * known && guess < most * known {
                 joint.stiffness_nm_per_rad = guess;
             }
         }

@@ -9,6 +9,7 @@ use super::answer::{EstimatedJoint, Figure, IdentifyOutput};
 use super::args::{Args, band};
 use super::methods::settling;
 use crate::case::Case;
+use crate::criteria::{DIFFERENT_LEVELS, SAME_POSTURE_DEG};
 use crate::frf::{MeasurementSettings, measure};
 use crate::identify::case_file;
 use crate::identify::cubic_joints::{self, PostureDwells};
@@ -19,13 +20,6 @@ use crate::identify::steady::{Settling, steady};
 use crate::identify::student::NINETY_PERCENT;
 use crate::recording::{Recording, TestKind};
 use crate::structure::{Direction, Form, Robot, Structure};
-
-/// Largest difference of joint angles, in degrees, between recordings of the same posture: a choice.
-const SAME_DEG: f64 = 1e-3;
-
-/// Smallest ratio of two force amplitudes that count as different levels: a choice above the few percent of force control of a
-/// shaker.
-const LEVELS: f64 = 1.2;
 
 /// Recordings at one posture of the robot.
 struct AtPosture {
@@ -79,7 +73,7 @@ fn postures(recordings: &[Recording]) -> Result<Vec<AtPosture>, Error> {
         };
         let is_same = |known: &[f64]| {
             let mut pairs = known.iter().zip(&posture.joints_deg);
-            known.len() == posture.joints_deg.len() && pairs.all(|(a, b)| (a - b).abs() < SAME_DEG)
+            known.len() == posture.joints_deg.len() && pairs.all(|(a, b)| (a - b).abs() < SAME_POSTURE_DEG)
         };
         match postures.iter_mut().find(|known| is_same(&known.joints_deg)) {
             Some(known) => known.recordings.push(recording.clone()),
@@ -116,7 +110,7 @@ fn has_levels(dwells: &[Dwell]) -> bool {
         .collect();
     forces.iter().any(|(direction, force)| {
         let mut others = forces.iter().filter(|(other, _)| other == direction);
-        others.any(|(_, other)| *other > LEVELS * force)
+        others.any(|(_, other)| *other > DIFFERENT_LEVELS * force)
     })
 }
 

@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use super::answer::{Coefficients, IdentifyOutput, Maps};
 use super::args::Args;
 use super::{Error, records};
+use crate::criteria::{BIASED_PREDICTION, SAME_FREQUENCY, SAME_LEVEL};
 use crate::identify::case_file::Estimate;
 use crate::identify::dwell::Dwell;
 use crate::identify::harmonic_balance::Grid;
@@ -17,9 +18,6 @@ use crate::identify::steady::{Settling, slowest_decay, steady};
 use crate::identify::steady_fit::{Data, Fit, FitError};
 use crate::recording::Recording;
 use crate::structure::Direction;
-
-/// Largest relative difference of frequencies that count as the same step of a step-sine test: a choice.
-const SAME_FREQUENCY: f64 = 1e-3;
 
 pub(super) fn harmonic_balance(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutput, Error> {
     if let Some(samples) = args.period_samples {
@@ -166,7 +164,7 @@ pub(super) fn hfrf(args: &Args, recordings: &[Recording]) -> Result<IdentifyOutp
     let predicted = data.relative_error(&fit.theta);
     let mut warnings = found.warnings;
     // A model that is correct within the noise has about the same prediction error as the best fit.
-    if predicted > 2.0 * found.fit.relative_error + 1e-3 {
+    if predicted > BIASED_PREDICTION.0 * found.fit.relative_error + BIASED_PREDICTION.1 {
         let mut shifts = Vec::new();
         for role in [Role::CubicDamping(0), Role::CubicStiffness(0)] {
             if let (Some(i), Some(j)) = (fit.law.index(role), found.law.index(role)) {
@@ -248,10 +246,9 @@ fn curves(dwells: &[Dwell]) -> Vec<Curve> {
     for response in higher_order::responses(dwells, 0.0) {
         for (force, q) in response.levels {
             let point = (response.omega, q / force);
-            // Force levels of a test differ by more than 5 %; force control of a shaker keeps a level within 5 %.
             match curves
                 .iter_mut()
-                .find(|curve| (curve.force_n / force - 1.0).abs() < 0.05)
+                .find(|curve| (curve.force_n / force - 1.0).abs() < SAME_LEVEL)
             {
                 Some(curve) => curve.points.push(point),
                 None => curves.push(Curve {

@@ -1,0 +1,41 @@
+//! Every threshold by which the command decides, each with the source of its number.
+//!
+//! A number without a derivation or a campaign behind it is marked "Unfounded". Sizes of pictures, bounds of options and waiting times
+//! decide nothing about a machine and stay beside the code that uses them.
+
+// Identification
+
+/// Relative difference of two frequencies up to which they belong to the same step of a step-sine test. Unfounded.
+pub(crate) const SAME_FREQUENCY: f64 = 1e-3;
+
+/// Relative difference of two force amplitudes below which they belong to the same level of a test. Force control of a shaker keeps a
+/// level within 5 %, and levels of a test differ by more. Unfounded.
+pub(crate) const SAME_LEVEL: f64 = 0.05;
+
+/// Ratio of two force amplitudes above which they are different levels of a test, so that cubic terms of joints are fitted. Unfounded.
+pub(crate) const DIFFERENT_LEVELS: f64 = 1.2;
+
+/// Difference of a joint angle up to which two recordings are at the same posture, degrees. Postures stand in sidecars as they were
+/// commanded, so that only their rounding differs.
+pub(crate) const SAME_POSTURE_DEG: f64 = 1e-3;
+
+/// Prediction error of higher-order FRF above which the user is warned of their bias: relative to that of harmonic balance, and in
+/// addition to it. Noise alone makes both errors equal. Unfounded.
+pub(crate) const BIASED_PREDICTION: (f64, f64) = (2.0, 1e-3);
+
+// Stability
+
+/// Interpolation error between the lines of an FRF table, relative to its peak, above which the user is warned. Unfounded.
+pub(crate) const COARSE_TABLE: f64 = 0.01;
+
+/// Relative change of a stability limit below which the limit counts as unchanged. Unfounded.
+pub(crate) const UNCHANGED_LIMIT: f64 = 1e-6;
+
+// Reports
+
+/// Relative change of the advised speed up to which the advice counts as unchanged in a log. The tooth-passing rule follows every small
+/// change of the estimated chatter frequency. Unfounded.
+pub(crate) const SAME_SPEED: f64 = 0.01;
+
+/// Ratio of the largest to the smallest amplitude from which stiffness and damping are drawn over the amplitude. Unfounded.
+pub(crate) const AMPLITUDE_RATIO: f64 = 1.2;
