@@ -9,24 +9,24 @@ use quietcut_simulate::SimulateError;
 /// The case or a recording cannot be diagnosed.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
-    /// The case lacks a required part.
+    /// The case file cannot be used: an entry is missing or wrong.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// A recording lacks a channel.
+    /// A recording cannot be read or lacks a required channel.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// The case cannot be simulated.
     #[error("{path}: {error}")]
     Simulate {
-        /// The case.
+        /// File of the case.
         path: PathBuf,
-        /// The reason.
+        /// The reason from the simulation.
         error: SimulateError,
     },
     /// A recording that cannot be compared with the baseline.
     #[error("{path}: {what}")]
     Record {
-        /// The recording.
+        /// File of the recording.
         path: PathBuf,
         /// The defect, and what is required.
         what: String,

@@ -1,21 +1,23 @@
-//! What the simulation gets wrong, why, and what to add.
+//! Finds what a simulation model of a milling machine gets wrong: the physical causes, their parameters, and the extension of the case that
+//! corrects them.
 //!
-//! The residual is taken with the *measured* motion: with H the receptance of the case and f_r a term that it lacks,
-//! y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large terms. A cause is one or few regressors, and the fit of
-//! any set of causes is linear least squares. The few best candidate models are then fitted by prediction error, without the noise of
-//! the measured motion in them: tests of structures are simulated, cuts are predicted again with the extended case.
+//! The residual is computed along the *measured* motion: with H the receptance of the case, F the force and f_r a restoring force that the
+//! case lacks, y − H·F = −H·f_r(x, v) + free decay + noise holds exactly, also for large f_r. A cause contributes one or few regressors
+//! f_r(x, v), and the fit of any set of causes is linear least squares. The few best candidate models are then fitted by prediction error,
+//! whose regressors do not contain the noise of the measured motion: tests of structures are simulated, cuts are predicted again with the
+//! extended case.
 //!
 //! Data flows through these rooms from the top to the bottom; a room uses only those above it:
 //!
-//! - `error`, `progress`, `signal`: the ground. Errors, options, stages; transforms and noise floors of sampled signals.
+//! - `error`, `progress`, `signal`: errors, options, stages; transforms and noise floors of sampled signals.
 //! - `baseline`: the model of the case file. It knows no recording.
 //! - `motion`: the kinematics of a recorded cut (spindle angle, tooth passings, chips) and free decays. It knows no `Record`.
 //! - `records`: each recording beside what the baseline predicts of it, and the `Study` that holds them. It knows no cause.
 //! - `candidates`: the causes that a baseline may lack, as regressors along the measured motion and as simulations. It fits nothing.
 //! - `fit`: the parameters of one candidate model. It does not compare candidates.
-//! - `selection`: which candidate model explains the records. It words nothing.
+//! - `selection`: which candidate model explains the records. It writes no text.
 //! - `conclusion`: parameter estimates, intervals, residual views, gain, effect on the lobes, the answer.
-//! - `next_test`: the experiment that separates what is confounded.
+//! - `next_test`: the experiment that separates confounded candidate models.
 //!
 //! `baseline` and `motion` stand before `records` because a `Record` holds the prediction of the baseline along the motion.
 

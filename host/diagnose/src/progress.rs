@@ -3,7 +3,7 @@
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// Seed of the random numbers.
+    /// Seed of all random numbers of a diagnosis: the same seed gives the same answer.
     pub seed: u64,
 }
 

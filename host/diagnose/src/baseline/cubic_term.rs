@@ -11,8 +11,8 @@ struct CubicMatrices {
     stiffness: Matrix3<f64>,
 }
 
-/// The restoring force of the cubic matrices of a structure along x, y and z; `None` without such matrices. Rows of rotations are left out,
-/// because no force at the tool is a moment.
+/// The restoring force of a structure's cubic matrices along x, y and z; `None` without such matrices. Rows and columns of rotations are
+/// omitted, because the state `At` holds translations only.
 pub(crate) fn cubic_term(structure: &Structure) -> Option<Box<dyn Term>> {
     let Form::Matrices(matrices) = &structure.form else {
         return None;

@@ -9,8 +9,8 @@ use quietcut_model::structure::{FirstOrder, Form, Structure};
 
 /// Z(iω) = −ω²M + iωC + K along the machine's `axes`, N/m, at the bins of `grid`.
 ///
-/// Matrices without rotations give this sum, also where K is singular and no receptance exists. Other structures give the inverse of the
-/// receptance over the axes. Zero where neither exists.
+/// For a structure given by matrices without rotations, Z is this sum, also where K is singular and no receptance exists. For other
+/// structures, Z is the inverse of the receptance over `axes`, and zero at bins where that inverse does not exist.
 pub(crate) fn table(
     structure: &Structure,
     first_order: &FirstOrder,

@@ -22,13 +22,13 @@ pub(crate) struct Baseline<'a> {
     pub effects: Effects,
     /// Structure with the mass, damping and stiffness that the extensions change.
     pub altered: Structure,
-    /// Restoring forces beside the linear structure.
+    /// Restoring forces that the linear structure does not contain.
     pub terms: Vec<Box<dyn Term>>,
     /// The linear structure with all linear extensions, in first-order form.
     pub first_order: FirstOrder,
     /// Receptance of the linear structure.
     pub receptance: Receptance,
-    /// True where a step of the force makes the velocity jump, so that accelerations are averages over a sample: see
+    /// True if a step of the force makes the velocity jump, so that accelerations are averages over a sampling interval: see
     /// [`quietcut_simulate::Dynamics::velocity_jumps`].
     pub velocity_jumps: bool,
     /// The machine's axes (0, 1, 2) in which the structure moves.
@@ -64,7 +64,7 @@ impl<'a> Baseline<'a> {
         })
     }
 
-    /// The linear structure with one further effect.
+    /// The linear structure with the baseline's extensions and one further effect, in first-order form.
     ///
     /// # Errors
     /// The effect does not apply to this structure.
@@ -73,14 +73,14 @@ impl<'a> Baseline<'a> {
         Ok(dynamics.first_order())
     }
 
-    /// True of a structure with a rigid-body mode.
+    /// True for a structure with a rigid-body mode: a pole at zero.
     pub(crate) fn is_free(&self) -> bool {
         let poles = self.first_order.poles();
         let largest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
         poles.iter().any(|pole| pole.norm() <= 1e-9 * largest.max(1e-9))
     }
 
-    /// The longest time constant of the structure, s.
+    /// The longest time constant of the structure, s: the largest −1/Re λ of its poles λ.
     pub(crate) fn slowest_decay_s(&self) -> f64 {
         self.first_order
             .poles()
@@ -99,13 +99,14 @@ impl<'a> Baseline<'a> {
             .min_by(f64::total_cmp)
     }
 
-    /// The sensor behind a channel name; `None` for a quantity that is neither force nor motion along x, y or z.
+    /// The sensor of the channel `name`, with the sensor effects of the case's extensions; `None` for a quantity that is neither force nor
+    /// motion along x, y or z.
     pub(crate) fn pickup(&self, name: &str) -> Option<Pickup> {
         pickup_of(name).map(|pickup| self.effects.pickup(pickup))
     }
 }
 
-/// The machine's axes of a structure.
+/// The machine's axes (0, 1, 2) along which a structure moves. Rotations have none.
 pub(crate) fn axes_of(structure: &Structure) -> Vec<usize> {
     structure
         .directions
@@ -114,12 +115,12 @@ pub(crate) fn axes_of(structure: &Structure) -> Vec<usize> {
         .collect()
 }
 
-/// The direction of an axis.
+/// The direction x, y or z of the machine's axis 0, 1 or 2.
 pub(crate) fn direction_of(axis: usize) -> Direction {
     [Direction::X, Direction::Y, Direction::Z][axis.min(2)]
 }
 
-/// The sensor that a channel name stands for: fx, x, vx, ax …
+/// The ideal sensor of a channel name: fx, x, vx, ax and so on.
 fn pickup_of(name: &str) -> Option<Pickup> {
     use quietcut_recording::Quantity;
     let (quantity, axis) = match name.as_bytes() {
@@ -133,7 +134,7 @@ fn pickup_of(name: &str) -> Option<Pickup> {
     Some(Pickup::of_axis(quantity, axis))
 }
 
-/// The restoring forces of effects, without those of the baseline.
+/// The restoring forces of `effects` alone, without those of the baseline.
 pub(crate) fn terms_of(
     effects: &Effects,
     structure: &Structure,

@@ -9,19 +9,19 @@ use quietcut_model::structure::FirstOrder;
 
 /// Relative distance below which two poles count as one: rounding of the eigenvalues.
 const SAME: f64 = 1e-9;
-/// Modes with less than this share of the largest 1/mass along an axis are left out.
-const FELT: f64 = 1e-3;
+/// Least inverse modal mass of a mode along an axis, as a share of the largest there, with which the axis is said to excite the mode.
+const LEAST_INVERSE_MASS_SHARE: f64 = 1e-3;
 
 /// H(s) = Σ_r R_r/(s − λ_r) of a structure in first-order form, m/N; rows displacement, columns force.
 #[derive(Clone, Debug)]
 pub(crate) struct Receptance {
     terms: Vec<(Complex64, Matrix3<Complex64>)>,
-    /// The structure itself, where a defective system matrix has no such sum.
+    /// The first-order form itself, if its matrix is defective and no sum over poles represents the receptance; otherwise `None`.
     whole: Option<FirstOrder>,
 }
 
 impl Receptance {
-    /// Residues by the projectors P_r = Π_{j≠r} (A − λ_j)/(λ_r − λ_j) (Lagrange–Sylvester); poles that coincide count once.
+    /// Computes the residues with the projectors P_r = Π_{j≠r} (A − λ_j)/(λ_r − λ_j) (Lagrange–Sylvester). Poles that coincide count once.
     pub(crate) fn new(first_order: &FirstOrder) -> Self {
         let mut poles: Vec<Complex64> = Vec::new();
         for pole in first_order.poles() {
@@ -79,7 +79,8 @@ impl Receptance {
         sum
     }
 
-    /// Poles in the upper half plane that a force along `axis` excites, and the inverse modal mass 2·Im(λ)·|R| of each at that axis, 1/kg.
+    /// Poles λ in the upper half plane that a force along `axis` excites, each with the inverse modal mass 2·Im(λ)·|R| along that axis,
+    /// 1/kg.
     pub(crate) fn modes_along(&self, axis: usize) -> impl Iterator<Item = (Complex64, f64)> {
         let per_mass = move |(pole, residue): &(Complex64, Matrix3<Complex64>)| {
             2.0 * pole.im * residue[(axis, axis)].norm()
@@ -88,10 +89,11 @@ impl Receptance {
         self.terms
             .iter()
             .map(move |term| (term.0, per_mass(term)))
-            .filter(move |(pole, per_mass)| pole.im > 0.0 && *per_mass > FELT * largest)
+            .filter(move |(pole, per_mass)| pole.im > 0.0 && *per_mass > LEAST_INVERSE_MASS_SHARE * largest)
     }
 
-    /// Root of Σ |R_r/(iω − λ_r)|² on the diagonal entry of `axis`, m/N: |H| if the modes did not cancel each other.
+    /// √(Σ |R_r/(iω − λ_r)|²) over the poles, with the residues' diagonal entries of `axis`, m/N: the size that |H| would have if modes did
+    /// not cancel each other.
     pub(crate) fn size_at(&self, omega: f64, axis: usize) -> f64 {
         let s = Complex64::new(0.0, omega);
         self.terms
@@ -102,7 +104,7 @@ impl Receptance {
     }
 }
 
-/// H(iω) at the bins of the finer samples, m/N.
+/// H(iω) at the bins of the upsampled spectrum, m/N.
 pub(crate) fn response(receptance: &Receptance, grid: &Grid) -> Vec<Matrix3<Complex64>> {
     (0..grid.fine_bins())
         .into_par_iter()

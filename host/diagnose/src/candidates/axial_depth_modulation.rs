@@ -1,7 +1,7 @@
-//! The depth of cut follows the axial vibration, b = b₀ − z: it does, or it does not.
+//! The depth of cut follows the axial vibration, b = b₀ − z. The effect is on or off and has no magnitude.
 //!
-//! Shows: forces in the rhythm of z, with edges that are not at 90°. Does not show: anything where z is stiff or the edge angle is 90°.
-//! Fit: no parameter; the coefficient of the change must come out near 1. Source: thesis, eq. 3.5.
+//! Shows: forces that vary with z, if the edge angle is not 90°. Does not show: anything if z is stiff or the edge angle is 90°. Fit: one
+//! coefficient of the regressor, which is 1 if the effect exists; no reported parameter. Source: thesis, eq. 3.5.
 
 use super::process::{changed, everywhere, has_axial};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
@@ -11,7 +11,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct OfDepth;
 
-/// How far from 1 the coefficient of what is there or not may be.
+/// Largest distance from 1 of the coefficient of this effect, which is 1 in theory because the effect is on or off.
 const ROUNDING: f64 = 0.35;
 
 impl Cause for OfDepth {

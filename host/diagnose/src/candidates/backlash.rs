@@ -1,8 +1,8 @@
 //! A share s of the spring does not act within a gap: f_r += s·k·(d(x) − x), d the dead zone of the gap.
 //!
-//! Shows: once the amplitude is over the gap, stiffness that grows with it towards that of the case; odd harmonics. Does not show: any
-//! change of damping, or anything but less stiffness within the gap.
-//! Fit: linear in s for each gap, the gap as a shape. Source: Nordin and Gutman, Automatica 38 (2002).
+//! Shows: above the amplitude of the gap, a stiffness that rises with amplitude towards that of the case; odd harmonics. Does not show: a
+//! change of damping; any effect other than reduced stiffness within the gap. Fit: linear in s for each gap; the gap is a nonlinear
+//! parameter. Source: Nordin and Gutman, Automatica 38 (2002).
 
 use super::restoring::{Restoring, largest_m, logarithmic, plain, smallest_m};
 use quietcut_model::effects::EffectName;

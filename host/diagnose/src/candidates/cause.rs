@@ -22,20 +22,20 @@ pub(crate) enum Location {
     Everywhere,
     /// Along one of the machine's axes (0, 1, 2).
     Axis(usize),
-    /// Along each of these, by a law of its own.
+    /// Along each of these axes, with separate coefficients for each axis.
     EachOf(Vec<usize>),
-    /// Between two of them.
+    /// Between two of the machine's axes.
     Axes(usize, usize),
-    /// In a channel.
+    /// In the channel of this name.
     Channel(String),
-    /// In each of these channels, alike.
+    /// In each of these channels, with the same coefficients.
     Channels(Vec<String>),
-    /// In a channel, from another of the machine's axes.
+    /// In the channel of this name, which also reads this axis of the machine.
     ChannelFrom(String, usize),
 }
 
 impl Location {
-    /// The direction, where it is one.
+    /// The direction of a location on one axis; otherwise `None`.
     pub(crate) fn direction(&self) -> Option<Direction> {
         match self {
             Self::Axis(axis) | Self::ChannelFrom(_, axis) => Some(direction_of(*axis)),
@@ -43,7 +43,7 @@ impl Location {
         }
     }
 
-    /// The channel, where it is one.
+    /// The name of the channel of a location in one channel; otherwise `None`.
     pub(crate) fn channel(&self) -> Option<&str> {
         match self {
             Self::Channel(name) | Self::ChannelFrom(name, _) => Some(name),
@@ -51,7 +51,7 @@ impl Location {
         }
     }
 
-    /// The keys that say this place in an extension.
+    /// The keys `direction`, `directions` and `channel` of this location in a table `[extension.NAME]`.
     pub(crate) fn table(&self) -> toml::Table {
         let mut table = toml::Table::new();
         if let Some(direction) = self.direction() {
@@ -85,20 +85,20 @@ impl fmt::Display for Location {
     }
 }
 
-/// What one coefficient of a cause adds to a record, per unit of the coefficient.
+/// Contribution of a cause to a record, per unit of one coefficient.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regressor {
-    /// f_r along the machine's axes, N, at the finer samples of the record: filtered by the structure where the force drives,
-    /// −H·f_r, and taken as it is where the force is what is compared.
+    /// Restoring force f_r along the machine's axes, N, upsampled. A record in the response domain compares −H·f_r with the residual, a
+    /// record in the force domain f_r itself.
     pub restoring_n: [Vec<f64>; 3],
-    /// What it adds to what each channel reads, at the samples of the record; empty for channels that it leaves alone.
+    /// Direct contribution to the reading of each channel, at the samples of the record; empty for channels without one.
     pub observed: Vec<Vec<f64>>,
-    /// What it adds to the force of a cut.
+    /// Contribution to the cutting force, of a cut.
     pub cut: Option<CutForce>,
 }
 
 impl Regressor {
-    /// One that acts by a force.
+    /// A regressor that is a restoring force.
     pub(crate) fn of_force(restoring_n: [Vec<f64>; 3]) -> Self {
         Self {
             restoring_n,
@@ -106,7 +106,7 @@ impl Regressor {
         }
     }
 
-    /// One that acts on channels.
+    /// A regressor that acts directly on the readings of channels.
     pub(crate) fn of_channels(observed: Vec<Vec<f64>>) -> Self {
         Self {
             observed,
@@ -114,7 +114,7 @@ impl Regressor {
         }
     }
 
-    /// One that acts by the force of a cut.
+    /// A regressor that is a change of the cutting force.
     pub(crate) fn of_cut(force: CutForce) -> Self {
         Self {
             cut: Some(force),
@@ -122,7 +122,7 @@ impl Regressor {
         }
     }
 
-    /// What it adds to the residual of each channel of `record`.
+    /// Contribution to the residual of each channel of `record`, sample by sample.
     pub(crate) fn columns(&self, record: &Record) -> Vec<Vec<f64>> {
         let count = record.grid.count();
         let mut columns: Vec<Vec<f64>> = (0..record.channels.len())
@@ -148,7 +148,7 @@ impl Regressor {
                 .then(|| record.grid.spectrum_of_fine(force))
         });
         for (index, (channel, column)) in record.channels.iter().zip(&mut columns).enumerate() {
-            // The force of a cut is what it is: a spring moves the tool.
+            // A restoring force moves the tool, but is no part of the cutting force that the channel measures.
             if record.domain == Domain::Response && channel.pickup.quantity == Quantity::Force {
                 continue;
             }
@@ -177,49 +177,49 @@ impl Regressor {
     }
 }
 
-/// A parameter that has been fitted: its key in `parameters` of the answer and in the extension, and its value.
+/// A fitted parameter: its key in `parameters` of the answer and in the extension, and its value.
 pub(crate) type Parameter = (&'static str, f64);
 
-/// One name of a cause with what belongs to it.
+/// One effect name of a cause, with its location, parameters and extension.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Part {
-    /// The name, as in `[extension.NAME]`.
+    /// The effect's name, as in `[extension.NAME]`.
     pub name: &'static str,
-    /// Where this part acts.
+    /// Where the effect acts.
     pub location: Location,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<Parameter>,
-    /// The extension that makes it part of a case.
+    /// The table `[extension.NAME]` that adds the effect to a case.
     pub extension: toml::Table,
 }
 
 /// A physical term that the baseline may lack.
 ///
-/// It is linear in its coefficients once its shape (gap, yield, time constant …) is given:
-/// residual = Σ coefficient · regressor(shape, measured motion) + free decays + noise.
+/// It is linear in its coefficients once its nonlinear parameters (gap, yield displacement, time constant …) are given: residual = Σ
+/// coefficient · regressor(nonlinear parameters, measured motion) + free decays + noise.
 pub(crate) trait Cause: Send + Sync {
-    /// The effect that it is.
+    /// The effect that the cause represents.
     fn effect(&self) -> EffectName;
 
-    /// Its name, as in `[extension.NAME]`.
+    /// The effect's name, as in `[extension.NAME]`.
     fn name(&self) -> &'static str {
         self.effect().name()
     }
 
-    /// All names that it has in an answer: one, unless it is several that act through each other.
+    /// All effect names of the cause in an answer. Most causes have one; friction behind a backlash has two.
     fn names(&self) -> Vec<&'static str> {
         vec![self.name()]
     }
 
-    /// Where in this scene it could act and be seen; empty where it cannot.
+    /// Locations at which the cause can act and be measured in this study; empty if there is none.
     fn locations(&self, study: &Study<'_>) -> Vec<Location>;
 
-    /// Shapes to begin with: a grid over the parameters that do not enter linearly. One empty shape where all do.
+    /// Start values of the nonlinear parameters, as a grid. A cause that is linear in all parameters has one empty set.
     fn nonlinear_grid(&self, _scene: &Study<'_>, _place: &Location) -> Vec<Vec<f64>> {
         vec![Vec::new()]
     }
 
-    /// Further shapes that are worth a look for what other causes have left, by record and channel.
+    /// Further start values of the nonlinear parameters, from the residual `left` that other causes leave: samples by record and channel.
     fn nonlinear_grid_beside(
         &self,
         _scene: &Study<'_>,
@@ -229,12 +229,12 @@ pub(crate) trait Cause: Send + Sync {
         Vec::new()
     }
 
-    /// Bounds of the parameters of a shape: lowest and highest.
+    /// Bounds of the nonlinear parameters: lowest and highest value of each.
     fn bounds(&self, _scene: &Study<'_>, _place: &Location) -> Vec<[f64; 2]> {
         Vec::new()
     }
 
-    /// What it adds to a record per unit of each coefficient; `None` where it cannot be computed there.
+    /// Regressors of the cause in a record, one for each coefficient; `None` if they cannot be computed there.
     fn regressors(
         &self,
         study: &Study<'_>,
@@ -243,7 +243,7 @@ pub(crate) trait Cause: Send + Sync {
         nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>>;
 
-    /// Parameters by key of what was fitted; `None` where no such cause is physical (a negative friction).
+    /// Parameters by key from the fitted coefficients; `None` if they are not physical, as a negative friction force.
     fn parameters(
         &self,
         study: &Study<'_>,
@@ -252,13 +252,13 @@ pub(crate) trait Cause: Send + Sync {
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>>;
 
-    /// The shape at which the regressors would be exact, where the coefficients say so themselves: it is then no freedom of
-    /// the fit but found by going there.
+    /// Nonlinear parameters that follow from the fitted coefficients, for a cause whose regressors are exact at those values. They are then
+    /// found by fixed-point iteration, not by a search. `None` for other causes.
     fn settled(&self, _shape: &[f64], _coefficients: &[f64]) -> Option<Vec<f64>> {
         None
     }
 
-    /// The extension that makes the cause part of a case.
+    /// The table `[extension.NAME]` that adds the cause to a case.
     fn extension(&self, location: &Location, parameters: &[Parameter]) -> toml::Table {
         let mut table = location.table();
         for (key, value) in parameters {
@@ -267,7 +267,7 @@ pub(crate) trait Cause: Send + Sync {
         table
     }
 
-    /// What the answer says, name by name: parameters and extension.
+    /// Entries of the answer, one for each effect name and axis: parameters and extension.
     fn parts(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
         vec![Part {
             name: self.name(),
@@ -277,12 +277,13 @@ pub(crate) trait Cause: Send + Sync {
         }]
     }
 
-    /// Standard deviations of parameters that are known otherwise than by the fit, by key.
+    /// Standard deviations, by key, of parameters that another measurement than the fit determines, as the tachometer does.
     fn known_deviations(&self, _scene: &Study<'_>) -> Vec<Parameter> {
         Vec::new()
     }
 
-    /// Parameters that are said beside those of the extension, as the same thing in other words.
+    /// Further parameters for the answer that express the same change in other quantities, as a natural frequency instead of a relative
+    /// change.
     fn also(&self, _scene: &Study<'_>, _place: &Location, _parameters: &[Parameter]) -> Vec<Parameter> {
         Vec::new()
     }

@@ -1,4 +1,4 @@
-//! A set of coefficients of the material that differs from that of the case: F is linear in each.
+//! Cutting or edge coefficients of the material that differ from those of the case. The force F is linear in each.
 
 use super::process::{changed, cutter, everywhere, has_axial};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
@@ -12,11 +12,11 @@ use quietcut_simulate::Cutter;
 pub(super) struct Coefficients {
     pub(super) effect: EffectName,
     pub(super) keys: [&'static str; 3],
-    /// Where they stand in the material.
+    /// The three coefficients in the material.
     pub(super) of: fn(&mut Material) -> [&mut f64; 3],
-    /// A step as large as they are.
+    /// Step of a coefficient, in its unit, of the size of the coefficients themselves.
     pub(super) step: fn(&Cutter) -> f64,
-    /// True where such a tangential coefficient can be.
+    /// True for a physically possible tangential coefficient.
     pub(super) can_be: fn(f64) -> bool,
 }
 
@@ -37,7 +37,7 @@ impl Cause for Coefficients {
         _: &[f64],
     ) -> Option<Vec<Regressor>> {
         let step = (self.step)(cutter(study)?);
-        // The axial coefficient acts where there is an axial direction.
+        // The axial coefficient is fitted only if the structure has an axial direction.
         let count = if has_axial(study) { 3 } else { 2 };
         let with_more = |index: usize| {
             changed(

@@ -1,10 +1,9 @@
-//! f_r += fc·sign(v), alike for both ways or another force for each; sticking included.
+//! f_r += fc·sign(v), sticking included; fc is the same in both directions of motion, or has one value for each.
 //!
-//! Shows: damping that falls as 1/amplitude, rest between moves at low levels, odd harmonics that fall slowly with their order. Does
-//! not show: a frequency that moves while it slips, or anything at large amplitudes. A Bouc-Wen loop with very stiff pre-slip is the
-//! same.
-//! Fit: linear in fc along the motion, sticking in the simulation. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica
-//! 30 (1994).
+//! Shows: damping that falls as 1/amplitude, sticking at low levels, odd harmonics that decrease slowly with their order. Does not show: a
+//! change of frequency while it slips, or an effect at large amplitudes. A Bouc–Wen loop with very stiff pre-slip is equivalent. Fit:
+//! linear in fc along the measured motion; sticking is simulated. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30
+//! (1994).
 
 use super::restoring::{Restoring, largest_m, plain};
 use crate::records::domain::Domain;
@@ -20,7 +19,7 @@ pub(super) const EACH_WAY: Restoring = Restoring {
     ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
-/// Friction that takes hold only once a play has been crossed: no force after a reversal, then friction.
+/// Friction behind a backlash: after each reversal no force until the gap is crossed, then friction.
 pub(super) const BEHIND_PLAY: Restoring = Restoring {
     nonlinear_parameters: &["play_mm"],
     nonlinear_grid: |study, axis| {
@@ -35,8 +34,8 @@ pub(super) const BEHIND_PLAY: Restoring = Restoring {
     ..plain(EffectName::CoulombFriction, &["fc_n", "fc_minus_n"])
 };
 
-/// The same where the joint that has the play closes softly. Where a structure moves freely a loop of Bouc and Wen takes its place:
-/// it is sought where the motion is imposed, and the force of every instant is seen.
+/// Friction behind a backlash whose contact closes gradually over `contact_mm`. It is a candidate only if the motion is imposed and every
+/// instant of the force is measured; for a structure that moves freely, hysteresis (Bouc–Wen) describes the same loop.
 pub(super) const BEHIND_CLEARANCE: Restoring = Restoring {
     nonlinear_parameters: &["play_mm", "contact_mm"],
     nonlinear_grid: |study, axis| {

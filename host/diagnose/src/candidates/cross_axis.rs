@@ -1,8 +1,8 @@
-//! A channel that sees another direction too: y = y_t + p·(the other direction).
+//! A channel that also reads another direction: y = y_t + p·(the other direction), y_t the true value.
 //!
-//! Shows: what the other direction does, at once and without a phase, also where only that is driven. Does not show: anything where the
-//! other direction rests. A cross receptance would be reciprocal.
-//! Fit: linear in p. Source: transverse sensitivity as in McConnell and Varoto, Vibration Testing (2008).
+//! Shows: the motion of the other direction without delay or phase, also if only that direction is driven. Does not show: anything if the
+//! other direction is at rest. A cross receptance would be reciprocal. Fit: linear in p. Source: transverse sensitivity as in McConnell and
+//! Varoto, Vibration Testing (2008).
 
 use num_complex::Complex64;
 
@@ -14,7 +14,7 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct CrossAxis;
 
-/// The fraction for which the chip of a cut is taken.
+/// Fraction p of the finite difference from which the change of the chip, and so of the cutting force, is computed.
 const SMALL_FRACTION: f64 = 0.05;
 
 impl Cause for CrossAxis {
@@ -53,7 +53,7 @@ impl Cause for CrossAxis {
         weights[*axis] = 1.0;
         let read = of_meant(record, location, |_| weights, |_| Complex64::ONE);
         let other = record.motion.clone();
-        // x = y − p·(the other direction).
+        // The true motion is x = y − p·(the other direction).
         Some(in_cut(record, location, read, SMALL_FRACTION, |motion, to| {
             for (to, from) in [
                 (&mut motion.x[to], &other.x[*axis]),

@@ -1,8 +1,8 @@
 //! f_r += c3·v³.
 //!
-//! Shows: damping that grows as v²; the third harmonic in phase with velocity; at two levels and more, or in a decay. Does not show: a
-//! frequency that moves. At one level it is damping.
-//! Fit: linear in c3. Source: Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2.
+//! Shows: damping that grows as v²; a third harmonic in phase with the velocity; both at two or more levels, or in a decay. Does not show:
+//! a change of frequency. At one level it is equivalent to linear damping. Fit: linear in c3. Source: Worden and Tomlinson, Nonlinearity in
+//! Structural Dynamics (2001), ch. 2.
 
 use super::restoring::{Restoring, plain};
 use quietcut_model::effects::EffectName;

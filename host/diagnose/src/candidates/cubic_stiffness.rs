@@ -1,9 +1,9 @@
 //! f_r += k3·x³.
 //!
-//! Shows: the natural frequency moves with amplitude, as x²; odd harmonics, the third first; at two levels and more, or in a decay.
-//! Does not show: even harmonics, an offset, or a damping that depends on amplitude. Below the turn of a softening-hardening spring
-//! nothing tells the two apart.
-//! Fit: linear in k3. Source: Worden and Tomlinson, Nonlinearity in Structural Dynamics (2001), ch. 2; Kerschen et al., MSSP 20 (2006).
+//! Shows: a natural frequency that changes as the square of the amplitude; odd harmonics, the third the largest; both at two or more
+//! levels, or in a decay. Does not show: even harmonics, an offset, or damping that depends on amplitude. Below the minimum of its
+//! stiffness, a softening-hardening spring cannot be told from it. Fit: linear in k3. Source: Worden and Tomlinson, Nonlinearity in
+//! Structural Dynamics (2001), ch. 2; Kerschen et al., MSSP 20 (2006).
 
 use super::restoring::{Restoring, plain};
 use quietcut_model::effects::EffectName;

@@ -1,8 +1,8 @@
-//! Stiffness that moves with time: K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))).
+//! Stiffness that changes with time: K·(1 + r·t), or K·(1 + a·(1 − e^(−t/T))).
 //!
-//! Shows: frequencies that move along the record at one amplitude, all by the same share. Does not show: harmonics, or a dependence on
-//! amplitude where levels come in any order. Levels that only rise or fall with time imitate it.
-//! Fit: linear in r or a, T as a shape. Source: structures with parameters of time as in Poulimenos and Fassois, MSSP 20 (2006).
+//! Shows: natural frequencies that change along the record at constant amplitude, all by the same factor. Does not show: harmonics, or a
+//! dependence on amplitude. Levels that only rise or only fall with time cannot be told from drift. Fit: linear in r or a; T is a nonlinear
+//! parameter. Source: structures with time-dependent parameters as in Poulimenos and Fassois, MSSP 20 (2006).
 
 use super::restoring::{Restoring, logarithmic, longest_s, plain};
 use quietcut_model::effects::EffectName;
@@ -22,7 +22,7 @@ pub(super) const SETTLING: Restoring = Restoring {
             .collect()
     },
     everywhere: true,
-    // A stiffness that more than doubles, or vanishes, is another machine.
+    // A stiffness that more than doubles or becomes negative is no drift.
     physical: |change| change.iter().all(|change| change.abs() <= 1.0),
     bounds: |study, _| vec![[0.05 * longest_s(study), 2.0 * longest_s(study)]],
     ..plain(EffectName::Drift, &["relative_change"])

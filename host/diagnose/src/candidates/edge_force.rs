@@ -1,8 +1,8 @@
 //! The edge coefficients K_te, K_re, K_ae differ from those of the case.
 //!
-//! Shows: forces that do not depend on the chip while a tooth is in the cut. Does not show: any change with the feed; of two feeds the
-//! cutting coefficients would change both. Wear of a short record looks the same.
-//! Fit: linear in each. Source: Altintas, Manufacturing Automation (2012), ch. 2; Budak, Altintas and Armarego (1996).
+//! Shows: forces that do not depend on the chip thickness while a tooth is engaged. Does not show: any change with the feed, whereas
+//! cutting coefficients change the force at each of two feeds. In a short record wear is equivalent. Fit: linear in each coefficient.
+//! Source: Altintas, Manufacturing Automation (2012), ch. 2; Budak, Altintas and Armarego (1996).
 
 use super::coefficients::Coefficients;
 use quietcut_model::effects::EffectName;
@@ -17,7 +17,7 @@ pub(super) const EDGE_FORCE: Coefficients = Coefficients {
             &mut material.kae_n_per_mm,
         ]
     },
-    // The cutting force of the feed, N/mm.
+    // Step: the cutting force per mm of edge at a chip as thick as the feed per tooth, N/mm.
     step: |cutter| {
         (1e3 * cutter.feed_per_tooth_m * cutter.force.material().ktc_mpa)
             .abs()

@@ -2,8 +2,8 @@
 
 use toml::{Table, Value};
 
-/// Tables `[extension.NAME]`, in their order, each name once: a cause that acts along several directions has a list of them, and
-/// of each parameter a list that is as long.
+/// Joins tables `[extension.NAME]` of the same name, in their order. A cause that acts along several directions gets one table with a list
+/// of directions and, for each parameter, a list of equal length.
 pub(crate) fn joined<'a>(parts: impl IntoIterator<Item = (&'a str, &'a Table)>) -> Vec<(String, Table)> {
     let mut all: Vec<(String, Table)> = Vec::new();
     for (name, table) in parts {

@@ -1,8 +1,8 @@
 //! The cutting coefficients K_tc, K_rc, K_ac differ from those of the case.
 //!
-//! Shows: forces in proportion to the chip, and with them the chatter limits. Does not show: force at a vanishing chip. Without measured
-//! force all coefficients by one factor are a gain of all channels.
-//! Fit: linear in each. Source: Altintas, Manufacturing Automation (2012), ch. 2.
+//! Shows: forces proportional to the chip thickness, and changed chatter limits. Does not show: force at vanishing chip thickness. Without
+//! measured force, one factor on all coefficients is equivalent to a gain of all channels. Fit: linear in each coefficient. Source:
+//! Altintas, Manufacturing Automation (2012), ch. 2.
 
 use super::coefficients::Coefficients;
 use quietcut_model::effects::EffectName;
@@ -18,6 +18,6 @@ pub(super) const FORCE_COEFFICIENTS: Coefficients = Coefficients {
         ]
     },
     step: |cutter| cutter.force.material().ktc_mpa.abs().max(1.0),
-    // A chip pushes against the turning.
+    // The chip resists the motion of the tooth: the tangential coefficient is positive.
     can_be: |tangential| tangential > 0.0,
 };

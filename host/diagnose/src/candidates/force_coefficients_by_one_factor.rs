@@ -1,6 +1,6 @@
-//! All coefficients of the force, those of the edge included, differ by one factor: F·(1 + change).
+//! All cutting and edge coefficients change by one factor: F·(1 + change).
 //!
-//! In the steady state of a stable linear cut without measured force one gain on all channels is exactly the same.
+//! In the steady state of a stable linear cut without measured force, one gain of all channels is exactly equivalent.
 
 use super::process::{changed, cutter, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
@@ -9,7 +9,7 @@ use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 use quietcut_model::milling::Material;
 
-/// Coefficients of the cut, and those of an edge that has a force.
+/// One factor on the cutting coefficients and, if `with_edge` is true, on the edge coefficients.
 pub(super) struct CommonFactor {
     pub(super) with_edge: bool,
 }

@@ -1,10 +1,10 @@
-//! The force is not in proportion to the chip: F = K·b·h₀·(h/h₀)^p.
+//! The force is not proportional to the chip thickness: F = K·b·h₀·(h/h₀)^p.
 //!
-//! Shows: at two feeds, or over the chips of one tooth pass, a force that grows less than the chip. Does not show: anything but other
-//! coefficients at one chip. Source: Kienzle, VDI-Z 94 (1952).
+//! Shows: at two feeds, or over the chip thicknesses of one tooth passing, a force that grows less than the chip thickness. Does not show:
+//! at one chip thickness, any difference from other cutting coefficients. Source: Kienzle, VDI-Z 94 (1952).
 //!
-//! Fit: with a chip h* to measure by, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*): the coefficients are p − 1 and q, and
-//! their regressors are exact at the shape (p, q) that they are made for.
+//! Fit: with a reference chip thickness h*, h₀·(h/h₀)^p = e^q·h*·(h/h*)^p with q = (1 − p)·ln(h₀/h*). The coefficients are p − 1 and q. The
+//! regressors are finite differences, exact if p and q are the values at which they are computed.
 
 use super::process::{added, changed, cutter, everywhere, step};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
@@ -15,10 +15,10 @@ use quietcut_simulate::ChipLaw;
 
 pub(super) struct ForceExponent;
 
-/// A shape closer to 1 than this is the slope there.
+/// Smallest step of the finite differences in p and q.
 const LEAST: f64 = 1e-3;
 
-/// h*, m: half the feed of the first cut.
+/// Reference chip thickness h*, m: half the feed per tooth of the first cut.
 fn reference_m(study: &Study<'_>) -> f64 {
     cutter(study).map_or(1e-4, |cutter| 0.5 * cutter.feed_per_tooth_m)
 }
@@ -78,7 +78,7 @@ impl Cause for ForceExponent {
     ) -> Option<Vec<Parameter>> {
         let &[less, q] = coefficients else { return None };
         let reference_mm = 1e3 * reference_m(study) * (-q / less).exp();
-        // Beyond these no chip law was ever measured.
+        // Exponents from 0.2 to 2 contain all published chip laws.
         let physical = less > -0.8 && less < 1.0 && reference_mm.is_finite() && reference_mm > 0.0;
         physical.then(|| vec![("exponent", 1.0 + less), ("reference_chip_mm", reference_mm)])
     }

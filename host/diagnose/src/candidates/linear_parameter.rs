@@ -1,8 +1,9 @@
-//! Mass, stiffness and damping that differ from the case.
+//! Mass, stiffness or damping that differs from the case.
 //!
-//! Shows: a receptance that differs and does not depend on amplitude: above resonance for mass, below it for stiffness, at it for
-//! damping. Does not show: harmonics, or lines where nothing drives. All three by one factor are a gain of the only channel.
-//! Fit: linear in the relative change. Source: the output-error equation of Pintelon and Schoukens, System Identification (2012).
+//! Shows: a receptance that differs from the baseline and does not depend on amplitude: above resonance for mass, below it for stiffness,
+//! at it for damping. Does not show: harmonics, or response at frequencies without excitation. All three changed by one factor are
+//! equivalent to a gain of the only channel. Fit: linear in the relative change. Source: the output-error equation of Pintelon and
+//! Schoukens, System Identification (2012).
 //!
 //! With H the receptance and θ the relative change of the parameter, x = H(θ) F, and where Z = H⁻¹ is linear in θ (every
 //! structure of mass, damping and stiffness) the residual along the *measured* motion is exact for changes of any size:
@@ -24,9 +25,10 @@ use quietcut_model::structure::Form;
 use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
 
-/// Relative step of the differences: their error is its square, rounding is 1e-12 over it.
+/// Relative step of the central differences. Their relative error is about its square, 1e-8; rounding contributes 1e-12/`STEP`.
 const STEP: f64 = 1e-4;
-/// Share of the parts of H below which it counts as nearly vanishing.
+/// |H| over the root sum of squares of its modal contributions below which H is regularized as nearly vanishing: ε in the head of this
+/// file.
 const VANISHING: f64 = 0.05;
 
 #[derive(Clone, Copy)]
@@ -47,7 +49,7 @@ impl Linear {
         }
     }
 
-    /// The entry of the matrix on the diagonal, where the structure has one there.
+    /// Diagonal entry of the mass, stiffness or damping matrix for the direction of `location`; `None` if there is none.
     fn entry(&self, study: &Study<'_>, location: &Location) -> Option<f64> {
         let Form::Matrices(matrices) = &study.baseline.structure.form else {
             return None;
@@ -236,8 +238,8 @@ impl Cause for Linear {
     }
 }
 
-/// The forces of a cut whose acceleration is measured, at the bins of the finer samples: above half the sample rate the structure
-/// is a mass, and its acceleration is folded into the band.
+/// Spectra of the cutting forces on the upsampled grid, for a cut with measured acceleration; otherwise `None`. Above half the sample rate
+/// the structure responds as a mass, and sampling folds its acceleration into the band.
 fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
     let cut = record.cut.as_ref()?;
     record
@@ -247,7 +249,7 @@ fn of_folded_forces(record: &Record) -> Option<[Option<Vec<Complex64>>; 3]> {
         .then(|| record.cut_spectra(&cut.force))
 }
 
-/// F_eff, N, over the axes of the baseline.
+/// F_eff of the file's head, N, at each bin, by axis.
 fn effective_force(study: &Study<'_>, record: &Record) -> [Vec<Complex64>; 3] {
     let baseline = &study.baseline;
     let (axes, grid) = (&baseline.axes, &record.grid);

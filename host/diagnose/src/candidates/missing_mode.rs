@@ -1,11 +1,11 @@
-//! One more mode in the receptance of a direction: y gets F/(m·(ω_m² − ω² + 2iζω_m ω)), exact where the force is measured.
+//! A further mode in the receptance of a direction: y changes by F/(m·(ω_m² − ω² + 2iζω_m ω)), which is exact if the force is measured.
 //!
-//! Shows: a resonance with a phase of its own at a frequency where the case has none, the same at all levels. Does not show: harmonics or
-//! a dependence on amplitude. Far outside the band it is a little stiffness or mass (the residual terms of a modal fit).
-//! Fit: 1/m linear, ω_m and ζ as a shape. Source: Ewins, Modal Testing (2000), ch. 4.
+//! Shows: a resonance with its phase at a frequency where the case has none, the same at all levels. Does not show: harmonics, or a
+//! dependence on amplitude. Far outside the band it acts as a small stiffness or mass (the residual terms of a modal fit). Fit: linear in
+//! 1/m; ω_m and ζ are nonlinear parameters. Source: Ewins, Modal Testing (2000), ch. 4.
 //!
-//! A structure that is let go was pulled as a whole: the mode begins at rest where the static force F₀ = H(0)⁻¹ u(0) had it,
-//! and y gets F₀/(m ω_m²)·e^(−ζω_m t)·(cos ω_d t + ζω_m/ω_d · sin ω_d t), ω_d = ω_m √(1 − ζ²).
+//! In a free decay the structure starts from static deflection: the mode begins at rest at its deflection under the static force F₀ =
+//! H(0)⁻¹ u(0), and y changes by F₀/(m ω_m²)·e^(−ζω_m t)·(cos ω_d t + ζω_m/ω_d · sin ω_d t), ω_d = ω_m √(1 − ζ²).
 
 use nalgebra::Vector3;
 use num_complex::Complex64;
@@ -23,9 +23,9 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct MissingMode;
 
-/// Damping ratios that are tried first.
+/// Damping ratios of the start values.
 const DAMPING: [f64; 3] = [0.008, 0.025, 0.08];
-/// Frequencies that are kept after the first look.
+/// Number of start values: the highest peaks of the search over frequency and damping ratio.
 const KEPT: usize = 4;
 
 impl Cause for MissingMode {
@@ -59,7 +59,7 @@ impl Cause for MissingMode {
         self.nonlinear_grid_beside(study, location, &residual)
     }
 
-    /// The few frequencies at which such a mode would look most like the residual, at three dampings each.
+    /// Frequencies and damping ratios at which one more mode would explain most of the residual `left`.
     fn nonlinear_grid_beside(
         &self,
         study: &Study<'_>,
@@ -165,8 +165,8 @@ impl Cause for MissingMode {
         Some(vec![Regressor::of_channels(observed)])
     }
 
-    /// None where a mode of the case has its peak within the peak of this one and is as large: that is a change of a mode that is
-    /// there.
+    /// `None` if the baseline has a mode at least as large whose half-power bandwidth overlaps with that of this one: the fit then
+    /// describes a change of that mode.
     fn parameters(
         &self,
         study: &Study<'_>,
@@ -196,7 +196,7 @@ impl Cause for MissingMode {
     }
 }
 
-/// 1/(ω_m² − ω² + 2iζω_m ω), the receptance of a mode of mass 1.
+/// 1/(ω_m² − ω² + 2iζω_m ω): the receptance of a mode with modal mass 1 kg.
 fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
     let natural = TAU * frequency_hz;
     Complex64::new(
@@ -206,17 +206,17 @@ fn mode(omega: f64, frequency_hz: f64, damping_ratio: f64) -> Complex64 {
     .inv()
 }
 
-/// True of a record of what was let go, where nobody measured the force along `axis`.
+/// True for a free decay whose force along `axis` is not measured.
 fn is_let_go(record: &Record, axis: usize) -> bool {
     starts_anywhere(record) && record.force_n[axis].is_empty()
 }
 
-/// The static force from which the baseline was let go, N.
+/// The static force that held the baseline before its free decay, N; `None` if it cannot be computed.
 fn held_by_n(study: &Study<'_>, record: &Record) -> Option<Vector3<f64>> {
     holding_force_n(study, &study.baseline.first_order, &record.decays.start)
 }
 
-/// What a channel reads of a mode of mass 1 that is let go from under a static force along `axis`, sample after sample.
+/// Samples of a channel that reads the free decay of a mode with modal mass 1 kg from rest under the static force `force_n` along `axis`.
 fn released<'a>(
     record: &'a Record,
     channel: &'a Observed,
@@ -226,7 +226,7 @@ fn released<'a>(
 ) -> impl Iterator<Item = f64> + 'a {
     let natural = TAU * frequency_hz;
     let pole = natural * Complex64::new(-damping_ratio, (1.0 - damping_ratio * damping_ratio).sqrt());
-    // η(t) = η(0)·Re[−λ̄/(i ω_d)·e^(λt)]: one at the start, and at rest there.
+    // η(t) = η(0)·Re[−λ̄/(i ω_d)·e^(λt)]: η(0) at the start, with zero velocity.
     let start = -pole.conj() / Complex64::new(0.0, pole.im) * pole.powi(derivatives(channel.pickup.quantity));
     let size = channel.pickup.weights[axis] * force_n / (natural * natural);
     let since = move |sample: usize| sample as f64 / record.grid.rate_hz() - channel.pickup.delay_s;
@@ -236,7 +236,7 @@ fn released<'a>(
     })
 }
 
-/// A channel that hears the axis in a record of what was let go, with the force that held it.
+/// A free decay and a channel that reads `axis`: record, channel, residual of the channel, axis, and static force along the axis, N.
 type Release<'a> = (&'a Record, &'a Observed, &'a [f64], usize, f64);
 
 fn releases<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) -> Vec<Release<'a>> {
@@ -253,8 +253,8 @@ fn releases<'a>(study: &'a Study<'_>, axis: usize, left: &'a [Vec<Vec<f64>>]) ->
     all
 }
 
-/// One bin of a channel: ω, the force as the channel would read it of a mode with receptance 1, and the residual; both in
-/// units of the noise.
+/// One bin of a channel: ω in rad/s; the force multiplied by the sensor's factor; the residual. Force and residual are over the standard
+/// deviation of the channel's noise.
 type Bin = (f64, Complex64, Complex64);
 
 fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
@@ -278,7 +278,7 @@ fn bins(study: &Study<'_>, axis: usize, left: &[Vec<Vec<f64>>]) -> Vec<Bin> {
     all
 }
 
-/// The share of the residual's power in units of the noise that a mode takes, positive masses only.
+/// Reduction of χ² by a mode of this frequency and damping ratio with the best modal mass; 0 if that mass is negative.
 fn likeness(bins: &[Bin], releases: &[Release<'_>], frequency_hz: f64, damping_ratio: f64) -> f64 {
     let (mut along, mut size) = (0.0, 0.0);
     for (omega, force, residual) in bins {

@@ -1,4 +1,4 @@
-//! The candidates of each effect: what depends on records. One file of the name of each effect, beside the rooms that several share:
+//! Candidate causes, one file for each effect. They contain what depends on records: regressors, start values, bounds. Shared parts are in
 //! [`linear_parameter`], [`restoring`], [`process`] and [`sensor`].
 
 mod axial_depth_modulation;
@@ -42,12 +42,13 @@ use quietcut_model::effects::EffectName;
 
 use self::cause::Cause;
 
-/// The candidates of all effects.
+/// The candidate causes of all effects.
 pub(crate) fn all() -> Vec<Box<dyn Cause>> {
     EffectName::ALL.into_iter().flat_map(of).collect()
 }
 
-/// The forms that compete under the name of an effect. There is no wildcard: a new effect does not compile without its candidates.
+/// The forms of a cause that compete under the name of one effect. The match has no wildcard, so that a new effect without candidates does
+/// not compile.
 fn of(effect: EffectName) -> Vec<Box<dyn Cause>> {
     match effect {
         EffectName::Mass => vec![Box::new(mass::CAUSE)],

@@ -1,8 +1,8 @@
-//! A potential shared by two directions: ½·k_xxyy·x²y² or k_xxy·x²y; each direction gets its derivative.
+//! A potential shared by two directions: ½·k_xxyy·x²y² or k_xxy·x²y. The restoring force of each direction is its derivative.
 //!
-//! Shows: only where both directions move; sums and differences of their frequencies, a stiffness of one that moves with the
-//! amplitude of the other. Does not show: anything where one of them rests.
-//! Fit: linear. Source: Nayfeh and Mook, Nonlinear Oscillations (1979), ch. 6.
+//! Shows, if both directions move: response at sums and differences of their frequencies; a stiffness of one direction that changes with
+//! the amplitude of the other. Does not show: anything while one direction is at rest. Fit: linear in the coefficient. Source: Nayfeh and
+//! Mook, Nonlinear Oscillations (1979), ch. 6.
 
 use super::restoring::{Restoring, plain};
 use quietcut_model::effects::EffectName;

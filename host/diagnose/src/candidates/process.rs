@@ -1,8 +1,8 @@
-//! What a cutting process may have otherwise: every one changes the force of the cut along the measured motion.
+//! Causes in the cutting process: each changes the cutting force along the measured motion.
 //!
-//! The force with the cause is that of the simulation's own [`Cutter`](quietcut_simulate::Cutter) and
-//! [`ForceLaw`](quietcut_simulate::ForceLaw). What it adds is filtered by the structure where motion is compared, and compared
-//! as it is where the force was measured.
+//! The simulation's own [`Cutter`](quietcut_simulate::Cutter) and [`ForceLaw`](quietcut_simulate::ForceLaw) compute the force with the
+//! cause. The difference from the force of the baseline is filtered by the receptance if motion is compared, and compared directly if force
+//! is measured.
 
 use crate::candidates::cause::{Location, Regressor};
 use crate::motion::cut_force::CutForce;
@@ -11,7 +11,7 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_simulate::Cutter;
 
-/// The whole cut, where the scene has one that is not known to have the cause already.
+/// The location of a cause of the cutting process: everywhere. Empty if the study has no cut or the case has this extension already.
 pub(super) fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
     let known = study.baseline.case.extensions.contains_key(name);
     if known || cutter(study).is_none() {
@@ -21,7 +21,7 @@ pub(super) fn everywhere(study: &Study<'_>, name: &str) -> Vec<Location> {
     }
 }
 
-/// The tool of the first cut of a scene.
+/// The tool of the first cut of the study.
 pub(super) fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
     study
         .records
@@ -29,13 +29,13 @@ pub(super) fn cutter<'a>(study: &'a Study<'_>) -> Option<&'a Cutter> {
         .find_map(|record| Some(&record.cut.as_ref()?.cut.cutter))
 }
 
-/// True where the axial direction is part of the cut: it moves, or its force is seen.
+/// True if the structure has an axial direction.
 pub(super) fn has_axial(study: &Study<'_>) -> bool {
     study.baseline.axes.contains(&2)
 }
 
-/// What a cut adds per unit when its tool changes from `before` to `after`, `over` units apart; nothing in a record without a
-/// cut.
+/// Change of the cutting force between the tools `before` and `after`, divided by the change `over` of the parameter; empty for a record
+/// without a cut.
 pub(super) fn added(
     record: &Record,
     before: impl Fn(&mut Cutter),
@@ -49,7 +49,8 @@ pub(super) fn added(
     Regressor::of_cut(after.difference(&before, over))
 }
 
-/// What a cut adds per unit when its tool changes from the one that is believed.
+/// Change of the cutting force from the baseline's tool to the tool `after`, divided by the change `over` of the parameter; empty for a
+/// record without a cut.
 pub(super) fn changed(record: &Record, after: impl Fn(&mut Cutter), over: f64) -> Regressor {
     let Some(cut) = &record.cut else {
         return Regressor::default();
@@ -63,7 +64,7 @@ pub(super) fn with(record: &Record, cut: &Cutting, change: impl Fn(&mut Cutter))
     cut.force_of(&cutter, &record.motion)
 }
 
-/// A step that stands for a size that may vanish.
+/// `size` as a step of a finite difference, or `least` if its magnitude is smaller.
 pub(super) fn step(size: f64, least: f64) -> f64 {
     if size.abs() < least { least } else { size }
 }

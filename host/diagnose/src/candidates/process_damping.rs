@@ -1,8 +1,8 @@
-//! The flank rubs on the wave just cut: −(C/V)·b·v_n on the edge, V the cutting speed.
+//! The flank rubs on the wave that the edge has just cut: a force −(C/V)·b·v_n on the edge, V the cutting speed.
 //!
-//! Shows: damping that grows with depth and with 1/speed, in the direction normal to the edge. Does not show: anything at standstill,
-//! where damping of the structure would. At one speed and depth it is damping.
-//! Fit: linear in C, along the measured velocity. Source: Altintas, Eynian and Onozuka, CIRP Annals 57 (2008).
+//! Shows: damping that grows with axial depth and with 1/speed, in the direction normal to the edge. Does not show: anything without
+//! cutting, unlike damping of the structure. At one speed and depth it is equivalent to damping of the structure. Fit: linear in C, along
+//! the measured velocity. Source: Altintas, Eynian and Onozuka, CIRP Annals 57 (2008).
 
 use super::process::{changed, cutter, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
@@ -46,7 +46,7 @@ impl Cause for OfFlank {
         _: &[f64],
         coefficients: &[f64],
     ) -> Option<Vec<Parameter>> {
-        // A flank takes energy.
+        // A rubbing flank dissipates energy: C is positive.
         coefficients
             .first()
             .filter(|damping| **damping > 0.0)

@@ -1,4 +1,4 @@
-//! Terms of the restoring side: their equations are those of the simulation, taken along the measured motion.
+//! Restoring forces: the equations are those of the simulation, evaluated along the measured motion.
 
 use crate::baseline::terms_of;
 use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
@@ -8,32 +8,33 @@ use quietcut_model::effects::EffectName;
 use quietcut_simulate::Effects;
 use quietcut_simulate::path::restoring_along;
 
-/// A term f_r = Σ coefficient · f(x, v, t; shape).
+/// A restoring force f_r = Σ coefficient · f(x, v, t; nonlinear parameters).
 pub(super) struct Restoring {
     pub(super) effect: EffectName,
-    /// Keys of the coefficients.
+    /// Keys of the coefficients, in which the force is linear.
     pub(super) linear: &'static [&'static str],
-    /// Keys of the shape.
+    /// Keys of the nonlinear parameters.
     pub(super) nonlinear_parameters: &'static [&'static str],
-    /// How many axes it joins.
+    /// Number of axes that one force couples: 1 or 2.
     pub(super) axes: usize,
-    /// Whether two axes that it joins enter alike: they are then one location, not two.
+    /// True if the force is symmetric in its two axes: (a, b) and (b, a) are then one location.
     pub(super) is_symmetric: bool,
-    /// Whether it may also act along all axes at once, by one law.
+    /// True if a further candidate acts along all axes with the same coefficients.
     pub(super) everywhere: bool,
-    /// Whether it may also act along each of them by a law of its own, as in joints of one kind; it has no shape then.
+    /// True if a further candidate acts along all axes with separate coefficients, as in joints of one kind. Such a force has no nonlinear
+    /// parameters.
     pub(super) each: bool,
-    /// A grid of shapes for what moves as it does in the scene.
+    /// Start values of the nonlinear parameters, from the amplitudes in the study along an axis.
     pub(super) nonlinear_grid: fn(&Study<'_>, usize) -> Vec<Vec<f64>>,
-    /// Bounds of the shape.
+    /// Bounds of the nonlinear parameters.
     pub(super) bounds: fn(&Study<'_>, usize) -> Vec<[f64; 2]>,
-    /// Whether it acts behind a play, which is a backlash.
+    /// True if the force acts behind a backlash, which the answer then names too.
     pub(super) behind_play: bool,
-    /// Whether coefficients and shape are physical.
+    /// True for physically possible coefficients.
     pub(super) physical: fn(coefficients: &[f64]) -> bool,
 }
 
-/// A linear one that may have either sign.
+/// A force along one axis that is linear in its coefficients, whose signs are free.
 pub(super) const fn plain(effect: EffectName, linear: &'static [&'static str]) -> Restoring {
     Restoring {
         effect,
@@ -85,7 +86,7 @@ fn first_axis(location: &Location) -> usize {
     }
 }
 
-/// The places where a law is to be said: one, unless it is another along each axis.
+/// The locations that have coefficients of their own: each axis for [`Location::EachOf`], otherwise the location itself.
 fn single_places(location: &Location) -> Vec<Location> {
     match location {
         Location::EachOf(axes) => axes.iter().map(|axis| Location::Axis(*axis)).collect(),
@@ -93,7 +94,7 @@ fn single_places(location: &Location) -> Vec<Location> {
     }
 }
 
-/// `count` values from `first` to `last`, evenly in their logarithm.
+/// `count` values from `first` to `last`, equally spaced in their logarithm.
 pub(super) fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
     (0..count)
         .map(|index| first * (last / first).powf(index as f64 / (count - 1).max(1) as f64))
@@ -101,7 +102,7 @@ pub(super) fn logarithmic(first: f64, last: f64, count: usize) -> Vec<f64> {
 }
 
 impl Restoring {
-    /// True where the baseline has an extension of its name: a case holds one.
+    /// True if the case has an extension of this name already: it can hold only one.
     fn in_baseline(&self, study: &Study<'_>) -> bool {
         self.names()
             .iter()
@@ -121,7 +122,7 @@ impl Restoring {
         table
     }
 
-    /// What the answer says of the law along one axis.
+    /// Entries of the answer for the force along one axis.
     fn parts_of_one(&self, location: &Location, parameters: &[Parameter]) -> Vec<Part> {
         let of_play = |(key, _): &&Parameter| self.behind_play && self.nonlinear_parameters.contains(key);
         let own: Vec<Parameter> = parameters.iter().filter(|p| !of_play(p)).copied().collect();
@@ -153,7 +154,7 @@ impl Restoring {
         parts
     }
 
-    /// What one of its coefficients, 1, adds along the motion of a record; `None` where it cannot act there.
+    /// The force of coefficient number `index` with the value 1, along the motion of a record; `None` if the structure has no such force.
     fn along(
         &self,
         study: &Study<'_>,
@@ -221,7 +222,7 @@ impl Cause for Restoring {
                 .iter()
                 .flat_map(|a| axes.iter().map(move |b| (*a, *b)))
                 .filter(|(a, b)| a != b)
-                // A potential in which both enter alike is one place, not two.
+                // A symmetric potential has one location for each pair of axes, not two.
                 .filter(|(a, b)| !self.is_symmetric || a < b)
                 .map(|(a, b)| Location::Axes(a, b))
                 .collect(),

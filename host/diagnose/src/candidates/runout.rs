@@ -1,8 +1,8 @@
 //! Runout: tooth j on the radius R + e·cos(ψ + 2πj/N).
 //!
-//! Shows: lines at the spindle order 1 and its multiples between those of the teeth, from the first tooth on. Does not show: growth, or
-//! lines that are not of the spindle. A flip of an even number of teeth has the same lines once it no longer grows.
-//! Fit: linear in e cos ψ and −e sin ψ. Source: Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983).
+//! Shows: lines at the spindle frequency and its multiples other than tooth-passing harmonics, from the first engaged tooth on. Does not
+//! show: growth, or lines that are not multiples of the spindle frequency. A saturated flip of a tool with an even number of teeth has the
+//! same lines. Fit: linear in e cos ψ and −e sin ψ. Source: Kline and DeVor, Int. J. Mach. Tool Des. Res. 23 (1983).
 
 use std::f64::consts::TAU;
 
@@ -16,9 +16,9 @@ use quietcut_simulate::Cutter;
 
 pub(super) struct OfTool;
 
-/// Offsets that are tried first, as shares of the feed per tooth.
+/// Offsets e of the start values, as shares of the feed per tooth.
 const SHARES_OF_FEED: [f64; 2] = [0.1, 0.25];
-/// A shape below this, in µm, is the slope there.
+/// Smallest step of the finite differences in e cos ψ and −e sin ψ, µm.
 const LEAST_UM: f64 = 0.01;
 
 fn teeth(study: &Study<'_>) -> usize {
@@ -46,7 +46,7 @@ impl Cause for OfTool {
             .tool
             .as_ref()
             .is_some_and(|tool| tool.runout.is_none());
-        // The only tooth of a tool follows itself.
+        // With one tooth, runout changes no chip: that tooth cuts its own surface.
         if runs_true && teeth(study) > 1 {
             everywhere(study, self.name())
         } else {
@@ -54,7 +54,7 @@ impl Cause for OfTool {
         }
     }
 
-    /// The slope at none, and about offsets with which some teeth leave the surface.
+    /// Start values e cos ψ and −e sin ψ in µm: zero, and offsets so large that some teeth do not cut.
     fn nonlinear_grid(&self, study: &Study<'_>, _: &Location) -> Vec<Vec<f64>> {
         let feed_um = cutter(study).map_or(0.0, |cutter| 1e6 * cutter.feed_per_tooth_m);
         let directions = if teeth(study) > 2 { 6 } else { 2 };
@@ -79,7 +79,7 @@ impl Cause for OfTool {
         };
         let (along_step, across_step) = (step(along, LEAST_UM), step(across, LEAST_UM));
         let mut regressors = vec![changed(record, offset(along_step, 0.0), along_step)];
-        // Two teeth stand on one line: what is across it moves neither.
+        // With two teeth, an offset perpendicular to their line changes no radius.
         if teeth(study) > 2 {
             regressors.push(added(
                 record,

@@ -1,4 +1,5 @@
-//! Sensors that do not read the truth; y_t is the truth, along the measured motion.
+//! Regressors of sensor errors, shared by gain, delay, cross-axis sensitivity and offset. The estimated motion stands for the true value
+//! y_t.
 
 use num_complex::Complex64;
 
@@ -11,7 +12,7 @@ use crate::records::study::Study;
 use quietcut_recording::Quantity;
 use quietcut_simulate::path::Motion;
 
-/// Names of the channels of motion, where all records are predicted from their force.
+/// Names of the channels of motion, if all records are compared in the response domain; otherwise empty.
 pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
     if !study.all_in(Domain::Response) {
         return Vec::new();
@@ -25,13 +26,14 @@ pub(super) fn channels(study: &Study<'_>) -> Vec<String> {
     names
 }
 
-/// A place for each channel, and where there are several, one for all of them together.
+/// Locations of a sensor error: each channel of motion and, if there are several, all of them with one value. Empty if the case has this
+/// extension.
 pub(super) fn one_or_all(study: &Study<'_>, name: &str) -> Vec<Location> {
     if study.baseline.case.extensions.contains_key(name) {
         return Vec::new();
     }
     let names = channels(study);
-    // Without a motion that a force drives, nothing says how large or late it should be but another channel.
+    // Without a known force, only a second channel shows that a channel reads too much or too late.
     let free = study
         .records
         .iter()
@@ -54,10 +56,10 @@ pub(super) fn meant(location: &Location, channel: &Observed) -> bool {
     }
 }
 
-/// What the channel reads of the motion as it is known, with the spectrum turned by `change` of ω.
+/// Reading of a channel from the estimated motion, with its spectrum multiplied by `change`(ω).
 ///
-/// The acceleration of a cut jumps where teeth enter and leave, so that much of a reading is folded into the band by sampling:
-/// where a channel of the same kind reads an axis of a cut, its reading is taken and not the motion between the samples.
+/// The acceleration of a cut jumps when teeth enter and leave, and sampling folds much of it into the band. If a channel of the same
+/// quantity reads only this axis of a cut, its measured reading is used instead of the estimated motion.
 pub(super) fn read(
     record: &Record,
     channel: &Observed,
@@ -99,7 +101,7 @@ pub(super) fn read(
     grid.samples(&sum)
 }
 
-/// What the channels that are meant read with the spectrum turned by `change` of ω.
+/// Readings of the channels at `location`, each with its spectrum multiplied by `change`(ω).
 pub(super) fn of_meant(
     record: &Record,
     location: &Location,
@@ -116,8 +118,8 @@ pub(super) fn of_meant(
     vec![Regressor::of_channels(record.channels.iter().map(of).collect())]
 }
 
-/// The change of what a channel reads of a cut, ω turned by `change`: of the response to its force over the finer samples, so that
-/// steps stay steps, and of what the motion has besides.
+/// Reading of a channel in a cut with its spectrum multiplied by `change`(ω). The response to the cutting force is changed on the upsampled
+/// grid, so that steps stay steps; the rest of the reading is changed at the samples of the record.
 pub(super) fn in_steps(
     record: &Record,
     channel: usize,
@@ -135,7 +137,7 @@ pub(super) fn in_steps(
     let mut changed = record.read_response(&force, channel);
     let readings = record.readings[channel].iter().zip(&known);
     let mut besides: Vec<f64> = readings.map(|(all, known)| all - known).collect();
-    // Where a sample is not compared nothing is known of it: it is as the one before.
+    // A sample that is not compared takes the value before it.
     for &sample in record.skipped[channel].iter().filter(|sample| **sample > 0) {
         besides[sample] = besides[sample - 1];
     }
@@ -149,11 +151,12 @@ pub(super) fn in_steps(
     Some(changed)
 }
 
-/// The same regressor in a cut, where the chip was taken along a motion that the sensor tells wrongly: what the force is less
-/// along the motion that `truth` makes of it, which is `over` units away.
+/// Completes the regressors of a sensor error for a cut, whose chip is computed along the motion that the sensor misreads: subtracts the
+/// change of the cutting force from the measured to the true motion. `truth` corrects the motion along an axis for a sensor error of `over`
+/// units.
 ///
-/// With y = S x the reading of the motion x and F the force along a motion, y − H F(y) = (y − x) − H (F(y) − F(x)). Several sensors
-/// of one axis are taken to have an even share in what is known of its motion.
+/// With y = S x the reading of the motion x and F the force along a motion, y − H F(y) = (y − x) − H (F(y) − F(x)). If several sensors read
+/// one axis, each has an equal share in its estimated motion.
 pub(super) fn in_cut(
     record: &Record,
     location: &Location,

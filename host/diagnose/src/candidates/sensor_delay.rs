@@ -1,8 +1,8 @@
-//! A channel that is late: y(t) = y_t(t − τ), so that y − ŷ = y(t) − y(t + τ), which is −τ·ẏ while the delay is short.
+//! A channel that is late: y(t) = y_t(t − τ), so that y − ŷ = y(t) − y(t + τ), which is −τ·ẏ for a short delay.
 //!
-//! Shows: a phase in proportion to frequency over a band. Does not show: a change of amplitude; in a narrow band it is damping. Without a
-//! force or another channel to be late against it cannot be seen.
-//! Fit: τ as a shape, exact for delays of any length. Source: McConnell and Varoto, Vibration Testing (2008).
+//! Shows: a phase proportional to frequency over a band. Does not show: a change of amplitude; in a narrow band it is equivalent to
+//! damping. Without a force or another channel as reference the delay is not identifiable. Fit: τ is a nonlinear parameter; the regressor
+//! is exact for delays of any length. Source: McConnell and Varoto, Vibration Testing (2008).
 
 use num_complex::Complex64;
 
@@ -14,10 +14,10 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct Delay;
 
-/// Delays up to this share of the period of the highest frequency are looked for.
+/// Longest delay of the search, in periods of the highest frequency of the motion.
 const LONGEST: f64 = 0.4;
 
-/// Delays that differ by this factor are of another size.
+/// Factor between the fitted delay and the delay at which the regressor is computed from which on the fit does not describe a delay.
 const ANOTHER: f64 = 100.0;
 
 impl Cause for Delay {
@@ -53,7 +53,7 @@ impl Cause for Delay {
         nonlinear_parameters: &[f64],
     ) -> Option<Vec<Regressor>> {
         let delay = *nonlinear_parameters.first()?;
-        // Per second of delay, so that the coefficient is the delay.
+        // Divided by the delay, so that the coefficient is the delay in seconds.
         let change = |omega: f64| (Complex64::ONE - Complex64::cis(omega * delay)) / delay;
         let read = if record.cut.is_some() {
             let of = |channel: usize| {
@@ -69,13 +69,13 @@ impl Cause for Delay {
         } else {
             of_meant(record, location, |channel| channel.pickup.weights, change)
         };
-        // x(t) = y(t + τ).
+        // The true motion is x(t) = y(t + τ).
         Some(in_cut(record, location, read, delay, |motion, axis| {
             motion.advance(axis, delay);
         }))
     }
 
-    /// The regressor is exact at the delay that it was made for.
+    /// The fitted delay: the regressor is exact at the delay for which it is computed.
     fn settled(&self, _: &[f64], coefficients: &[f64]) -> Option<Vec<f64>> {
         coefficients
             .first()
@@ -83,7 +83,7 @@ impl Cause for Delay {
             .map(|delay| vec![*delay])
     }
 
-    /// None where the regressor was made for a delay of another size: that is no delay.
+    /// `None` if the fitted delay differs too much from the one for which the regressor is computed.
     fn parameters(
         &self,
         _: &Study<'_>,

@@ -1,9 +1,9 @@
-//! A channel that reads g times the truth: y = g·y_t, so that y − ŷ = (1 − 1/g)·y.
+//! A channel that reads g times the true value: y = g·y_t, so that y − ŷ = (1 − 1/g)·y.
 //!
-//! Shows: one factor at all frequencies and amplitudes, of one channel. Does not show: a phase, or anything in other channels. Of the
-//! only channel under a measured force it is mass, damping and stiffness by one factor; of all channels of a steady cut without
-//! measured force a factor of the cutting force; of one that is let go, where the start is not known, nothing.
-//! Fit: linear in 1 − 1/g. Source: the calibration factor of ISO 16063.
+//! Shows: one factor at all frequencies and amplitudes, in one channel. Does not show: a phase, or anything in other channels. Equivalent
+//! are: for the only channel under a measured force, mass, damping and stiffness changed by one factor; for all channels of a steady cut
+//! without measured force, a factor on the cutting force. The gain of the only channel of a free decay has no effect, because the initial
+//! state is unknown. Fit: linear in 1 − 1/g. Source: the calibration factor of ISO 16063.
 
 use num_complex::Complex64;
 
@@ -15,13 +15,13 @@ use quietcut_model::effects::EffectName;
 
 pub(super) struct Gain;
 
-/// The share 1 − 1/g beyond which nothing of the truth would be in a reading.
+/// Largest share 1 − 1/g: a gain of 50. Beyond it the reading would hardly contain the true value.
 const LARGEST_SHARE: f64 = 0.98;
 
-/// The share for which the chip of a cut is taken.
+/// Share 1 − 1/g of the finite difference from which the change of the chip, and so of the cutting force, is computed.
 const SMALL_SHARE: f64 = 0.05;
 
-/// g of the share 1 − 1/g.
+/// The gain g from the fitted share 1 − 1/g; `None` if the share is too large.
 pub(super) fn factor(coefficients: &[f64]) -> Option<f64> {
     let share = *coefficients.first()?;
     (share < LARGEST_SHARE).then(|| 1.0 / (1.0 - share))
@@ -49,7 +49,7 @@ impl Cause for Gain {
             |channel| channel.pickup.weights,
             |_| Complex64::ONE,
         );
-        // x = (1 − share)·y.
+        // The true motion is x = (1 − share)·y.
         Some(in_cut(record, location, read, SMALL_SHARE, |motion, axis| {
             let signals = motion.x[axis].iter_mut().chain(&mut motion.v[axis]);
             signals.for_each(|value| *value *= 1.0 - SMALL_SHARE);

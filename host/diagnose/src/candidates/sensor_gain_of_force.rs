@@ -1,10 +1,9 @@
-//! Sensors of the cutting force that read g times the truth: y = g·F, so that y − ŷ = (g − 1)·F along the measured motion.
+//! Force sensors that read g times the cutting force: y = g·F, so that y − ŷ = (g − 1)·F along the measured motion.
 //!
-//! Shows: one factor of measured forces at all orders of the tooth passage, of one sensor or of a dynamometer as a whole, while the
-//! motion is what the case makes of it. Does not show: anything in the motion; cutting coefficients that differ move the tool as well.
-//! Where a measured force drives the structure, a gain of its sensor is one of all channels of motion.
-//! Fit: linear in g − 1. Source: the calibration factor of ISO 16063; Altintas, Manufacturing Automation (2012), ch. 2, for what a
-//! dynamometer tells of a cut.
+//! Shows: one factor on the measured forces of one sensor or of a whole dynamometer at all tooth-passing harmonics, while the motion agrees
+//! with the baseline. Does not show: anything in the motion, whereas other cutting coefficients also change the motion. If a measured force
+//! drives the structure, the gain of its sensor is equivalent to one gain of all channels of motion. Fit: linear in g − 1. Source: the
+//! calibration factor of ISO 16063; Altintas, Manufacturing Automation (2012), ch. 2, for dynamometers in cuts.
 
 use crate::candidates::cause::{Cause, Location, Parameter, Part, Regressor};
 use crate::records::record::Record;
@@ -14,10 +13,10 @@ use quietcut_recording::Quantity;
 
 pub(super) struct ForceGain;
 
-/// The least g: below it nothing of the force would be in a reading.
+/// Least gain g: below it the reading would hardly contain the force.
 const LEAST: f64 = 0.02;
 
-/// The channels that a place means.
+/// Names of the channels of a location; empty if it is not in channels.
 fn names(location: &Location) -> &[String] {
     match location {
         Location::Channel(name) => std::slice::from_ref(name),
@@ -59,7 +58,7 @@ impl Cause for ForceGain {
                 return Vec::new();
             }
             let mut force = channel.predicted.clone();
-            // What is not compared is taken as measured there.
+            // Samples that are not compared have no residual.
             for &sample in &record.skipped[index] {
                 force[sample] = 0.0;
             }

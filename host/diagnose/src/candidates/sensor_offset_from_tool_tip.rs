@@ -1,11 +1,11 @@
-//! A sensor that does not sit at the tool tip, where the sidecar says so: y = Σ ratio_r·u_r with u_r what mode r moves the tool, so that
-//! y − ŷ = Σ (ratio_r − 1)·u_r.
+//! A sensor that does not sit at the tool tip, as its sidecar states: y = Σ ratio_r·u_r with u_r the contribution of mode r at the tool
+//! tip, so that y − ŷ = Σ (ratio_r − 1)·u_r.
 //!
-//! Shows: each mode larger or smaller by a ratio of its own, and no phase. Does not show: frequencies or damping that differ.
-//! Fit: linear in the ratios. Source: mode shapes of a rigid or flexible body as in Ewins, Modal Testing (2000), ch. 2.
+//! Shows: a ratio for each mode, without phase. Does not show: other frequencies or damping. Fit: linear in the ratios. Source: mode shapes
+//! of a rigid or flexible body as in Ewins, Modal Testing (2000), ch. 2.
 //!
-//! Where one mode moves the axis, or the structure is not given by its modes, there is one ratio, and it is what a gain of the channel is
-//! there. So it is in a cut, whose chip is known only along the motion that the sensor tells.
+//! There is only one ratio, equivalent to a gain of the channel, if one mode moves the axis, if the structure is not given by its modes, or
+//! in a cut, where the chip is computed along the motion of this sensor.
 
 use super::sensor::one_or_all;
 use super::sensor_gain::{Gain, factor};
@@ -21,15 +21,16 @@ use quietcut_model::structure::Form;
 
 pub(super) struct Offset;
 
-/// The ratio of each mode, in the order of the case; of structures with more modes there is one for all.
+/// Keys of the ratios of the modes, in the order of the case. Structures with more modes have one ratio.
 const RATIOS: [&str; 9] = [
     "ratio_1", "ratio_2", "ratio_3", "ratio_4", "ratio_5", "ratio_6", "ratio_7", "ratio_8", "ratio_9",
 ];
 
-/// A mode that moves an axis by less than this share of what the largest does is not seen there.
+/// Least response of a mode along an axis, as a share of the largest, for the mode to have a ratio of its own there.
 const SEEN: f64 = 1e-6;
 
-/// The modes that each have their ratio in a channel, as places in the case, of so many; `None` where there is one ratio for all.
+/// Indices of the modes that have a ratio of their own in the channel, and the number of modes of the case; `None` if there is one ratio
+/// for all.
 fn modes(study: &Study<'_>, location: &Location) -> Option<(Vec<usize>, usize)> {
     let name = location.channel()?;
     let Form::Modes(modes) = &study.baseline.structure.form else {
@@ -56,7 +57,7 @@ fn modes(study: &Study<'_>, location: &Location) -> Option<(Vec<usize>, usize)> 
     (seen.len() > 1).then_some((seen, modes.len()))
 }
 
-/// What a channel reads of one mode under the forces of the record, with its share of the free decay.
+/// Reading of a channel from one mode alone under the forces of the record, including the mode's free decay.
 fn read_of(study: &Study<'_>, record: &Record, index: usize, mode: usize) -> Vec<f64> {
     let channel: &Observed = &record.channels[index];
     let first_order = &study.baseline.first_order;

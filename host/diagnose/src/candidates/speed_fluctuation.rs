@@ -1,11 +1,11 @@
-//! The spindle does not turn steadily: Ω = Ω₀(1 + δ·sin(2πf_m t + ψ)).
+//! The spindle speed varies periodically: Ω = Ω₀(1 + δ·sin(2πf_m t + ψ)).
 //!
-//! Shows: in the tachometer, and as side lines of the tooth lines at ± f_m. Does not show: anything in records without a tachometer that
-//! drift of the structure could not. Source: Sexton, Milne and Stone (1977); Insperger and Stépán, J. Vib. Control 10 (2004).
+//! Shows: in the tachometer signal, and as sidebands at ±f_m of the tooth-passing lines. Does not show: without a tachometer, any
+//! difference from drift of the structure. Source: Sexton, Milne and Stone (1977); Insperger and Stépán, J. Vib. Control 10 (2004).
 //!
-//! Fit: the tachometer says how: the swing that comes nearest to its edges is looked for up to half a swing per turn. The force
-//! with that swing less the one at steady speed then has the coefficient 1: that it is near 1 is what the record confirms; how
-//! large the swing is, the tachometer knows better.
+//! Fit: δ, f_m and ψ are fitted to the tachometer edges, with f_m up to half the spindle frequency. The regressor is the difference between
+//! the cutting force with this modulation and the force at constant speed. Its coefficient is 1 if the records confirm the modulation; the
+//! reported amplitude is that of the tachometer, which is more accurate.
 
 use super::process::everywhere;
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};
@@ -17,10 +17,10 @@ use quietcut_simulate::Fluctuation;
 
 pub(super) struct OfSpindle;
 
-/// How far from 1 the coefficient may be.
+/// Largest distance of the coefficient from 1 at which the records confirm the speed modulation of the tachometer.
 const ROUNDING: f64 = 0.5;
 
-/// The swing that the tachometers of all cuts tell.
+/// The speed modulation in the tachometer signals of all cuts.
 fn of_tachometer(study: &Study<'_>) -> Option<SpeedModulation> {
     let spindle_motions: Vec<&SpindleMotion> = study
         .records
@@ -77,7 +77,7 @@ impl Cause for OfSpindle {
         Some(vec![Regressor::of_cut(force.difference(&cut.force, 1.0))])
     }
 
-    /// The shape is the tachometer's, not one that the fit chose.
+    /// The nonlinear parameters come from the tachometer and are not fitted.
     fn settled(&self, nonlinear_parameters: &[f64], _: &[f64]) -> Option<Vec<f64>> {
         Some(nonlinear_parameters.to_vec())
     }

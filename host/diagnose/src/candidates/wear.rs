@@ -1,7 +1,7 @@
-//! The edge wears: all forces of the cut grow, × (1 + r·t).
+//! The edge wears: all cutting forces grow along the record by the factor 1 + r·t.
 //!
-//! Shows: all tooth lines grow alike along the record. Does not show: frequencies that move. A sensor whose gain drifts is the same.
-//! Fit: linear in r. Source: Altintas, Manufacturing Automation (2012), ch. 2 (forces over flank wear).
+//! Shows: all tooth-passing lines grow by the same factor along the record. Does not show: changes of frequency. A sensor whose gain drifts
+//! is equivalent. Fit: linear in r. Source: Altintas, Manufacturing Automation (2012), ch. 2 (forces over flank wear).
 
 use super::process::{changed, everywhere};
 use crate::candidates::cause::{Cause, Location, Parameter, Regressor};

@@ -28,41 +28,41 @@ pub enum Outcome {
 pub struct Figure {
     /// The value, in the unit of its key.
     pub value: f64,
-    /// Its 90 % interval.
+    /// 90 % interval of the value, in the same unit.
     pub ci90: [f64; 2],
 }
 
 /// A cause with its estimated parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EstimatedCause {
-    /// Its name, as in `[extension.NAME]`.
+    /// Name of the cause, as in `[extension.NAME]`.
     pub name: &'static str,
     /// Confidence in the cause, 0 to 1.
     pub confidence: f64,
-    /// Direction of the force, of a cause along one axis.
+    /// Direction x, y or z in which the cause acts, if it acts along one axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
-    /// The two directions that it couples.
+    /// The two directions that the cause couples, if it couples two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub directions: Option<[&'static str; 2]>,
-    /// The channel in which it acts.
+    /// The channel in which the cause acts, if it is a sensor error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
     /// Parameters by key.
     pub parameters: BTreeMap<&'static str, Figure>,
-    /// The table `[extension.NAME]` that adds it to a case.
+    /// The table `[extension.NAME]` that adds the cause to a case.
     #[serde(skip)]
     pub extension: toml::Table,
-    /// Index of its cause in the candidate model: a cause along two directions has two entries.
+    /// Index of the cause in the candidate model. A cause along two directions has two entries with the same index.
     #[serde(skip)]
     pub choice: usize,
-    /// The same table at both ends of the 90 % interval along each principal direction of the covariance.
+    /// The table `[extension.NAME]` with parameters at both ends of the 90 % interval along each principal direction of their covariance.
     #[serde(skip)]
     pub moved: Vec<[toml::Table; 2]>,
 }
 
 impl EstimatedCause {
-    /// Its direction, directions or channel; empty if it has none.
+    /// Direction, directions or channel of the cause; empty if it has none.
     pub fn location(&self) -> String {
         let directions = self.directions.map(|[one, other]| format!("{one} and {other}"));
         let channel = self.channel.clone();
@@ -99,22 +99,22 @@ pub struct Quality {
     pub nrmse_whole: f64,
 }
 
-/// Gain by the extension.
+/// Reduction of the held-out residual by the extension.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gain {
     /// Share of the held-out residual energy above the noise that the extension explains: 1 − (E_after − n)/(E_before − n), with energies
     /// in units of the noise and n compared values; at least −1.
     pub residual_energy_removed: f64,
-    /// Its 90 % interval over draws of the noise. It ends at −1, where the extension doubles the residual energy. If the held-out residual
-    /// is close to noise, the interval is wide.
+    /// 90 % interval of `residual_energy_removed` over draws of the noise, at least −1: there the extension doubles the residual energy.
+    /// The interval is wide if the held-out residual is close to noise.
     pub ci90: [f64; 2],
 }
 
 impl Gain {
-    /// From the χ² `before` and `after` the extension, of `count` compared values.
+    /// Computes the gain from the χ² `before` and `after` the extension, over `count` compared values.
     ///
-    /// Each energy is that of a signal s² in noise: a non-central χ² with variance 2n + 4s². The noise of both is the same; it is taken as
-    /// independent, which widens the interval if both residuals are large.
+    /// Each χ² is that of a signal with energy s² in noise: non-central, with variance 2n + 4s². Both contain the same noise; treating it
+    /// as independent widens the interval if both residuals are large.
     pub(crate) fn new(before: f64, after: f64, count: f64) -> Self {
         let there = (before - count).max(1e-9 * before);
         let left = (after - count) / there;
@@ -136,10 +136,10 @@ impl Gain {
 pub struct Unexplained {
     /// Share of the residual energy that is neither explained nor noise.
     pub fraction: f64,
-    /// Its channel, frequency and time.
+    /// Channel, frequency and time at which the residual is largest.
     #[serde(rename = "where")]
     pub location: String,
-    /// A formula that may describe it: a guess.
+    /// A formula that may describe the residual: a guess.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub guess: Option<String>,
 }
@@ -147,7 +147,7 @@ pub struct Unexplained {
 /// The experiment that separates confounded candidate models.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NextTest {
-    /// Kind of the recording.
+    /// Kind of the test, as in a sidecar.
     pub kind: &'static str,
     /// Direction of the force, in a test of the structure.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -174,7 +174,7 @@ pub struct NextTest {
     pub measure: Option<&'static str>,
     /// Smallest distance between two candidate models in this test, in standard deviations. About 8 separate them nearly always.
     pub distance: f64,
-    /// The candidate models that it separates, and the channel that does.
+    /// The candidate models that the test separates, and the channel in which they differ most.
     pub why: String,
 }
 
@@ -214,7 +214,7 @@ impl NextTest {
 /// The answer.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
-    /// Outcome.
+    /// Outcome of the diagnosis.
     pub outcome: Outcome,
     /// Prediction error of the baseline.
     pub baseline: Quality,
@@ -226,7 +226,7 @@ pub struct Diagnosis {
     /// Prediction error of the extended case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub extended: Option<Quality>,
-    /// Gain by the extension.
+    /// Reduction of the held-out residual by the extension, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gain: Option<Gain>,
     /// The unexplained residual.
@@ -234,7 +234,7 @@ pub struct Diagnosis {
     /// Effect on the stability limits; `None` without an extension, or if limits cannot be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lobes: Option<Lobes>,
-    /// Lobes of the case with the known cuts, without an extension.
+    /// Stability lobes of the case with the recorded cuts, if there is no extension.
     #[serde(skip)]
     pub believed: Option<Chart>,
     /// The experiment that separates confounded candidate models.
@@ -253,13 +253,14 @@ pub struct Diagnosis {
     pub views: Vec<ResidualView>,
 }
 
-/// True if `causes` contains the same.
+/// True if `explanations` repeats `causes`, and JSON omits it.
 fn is_single(explanations: &[Vec<EstimatedCause>]) -> bool {
     explanations.len() < 2
 }
 
 impl Diagnosis {
-    /// Adds the causes of an equivalent candidate model: each name once, or with `other_locations` each location once.
+    /// Adds the causes of an equivalent candidate model. A cause already listed is skipped: one with the same name or, if `other_locations`
+    /// is true, with the same name and location.
     pub(crate) fn add_rival(&mut self, causes: Vec<EstimatedCause>, other_locations: bool) {
         for cause in &causes {
             let is_known = self.causes.iter().any(|known| {
@@ -305,11 +306,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_gain_is_said_where_there_is_one_to_be_measured() {
+    fn the_interval_of_a_gain_is_wide_if_the_residual_is_noise() {
         // χ² of 1 000 values: twice the noise before, the noise after.
         let gain = Gain::new(2000.0, 1000.0, 1000.0);
         assert_eq!(gain.residual_energy_removed, 1.0);
-        // √(2 000)/1 000 after, and the same for the energy before: 1.645·0.0447.
+        // The extension leaves no residual above the noise, so that only the energy after it scatters: 1 − 1.645·√(2·1 000)/1 000 = 0.926.
         assert!(
             (gain.ci90[0] - 0.926).abs() < 1e-3 && gain.ci90[1] == 1.0,
             "{gain:?}"

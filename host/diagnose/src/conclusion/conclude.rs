@@ -1,4 +1,4 @@
-//! From a study to its answer.
+//! Concludes a diagnosis: selects a candidate model and turns it into an answer.
 
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality, Unexplained};
 use crate::conclusion::parameter_estimates::{by_common_factor, parameter_estimates};
@@ -96,7 +96,7 @@ fn answer(
         .filter(|_| of_noise <= NOISE_TOLERANCE || of_excess <= allowed)
     else {
         if of_noise > NOISE_TOLERANCE {
-            // A rejected candidate model explains nothing.
+            // The candidate model is rejected: the views show the residual of the baseline.
             diagnosis.views = residual_views(study, library, None);
             diagnosis.unexplained.location = crate::conclusion::unexplained::describe(&diagnosis.views);
             diagnosis.outcome = Outcome::Unexplained;
@@ -117,7 +117,7 @@ fn answer(
         1.0
     };
     let confidence = doubt * confidence(selection.ahead, of_excess / allowed);
-    // Errors of the computation are proportional to the signal: if they resemble a cause, they do not average out.
+    // Errors of the computation are proportional to the signal. If they resemble a cause, they do not average out.
     let uncertain = inflation + criteria.coherent;
     let spread = |model: &CandidateModel| {
         let closed = criteria.closed.as_ref();
@@ -170,8 +170,8 @@ fn answer(
     diagnosis
 }
 
-/// Groups the names that not all equivalent candidate models contain, and bounds their confidence. If all models have the same names, the
-/// group is those at different locations.
+/// Sets the outcome to confounded. The group of equivalent names holds those that not all equivalent candidate models share, and their
+/// confidence is bounded. If all models share all names, the group holds the names that occur at different locations.
 fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.outcome = Outcome::Confounded;
     let mut group = diagnosis.names();
@@ -191,7 +191,7 @@ fn confound(diagnosis: &mut Diagnosis, shared: &[&'static str]) {
     diagnosis.equivalent = vec![group];
 }
 
-/// Confidence from the lead over the best rival, and from the residual as a share of the allowed one.
+/// Confidence from `ahead`, the gain beyond that of the best rival, and from `left`, the residual as a share of the allowed one.
 fn confidence(ahead: f64, left: f64) -> f64 {
     let by_rivals = 1.0 / (1.0 + (-(ahead - 0.5 * EQUIVALENT) / CONFIDENCE_WIDTH).exp());
     let by_rest = 1.0 - CONFIDENCE_LOSS * left.clamp(0.0, 1.0).powi(2);

@@ -9,7 +9,7 @@ use crate::conclusion::answer::{Diagnosis, EstimatedCause, Figure, Outcome};
 use crate::conclusion::lobes::Moved;
 use quietcut_model::case::Case;
 
-/// Comment with the 90 % intervals of a key, of all causes that have it, also by number (`ratio_1`, `ratio_2` …).
+/// TOML comment with the 90 % intervals of `key` in all `causes` that have it, numbered keys (`ratio_1`, `ratio_2` …) included.
 fn intervals(causes: &[&EstimatedCause], key: &str) -> String {
     let is_of_key = |known: &str| {
         let behind = known
@@ -45,8 +45,8 @@ impl Diagnosis {
         })
     }
 
-    /// The extended case at both ends of the 90 % interval along each principal direction of the covariance, cause after cause. Causes are
-    /// taken as independent.
+    /// The extended case with parameters at both ends of the 90 % interval along each principal direction of the covariance, for one cause
+    /// after the other. Causes are taken as independent.
     pub fn moved(&self, case: &Case) -> Vec<Moved> {
         let found = &self.causes[..self.acting];
         let choices = found

@@ -1,10 +1,10 @@
 //! A formula for a residual that no known cause explains.
 //!
 //! The missing restoring force along an axis is Σ cᵢ φᵢ(x, v) with few of many terms: products of powers x^i v^j, terms that switch with
-//! the sign of the velocity, and the state z of Bouc–Wen loops with several yields. Forward regression adds the term that explains most of
-//! the residual, as long as Schwarz's criterion n ln χ² + k ln n decreases. The share of the held-out residual that the formula explains is
-//! its worth. S. A. Billings, Nonlinear System Identification, 2013, ch. 3 (forward regression); S. L. Brunton et al., PNAS 113 (2016) 3932
-//! (sparse regression).
+//! the sign of the velocity, and the state z of Bouc–Wen loops with several yield displacements. Forward regression adds the term that
+//! explains most of the residual, as long as Schwarz's criterion n ln χ² + k ln n decreases. The quality of the formula is the share of the
+//! held-out residual energy that it explains. S. A. Billings, Nonlinear System Identification, 2013, ch. 3 (forward regression); S. L.
+//! Brunton et al., PNAS 113 (2016) 3932 (sparse regression).
 
 use std::fmt::Write;
 
@@ -39,10 +39,10 @@ const POWERS: [(i32, i32); 16] = [
     (0, 5),
 ];
 
-/// Yields of the Bouc–Wen loops, as shares of the largest displacement.
+/// Yield displacements of the Bouc–Wen loops, as shares of the largest displacement along the axis.
 const YIELDS: [f64; 4] = [0.05, 0.15, 0.4, 0.8];
 
-/// One term along one axis.
+/// One term φ(x, v) of the formula, along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Term {
     Power(i32, i32),
@@ -54,11 +54,11 @@ enum Term {
     Sign,
     /// |x| sign v.
     Rub,
-    /// z of a Bouc–Wen loop with this yield, m.
+    /// The state z of a Bouc–Wen loop with this yield displacement, m.
     Loop(f64),
 }
 
-/// The formula with its worth; `None` if it explains less than a tenth of the held-out residual.
+/// The formula with the share of the held-out residual energy that it explains; `None` if that is less than `LEAST_GUESS`.
 pub(crate) fn guess(study: &Study<'_>, regression: &mut Regression) -> Option<String> {
     let mut all: Vec<(usize, Term, usize)> = Vec::new();
     for axis in study.driven_axes() {
@@ -123,7 +123,8 @@ fn terms(study: &Study<'_>, axis: usize) -> Vec<Term> {
     powers.chain(others).chain(loops).collect()
 }
 
-/// Samples by record and channel per unit of the coefficient; `None` if the term does not apply.
+/// Contribution of a term to the residual per unit of its coefficient, by record, channel and sample; `None` if the structure cannot have
+/// the term.
 fn column(study: &Study<'_>, axis: usize, term: Term) -> Option<Vec<Vec<Vec<f64>>>> {
     let columns: Vec<Vec<Vec<f64>>> = study
         .records
@@ -164,7 +165,7 @@ fn along(study: &Study<'_>, motion: &Motion, axis: usize, term: Term) -> Option<
             ];
             let effects = Effects::parse(texts.iter().map(String::as_str)).ok()?;
             let terms = effects.0.first()?.terms(study.baseline.structure).ok()?;
-            // The term is z − x; x is added to get z.
+            // The effect's restoring force is z − x; adding x gives z.
             let difference = restoring_along(&**terms.first()?, motion).into_iter().nth(axis)?;
             difference
                 .iter()

@@ -14,34 +14,35 @@ use quietcut_stability::{
     default_speeds, needs_orbit, spaced,
 };
 
-/// Number of speeds of a chart.
+/// Number of speeds of a chart, unless each limit takes seconds to compute.
 const SPEEDS: usize = 41;
 
-/// Number of speeds of a chart whose limits take seconds each, as those of forced orbits over the revolution do.
+/// Number of speeds of a chart whose limits take seconds each, as limits about forced orbits over a revolution do.
 const FEW_SPEEDS: usize = 2;
 
-/// Number of speeds at which the lowest limit is searched.
+/// Number of speeds at which [`depth_mm`] searches the lowest limit.
 const COARSE: usize = 12;
 
-/// Smallest depth of that search, mm.
+/// First axial depth at which [`depth_mm`] searches the lowest limit, mm.
 const SHALLOWEST_MM: f64 = 0.01;
-/// Largest depth of that search, mm.
+/// Largest axial depth to which [`depth_mm`] searches the lowest limit, mm.
 const DEEPEST_MM: f64 = 200.0;
 
-/// Depth of a chart over the lowest limit.
+/// Largest axial depth of a chart, as a multiple of its lowest limit.
 const DEPTH: f64 = 4.0;
 
-/// Depth of a chart over the deepest cut.
+/// Largest axial depth of a chart, as a multiple of the deepest cut in it.
 const BELOW_CUTS: f64 = 1.2;
 
-/// The limit at one speed before and after the extension; `None` if it is above the largest depth.
+/// Stability limit at one spindle speed before and after the extension; `None` if it is above the largest depth of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Limit of the case, mm.
+    /// Limit of axial depth of the case, mm.
     pub limit_before_mm: Option<f64>,
-    /// Limit of the extended case, mm.
+    /// Limit of axial depth of the extended case, mm.
     pub limit_after_mm: Option<f64>,
-    /// 90 % interval of the limit of the extended case, from those of its parameters; an upper end of `None` is above the largest depth.
+    /// 90 % interval of `limit_after_mm`, from the intervals of the parameters. An upper end of `None` is above the largest depth of the
+    /// search.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_after_ci90_mm: Option<[Option<f64>; 2]>,
     /// Spindle speed, rev/min.
@@ -56,10 +57,10 @@ pub struct Change {
     pub chatter_after_hz: Option<f64>,
 }
 
-/// Predictions of trial cuts and recorded cuts.
+/// Counts of right and wrong predictions of trial cuts and recorded cuts, before and after the extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct CallsChange {
-    /// Predictions of the case.
+    /// Predictions of the case without the extension.
     pub before: Calls,
     /// Predictions of the extended case.
     pub after: Calls,
@@ -68,20 +69,20 @@ pub struct CallsChange {
 /// The lobes of one case with trial cuts and recorded cuts.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// Method of the limits.
+    /// Name of the stability method.
     pub method: &'static str,
     /// Largest depth of the search for limits, mm.
     pub searched_mm: f64,
-    /// The limits by speed.
+    /// The stability limits, by spindle speed.
     pub lines: Vec<SpeedLine>,
-    /// The cuts, each with the verdict on its prediction.
+    /// Trial cuts and recorded cuts, each with the comparison of its outcome with the prediction.
     pub cuts: Vec<(TestCut, Call)>,
 }
 
-/// The limits of the case and of the extended case.
+/// Stability limits of the case and of the extended case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Lobes {
-    /// At the speed of the recorded cuts, else where the two differ most.
+    /// Limits at the speed of the first recorded cut; without one, at the speed where the two cases differ most.
     #[serde(flatten)]
     pub at: Change,
     /// Largest depth of the search for limits, mm.
@@ -89,25 +90,24 @@ pub struct Lobes {
     /// Time at which limits with drift or wear hold: the end of the longest recording, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after_s: Option<f64>,
-    /// Method of the limits of the extended case.
+    /// Name of the stability method of the extended case.
     pub method_after: &'static str,
-    /// At every speed.
+    /// Limits at every speed of the chart.
     pub speeds: Vec<Change>,
     /// Predictions of trial cuts and recorded cuts, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calls: Option<CallsChange>,
-    /// Both charts.
+    /// Charts of the case and of the extended case.
     #[serde(skip)]
     pub charts: [Chart; 2],
 }
 
-/// An extended case at both ends of the 90 % interval along one direction of its parameters.
+/// An extended case with parameters at both ends of the 90 % interval along one principal direction of their covariance.
 pub type Moved = [Case; 2];
 
-/// The lobes of a case over the speeds of trial cuts and recorded cuts, else of the machine.
+/// The lobes of a case over the speeds of trial cuts, else around those of recorded cuts, else over the speed range of the machine.
 ///
-/// # Errors
-/// A case without tool, material or cut, or one whose limits cannot be computed.
+/// The case has no tool, material or cut, or its limits cannot be computed.
 pub fn believed(case: &Case, recordings: &[Recording], cuts: &[TestCut]) -> Result<Chart, StabilityError> {
     let method = method(case, after_s(&[case], recordings))?;
     let cuts = Cuts::new(case, recordings, cuts);
@@ -115,10 +115,10 @@ pub fn believed(case: &Case, recordings: &[Recording], cuts: &[TestCut]) -> Resu
     Chart::new(&*method, &range, &cuts)
 }
 
-/// The limits of a case and of the extended case over the same speeds; `moved` contains the uncertainty of the extension.
+/// Stability limits of a case and of its extended case over the same speeds. `moved` holds the extended case at the ends of its parameters'
+/// intervals.
 ///
-/// # Errors
-/// As [`believed`], also for the extended case.
+/// As [`believed`], and the same for the extended case.
 pub fn lobes(
     case: &Case,
     extended: &Case,
@@ -165,8 +165,8 @@ pub fn lobes(
     })
 }
 
-/// The 90 % intervals of the limits. Directions of the parameters are independent: their changes add by squares, upward and downward apart.
-/// None if the limits of a moved case cannot be computed.
+/// Adds the 90 % intervals of the limits to `speeds`. The principal directions of the parameters are independent: the squares of their
+/// changes of a limit add, separately for increases and decreases.
 fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[Moved], after_s: Option<f64>) {
     if moved.is_empty() {
         return;
@@ -204,11 +204,11 @@ fn spread(speeds: &mut [Change], searched_mm: f64, moved: &[Moved], after_s: Opt
     }
 }
 
-/// Trial cuts and recorded cuts.
+/// The trial cuts and recorded cuts of a chart.
 struct Cuts<'a> {
     tried: &'a [TestCut],
     recorded: Vec<TestCut>,
-    /// Speeds of all recorded cuts, also of those that belong to another chart.
+    /// Speeds of all recorded cuts, rev/min, including cuts whose immersion or feed belongs to another chart.
     recorded_rpm: Vec<f64>,
 }
 
@@ -230,7 +230,7 @@ impl<'a> Cuts<'a> {
     }
 }
 
-/// Speeds and depths of a chart.
+/// Spindle speeds of a chart and its largest axial depth.
 struct Range {
     speeds_rpm: Vec<f64>,
     searched_mm: f64,
@@ -271,7 +271,7 @@ impl Chart {
         })
     }
 
-    /// Counts of right and wrong predictions.
+    /// Counts of right and wrong predictions of the cuts.
     pub fn calls(&self) -> Calls {
         let calls: Vec<Call> = self.cuts.iter().map(|(_, call)| *call).collect();
         Calls::of(&calls)
@@ -291,7 +291,7 @@ fn is_costly(case: &Case) -> bool {
 }
 
 impl Change {
-    /// Natural logarithm of the limit after over that before; a limit of `None` counts as the largest depth.
+    /// Natural logarithm of the limit after the extension over the limit before it. A limit of `None` counts as `searched_mm`.
     pub fn relative(&self, searched_mm: f64) -> f64 {
         let limit = |limit_mm: Option<f64>| limit_mm.unwrap_or(searched_mm).max(1e-6 * searched_mm);
         (limit(self.limit_after_mm) / limit(self.limit_before_mm)).ln()
@@ -326,7 +326,8 @@ fn method(case: &Case, after_s: Option<f64>) -> Result<Box<dyn Method>, Stabilit
     }
 }
 
-/// Speeds of trial cuts, else around those of recorded cuts, else of the machine; recorded speeds are always among them.
+/// Spindle speeds of a chart, rev/min: the range of trial cuts, else around that of recorded cuts, else that of the machine. Speeds of
+/// recorded cuts are always among them.
 fn speeds(
     case: &Case,
     cuts: &[TestCut],
@@ -357,7 +358,7 @@ fn speeds(
     Ok(speeds)
 }
 
-/// A multiple of the lowest limit, which doubling the depth finds.
+/// Largest axial depth of a chart, mm: a multiple of the lowest limit, which is searched by doubling the depth.
 fn depth_mm(method: &dyn Method, speeds_rpm: &[f64]) -> Result<f64, StabilityError> {
     let every = speeds_rpm.len().div_ceil(COARSE).max(1);
     let coarse: Vec<f64> = speeds_rpm.iter().copied().step_by(every).collect();
@@ -378,7 +379,7 @@ mod tests {
     use super::*;
     use quietcut_stability::trial_cuts::Outcome;
 
-    /// The robot with all stiffness changed by this share.
+    /// The robot's case with an extension that changes all stiffness by this share.
     fn stiffened(change: f64) -> Case {
         let mut case = quietcut_testkit::case("kuka-kr90-acetal");
         let mut table = toml::Table::new();
@@ -388,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_known_as_well_as_the_parameters_of_what_was_found() {
+    fn intervals_of_limits_follow_from_intervals_of_parameters() {
         let case = quietcut_testkit::case("kuka-kr90-acetal");
         let between = |low: f64, high: f64| {
             lobes(
@@ -404,7 +405,7 @@ mod tests {
         let found = between(0.06, 0.14);
         for (at, change) in found.speeds.iter().enumerate() {
             let center_mm = change.limit_after_mm.unwrap_or(found.searched_mm);
-            // If both ends lie on one side of the limit, the interval extends to that side alone.
+            // If both ends of the parameters lie on one side of the estimate, the interval extends to that side only.
             let [one, other] = [&low, &high].map(|ends| ends.speeds[at].limit_after_ci90_mm.unwrap());
             let [from_mm, to_mm] = change.limit_after_ci90_mm.unwrap();
             assert!(from_mm.unwrap() <= center_mm && to_mm.is_none_or(|to_mm| to_mm >= center_mm));
@@ -412,7 +413,7 @@ mod tests {
             let last = |limit_mm: Option<f64>| limit_mm.unwrap_or(f64::INFINITY);
             assert_eq!(last(to_mm), last(one[1]).max(last(other[1])));
         }
-        // The same direction twice extends √2 as far.
+        // Two independent principal directions with equal changes give an interval √2 as wide.
         let moved = [stiffened(0.06), stiffened(0.14)];
         let twice = lobes(&case, &stiffened(0.1), &[moved.clone(), moved], &[], &[]).unwrap();
         let reach = |lobes: &Lobes| {
@@ -426,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn without_an_extension_the_cuts_are_called_by_the_case() {
+    fn without_an_extension_the_case_predicts_the_cuts() {
         let case = quietcut_testkit::case("kuka-kr90-acetal");
         // Chapter 7: the limit is 3.174 mm at 600 rev/min.
         let cut = |depth_mm, outcome| TestCut {

@@ -1,8 +1,9 @@
-//! Long records of random forces, impacts and cuts: the search uses their beginnings, and the rest validates the result.
+//! Long records of random forces, impacts and cuts: causes are searched in the first part of each record, and the rest validates the
+//! result.
 //!
-//! A search predicts its records hundreds of times. The first seconds of a random excitation, of impacts or of a cut at one speed carry
-//! nearly the information of a minute, except on changes over the minute. So the answer counts only if its residual is as small on the rest
-//! as on the beginnings. The gain is stated for the rest alone, to which nothing was fitted.
+//! A search predicts its records hundreds of times. The first seconds of a random excitation, of impacts or of a cut at one speed contain
+//! nearly the information of a minute, except on changes over the minute. Therefore the answer is accepted only if its residual is as small
+//! in the rest as in the first part. The gain is computed from the rest alone, to which nothing was fitted.
 
 use crate::baseline::Baseline;
 use crate::conclusion::answer::{Diagnosis, Gain, Outcome, Quality};
@@ -14,15 +15,15 @@ use crate::records::study::Study;
 use quietcut_model::case::Case;
 use quietcut_recording::{Recording, TestKind};
 
-/// Number of samples of all records together that are searched.
+/// Number of samples of all records together in which causes are searched.
 const SEARCHED: usize = 32_768;
-/// Least number of periods of the slowest mode in the beginning of each record.
+/// Least length of the first part of a record, in periods of the lowest natural frequency.
 const PERIODS: f64 = 60.0;
-/// Least number of revolutions in the beginning of a cut.
-const TURNS: f64 = 24.0;
+/// Least length of the first part of a cut, in revolutions.
+const REVOLUTIONS: f64 = 24.0;
 
-/// The beginnings of the records and the rest of each, if all are of random forces, of impacts or of cuts at one speed; `None` if they are
-/// too short.
+/// The first part and the rest of each record, if all records are of random forces, of impacts or of cuts at one speed; `None` if the
+/// records are too short to be divided.
 fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 2]> {
     let lowest_hz = Baseline::new(case).ok()?.lowest_hz()?;
     let all: usize = recordings.iter().map(Recording::len).sum();
@@ -31,7 +32,8 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
         .map(|recording| {
             let turns_s = turns_s(recording)?;
             let samples = |seconds: f64| (seconds * recording.sample_rate_hz).ceil() as usize;
-            // After this many revolutions, the transient of the entry has decayed.
+            // The first part begins after the transient of the tool's entry, which takes as many revolutions as the first part has at
+            // least.
             let from = samples(turns_s);
             let least = samples((PERIODS / lowest_hz).max(turns_s));
             let count = (SEARCHED / recordings.len()).max(least);
@@ -44,18 +46,19 @@ fn beginnings(case: &Case, recordings: &[Recording]) -> Option<[Vec<Recording>; 
     ((left as f64) < WORTH_SHORTENING * all as f64).then_some([shortened, rest])
 }
 
-/// Least duration of the beginning of a cut, s; zero for shaker and hammer; `None` for tests that are not shortened.
+/// Least duration of the first part of a cut, s; zero for shaker and hammer; `None` for tests that are not shortened.
 fn turns_s(recording: &Recording) -> Option<f64> {
     match (recording.sidecar.kind, &recording.sidecar.cut) {
         (Some(TestKind::Shaker | TestKind::Hammer), _) => Some(0.0),
         (Some(TestKind::Cutting), Some(cut)) if cut.last_rpm.is_none() => {
-            Some(60.0 * TURNS / cut.spindle_rpm?)
+            Some(60.0 * REVOLUTIONS / cut.spindle_rpm?)
         }
         _ => None,
     }
 }
 
-/// The answer from the beginnings of the records, if it holds for all of them; `None` if not, or if the records are short.
+/// The answer from the first parts of the records, if it holds for the rest too; `None` if not, or if the records are too short to be
+/// divided.
 pub(crate) fn concluded(
     case: &Case,
     recordings: &[Recording],
@@ -76,7 +79,7 @@ pub(crate) fn concluded(
         searched_s.fold(0.0, f64::max)
     ));
     let extended = match diagnosis.outcome {
-        // Further samples cannot explain it.
+        // More samples cannot make a known cause explain the residual.
         Outcome::Unexplained => return Some(diagnosis),
         Outcome::None => case.clone(),
         _ => diagnosis.extended(case)?,
@@ -88,7 +91,7 @@ pub(crate) fn concluded(
     {
         return None;
     }
-    // Nothing was fitted to the rest.
+    // Nothing was fitted to the rest: all of it is held out.
     let quality = |nrmse: f64| Quality {
         nrmse_heldout: nrmse,
         nrmse_whole: nrmse,
@@ -105,13 +108,13 @@ pub(crate) fn concluded(
     Some(diagnosis)
 }
 
-/// Residual of a case on records.
+/// Residual of a case in records to which nothing is fitted.
 struct Residual {
-    /// χ².
+    /// Residual energy χ², in units of the noise variance.
     energy: f64,
     /// Number of compared values.
     count: f64,
-    /// NRMSE.
+    /// Prediction error (NRMSE).
     nrmse: f64,
 }
 

@@ -1,7 +1,7 @@
 //! The restoring force that a residual implies, along the axis of its channel.
 //!
-//! The residual of a response y = H (F − f_r) is y − H F = −H f_r. It is divided by −H where it exceeds its noise. In the domain of forces
-//! the residual is f_r itself.
+//! The residual of a response y = H (F − f_r) is y − H F = −H f_r. At frequencies where the residual exceeds its noise, dividing by −H
+//! gives the missing force f_r. In the force domain the residual is f_r itself.
 
 use num_complex::Complex64;
 
@@ -12,40 +12,40 @@ use crate::records::domain::Domain;
 use crate::records::record::Record;
 use quietcut_recording::Quantity;
 
-/// Number of bins over which the power of a residual is averaged.
+/// Number of bins over which the power of a residual is averaged before it is compared with the noise.
 const SMOOTHED: usize = 9;
 
-/// Periods of the slowest mode in a segment that has one amplitude.
+/// Duration of a segment in periods of the lowest natural frequency. One amplitude is assigned to each segment.
 const PERIODS: f64 = 2.0;
 
-/// A missing restoring force along the motion.
+/// The missing restoring force along one axis, with the motion on which it depends.
 #[derive(Clone, Debug)]
 pub struct MissingForce {
-    /// Displacement, m.
+    /// Displacement along the axis, m.
     pub x: Vec<f64>,
-    /// Velocity, m/s.
+    /// Velocity along the axis, m/s.
     pub v: Vec<f64>,
-    /// Force, N.
+    /// Missing restoring force, N.
     pub force_n: Vec<f64>,
     /// Static stiffness of the baseline along the axis, N/m; 0 without stiffness.
     pub stiffness: f64,
-    /// Samples of a segment over which stiffness and damping are fitted.
+    /// Number of samples in a segment over which stiffness and damping are fitted.
     segment: usize,
 }
 
 /// Stiffness and damping of the missing force in a segment, at its amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtAmplitude {
-    /// Largest distance from the mean, m.
+    /// Largest displacement from the segment's mean, m.
     pub amplitude_m: f64,
-    /// Missing force over displacement, N/m.
+    /// Stiffness that the missing force adds: the least-squares slope of force over displacement, N/m.
     pub stiffness: f64,
-    /// Missing force over velocity, N s/m.
+    /// Damping that the missing force adds: the least-squares slope of force over velocity, N s/m.
     pub damping: f64,
 }
 
 impl MissingForce {
-    /// The force that the residual of a channel implies; `None` for the force of a cut, or for an axis without motion.
+    /// The missing force that the residual of a channel implies; `None` for a channel of cutting force, or for an axis without motion.
     pub(crate) fn of(
         baseline: &Baseline<'_>,
         record: &Record,
@@ -65,7 +65,7 @@ impl MissingForce {
             Domain::Response => response_over(record, channel, axis, residual),
         };
         let at_rest = baseline.receptance.at(0.0)[(axis, axis)].re;
-        // A record without oscillating modes has twenty segments.
+        // For a structure without oscillating modes, the record is divided into twenty segments.
         let duration_s = residual.len() as f64 / record.grid.rate_hz();
         let segment_s = baseline.lowest_hz().map_or(0.05 * duration_s, |hz| PERIODS / hz);
         Some(Self {
@@ -99,14 +99,14 @@ impl MissingForce {
                 }
             })
             .collect();
-        let loudest = all.iter().map(|at| at.amplitude_m).fold(0.0, f64::max);
+        let largest = all.iter().map(|at| at.amplitude_m).fold(0.0, f64::max);
         all.into_iter()
-            .filter(|at| at.amplitude_m > LEAST_AMPLITUDE * loudest)
+            .filter(|at| at.amplitude_m > LEAST_AMPLITUDE * largest)
             .collect()
     }
 }
 
-/// −residual/receptance along its axis, at bins where it exceeds the noise.
+/// −residual/receptance along the channel's axis, N, from the bins where the residual exceeds the noise.
 fn response_over(record: &Record, channel: &Observed, axis: usize, residual: &[f64]) -> Vec<f64> {
     let grid = &record.grid;
     let spectrum = grid.spectrum(residual);

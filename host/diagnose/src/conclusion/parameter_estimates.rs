@@ -86,7 +86,8 @@ pub(crate) fn parameter_estimates(
     all
 }
 
-/// Mass, stiffness and damping changed by one factor, if that is equivalent to the gain of a sensor.
+/// The causes mass, stiffness and damping, all changed by one factor, if that is equivalent to the sensor gain that `best` holds; otherwise
+/// empty.
 pub(crate) fn by_common_factor(
     study: &Study<'_>,
     library: &Library,
@@ -101,7 +102,7 @@ pub(crate) fn by_common_factor(
     if !of_reading.contains(&library.cause(choice.candidate).effect()) {
         return Vec::new();
     }
-    // Both along the measured motion.
+    // χ² of the gain by linear regression along the measured motion, as for the common factor.
     let along = match regression.fit(Subset::Whole, &library.columns_of(best)) {
         Some(fit) => fit.left,
         None => best.fit.left,
@@ -118,7 +119,7 @@ pub(crate) fn by_common_factor(
         if (left - along) / inflation > EQUIVALENT {
             continue;
         }
-        // The factor has the relative uncertainty of the gain.
+        // The common factor has the same relative standard deviation as the gain.
         let deviation = best.fit.covariance[(0, 0)].max(0.0).sqrt() * inflation.sqrt();
         return library
             .candidates
@@ -132,7 +133,7 @@ pub(crate) fn by_common_factor(
                 let of = |change: f64| cause.parameters(study, &known.location, &[], &[change]);
                 let parameters = of(change)?;
                 let (key, value) = *parameters.first()?;
-                // Parameters are linear in the change.
+                // A parameter is linear in the relative change: its slope converts the deviation.
                 let (_, beyond) = *of(change + 1.0)?.first()?;
                 let scale = beyond - value;
                 let extension = cause.extension(&known.location, &parameters);
@@ -173,15 +174,15 @@ fn figure(value: f64, deviation: f64) -> Figure {
     }
 }
 
-/// A cause at both ends of the 90 % interval along each principal direction of its covariance. An end that is not physical is replaced by
-/// the estimate.
+/// The cause's parts with parameters at both ends of the 90 % interval along each principal direction of its covariance. A parameter set
+/// that is not physical is replaced by the estimate.
 fn moved(
     parts_of: &dyn Fn(&[f64]) -> Option<Vec<Part>>,
     inner: &[f64],
     covariance: &DMatrix<f64>,
     inflation: f64,
 ) -> Vec<[Vec<Part>; 2]> {
-    // Scaled by the standard deviations, because coefficients have different units.
+    // The principal directions are those of the correlation matrix, because the coefficients have different units.
     let scales: Vec<f64> = covariance
         .diagonal()
         .iter()
@@ -216,7 +217,7 @@ fn moved(
         .collect()
 }
 
-/// Standard deviations of `values`, by numerical differentiation.
+/// Standard deviations of the reported `values`, from the covariance of the inner coefficients and numerical derivatives.
 fn deviations(
     values: &dyn Fn(&[f64]) -> Option<Vec<f64>>,
     inner: &[f64],

@@ -8,7 +8,7 @@ use quietcut_model::case::Case;
 use quietcut_recording::{RecordedCut, Recording, Sensed, SpindleSettings, TestKind};
 use quietcut_stability::trial_cuts::{Outcome, TestCut};
 
-/// The recorded cuts that belong to the chart of a case: its immersion and feed, and one given speed and depth.
+/// The recorded cuts that belong to the chart of a case: with the immersion and feed of the case, and one given speed and depth.
 pub fn recorded_cuts(case: &Case, recordings: &[Recording]) -> Vec<TestCut> {
     recordings
         .iter()
@@ -62,7 +62,7 @@ fn outcome(recording: &Recording, teeth: Option<usize>) -> Outcome {
         match report.judgement.verdict {
             verdict if verdict.is_chatter() => return Outcome::Chatter,
             Verdict::Stable | Verdict::Forced | Verdict::Runout => detected = Outcome::Stable,
-            // Before the entry and after the exit of the tool.
+            // The monitor has no verdict before the entry and after the exit of the tool.
             _ => {}
         }
     }
@@ -78,7 +78,7 @@ mod tests {
     use quietcut_stability::{CubicTerms, Problem, line};
 
     #[test]
-    fn what_came_of_a_recorded_cut_is_what_the_device_hears() {
+    fn the_outcome_of_a_recorded_cut_is_that_of_the_signal_chain() {
         let case = quietcut_testkit::case("kuka-kr90-acetal");
         let problem = Problem::new(&case, CubicTerms::Refuse).unwrap();
         let limit_mm = line(&problem, 900.0, 8.0, 80)

@@ -17,25 +17,25 @@ use crate::signal::noise::rms;
 /// One channel of one record: measured samples, and the residuals of the baseline and of the extended case.
 #[derive(Clone, Debug)]
 pub struct ResidualView {
-    /// The record.
+    /// File of the recording.
     pub record: String,
-    /// The channel.
+    /// Name of the channel.
     pub channel: String,
-    /// Its unit.
+    /// Unit of the channel.
     pub unit: &'static str,
     /// Samples per second.
     pub rate_hz: f64,
-    /// Highest frequency at which it is compared, Hz.
+    /// Highest frequency at which the channel is compared, Hz.
     pub highest_hz: f64,
-    /// Standard deviation of its noise.
+    /// Standard deviation of the channel's noise, in the unit of the channel.
     pub deviation: f64,
-    /// Measured samples.
+    /// Measured samples, in the unit of the channel.
     pub measured: Vec<f64>,
     /// Residual of the baseline along the measured motion.
     pub residual: Vec<f64>,
     /// Residual of the extended case; empty without an extension.
     pub left: Vec<f64>,
-    /// The force that the residual implies; `None` without motion on which it could act.
+    /// The missing restoring force that the residual of the baseline implies; `None` if the channel's axis has no motion.
     pub missing: Option<MissingForce>,
     /// Spindle motion of a cut; `None` for other tests.
     pub spindle_motion: Option<SpindleMotionView>,
@@ -44,18 +44,19 @@ pub struct ResidualView {
 /// A channel of a cut over the spindle angle.
 #[derive(Clone, Debug)]
 pub struct SpindleMotionView {
-    /// Mean speed, rev/min.
+    /// Mean spindle speed, rev/min.
     pub rpm: f64,
-    /// Number of teeth.
+    /// Number of teeth of the tool.
     pub teeth: usize,
-    /// Measured value at each tooth passing of the immersion angle 0, with the number of the passing.
+    /// Number of each passing of a tooth through the angle 0, and the measured value there.
     pub measured: Vec<(u32, f64)>,
-    /// Residual at each tooth passing.
+    /// Number of each passing of a tooth through the angle 0, and the residual there.
     pub residual: Vec<(u32, f64)>,
 }
 
 impl ResidualView {
-    /// Amplitude spectrum of a signal of this channel, averaged to at most `points` points: (Hz, RMS per line).
+    /// Amplitude spectrum of a signal of this channel: (frequency in Hz, amplitude per line), with the lines averaged by power to at most
+    /// `points` points.
     pub fn spectrum(&self, samples: &[f64], points: usize) -> Vec<(f64, f64)> {
         if samples.is_empty() {
             return Vec::new();
@@ -74,13 +75,13 @@ impl ResidualView {
             .collect()
     }
 
-    /// Root mean squares: measured, residual of the baseline, residual of the extended case.
+    /// Root mean squares of the measured samples, the residual of the baseline and the residual of the extended case.
     pub fn sizes(&self) -> [f64; 3] {
         [rms(&self.measured), rms(&self.residual), rms(&self.left)]
     }
 }
 
-/// Views of every channel, with the residual of the candidate model if there is one.
+/// Views of every channel of every record, with the residual of the candidate model `best` if there is one.
 pub(crate) fn residual_views(
     study: &Study<'_>,
     library: &Library,
@@ -122,7 +123,7 @@ pub(crate) fn residual_views(
     all
 }
 
-/// Residual of a candidate model in each channel, without the free decay that fits it.
+/// Residual of a candidate model in each channel, minus the free decay that fits it best.
 fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &CandidateModel) -> Vec<Vec<f64>> {
     let explained = library.explained(study, record, best);
     let left: Vec<Vec<f64>> = record
@@ -146,7 +147,7 @@ fn left_by(study: &Study<'_>, library: &Library, record: &Record, best: &Candida
         .collect()
 }
 
-/// Tooth passings in samples, with their numbers.
+/// Tooth passings through the angle 0: number, and time in samples.
 fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     let pitch = TAU / cut.cutter.teeth.len().max(1) as f64;
     let rate_hz = record.grid.rate_hz();
@@ -165,7 +166,7 @@ fn passes(record: &Record, cut: &RecordedCut) -> Vec<(u32, f64)> {
     found
 }
 
-/// Samples at these passings, by linear interpolation.
+/// Values of `samples` at tooth passings, by linear interpolation, each with the number of its passing.
 fn strobe(passes: &[(u32, f64)], samples: &[f64]) -> Vec<(u32, f64)> {
     passes
         .iter()

@@ -6,13 +6,13 @@ use crate::conclusion::residual_views::ResidualView;
 use crate::signal::grid::Grid;
 use crate::signal::noise::rms;
 
-/// Number of segments into which a record is divided.
+/// Number of segments of equal length into which a record is divided.
 const SEGMENTS: usize = 40;
-/// Lines on each side of a peak of the spectrum that belong to it.
+/// Number of spectral lines on each side of the largest line whose energy counts with it.
 const NEAR: usize = 8;
 
-/// Frequency, spindle order, time and amplitude of the largest residual over its noise: of the extended case, or of the baseline without an
-/// extension.
+/// Words for the channel whose residual is largest relative to its noise: amplitude, frequency, spindle order and time. The residual is
+/// that of the extended case, or of the baseline if there is no extension.
 pub(crate) fn describe(views: &[ResidualView]) -> String {
     let worst = views.iter().max_by(|a, b| {
         let beside_noise =
@@ -55,11 +55,11 @@ fn of_channel(view: &ResidualView) -> String {
     }
     text + &format!(
         "; {:.0} % of the energy in the quarter of the record with the largest amplitude",
-        100.0 * where_it_moves_most(&by_segment, &segment_energies(&view.measured))
+        100.0 * share_at_large_amplitude(&by_segment, &segment_energies(&view.measured))
     )
 }
 
-/// The frequency of the highest line, and the share of the energy near it.
+/// Frequency of the largest spectral line, Hz, and the share of the energy near it; `None` without energy.
 fn peak(view: &ResidualView, samples: &[f64]) -> Option<(f64, f64)> {
     if samples.is_empty() {
         return None;
@@ -80,7 +80,7 @@ fn segment_length(samples: &[f64]) -> usize {
     samples.len().div_ceil(SEGMENTS).max(1)
 }
 
-/// Energy in each segment.
+/// Sum of squares in each segment.
 fn segment_energies(samples: &[f64]) -> Vec<f64> {
     samples
         .chunks(segment_length(samples))
@@ -88,9 +88,9 @@ fn segment_energies(samples: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Share of `energy` in the quarter of the segments with the largest measured amplitude: about a quarter if the residual does not depend on
-/// the amplitude, more if it grows with it.
-fn where_it_moves_most(energy: &[f64], measured: &[f64]) -> f64 {
+/// Share of `energy` in the quarter of the segments with the largest measured energy: about a quarter if the residual does not depend on
+/// the amplitude, more if it grows with the amplitude.
+fn share_at_large_amplitude(energy: &[f64], measured: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..measured.len().min(energy.len())).collect();
     order.sort_by(|a, b| measured[*b].total_cmp(&measured[*a]));
     let most: f64 = order[..order.len().div_ceil(4)]

@@ -12,20 +12,21 @@ use crate::records::record::Clean;
 pub(crate) struct Choice {
     /// Index of the candidate in the library.
     pub candidate: usize,
-    /// Index of its nonlinear parameters.
+    /// Index of the set of nonlinear parameters among the candidate's variants.
     pub variant: usize,
 }
 
 /// A set of causes with fitted parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct CandidateModel {
-    /// The causes, each at its location.
+    /// The causes of the model, each at its location.
     pub choices: Vec<Choice>,
-    /// The fit of all coefficients, in the order of the choices.
+    /// The linear fit of all coefficients, in the order of `choices`.
     pub fit: Fit,
     /// Number of fitted parameters, nonlinear ones included.
     pub parameter_count: usize,
-    /// Result of the prediction-error fit, if there is one: coefficients, nonlinear parameters and χ² are then its own.
+    /// Result of the prediction-error fit, if one was made. Coefficients, nonlinear parameters and χ² of the model are then those of this
+    /// fit.
     pub simulated: Option<Simulated>,
 }
 
@@ -34,9 +35,9 @@ pub(crate) struct CandidateModel {
 pub(crate) struct Simulated {
     /// By choice: covariance of the coefficients, followed by the nonlinear parameters, for unit-variance noise.
     pub covariance: Vec<DMatrix<f64>>,
-    /// By record: initial state; empty for a start from rest.
+    /// By record: fitted initial state; empty for a start from rest.
     pub starts: Vec<Vec<f64>>,
-    /// Prediction of the records by the extended case, if it is kept.
+    /// Prediction of the records by the extended case, if a later stage needs it.
     pub reading: Option<Arc<Reading>>,
 }
 

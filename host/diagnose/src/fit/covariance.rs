@@ -10,8 +10,8 @@ use crate::records::study::Study;
 
 /// By choice: covariance of the coefficients, followed by the nonlinear parameters, for unit-variance noise.
 ///
-/// The residual of forces is not noise, but errors of the equations and of differentiated motion. Their covariance is estimated from the
-/// residual; it is divided by `inflation`, by which the caller multiplies the noise variance.
+/// In the force domain the residual contains errors of the equations and of the differentiated motion besides noise. The covariance is then
+/// estimated from the residual and divided by `inflation`, because the caller multiplies it by that factor.
 pub(crate) fn covariance(
     study: &Study<'_>,
     library: &Library,

@@ -1,12 +1,12 @@
 //! Covariance of the parameters of a nonlinear machine under the noise of force sensors.
 //!
 //! The simulation is driven by the measured force f, the machine by f − n. The residual that n causes is whitened with the receptance of
-//! the baseline, S = diag(σ²) + Σ σ_f² h hᴴ (`whitening`). That is wrong for a machine with a fold near its resonance, or with dry
-//! friction: whether it jumps or slips depends on n as on the parameters, so that the covariance of the fit is far too small. With J the
-//! Jacobian in units of the noise and N = JᵀJ, the residual e by n moves the parameters by δ = N⁻¹ Jᵀ e. This file draws noise n_k,
-//! computes e_k = y(f + n_k) − y(f), and subtracts the part e'_k = H n_k that N already contains: C = D N⁻¹ D, D_i² = max(1, 1 +
-//! mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii). This is a parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani, An Introduction to
-//! the Bootstrap, 1993, ch. 6) and the linear machine as control variate. Intervals only become wider.
+//! the baseline, S = diag(σ²) + Σ σ_f² h hᴴ (`whitening`). For a machine with a fold near its resonance, or with dry friction, that linear
+//! S is wrong: whether the machine jumps or slips depends on n as much as on the parameters, and the covariance of the fit is far too
+//! small. Let J be the Jacobian in units of the noise and N = JᵀJ: a residual e that n causes shifts the parameters by δ = N⁻¹ Jᵀ e. This
+//! file draws noise n_k, computes e_k = y(f + n_k) − y(f), and subtracts the linear part e'_k = H n_k that N already contains: C = D N⁻¹ D,
+//! D_i² = max(1, 1 + mean_k(δ_ki² − δ'_ki²) / (N⁻¹)_ii). This is a parametric bootstrap with one Gauss–Newton step (Efron and Tibshirani,
+//! An Introduction to the Bootstrap, 1993, ch. 6) and the linear machine as control variate. Intervals only become wider.
 
 use std::ops::Range;
 
@@ -25,20 +25,22 @@ use crate::fit::output_error::{OutputError, projected};
 use crate::fit::segment::{Segment, Subset};
 use crate::fit::unknowns::{FreeParameter, at_bounds, covariance};
 
-/// Least and largest number of draws: 16 determine a standard deviation to a fifth, 4 to a third.
+/// Least and largest number of draws of force noise. The relative error of a standard deviation from n draws is 1/√(2n): a third for 4
+/// draws, a fifth for 16.
 const DRAWS: [usize; 2] = [4, 16];
-/// Samples that are simulated for all draws of long records.
+/// Largest number of samples simulated in all draws together, if that allows more than the least number of draws.
 const SIMULATED: usize = 400_000;
-/// Least number of draws of the first half, which decides whether the effect is significant.
+/// Least number of draws after which the test of `LEAST_FORCE_NOISE_VARIANCE` decides whether more are drawn.
 const FIRST: usize = 4;
-/// Stream of the random numbers, so that they differ from the noise of a simulated record with the same seed.
+/// Stream of the random generator. It makes the draws differ from the noise of a simulated record with the same seed.
 const STREAM: u64 = 0x666f_7263_6573;
 
-/// Forces along the axes, at the samples of a record.
+/// Forces along the machine's axes, N, at the samples of a record.
 type Forces = [Vec<f64>; 3];
 
 impl OutputError<'_> {
-    /// The candidate model with the covariance of this file; `None` if no force has noise or the extended case is linear.
+    /// The candidate model with its covariance widened by force noise; `None` if no force has noise, if the extended case is linear, or if
+    /// the widening is insignificant.
     pub(crate) fn spread(&self, library: &Library, model: &CandidateModel) -> Option<CandidateModel> {
         let simulated = model.simulated.as_ref()?;
         let mut deviations = self
@@ -69,7 +71,7 @@ impl OutputError<'_> {
         at_bounds(&problem, &point, &mut normal, &mut gradient);
         let covariance = covariance(&normal)?;
         let size = problem.slots.len();
-        // δ² − δ'² of one draw.
+        // δ² − δ'² of one draw, by parameter; `None` if the simulation diverges.
         let more_of = |draw: usize| {
             let noise = self.drawn(draw as u64);
             let closed = ClosedLoop::driven_by(self.study, &self.with(&noise));
@@ -91,17 +93,17 @@ impl OutputError<'_> {
         let most = (SIMULATED / samples.max(1)).clamp(DRAWS[0], DRAWS[1]);
         let first = FIRST.max(most / 2);
         let mut drawn = draws(0..first);
-        let is_worth = |more: &DVector<f64>| {
+        let is_significant = |more: &DVector<f64>| {
             let inner = problem.slots.iter().enumerate();
             inner
                 .filter(|(_, (slot, _))| matches!(slot, FreeParameter::Inner { .. }))
                 .any(|(slot, _)| more[slot] > LEAST_FORCE_NOISE_VARIANCE * covariance[(slot, slot)])
         };
-        if !is_worth(&mean(&drawn)?) {
+        if !is_significant(&mean(&drawn)?) {
             return None;
         }
         drawn.extend(draws(first..most));
-        // The variance of few draws turns a normal distribution into Student's, with the variance ν/(ν − 2).
+        // With few draws the normal distribution becomes Student's t with ν degrees of freedom and variance ν/(ν − 2).
         let degrees = drawn.iter().flatten().count().max(3) as f64;
         let more = mean(&drawn)? * (degrees / (degrees - 2.0));
         let mut spread = model.clone();
@@ -125,7 +127,7 @@ impl OutputError<'_> {
         Some(spread)
     }
 
-    /// A draw of the noise of the force sensors, by record.
+    /// One draw of force-sensor noise, N, by record.
     fn drawn(&self, draw: u64) -> Vec<Forces> {
         let mut random = ChaCha8Rng::seed_from_u64(draw);
         random.set_stream(STREAM);
@@ -159,7 +161,7 @@ impl OutputError<'_> {
             .collect()
     }
 
-    /// Whitened response of the baseline to `noise`, by record.
+    /// Whitened response of the baseline to the force noise `noise`, by record.
     fn by_baseline(&self, noise: &[Forces], segments: &[&Segment]) -> Vec<Vec<f64>> {
         let records = self.study.records.iter().zip(noise).enumerate();
         records
@@ -170,17 +172,17 @@ impl OutputError<'_> {
                 let read: Vec<Vec<f64>> = (0..record.channels.len())
                     .map(|channel| record.read_response(&spectra, channel))
                     .collect();
-                let mine = segments.iter().filter(|segment| segment.record == index);
-                mine.flat_map(|segment| segment.whiten(&read)).collect()
+                let of_record = segments.iter().filter(|segment| segment.record == index);
+                of_record.flat_map(|segment| segment.whiten(&read)).collect()
             })
             .collect()
     }
 }
 
-/// Mean of the draws. A draw whose simulation diverged counts as the largest of the others; `None` if all diverged.
+/// Mean over the draws. A draw whose simulation diverged counts as the elementwise maximum of the others; `None` if all diverged.
 fn mean(drawn: &[Option<DVector<f64>>]) -> Option<DVector<f64>> {
-    let farthest = drawn.iter().flatten().cloned().reduce(|a, b| a.sup(&b))?;
-    let sum: DVector<f64> = drawn.iter().map(|draw| draw.as_ref().unwrap_or(&farthest)).sum();
+    let largest = drawn.iter().flatten().cloned().reduce(|a, b| a.sup(&b))?;
+    let sum: DVector<f64> = drawn.iter().map(|draw| draw.as_ref().unwrap_or(&largest)).sum();
     Some(sum / drawn.len() as f64)
 }
 
@@ -188,7 +190,7 @@ fn mean(drawn: &[Option<DVector<f64>>]) -> Option<DVector<f64>> {
 mod tests {
     use std::path::Path;
 
-    use crate::tests::structure::believed;
+    use crate::tests::structure::baseline;
     use crate::{Options, diagnose};
     use quietcut_model::structure::Direction;
     use quietcut_recording::Recording;
@@ -197,7 +199,7 @@ mod tests {
 
     const K3_N_PER_M3: f64 = -5e10;
 
-    /// A sweep through the fold of a softening spring, with 1 % of noise on force and displacement.
+    /// A sine sweep through the fold of a softening spring, with 1 % noise on force and displacement.
     fn record(seed: u64) -> Recording {
         let signal = Signal::Sweep {
             first_hz: 10.0,
@@ -212,7 +214,7 @@ mod tests {
         };
         let path = format!("sweep-{seed}.csv");
         let (mut record, _) = rig
-            .record(believed().structure().unwrap(), Path::new(&path))
+            .record(baseline().structure().unwrap(), Path::new(&path))
             .unwrap();
         let noise = Noise {
             relative: 0.01,
@@ -223,12 +225,12 @@ mod tests {
     }
 
     #[test]
-    fn a_spring_is_known_no_better_than_noise_of_the_force_lets_its_jump_be() {
+    fn force_noise_widens_the_interval_of_a_spring_with_a_fold() {
         let seeds = 1..=6;
         let count = seeds.clone().count() as f64;
         let squares: f64 = seeds
             .map(|seed| {
-                let diagnosis = diagnose(&believed(), &[record(seed)], &Options::default()).unwrap();
+                let diagnosis = diagnose(&baseline(), &[record(seed)], &Options::default()).unwrap();
                 assert_eq!(diagnosis.names(), ["cubic-stiffness"], "seed {seed}");
                 let k3 = &diagnosis.causes[0].parameters["k3_n_per_m3"];
                 let [low, high] = k3.ci90;
@@ -236,18 +238,18 @@ mod tests {
                 ((k3.value - K3_N_PER_M3) / (0.5 * (high - low))).powi(2)
             })
             .sum();
-        // A normal distribution scatters by 1/1.645 half-widths; six draws of it exceed twice that once in a thousand. With the receptance
-        // alone the scatter is three.
+        // The errors are in units of the 90 % half-width, 1.645 standard deviations. Their root mean square is 1/1.645 = 0.61 for a normal
+        // distribution, and six draws exceed twice that once in a thousand. Without this file's widening it is three.
         let scatter = (squares / count).sqrt();
         assert!(scatter < 1.2, "{scatter} half-widths");
     }
 
     #[test]
-    fn a_wrong_unit_is_said_of_what_looks_nothing_like_the_case() {
+    fn a_wrong_unit_is_reported_for_a_response_unlike_the_prediction() {
         let mut record = record(1);
         let displacement = record.channels.iter_mut().find(|channel| channel.name == "x");
         displacement.unwrap().samples.iter_mut().for_each(|x| *x *= 1e3);
-        let said = diagnose(&believed(), &[record], &Options::default())
+        let said = diagnose(&baseline(), &[record], &Options::default())
             .unwrap_err()
             .to_string();
         assert!(

@@ -1,4 +1,4 @@
-//! All causes at all locations of a study, with their columns of the regression.
+//! The causes of a study at their locations, with their regression columns.
 
 use rayon::prelude::*;
 
@@ -10,25 +10,25 @@ use crate::records::record::Record;
 use crate::records::study::Study;
 use quietcut_model::effects::EffectName;
 
-/// A cause at a location, with the regression columns for each set of its nonlinear parameters.
+/// One cause at one location, with the regression columns for each set of its nonlinear parameters.
 pub(crate) struct Candidate {
-    /// Index of the cause in the library.
+    /// Index of the cause in `Library::causes`.
     pub cause: usize,
-    /// Axis, mode or channel in which it acts.
+    /// Axis, axes or channel in which the cause acts.
     pub location: Location,
-    /// Sets of nonlinear parameters, each with its columns.
+    /// Sets of nonlinear parameters, each with the numbers of its regression columns.
     pub variants: Vec<(Vec<f64>, Vec<usize>)>,
 }
 
 /// The causes of a study and their candidates.
 pub(crate) struct Library {
-    /// All causes.
+    /// All causes, whether they have a location in this study or not.
     pub causes: Vec<Box<dyn Cause>>,
-    /// Causes at their locations.
+    /// The causes at their locations in this study.
     pub candidates: Vec<Candidate>,
 }
 
-/// The parameters of the linear structure that one factor changes together.
+/// The effects that change the linear structure. All three by one factor scale its dynamic stiffness by that factor.
 pub(crate) const OF_DYNAMIC_STIFFNESS: [EffectName; 3] =
     [EffectName::Mass, EffectName::Stiffness, EffectName::Damping];
 
@@ -49,7 +49,7 @@ impl Library {
                 })
             })
             .collect();
-        // The regressors along several axes are those along each of them.
+        // A cause that acts along several axes with separate coefficients reuses the columns of each single axis.
         let (each, placed): (Vec<_>, Vec<_>) = placed
             .into_iter()
             .partition(|(_, location, _)| matches!(location, Location::EachOf(_)));
@@ -96,7 +96,8 @@ impl Library {
         }
     }
 
-    /// Columns of a cause along each of several axes; `None` if the columns along one of them are missing.
+    /// Columns of a cause that acts along each of several axes, from those of the single axes; `None` if the columns of one axis are
+    /// missing.
     fn columns_along_each(
         &self,
         cause: usize,
@@ -134,7 +135,7 @@ impl Library {
             .collect()
     }
 
-    /// The columns of a choice.
+    /// The numbers of a choice's regression columns.
     pub(crate) fn columns(&self, choice: Choice) -> &[usize] {
         &self.candidates[choice.candidate].variants[choice.variant].1
     }
@@ -161,7 +162,7 @@ impl Library {
         self.parameters(study, &model).map(|_| model)
     }
 
-    /// Number of fitted parameters of a choice. Nonlinear parameters that follow from the coefficients do not count.
+    /// Number of fitted parameters of a choice. Nonlinear parameters that follow from the coefficients ([`Cause::settled`]) do not count.
     pub(crate) fn parameter_count(&self, choice: Choice) -> usize {
         let (nonlinear_parameters, columns) = &self.candidates[choice.candidate].variants[choice.variant];
         let settles = self
@@ -171,7 +172,7 @@ impl Library {
         columns.len() + if settles { 0 } else { nonlinear_parameters.len() }
     }
 
-    /// All columns of a candidate model, choice after choice.
+    /// The column numbers of a candidate model, one choice after the other.
     pub(crate) fn columns_of(&self, model: &CandidateModel) -> Vec<usize> {
         model
             .choices
@@ -181,7 +182,7 @@ impl Library {
             .collect()
     }
 
-    /// Coefficients of one choice.
+    /// Coefficients of the choice at `position` in a candidate model.
     pub(crate) fn coefficients(&self, model: &CandidateModel, position: usize) -> Vec<f64> {
         let from: usize = model.choices[..position]
             .iter()
@@ -215,7 +216,7 @@ impl Library {
         sum
     }
 
-    /// χ² on the held-out segments with the coefficients of the fitted segments.
+    /// χ² of a candidate model on the held-out segments, with coefficients fitted to the fitted segments.
     pub(crate) fn left_held_out(&self, regression: &Regression, model: &CandidateModel) -> f64 {
         let columns = self.columns_of(model);
         match regression.fit(Subset::Fitted, &columns) {
@@ -249,7 +250,7 @@ impl Library {
             .collect()
     }
 
-    /// The extensions that add a candidate model to a case.
+    /// Names and tables of the extensions that add a candidate model to a case; `None` if a parameter is not physical.
     pub(crate) fn extensions(
         &self,
         study: &Study<'_>,
@@ -264,7 +265,8 @@ impl Library {
         Some(parts.map(|part| (part.name, part.extension)).collect())
     }
 
-    /// By choice: columns of the derivatives with respect to its nonlinear parameters; none if these follow from the coefficients.
+    /// By choice: numbers of the columns that hold the derivatives with respect to its nonlinear parameters; none if these follow from the
+    /// coefficients.
     pub(crate) fn slopes_of(
         &self,
         study: &Study<'_>,
@@ -288,7 +290,8 @@ impl Library {
             .collect()
     }
 
-    /// Columns of the derivatives of a choice with respect to its nonlinear parameters, by central differences.
+    /// Adds the derivatives of a choice's contribution with respect to its nonlinear parameters, by central differences, and returns their
+    /// column numbers; `None` if they cannot be computed.
     pub(crate) fn slopes(
         &self,
         study: &Study<'_>,
@@ -338,7 +341,8 @@ impl Library {
             .collect()
     }
 
-    /// χ² with one common factor on mass, stiffness and damping at `location`, and that factor minus one.
+    /// χ² with one common factor on mass, stiffness and damping at `location`, and the best factor minus one; `None` if the causes have no
+    /// such location or the factor has no effect.
     pub(crate) fn common_factor(&self, regression: &Regression, location: &Location) -> Option<(f64, f64)> {
         let columns: Vec<usize> = OF_DYNAMIC_STIFFNESS
             .iter()
@@ -352,7 +356,7 @@ impl Library {
             })
             .collect::<Option<_>>()?;
         let at = |factor: f64| regression.left(Subset::Whole, &columns, &vec![factor; columns.len()]);
-        // χ² is a parabola in the factor.
+        // χ² is a parabola in the factor: three values determine its minimum.
         let (below, middle, above) = (at(-1.0), at(0.0), at(1.0));
         let curvature = below + above - 2.0 * middle;
         if curvature <= 0.0 {
@@ -362,7 +366,7 @@ impl Library {
         Some((at(best), best))
     }
 
-    /// Adds the sets of nonlinear parameters that the residual `left` of a candidate model suggests.
+    /// Adds further sets of nonlinear parameters to all candidates: those that the residual `left` of a candidate model suggests.
     pub(crate) fn add_variants_beside(
         &mut self,
         study: &Study<'_>,
@@ -377,7 +381,7 @@ impl Library {
         }
     }
 
-    /// Adds a set of nonlinear parameters to a candidate; `None` if it has no regressors.
+    /// Adds a set of nonlinear parameters to a candidate; `None` if its regressors cannot be computed.
     pub(crate) fn add_variant(
         &mut self,
         study: &Study<'_>,
@@ -412,7 +416,7 @@ impl Library {
     }
 }
 
-/// Regressors by coefficient, record and channel.
+/// Regressors of a cause by coefficient, record, channel and sample; `None` if they cannot be computed or are not finite.
 fn columns(
     study: &Study<'_>,
     cause: &dyn Cause,

@@ -1,4 +1,4 @@
-//! The parameters of one candidate model: linear regression first, then the prediction-error fit.
+//! Fits the parameters of one candidate model: by linear regression first, then by prediction error.
 
 pub(crate) mod candidate_model;
 pub(crate) mod closed_fit;

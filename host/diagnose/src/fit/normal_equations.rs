@@ -1,8 +1,8 @@
-//! Inner products of regression columns, from which every fit of some of them is solved.
+//! Inner products of regression columns: the normal equations of any set of columns consist of them.
 
 use nalgebra::DMatrix;
 
-/// Samples per block: this part of all columns stays in the cache.
+/// Samples per block of a matrix product, so few that the block of all columns stays in the cache.
 const BLOCK: usize = 1024;
 
 /// Inner products of the columns on one subset of the records.
@@ -16,7 +16,7 @@ pub(crate) struct Products {
     pub(crate) with_residual: Vec<f64>,
     /// Squared length of the residual.
     pub(crate) residual: f64,
-    /// Number of compared values, without those that free decays and offsets take.
+    /// Number of compared values minus those that the projection on free decays and offsets removes.
     pub(crate) count: usize,
 }
 
@@ -35,12 +35,12 @@ impl Products {
         }
     }
 
-    /// Square of a column.
+    /// Squared length of a column.
     pub(crate) fn square(&self, column: usize) -> f64 {
         self.squares[column]
     }
 
-    /// Product of two columns; `None` if it is not computed yet.
+    /// Inner product of two columns; `None` if it is not computed yet.
     pub(crate) fn known(&self, i: usize, j: usize) -> Option<f64> {
         if i == j {
             return Some(self.squares[i]);
@@ -49,7 +49,7 @@ impl Products {
     }
 }
 
-/// Products of the columns from `first` on with all `columns`, one row each.
+/// Inner products of the columns from `first` on with all `columns`, one row for each.
 ///
 /// The cost is 2·(new columns)·(columns)·(samples) flops. Products of blocks stay in the cache, whereas single inner products would be
 /// limited by memory.

@@ -2,8 +2,8 @@
 //!
 //! Regression along the measured motion is biased by the noise in that motion and by aliasing. A simulation has neither: with r(θ) = y −
 //! y_simulated(θ) in units of the noise, Σ r² is minimal at the most likely θ (Ljung, System Identification, 1999, chapter 7). The Jacobian
-//! is computed by differences. A record with an unknown initial state has it among the parameters. A start that is too far from the whole
-//! record is improved on its beginning.
+//! is computed by finite differences. An unknown initial state of a record is fitted with the parameters. If the start value fits the whole
+//! record poorly, it is first improved on the beginning of the record.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -18,20 +18,21 @@ use crate::records::study::Study;
 use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
-/// Shares of a record on which a distant start is fitted first.
+/// Shares of each record, from its beginning, on which a poor start value is fitted first, one after the other.
 const HORIZONS: [f64; 2] = [0.12, 0.35];
 
-/// Least step of a difference, as a share of its parameter: rounding of the integration.
+/// Least step of a finite difference, as a share of its parameter. Smaller steps drown in the rounding errors of the integration.
 pub(crate) const LEAST_STEP: f64 = 1e-7;
 
-/// The same with dry friction. Accelerations jump where it slips or sticks, and a jump moves by whole samples: a step must move many.
+/// Least step of a finite difference, as a share of its parameter, with dry friction. Accelerations jump when friction slips or sticks, and
+/// the time of a jump changes by whole samples: a step must shift it by many samples.
 const LEAST_STEP_OF_FRICTION: f64 = 3e-3;
 
-/// Simulations compared with the records.
+/// Compares simulations of candidate models with the records of a study.
 pub(crate) struct OutputError<'a> {
     pub(crate) study: &'a Study<'a>,
     pub(crate) closed: ClosedLoop,
-    /// Segments of each subset, in the order of the records.
+    /// Segments of all subsets, in the order of the records.
     segments: Vec<Segment>,
     pub(crate) horizons: Vec<Vec<Segment>>,
     /// True if every record is a free decay.
@@ -51,10 +52,10 @@ pub(crate) fn projected(columns: &[Column], size: usize, residuals: &[Vec<f64>])
 }
 
 impl<'a> OutputError<'a> {
-    /// `None` if some record cannot be simulated.
+    /// Prepares the simulations of a study; `None` if one of its records cannot be simulated.
     pub(crate) fn new(study: &'a Study<'a>) -> Option<Self> {
         let closed = ClosedLoop::new(study)?;
-        // The initial state of a free decay is among the parameters.
+        // The initial state of a free decay is fitted, and not projected out.
         let nuisance = |record: &crate::records::record::Record| {
             if starts_anywhere(record) {
                 Nuisance::Offsets
@@ -96,11 +97,11 @@ impl<'a> OutputError<'a> {
         effects: &Effects,
         start: &[f64],
     ) -> Option<Vec<f64>> {
-        let mine: Vec<&&Segment> = segments
+        let of_record: Vec<&&Segment> = segments
             .iter()
             .filter(|segment| segment.record == record)
             .collect();
-        let Some(length) = mine.iter().map(|segment| segment.range.end).max() else {
+        let Some(length) = of_record.iter().map(|segment| segment.range.end).max() else {
             return Some(Vec::new());
         };
         let mut samples = closed.simulate(self.study, record, effects, start, length)?;
@@ -109,7 +110,12 @@ impl<'a> OutputError<'a> {
                 *simulated = measured - *simulated;
             }
         }
-        Some(mine.iter().flat_map(|segment| segment.whiten(&samples)).collect())
+        Some(
+            of_record
+                .iter()
+                .flat_map(|segment| segment.whiten(&samples))
+                .collect(),
+        )
     }
 
     pub(crate) fn residuals(
@@ -121,7 +127,7 @@ impl<'a> OutputError<'a> {
         self.residuals_by(&self.closed, problem, segments, point)
     }
 
-    /// [`Self::residuals`] under other forces.
+    /// [`Self::residuals`] of a simulation with the forces of `closed` instead of the measured forces.
     pub(crate) fn residuals_by(
         &self,
         closed: &ClosedLoop,
@@ -136,7 +142,7 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Columns of J = ∂y_simulated/∂θ by differences, record after record.
+    /// Columns of J = ∂y_simulated/∂θ by finite differences, record after record. `left` is the residual at `point`.
     pub(crate) fn columns(
         &self,
         problem: &FitProblem<'_>,
@@ -148,7 +154,7 @@ impl<'a> OutputError<'a> {
             .slots
             .iter()
             .map(|(slot, step)| {
-                // If a step leaves the physical range, the opposite one is taken.
+                // If the step leaves the physical range, the opposite step is taken.
                 [*step, -step].into_iter().find_map(|step| {
                     let mut moved = point.clone();
                     *slot.of(&mut moved) += step;
@@ -159,7 +165,7 @@ impl<'a> OutputError<'a> {
             .collect();
         let tasks: Vec<(usize, usize)> = (0..left.len())
             .flat_map(|record| (0..problem.slots.len()).map(move |slot| (record, slot)))
-            .filter(|(record, slot)| problem.slots[*slot].0.is_felt_by(*record))
+            .filter(|(record, slot)| problem.slots[*slot].0.affects(*record))
             .collect();
         tasks
             .into_par_iter()
@@ -175,7 +181,7 @@ impl<'a> OutputError<'a> {
             .collect()
     }
 
-    /// Jᵀ J and Jᵀ r. It also adapts the steps, so that each changes χ² by about one.
+    /// Computes Jᵀ J and Jᵀ r, and adapts the steps of the finite differences so that each changes χ² by about one.
     pub(crate) fn normal(
         &self,
         problem: &mut FitProblem<'_>,
@@ -222,7 +228,7 @@ impl<'a> OutputError<'a> {
         (normal, gradient)
     }
 
-    /// The free parameters of a candidate model, with its regression as the start.
+    /// The free parameters of a candidate model and their start values from its linear regression; `None` if these are not physical.
     pub(crate) fn problem<'b>(
         &self,
         library: &'b Library,
@@ -297,7 +303,7 @@ impl<'a> OutputError<'a> {
         Some((problem, point))
     }
 
-    /// Initial state of the baseline in a record, after the contribution of the candidate model is subtracted.
+    /// Initial state of the baseline in a record, fitted to the residual of the candidate model.
     fn state_at_start(&self, library: &Library, model: &CandidateModel, index: usize) -> Vec<f64> {
         let record = &self.study.records[index];
         let explained = library.explained(self.study, record, model);

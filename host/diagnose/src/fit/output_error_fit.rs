@@ -126,7 +126,7 @@ impl ClosedFit for OutputError<'_> {
         let (mut problem, mut point) = self.problem(library, model)?;
         point.starts.clone_from(&simulated.starts);
         let fitted = self.of_subset(Subset::Fitted);
-        // The fitted segments do not depend on the initial states of held-out records, which are therefore fitted here.
+        // The initial states of held-out records have no influence on the fitted segments, and are fitted to the held-out segments here.
         let found = self.search(&mut problem, &fitted, point, 4, f64::INFINITY)?;
         let held_out = self.of_subset(Subset::HeldOut);
         let only_here = |slot: &FreeParameter| match slot {

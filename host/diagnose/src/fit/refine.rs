@@ -1,4 +1,4 @@
-//! Refinement of nonlinear parameters between the points of their grid.
+//! Refines nonlinear parameters between the points of their start grid.
 
 use crate::criteria::{LEAST_REFINEMENT, WORTH_REFINING};
 use crate::fit::candidate_model::CandidateModel;
@@ -6,7 +6,7 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Regression, Subset};
 use crate::records::study::Study;
 
-/// Number of candidate models that are refined.
+/// Largest number of candidate models whose nonlinear parameters are refined.
 const REFINED: usize = 3;
 
 /// Refines the nonlinear parameters of the best candidate models.
@@ -57,11 +57,12 @@ fn one(
     }
 }
 
-/// Largest number of iterations of nonlinear parameters that follow from the coefficients. Loss of contact slows them down.
-const SETTLINGS: usize = 12;
+/// Largest number of fixed-point iterations of nonlinear parameters that follow from the coefficients. The iteration converges slowly if
+/// teeth lose contact.
+const FIXED_POINT_ITERATIONS: usize = 12;
 
-/// Iterates the nonlinear parameters that follow from the coefficients to their fixed point, with half steps where a whole step increases
-/// χ².
+/// Iterates nonlinear parameters that follow from the coefficients to their fixed point. Where a whole step increases χ², half a step is
+/// tried.
 fn settle(
     study: &Study<'_>,
     library: &mut Library,
@@ -69,7 +70,7 @@ fn settle(
     mut model: CandidateModel,
     position: usize,
 ) -> CandidateModel {
-    for _ in 0..SETTLINGS {
+    for _ in 0..FIXED_POINT_ITERATIONS {
         let choice = model.choices[position];
         let nonlinear_parameters = library.candidates[choice.candidate].variants[choice.variant]
             .0
@@ -98,7 +99,8 @@ fn settle(
             with_nonlinear_parameters(study, library, regression, &model, position, next.collect())
                 .filter(|better| better.fit.left < model.fit.left)
         });
-        // A smaller χ² away from the fixed point contradicts itself and does not count.
+        // If no step decreases χ², the whole step is taken: the regressors are exact only at the fixed point, so that a smaller χ²
+        // elsewhere does not count.
         let better =
             better.or_else(|| with_nonlinear_parameters(study, library, regression, &model, position, asked));
         let Some(better) = better else {
@@ -109,10 +111,10 @@ fn settle(
     model
 }
 
-/// Largest number of Gauss–Newton steps.
-const SLOPES_FOLLOWED: usize = 3;
+/// Largest number of Gauss–Newton steps in the nonlinear parameters, after the search.
+const GAUSS_NEWTON_STEPS: usize = 3;
 
-/// Searches each nonlinear parameter with decreasing steps, then takes Gauss–Newton steps.
+/// Searches each nonlinear parameter in turn with decreasing steps, then takes Gauss–Newton steps.
 fn search(
     study: &Study<'_>,
     library: &mut Library,
@@ -136,7 +138,7 @@ fn search(
             for sign in [1.0, -1.0] {
                 let mut moved = nonlinear_parameters.clone();
                 let step = sign * steps[parameter];
-                // Positive parameters move by factors, others by shares of their range.
+                // A parameter with a positive lower bound moves by factors, any other by shares of its range.
                 moved[parameter] = if low > 0.0 {
                     nonlinear_parameters[parameter] * (1.0 + step)
                 } else {
@@ -157,7 +159,7 @@ fn search(
             }
         }
     }
-    for _ in 0..SLOPES_FOLLOWED {
+    for _ in 0..GAUSS_NEWTON_STEPS {
         let Some(better) = along_slopes(study, library, regression, &model, position, &bounds) else {
             break;
         };
@@ -166,7 +168,7 @@ fn search(
     model
 }
 
-/// One Gauss–Newton step in the nonlinear parameters; `None` if it does not decrease χ².
+/// One Gauss–Newton step in the nonlinear parameters; `None` if it decreases χ² by less than `LEAST_REFINEMENT`.
 fn along_slopes(
     study: &Study<'_>,
     library: &mut Library,

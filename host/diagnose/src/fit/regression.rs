@@ -1,7 +1,7 @@
-//! Least squares of all regressors in units of the noise, after free decays are projected out.
+//! Linear least squares of regressors in units of the noise, with free decays projected out.
 //!
-//! Every record counts as a whole, and is also divided into fitted and held-out segments. Residual and regressors of each segment are
-//! whitened. Their inner products (Gram matrices) then give the fit of any set of regressors.
+//! Every record is one segment as a whole, and is also divided into fitted and held-out segments. Residual and regressors of each segment
+//! are whitened. Their inner products (Gram matrices) then give the fit of any set of regressors.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -13,14 +13,14 @@ use crate::fit::segment::{Nuisance, Segment, split};
 use crate::records::study::Study;
 use crate::signal::dot::dot;
 
-/// Ridge on the unit diagonal of the normal equations of all columns of the library, which are nearly dependent.
+/// Ridge on the unit diagonal of normal equations with all columns of the library, which are nearly dependent.
 const SOFTENED: f64 = 1e-9;
 
-/// Ridge on the unit diagonal of the normal equations of a fit: rounding. Columns of a cut are less accurate and have the square of its
-/// relative error in its place.
+/// Ridge on the unit diagonal of the normal equations of a fit: rounding. For cuts, whose columns are less accurate, the square of their
+/// relative error replaces it.
 const ROUNDING: f64 = 1e-13;
 
-/// Linear fit of some columns.
+/// Result of a linear fit of some columns to the residual.
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     /// The coefficients.
@@ -31,10 +31,10 @@ pub(crate) struct Fit {
     pub left: f64,
 }
 
-/// Linear fit of some columns to another residual.
+/// Result of a linear fit of some columns to the residual of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct Refit {
-    /// The change of their coefficients.
+    /// Change of the columns' coefficients.
     pub change: Vec<f64>,
     /// χ² before the change.
     pub before: f64,
@@ -42,15 +42,15 @@ pub(crate) struct Refit {
     pub taken: f64,
 }
 
-/// All columns of a study.
+/// The residuals and regression columns of a study, whitened and by segment.
 pub(crate) struct Regression {
     segments: Vec<Segment>,
-    /// Values by column and segment.
+    /// Whitened values, by column and segment.
     columns: Vec<Vec<Vec<f64>>>,
     residuals: Vec<Vec<f64>>,
-    /// Products on the fitted, held-out and whole records.
+    /// Inner products on the fitted segments, on the held-out segments and on the whole records.
     products: [Products; 3],
-    /// Number of columns whose products are complete.
+    /// Number of columns whose inner products with each other are computed.
     complete: usize,
     /// Ridge on the unit diagonal of the normal equations of every fit.
     ridge: f64,
@@ -111,11 +111,11 @@ impl Regression {
         }
     }
 
-    /// Rescales the noise variance of each record so that the full model leaves the same normalized residual in every record (feasible
-    /// GLS).
+    /// Rescales the noise variance of each record so that a fit of all columns leaves the same normalized residual in every record
+    /// (feasible GLS).
     ///
-    /// The residual of forces is not noise, but errors of the equations, which differ between records. Unscaled least squares would fit the
-    /// record that the equations describe worst.
+    /// In the force domain the residual contains errors of the equations, which differ between records. Without rescaling, least squares
+    /// would fit mainly the record that the equations describe worst.
     pub(crate) fn level_records(&mut self) {
         let records = self
             .segments
@@ -144,7 +144,7 @@ impl Regression {
         self.sum();
     }
 
-    /// χ² of one segment with all columns.
+    /// χ² of one segment after a fit of all columns.
     fn residual_of_segment(&self, segment: usize) -> f64 {
         let residual = &self.residuals[segment];
         let mut columns: Vec<&[f64]> = self.columns.iter().map(|column| &column[segment][..]).collect();
@@ -197,7 +197,7 @@ impl Regression {
         self.columns.len() - 1
     }
 
-    /// Computes all missing products, before many sets of columns are fitted.
+    /// Computes all missing inner products at once. It is called before many sets of columns are fitted.
     pub(crate) fn complete(&mut self) {
         let (first, size) = (self.complete, self.columns.len());
         if first == size {
@@ -220,7 +220,7 @@ impl Regression {
         self.complete = size;
     }
 
-    /// Length of a column on a subset, per unit of its coefficient.
+    /// Euclidean length of a column on a subset, per unit of its coefficient.
     pub(crate) fn length(&self, subset: Subset, column: usize) -> f64 {
         self.products(subset).square(column).sqrt()
     }
@@ -228,12 +228,13 @@ impl Regression {
     /// Inner product of two columns on a subset.
     fn product(&self, subset: Subset, i: usize, j: usize) -> f64 {
         self.products(subset).known(i, j).unwrap_or_else(|| {
-            let mine = self
+            let of_subset = self
                 .segments
                 .iter()
                 .enumerate()
                 .filter(|(_, segment)| segment.subset == subset);
-            mine.map(|(index, _)| dot(&self.columns[i][index], &self.columns[j][index]))
+            of_subset
+                .map(|(index, _)| dot(&self.columns[i][index], &self.columns[j][index]))
                 .sum()
         })
     }
@@ -242,17 +243,17 @@ impl Regression {
         &self.products[subset as usize]
     }
 
-    /// χ² without any column.
+    /// χ² of the baseline on a subset: without any column.
     pub(crate) fn residual(&self, subset: Subset) -> f64 {
         self.products(subset).residual
     }
 
-    /// Number of compared values.
+    /// Number of compared values on a subset.
     pub(crate) fn count(&self, subset: Subset) -> usize {
         self.products(subset).count
     }
 
-    /// Prediction error (NRMSE) on a subset; all channels have equal weight.
+    /// Prediction error (NRMSE) of the baseline on a subset; all channels have equal weight.
     pub(crate) fn nrmse(&self, study: &Study<'_>, subset: Subset) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0.0_f64);
         for segment in self.segments.iter().filter(|segment| segment.subset == subset) {
@@ -273,12 +274,13 @@ impl Regression {
         self.columns.len()
     }
 
-    /// Linear fit of some columns on a subset; `None` if they are dependent or zero.
+    /// Linear fit of some columns to the baseline's residual on a subset; `None` if the columns are dependent or zero.
     pub(crate) fn fit(&self, subset: Subset, columns: &[usize]) -> Option<Fit> {
         self.solve(subset, columns, self.ridge)
     }
 
-    /// Coefficients of `columns` that fit the column `target`, and the energy that they explain.
+    /// Coefficients of `columns` that fit the column `target`, and the energy that they explain; `None` if the columns are dependent or
+    /// zero.
     pub(crate) fn fit_column(
         &self,
         subset: Subset,
@@ -302,16 +304,20 @@ impl Regression {
         columns: &[usize],
         residuals: &[Vec<Vec<f64>>],
     ) -> Option<Refit> {
-        let mine = self.whitened(subset, residuals);
+        let of_subset = self.whitened(subset, residuals);
         let with = |column: usize| -> f64 {
-            mine.iter()
+            of_subset
+                .iter()
                 .map(|(segment, residual)| dot(&self.columns[column][*segment], residual))
                 .sum()
         };
         let right: Vec<f64> = columns.iter().map(|column| with(*column)).collect();
         let (change, _) = self.normal(subset, columns, self.ridge, &right)?;
         Some(Refit {
-            before: mine.iter().map(|(_, residual)| dot(residual, residual)).sum(),
+            before: of_subset
+                .iter()
+                .map(|(_, residual)| dot(residual, residual))
+                .sum(),
             taken: change
                 .iter()
                 .zip(&right)
@@ -321,7 +327,7 @@ impl Regression {
         })
     }
 
-    /// χ² of `residuals`, given by record and channel, after `coefficients` of `columns`.
+    /// χ² of `residuals`, given by record and channel, after subtracting `columns` with these `coefficients`.
     pub(crate) fn left_with(
         &self,
         subset: Subset,
@@ -351,12 +357,12 @@ impl Regression {
         fit: &Fit,
     ) -> DMatrix<f64> {
         let mut middle = DMatrix::zeros(columns.len(), columns.len());
-        let mine = self
+        let of_subset = self
             .segments
             .iter()
             .enumerate()
             .filter(|(_, segment)| segment.subset == subset);
-        for (segment, _) in mine {
+        for (segment, _) in of_subset {
             let residual = &self.residuals[segment];
             let mut x = DMatrix::from_fn(residual.len(), columns.len(), |row, column| {
                 self.columns[columns[column]][segment][row]
@@ -381,7 +387,7 @@ impl Regression {
             .collect()
     }
 
-    /// χ² with all columns of the library.
+    /// χ² after a fit of all columns of the library.
     pub(crate) fn left_by_all(&self) -> f64 {
         let whole = self.products(Subset::Whole);
         let all: Vec<usize> = (0..self.columns.len())
@@ -440,7 +446,7 @@ impl Regression {
         Some(((0..size).map(|i| solution[i] / scale[i]).collect(), covariance))
     }
 
-    /// χ² on a subset with given coefficients.
+    /// χ² of the baseline's residual on a subset after subtracting `columns` with these `coefficients`.
     pub(crate) fn left(&self, subset: Subset, columns: &[usize], coefficients: &[f64]) -> f64 {
         let products = self.products(subset);
         let mut left = products.residual;

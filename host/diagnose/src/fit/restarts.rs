@@ -1,4 +1,4 @@
-//! Restarts of a search that is stuck: near its end, and from other amplitudes.
+//! Restarts a search that is stuck: near its end, and from other amplitudes.
 
 use crate::criteria::{SEARCH_SETTLED, STUCK};
 use crate::fit::output_error::{LEAST_STEP, OutputError};
@@ -6,20 +6,20 @@ use crate::fit::search::ROUNDS;
 use crate::fit::segment::Segment;
 use crate::fit::unknowns::{FitProblem, FreeParameter, ParameterPoint, SearchResult, energy};
 
-/// Relative distances from the end of a search with friction at which it restarts.
-const BESIDE: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
-/// Factors on the start of a search at which it restarts.
+/// Relative changes of one parameter from the end of a search with friction, at which the search restarts.
+const NEARBY: [f64; 6] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 0.016];
+/// Factors on the start values of a search at which it restarts.
 const SIZES: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
-/// Largest number of parameters that restart from other amplitudes: the number of starts grows exponentially.
-const FEW: usize = 2;
-/// Number of the best starts that are followed to the end.
-const FOLLOWED: usize = 3;
-/// Iterations on the beginning of a record.
-const ROUNDS_AT_FIRST: usize = 4;
+/// Largest number of parameters with which a search restarts from other amplitudes: the number of starts grows exponentially with it.
+const MOST_PARAMETERS: usize = 2;
+/// Number of starts, the best ones, from which the search is completed.
+const COMPLETED: usize = 3;
+/// Iterations of the search from each start on the beginning of each record, which ranks the starts.
+const RANKING_ROUNDS: usize = 4;
 
 impl OutputError<'_> {
-    /// The search result `found` from `start`, or a better one of a restart. `count` values are compared, and another candidate model has
-    /// reached the χ² `rival`.
+    /// The search result `found` from `start`, or the better result of a restart. `count` is the number of compared values, `rival` the χ²
+    /// that another candidate model has reached.
     pub(crate) fn restarted(
         &self,
         problem: &mut FitProblem<'_>,
@@ -29,7 +29,7 @@ impl OutputError<'_> {
         (rival, count): (f64, usize),
     ) -> SearchResult {
         let stuck = STUCK * count as f64;
-        let is_simple = problem.choices.len() == 1 && problem.inner().count() <= FEW;
+        let is_simple = problem.choices.len() == 1 && problem.inner().count() <= MOST_PARAMETERS;
         if self.is_free_decay && found.left > stuck && is_simple {
             found = self.restarted_elsewhere(problem, segments, start, found, rival);
         }
@@ -49,7 +49,7 @@ impl OutputError<'_> {
     ) -> SearchResult {
         let mut best: Option<(f64, ParameterPoint)> = None;
         for slot in problem.inner() {
-            for share in BESIDE.into_iter().flat_map(|share| [share, -share]) {
+            for share in NEARBY.into_iter().flat_map(|share| [share, -share]) {
                 let mut moved = ended.point.clone();
                 *slot.of(&mut moved) *= 1.0 + share;
                 let least = best.as_ref().map_or(ended.left, |best| best.0);
@@ -66,7 +66,8 @@ impl OutputError<'_> {
         again.filter(|again| again.left < ended.left).unwrap_or(ended)
     }
 
-    /// The best of searches from other amplitudes. The phase of a free decay depends on them, and χ² has several minima.
+    /// The best of searches from other amplitudes. In a free decay of a nonlinear structure the phase depends on them, and χ² has several
+    /// minima.
     fn restarted_elsewhere(
         &self,
         problem: &mut FitProblem<'_>,
@@ -98,12 +99,12 @@ impl OutputError<'_> {
                         *value = value.clamp(low, high);
                     }
                 }
-                let found = self.search(problem, &first, point, ROUNDS_AT_FIRST, f64::INFINITY)?;
+                let found = self.search(problem, &first, point, RANKING_ROUNDS, f64::INFINITY)?;
                 Some((found.left, found.point))
             })
             .collect();
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (_, point) in tried.into_iter().take(FOLLOWED) {
+        for (_, point) in tried.into_iter().take(COMPLETED) {
             let point = self.near_to_far(problem, point);
             let rival = rival.min(best.left);
             if let Some(found) = self.search(problem, segments, point, ROUNDS, rival)

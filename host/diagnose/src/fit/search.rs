@@ -1,4 +1,4 @@
-//! The search of Levenberg and Marquardt for the parameters of a simulated candidate model.
+//! Levenberg–Marquardt search for the parameters of a simulated candidate model.
 
 use nalgebra::DMatrix;
 
@@ -11,8 +11,8 @@ use crate::fit::unknowns::{FitProblem, ParameterPoint, SearchResult, at_bounds, 
 pub(crate) const ROUNDS: usize = 15;
 
 impl OutputError<'_> {
-    /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated. It ends early if its χ² stays behind `rival`,
-    /// which another candidate model has reached.
+    /// Levenberg–Marquardt search from `start`; `None` if the start cannot be simulated. The search ends early if its χ² stays behind
+    /// `rival`, the χ² that another candidate model has reached.
     pub(crate) fn search(
         &self,
         problem: &mut FitProblem<'_>,
@@ -35,7 +35,7 @@ impl OutputError<'_> {
             (normal, gradient) = self.normal(problem, &columns, &point, &residuals);
             at_bounds(problem, &point, &mut normal, &mut gradient);
             let before = left;
-            // To first order most of the residual cannot be fitted.
+            // The search is hopeless if, to first order, a whole step leaves χ² behind the rival and most of the residual unexplained.
             let promised = left - predicted(&normal, &gradient);
             if round >= 1 && promised - rival > HOPELESS_LAG && promised > 0.5 * left {
                 break;
@@ -62,7 +62,7 @@ impl OutputError<'_> {
         Some(SearchResult { point, left, normal })
     }
 
-    /// Improves `point` by searches on growing parts of every record.
+    /// Improves `point` by searches on the beginning of every record, first on a short part, then on a longer one.
     pub(crate) fn near_to_far(
         &self,
         problem: &mut FitProblem<'_>,

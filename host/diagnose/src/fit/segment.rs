@@ -1,5 +1,5 @@
-//! Segments of records as they are compared: transformed, band-limited, whitened, and orthogonal to free decays and constant offsets of the
-//! sensors.
+//! Segments of records in the form in which they are compared: transformed, band-limited, whitened, and orthogonal to free decays and
+//! constant offsets of the sensors.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -12,20 +12,21 @@ use crate::signal::dot::dot;
 use crate::signal::grid::SegmentTransform;
 use quietcut_recording::TestKind;
 
-/// A segment of a record.
+/// One segment of a record, with the transform that makes its values comparable.
 pub(crate) struct Segment {
-    /// Index of its record in the study.
+    /// Index of the segment's record in the study.
     pub(crate) record: usize,
     pub(crate) range: Range<usize>,
     pub(crate) subset: Subset,
-    /// One over the factor on the noise of its record.
+    /// Weight of the segment's values: one over the factor by which
+    /// [`Regression::level_records`](crate::fit::regression::Regression::level_records) raises the noise of its record.
     pub(crate) weight: f64,
     bins: usize,
     transform: SegmentTransform,
     whitening: Whitening,
-    /// By channel: samples that are not compared, counted from the start of the segment.
+    /// By channel: indices of samples that are not compared, from the start of the segment.
     skipped: Vec<Vec<usize>>,
-    /// Orthonormal basis of free decays and offsets.
+    /// Orthonormal basis of the whitened free decays and offsets.
     nuisance: Vec<Vec<f64>>,
 }
 
@@ -38,20 +39,20 @@ pub(crate) enum Nuisance {
     Offsets,
 }
 
-/// The segments that count.
+/// A subset of the segments, on which a sum is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subset {
-    /// Fitted segments.
+    /// Segments to which coefficients are fitted.
     Fitted,
-    /// Held-out segments.
+    /// Segments to which no coefficient is fitted.
     HeldOut,
-    /// Whole records.
+    /// Whole records, one segment each.
     Whole,
 }
 
-/// Each record as a whole, and in four segments of a third, a sixth, a third and a sixth. The short ones are held out: they contain other
-/// times, and of a sweep other frequencies, than the fitted ones. Of several free decays the last is held out as a whole, because the end
-/// of a decay carries no information.
+/// Divides each record: the whole, and four segments of a third, a sixth, a third and a sixth of it. The short ones are held out. They
+/// contain other times than the fitted ones and, in a sweep, other frequencies. Of several free decays the last is held out as a whole,
+/// because the end of a decay contains no information.
 pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) -> Vec<Segment> {
     let several = study.records.len() > 1;
     let last = study.records.len().saturating_sub(1);
@@ -87,7 +88,7 @@ pub(crate) fn split(study: &Study<'_>, unknown: impl Fn(&Record) -> Nuisance) ->
 }
 
 impl Segment {
-    /// A segment of the record at `index`.
+    /// Prepares the samples `range` of the record at `index` as a segment.
     pub(crate) fn new(
         study: &Study<'_>,
         index: usize,
@@ -137,7 +138,7 @@ impl Segment {
         column
     }
 
-    /// Number of values that are projected out or not compared.
+    /// Number of degrees of freedom that the projection removes or that are not compared.
     pub(crate) fn taken(&self) -> usize {
         self.nuisance.len() + self.skipped.iter().map(Vec::len).sum::<usize>()
     }
@@ -161,7 +162,7 @@ fn raw(segment: &Segment, samples: &[Vec<f64>]) -> Vec<f64> {
     column
 }
 
-/// Orthonormal basis of free decays and offsets in a segment; empty where forces are compared.
+/// Orthonormal basis of free decays and offsets in a segment; empty in the force domain.
 fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f64>> {
     if record.domain == Domain::Force {
         return Vec::new();
@@ -194,7 +195,7 @@ fn nuisance(record: &Record, segment: &Segment, unknown: Nuisance) -> Vec<Vec<f6
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut column in raws {
         let size = dot(&column, &column).sqrt();
-        // Two passes of Gram–Schmidt leave only rounding.
+        // Two passes of Gram–Schmidt make the columns orthogonal within rounding.
         for _ in 0..2 {
             for known in &basis {
                 let along = dot(&column, known);

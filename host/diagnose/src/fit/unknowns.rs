@@ -8,7 +8,7 @@ use crate::records::study::Study;
 use crate::signal::dot::dot;
 use quietcut_simulate::Effects;
 
-/// Values of all parameters and initial states.
+/// Values of all parameters and initial states of a candidate model.
 #[derive(Clone, Debug)]
 pub(crate) struct ParameterPoint {
     /// By choice: coefficients, followed by the nonlinear parameters.
@@ -17,7 +17,7 @@ pub(crate) struct ParameterPoint {
     pub(crate) starts: Vec<Vec<f64>>,
 }
 
-/// One parameter or initial state that is fitted.
+/// One parameter of a cause, or one component of an initial state, that is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum FreeParameter {
     Inner {
@@ -31,16 +31,16 @@ pub(crate) enum FreeParameter {
     },
 }
 
-/// A candidate model with its free parameters, each with the step of its difference.
+/// A candidate model with its free parameters, each with the step of its finite difference.
 pub(crate) struct FitProblem<'a> {
     pub(crate) library: &'a Library,
     pub(crate) choices: &'a [Choice],
     pub(crate) slots: Vec<(FreeParameter, f64)>,
-    /// Least step of a difference, as a share of its parameter.
+    /// Least step of a finite difference, as a share of its parameter.
     pub(crate) least_step: f64,
 }
 
-/// End of a search.
+/// Result of a search: the parameters, their χ² and the normal matrix.
 pub(crate) struct SearchResult {
     pub(crate) point: ParameterPoint,
     pub(crate) left: f64,
@@ -56,8 +56,8 @@ impl FreeParameter {
         }
     }
 
-    /// False if the response of a record does not depend on it.
-    pub(crate) fn is_felt_by(self, record: usize) -> bool {
+    /// True if the parameter changes the simulated response of `record`.
+    pub(crate) fn affects(self, record: usize) -> bool {
         match self {
             Self::Inner { .. } => true,
             Self::Start { record: own, .. } => own == record,
@@ -66,13 +66,13 @@ impl FreeParameter {
 }
 
 impl FitProblem<'_> {
-    /// Free parameters without the initial states.
+    /// The free parameters of causes, without the initial states.
     pub(crate) fn inner(&self) -> impl Iterator<Item = FreeParameter> {
         let slots = self.slots.iter().map(|(slot, _)| *slot);
         slots.filter(|slot| matches!(slot, FreeParameter::Inner { .. }))
     }
 
-    /// The effects at a point; `None` if it is not physical.
+    /// The effects of the candidate model with the parameters of `point`; `None` if they are not physical.
     pub(crate) fn effects(&self, study: &Study<'_>, point: &ParameterPoint) -> Option<Effects> {
         let Self { library, choices, .. } = self;
         let mut tables = Vec::new();
@@ -95,7 +95,7 @@ pub(crate) fn energy(residuals: &[Vec<f64>]) -> f64 {
     residuals.iter().map(|residual| dot(residual, residual)).sum()
 }
 
-/// Solves (Jᵀ J + trust·diag) step = Jᵀ r and takes the step within the bounds; `None` if there is no solution.
+/// Solves (Jᵀ J + trust·diag(Jᵀ J)) step = Jᵀ r and takes the step within the bounds; `None` if the matrix is singular.
 pub(crate) fn stepped(
     problem: &FitProblem<'_>,
     point: &ParameterPoint,
@@ -119,7 +119,7 @@ pub(crate) fn stepped(
     Some(next)
 }
 
-/// Decrease of χ² by a whole step, to first order.
+/// Decrease of χ² by a whole Gauss–Newton step, to first order.
 pub(crate) fn predicted(normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     let right = gradient.component_mul(&roots(normal));
     scaled(normal, 1e-9).map_or(0.0, |factor| right.dot(&factor.solve(&right)))
@@ -148,7 +148,7 @@ pub(crate) fn at_bounds(
     }
 }
 
-/// One over the square roots of the diagonal; zero for a parameter without effect.
+/// One over the square roots of the diagonal entries; zero for a parameter without effect.
 fn roots(normal: &DMatrix<f64>) -> DVector<f64> {
     normal.diagonal().map(|entry| {
         if entry > 0.0 && entry.is_finite() {
@@ -159,7 +159,7 @@ fn roots(normal: &DMatrix<f64>) -> DVector<f64> {
     })
 }
 
-/// Cholesky factor of the matrix scaled to a unit diagonal, plus `ridge` on it.
+/// Cholesky factor of `normal`, scaled to a unit diagonal and with `ridge` added to that diagonal.
 fn scaled(normal: &DMatrix<f64>, ridge: f64) -> Option<nalgebra::Cholesky<f64, nalgebra::Dyn>> {
     let roots = roots(normal);
     let mut scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
@@ -180,7 +180,7 @@ pub(crate) fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     }))
 }
 
-/// By choice: covariance of its parameters for unit-variance noise, with unknown initial states; zero for a fixed parameter.
+/// By choice: covariance of its parameters for unit-variance noise, with the initial states unknown; zero for a fixed parameter.
 pub(crate) fn by_choice(slots: &[FreeParameter], found: &SearchResult) -> Vec<DMatrix<f64>> {
     let mut all: Vec<DMatrix<f64>> = found
         .point

@@ -1,4 +1,4 @@
-//! Whitening of a record: its noise becomes unit-variance and independent between channels.
+//! Whitens a record: after it, the noise has unit variance and is independent between channels.
 
 use nalgebra::Cholesky;
 use num_complex::Complex64;
@@ -7,22 +7,22 @@ use crate::records::amplification::LoopNoise;
 use crate::records::domain::Domain;
 use crate::records::record::Record;
 
-/// Covariance of the channels at each bin: S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ. The first part is the noise of the sensors. The second is the
-/// response h to the noise of the force sensors and to aliased forces, both as the noise floor σ_f of each force; all channels have it in
-/// common.
+/// Whitening by L⁻¹, with the covariance of the channels at each bin S = diag(σ²) + Σ σ_f² h hᴴ = L Lᴴ. The first part is the noise of the
+/// motion sensors. The second is the response h to noise of the force sensors and to aliased forces, both contained in the noise floor σ_f
+/// of each force; it is correlated between channels.
 #[derive(Default)]
 pub(crate) struct Whitening {
     channels: usize,
-    /// By bin: number of values per channel, one if it is real.
+    /// By bin: number of real values per channel, 1 for a real bin and 2 for a complex one.
     numbers: Vec<usize>,
-    /// By bin and channel: one over the diagonal of L.
+    /// By bin and channel: one over the diagonal element of L.
     weights: Vec<f64>,
     /// By bin: rows of L to the left of the diagonal; empty if the channels are independent.
     common: Vec<Complex64>,
 }
 
 impl Whitening {
-    /// Whitening of a segment of `length` samples, of which `bins` bins are compared.
+    /// Prepares the whitening of a segment of `length` samples, whose first `bins` bins are compared.
     pub(crate) fn of(record: &Record, length: usize, bins: usize) -> Self {
         let channels = record.channels.len();
         let is_real = |bin: usize| bin == 0 || 2 * bin == length;
@@ -68,7 +68,7 @@ impl Whitening {
         whitening
     }
 
-    /// Multiplies by L⁻¹ the values of all channels, channel after channel.
+    /// Multiplies the values of all channels by L⁻¹. `column` holds them channel after channel.
     pub(crate) fn apply(&self, column: &mut [f64]) {
         let per_channel = column.len() / self.channels.max(1);
         let rows = if self.common.is_empty() {
@@ -100,7 +100,7 @@ impl Whitening {
     }
 }
 
-/// h σ_f of each channel for each of the `forces`, given by axis and standard deviation, at ω.
+/// Writes h σ_f of each channel at ω, rad/s, into `read`. `forces` holds the axis and standard deviation of each force.
 fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mut [Complex64]) {
     let nearest = (omega / record.grid.omega(1)).round() as usize;
     let of_channels = read.chunks_exact_mut(forces.len().max(1));
@@ -116,7 +116,7 @@ fn read_of_noise(record: &Record, omega: f64, forces: &[(usize, f64)], read: &mu
     }
 }
 
-/// L of S = diag(σ²) + R Rᴴ by Cholesky, row by row; `read` is R, with one row per channel.
+/// Writes L of S = diag(σ²) + R Rᴴ into `rows`, by Cholesky. `deviations` is σ, `read` is R with one row per channel.
 fn factorize(deviations: &[f64], read: &[Complex64], rows: &mut [Complex64]) {
     let (channels, forces) = (deviations.len(), read.len() / deviations.len().max(1));
     for i in 0..channels {
@@ -130,7 +130,7 @@ fn factorize(deviations: &[f64], read: &[Complex64], rows: &mut [Complex64]) {
                 sum -= rows[i * channels + k] * rows[j * channels + k].conj();
             }
             rows[i * channels + j] = if i == j {
-                // No channel has less noise than its own sensor.
+                // Rounding must not make the variance smaller than that of the channel's own sensor.
                 Complex64::from(sum.re.max(own).sqrt())
             } else {
                 sum / rows[j * channels + j].re
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_factor_is_that_of_the_covariance() {
+    fn the_cholesky_factor_reproduces_the_covariance() {
         let deviations = [0.5, 2.0, 1.0];
         let read: Vec<Complex64> = (0..6)
             .map(|k| Complex64::from_polar(1.0 + f64::from(k), 0.7 * f64::from(k * k)))
@@ -163,8 +163,8 @@ mod tests {
     }
 
     #[test]
-    fn what_channels_have_in_common_counts_once() {
-        // Two channels that read only one common signal, with three values: a constant, and one bin with real and imaginary part.
+    fn a_signal_common_to_two_channels_counts_once() {
+        // Two channels that read one common signal. It has three values: the constant, and real and imaginary part of one bin.
         let rows = [Complex64::new(3.0, -1.0), Complex64::new(0.0, 2.0)];
         let whitening = Whitening {
             channels: 2,
@@ -172,13 +172,13 @@ mod tests {
             weights: vec![1.0, 0.5, 1.0, 0.25],
             common: rows.to_vec(),
         };
-        // The second channel is the first times the shared row.
+        // In both bins the second channel is the first times its entry of L; whitening removes it.
         let z = Complex64::new(2.0, 5.0);
         let second = rows[1] * z;
         let mut column = vec![7.0, z.re, z.im, 21.0, second.re, second.im];
         whitening.apply(&mut column);
         assert_eq!(column, [7.0, 2.0, 5.0, 0.0, 0.0, 0.0]);
-        // A signal in the second channel alone is scaled by its own noise.
+        // A signal in the second channel alone is divided by its own standard deviation.
         let mut column = vec![0.0, 0.0, 0.0, 4.0, 8.0, -4.0];
         whitening.apply(&mut column);
         assert_eq!(column, [0.0, 0.0, 0.0, 2.0, 2.0, -1.0]);

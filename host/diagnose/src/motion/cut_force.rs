@@ -1,11 +1,11 @@
-//! The sampled force of a cut.
+//! The cutting force along a record, upsampled and at its samples.
 
-/// The force of a cut along the machine's axes, N.
+/// The cutting force along the machine's axes, N.
 #[derive(Clone, Debug)]
 pub(crate) struct CutForce {
-    /// Mean over each finer sample.
+    /// Mean over each interval of the upsampled grid.
     pub mean_n: [Vec<f64>; 3],
-    /// Force at the samples of the record, where forces are measured; 0 at samples beside an entry or exit.
+    /// Force at the samples of the record, if forces are measured; 0 at samples near the entry or exit of a tooth.
     pub sampled_n: [Vec<f64>; 3],
 }
 

@@ -1,4 +1,4 @@
-//! Free decays: the response of a record to its initial state.
+//! Free decays: the response of the baseline to its initial state.
 
 use std::borrow::Cow;
 
@@ -10,14 +10,14 @@ use crate::signal::grid::Grid;
 use quietcut_recording::Quantity;
 use quietcut_simulate::effect::Pickup;
 
-/// Free decays of the baseline in each channel, and the initial state of the record.
+/// Free decays of the baseline in each channel of a record, and the initial state.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Decays {
-    /// Unit responses, by channel, state and sample.
+    /// Responses to a unit initial value of one state variable, by channel, state variable and sample.
     columns: Vec<Vec<Vec<f64>>>,
-    /// By channel: samples that are not compared.
+    /// By channel: indices of samples that are not compared.
     skipped: Vec<Vec<usize>>,
-    /// Initial state of the record.
+    /// Fitted initial state of the structure at the first sample of the record.
     pub start: Vec<f64>,
 }
 
@@ -62,7 +62,7 @@ impl Decays {
         }
     }
 
-    /// Number of states.
+    /// Number of state variables.
     pub(crate) fn count(&self) -> usize {
         self.start.len()
     }
@@ -107,7 +107,7 @@ impl Decays {
             .collect();
     }
 
-    /// Unit responses of a channel, zero at the samples that are not compared.
+    /// Unit responses of a channel, set to zero at the samples that are not compared.
     fn compared(&self, channel: usize) -> Cow<'_, [Vec<f64>]> {
         let mut columns = Cow::Borrowed(&self.columns[channel][..]);
         if !self.skipped[channel].is_empty() {
@@ -120,7 +120,7 @@ impl Decays {
         columns
     }
 
-    /// Samples of a channel without the free decay.
+    /// Subtracts the free decay from the samples of a channel.
     pub(crate) fn without(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
         let mut without = samples.to_vec();
         for (column, start) in self.compared(channel).iter().zip(&self.start) {

@@ -1,9 +1,9 @@
-//! The force of a recorded cut along a known motion.
+//! The cutting force of a recorded cut along a known motion.
 //!
 //! The measured motion u determines the chip thickness of every tooth: h = min over earlier passes p of n·(u − u(t − pτ)) + (r_j − r_(j+p))
-//! sin γ + p f sin φ sin γ, because all earlier passes left the surface. The force of the cut is linear in most parameters of the process.
-//! It jumps between samples where teeth enter and leave: its mean over each finer sample drives the structure, with entry, exit and loss of
-//! contact at their instants.
+//! sin γ + p f sin φ sin γ, because the surface is what all earlier passes left. The cutting force is linear in most parameters of the
+//! process. It jumps between samples when teeth enter and leave. Its mean over each interval of the upsampled grid drives the structure,
+//! with entry, exit and loss of contact at their exact instants.
 
 use crate::criteria::{SPEED_MISMATCH, UNCERTAIN_SAMPLES};
 use crate::error::DiagnoseError;
@@ -15,27 +15,27 @@ use quietcut_recording::Recording;
 use quietcut_simulate::path::Motion;
 use quietcut_simulate::{Cutter, Effects, Spindle};
 
-/// Share of the feed in a chip, sin φ, down to which earlier surfaces are evaluated.
+/// Least sin φ, the share of the feed in the chip thickness, down to which the surfaces of earlier passes are evaluated.
 const SHALLOW: f64 = 0.1;
-/// Largest number of passes that a tooth skips.
-const MOST_JUMPED: usize = 24;
+/// Largest number of passes during which a tooth may miss the workpiece.
+const MOST_MISSED: usize = 24;
 
-/// A recorded cut.
+/// A recorded cut: the tool, its engagement and the spindle angle.
 #[derive(Clone, Debug)]
 pub(crate) struct RecordedCut {
-    /// The tool and its engagement.
+    /// The tool with its immersion and depth.
     pub cutter: Cutter,
-    /// The spindle angle.
+    /// The spindle angle over time.
     pub spindle_motion: SpindleMotion,
-    /// Samples per second.
+    /// Sample rate of the record, Hz.
     rate_hz: f64,
-    /// Samples of the record.
+    /// Number of samples of the record.
     count: usize,
-    /// Number of earlier passes that may have left the surface, of a cut whose teeth skip passes.
+    /// Number of earlier passes that may have left the surface, if teeth miss passes; `None` if only the last pass left it.
     passes: Option<usize>,
 }
 
-/// Immersion and feed of a recording, from its sidecar, else from the case.
+/// Immersion and feed of a recording: from its sidecar, otherwise from the case.
 ///
 /// # Errors
 /// The case has no cut.
@@ -51,7 +51,7 @@ pub(crate) fn cut_of(case: &Case, recording: &Recording) -> Result<Cut, Diagnose
 }
 
 impl RecordedCut {
-    /// The cut of a recording: its working point from the sidecar, the rest from the case with its extensions.
+    /// The cut of a recording: working point from the sidecar, the rest from the case with its extensions.
     ///
     /// # Errors
     /// No tool, material or cut in the case, no depth in the sidecar, no tachometer in the recording; or an extension that does not apply.
@@ -95,7 +95,7 @@ impl RecordedCut {
         })
     }
 
-    /// The chips along `motion`, whose samples are `finer` times as dense as those of the record, for this motion of the spindle.
+    /// The chips along `motion` for a given spindle motion. `motion` has `finer` samples per sample of the record.
     pub(crate) fn chips(
         &self,
         spindle_motion: &SpindleMotion,
@@ -109,32 +109,32 @@ impl RecordedCut {
             finer,
             passes: self.passes,
         };
-        // Without force sensors no force is compared at samples.
+        // Without force sensors, no force is compared at the samples of the record.
         Chips::new(&self.cutter, spindle_motion, motion, sampling, |sample| {
             with_force && !self.is_beside(sample as f64 / self.rate_hz)
         })
     }
 
-    /// Samples per second.
+    /// Sample rate of the record, Hz.
     pub(crate) fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Lets teeth skip passes as a tool with amplitude `swing_m` does. Near the ends of a slot, where the feed adds only the share
-    /// `SHALLOW` of itself to a chip, a cut ahead of the surface is caught up after swing / (share · feed) passes.
-    pub(crate) fn let_jump(&mut self, swing_m: f64) {
-        let jumped = swing_m / (SHALLOW * self.cutter.feed_per_tooth_m).max(f64::MIN_POSITIVE);
-        self.passes = Some((jumped.ceil() as usize).min(MOST_JUMPED) + 2);
+    /// Lets teeth miss passes, as with a tool that vibrates with the amplitude `amplitude_m`. Near the ends of a slot each pass adds only
+    /// the share `SHALLOW` of the feed to the chip, so that a tooth misses amplitude / (share · feed) passes after a deep cut.
+    pub(crate) fn let_miss(&mut self, amplitude_m: f64) {
+        let missed = amplitude_m / (SHALLOW * self.cutter.feed_per_tooth_m).max(f64::MIN_POSITIVE);
+        self.passes = Some((missed.ceil() as usize).min(MOST_MISSED) + 2);
     }
 
-    /// Number of samples in the first revolution, or in as many as the surface depends on: the record lacks the passes before it.
-    pub(crate) fn first_turn(&self) -> usize {
+    /// Number of samples in the first revolutions, whose chips depend on passes before the record.
+    pub(crate) fn first_revolutions(&self) -> usize {
         let passes = self.passes.unwrap_or(1).max(self.cutter.teeth.len());
-        let turns = passes as f64 / self.cutter.teeth.len() as f64;
-        ((turns * self.spindle_motion.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
+        let revolutions = passes as f64 / self.cutter.teeth.len() as f64;
+        ((revolutions * self.spindle_motion.turn_s() * self.rate_hz).ceil() as usize).min(self.count)
     }
 
-    /// True where a tooth enters or leaves within `UNCERTAIN_SAMPLES` samples of `t`.
+    /// True if a tooth enters or leaves within `UNCERTAIN_SAMPLES` samples of the time `t`.
     pub(crate) fn is_beside(&self, t: f64) -> bool {
         let near_rad = UNCERTAIN_SAMPLES / self.rate_hz * self.spindle_motion.speed_rad_per_s(t);
         self.cutter.teeth.iter().any(|tooth| {

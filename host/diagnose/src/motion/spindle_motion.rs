@@ -9,25 +9,24 @@ use crate::error::DiagnoseError;
 use quietcut_recording::Recording;
 use quietcut_simulate::{Fluctuation, Spindle};
 
-/// The spindle angle along a record.
+/// The spindle angle over the time of a record.
 #[derive(Clone, Debug)]
 pub(crate) struct SpindleMotion {
     spindle: Spindle,
     rpm: f64,
-    /// Angle at the beginning of the whole recording, where the phase of a fluctuation counts from as well.
+    /// Angle at the beginning of the whole recording, rad. The phase of a speed modulation also starts there.
     start_rad: f64,
     fluctuation: Option<Fluctuation>,
-    /// See [`Recording::since_s`].
+    /// Time from the beginning of the whole recording to the first sample, s: see [`Recording::since_s`].
     since_s: f64,
-    /// Times of the edges at immersion angle 0 of tooth 1, s.
+    /// Times at which tooth 1 passes immersion angle 0: edges of the tachometer, s.
     edges_s: Vec<f64>,
 }
 
 impl SpindleMotion {
-    /// Fits the spindle angle to the tachometer of a recording: constant speed, with the fluctuation of the case if there is one.
+    /// Fits the spindle angle to the tachometer of a recording: constant speed, with the speed modulation of the case if there is one.
     ///
-    /// # Errors
-    /// No tachometer, too few edges, or several per revolution that are not declared.
+    /// The recording has no tachometer channel, or its tachometer has too few edges.
     pub(crate) fn new(
         recording: &Recording,
         fluctuation: Option<Fluctuation>,
@@ -61,7 +60,7 @@ impl SpindleMotion {
         .fitted())
     }
 
-    /// The spindle angle from the same edges with another fluctuation.
+    /// The spindle angle fitted to the same edges with another speed modulation.
     pub(crate) fn with(&self, fluctuation: Fluctuation) -> Self {
         Self {
             fluctuation: Some(fluctuation),
@@ -70,12 +69,12 @@ impl SpindleMotion {
         .fitted()
     }
 
-    /// Least-squares fit of speed and start angle to the edges. The fluctuation depends on the speed only by its amplitude, so that three
-    /// iterations settle it.
+    /// Least-squares fit of speed and start angle to the edges. The speed modulation depends on the mean speed only through its amplitude,
+    /// so that three iterations converge.
     fn fitted(mut self) -> Self {
         let count = self.edges_s.len() as f64;
         for _ in 0..3 {
-            // At edge k the angle is 2πk: without the fluctuation it is a line in time.
+            // At edge k the angle is 2πk. Minus the modulation, the angle is linear in time.
             let modulation_s = |t: f64| self.modulation_s(t);
             let times: Vec<f64> = self.edges_s.iter().map(|t| t + modulation_s(*t)).collect();
             let mean_t = times.iter().sum::<f64>() / count;
@@ -103,27 +102,27 @@ impl SpindleMotion {
         })
     }
 
-    /// Mean speed, rev/min.
+    /// Mean spindle speed, rev/min.
     pub(crate) fn rpm(&self) -> f64 {
         self.rpm
     }
 
-    /// Immersion angle of tooth 1 at `t` after the first sample, rad.
+    /// Immersion angle of tooth 1 at time `t` after the first sample, rad.
     pub(crate) fn angle_rad(&self, t: f64) -> f64 {
         self.start_rad + self.spindle.angle_rad(self.since_s(t))
     }
 
-    /// Speed at `t` after the first sample, rad/s.
+    /// Spindle speed at time `t` after the first sample, rad/s.
     pub(crate) fn speed_rad_per_s(&self, t: f64) -> f64 {
         self.spindle.speed_at_rad_per_s(self.since_s(t))
     }
 
-    /// Time since the beginning of the whole recording at `t` after the first sample, s.
+    /// Time since the beginning of the whole recording, s, at time `t` after the first sample.
     pub(crate) fn since_s(&self, t: f64) -> f64 {
         self.since_s + t
     }
 
-    /// Regenerative delay at `t` for a pitch of `angle_rad`, s.
+    /// Regenerative delay at time `t` for a pitch of `angle_rad` between two teeth, s.
     pub(crate) fn delay_s(&self, t: f64, angle_rad: f64) -> f64 {
         self.spindle.delay_s(self.since_s(t), angle_rad)
     }
@@ -134,9 +133,10 @@ impl SpindleMotion {
     }
 }
 
-/// Times of rising edges, s: crossings of mid-range after the level was in the lower quarter, by linear interpolation.
+/// Times of rising edges, s. An edge is an upward crossing of the middle of the range after the level was in the lower quarter; its time is
+/// interpolated linearly.
 ///
-/// The device adapts its threshold on the way; here the range of the whole record is known.
+/// The device adapts its threshold to the signal while it runs; here the range of the whole record is known.
 fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
     let (low, high) = level
         .iter()
@@ -157,14 +157,14 @@ fn rises_s(level: &[f64], rate_hz: f64, since_s: f64) -> Vec<f64> {
     rises_s
 }
 
-/// The first edge of each revolution: the one after the gap of the wheel, else every `positions`-th.
+/// The first edge of each revolution: the one after the gap of the tachometer wheel, or every `positions`-th without a gap.
 fn firsts_of_turns(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64> {
     if positions <= 1 {
         return edges_s.to_vec();
     }
     let there = positions - missing;
     let intervals: Vec<f64> = edges_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    // The widest interval of the first revolution is the gap.
+    // The widest interval of the first revolution is the gap of the wheel.
     let first = if missing == 0 || there < 2 {
         0
     } else {
@@ -178,22 +178,22 @@ fn firsts_of_turns(edges_s: &[f64], positions: usize, missing: usize) -> Vec<f64
     edges_s.iter().skip(first).step_by(there).copied().collect()
 }
 
-/// Step of the frequency grid, as a share of one period per record.
+/// Step of the grid of modulation frequencies, in periods per record.
 const STEP: f64 = 0.2;
 
-/// A speed modulation, estimated from tachometers.
+/// A speed modulation estimated from tachometer edges.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpeedModulation {
-    /// Amplitude, frequency and phase.
+    /// Relative amplitude δ, frequency f_m and phase ψ of the modulation.
     pub fluctuation: Fluctuation,
     /// Standard deviations of δ, f_m in Hz and ψ in rad, from the residual of the edge times.
     pub deviation: [f64; 3],
 }
 
-/// The speed modulation that fits the edges of all records best; `None` if none is significant.
+/// The speed modulation that fits the tachometer edges of all records best; `None` if none is significant.
 ///
-/// Edge k comes at t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + constant. That is linear in all but the frequency; T₀ and
-/// the constant belong to each record.
+/// Edge k is at the time t with k T₀ = t + δ cos ψ·(1 − cos ωt)/ω + δ sin ψ·sin ωt/ω + constant. The equation is linear in all unknowns
+/// except the frequency ω. T₀ and the constant differ between records.
 pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<SpeedModulation> {
     let longest_s = spindle_motions
         .iter()
@@ -216,20 +216,22 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     let count = ((high_hz - low_hz) / step_hz).max(0.0) as usize;
     let (_, best_hz) = (0..=count)
         .map(|index| low_hz + step_hz * index as f64)
-        .map(|hertz| (nearest(spindle_motions, hertz).left, hertz))
+        .map(|hertz| (fit_modulation(spindle_motions, hertz).left, hertz))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     // Golden-section search about the best frequency of the grid.
     let (mut from, mut to) = (best_hz - step_hz, best_hz + step_hz);
     for _ in 0..40 {
         let third = 0.381_966 * (to - from);
-        if nearest(spindle_motions, from + third).left < nearest(spindle_motions, to - third).left {
+        if fit_modulation(spindle_motions, from + third).left
+            < fit_modulation(spindle_motions, to - third).left
+        {
             to -= third;
         } else {
             from += third;
         }
     }
     let frequency_hz = 0.5 * (from + to);
-    let found = nearest(spindle_motions, frequency_hz);
+    let found = fit_modulation(spindle_motions, frequency_hz);
     let gained = (found.without - found.left) / 3.0;
     let delta = found.along.hypot(found.across);
     let is_found = gained > LEAST_MODULATION_F_RATIO * found.left / free && delta < LARGEST_MODULATION;
@@ -243,11 +245,11 @@ pub(crate) fn speed_modulation(spindle_motions: &[&SpindleMotion]) -> Option<Spe
     })
 }
 
-/// Standard deviations of δ, f_m and ψ for edge times with the given variance, s².
+/// Standard deviations of δ, f_m in Hz and ψ in rad, if the edge times have this variance, s².
 fn deviation(
     spindle_motions: &[&SpindleMotion],
     frequency_hz: f64,
-    found: &Nearest,
+    found: &ModulationFit,
     variance: f64,
 ) -> [f64; 3] {
     let step_hz = 1e-4 * frequency_hz;
@@ -283,19 +285,19 @@ fn deviation(
         .map(|gradient| (gradient.transpose() * covariance * gradient)[0].max(0.0).sqrt())
 }
 
-/// Least-squares fit of a modulation of given frequency.
-struct Nearest {
-    /// δ cos ψ and δ sin ψ.
+/// Result of a least-squares fit of a modulation with given frequency.
+struct ModulationFit {
+    /// Amplitude components δ cos ψ (`along`) and δ sin ψ (`across`).
     along: f64,
     across: f64,
-    /// Residual sum of squares of the edge times, s², with and without the modulation.
+    /// Residual sum of squares of the edge times, s², with the modulation (`left`) and without it (`without`).
     left: f64,
     without: f64,
 }
 
-fn nearest(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> Nearest {
+fn fit_modulation(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> ModulationFit {
     let omega = TAU * frequency_hz;
-    // Products of (1 − cos)/ω, sin/ω and t, each without its line over the edges of its record.
+    // Inner products of (1 − cos ωt)/ω, sin(ωt)/ω and t at the edges, each without its linear trend in every record.
     let mut products = [[0.0; 3]; 3];
     for spindle_motion in spindle_motions {
         let columns = [
@@ -319,7 +321,7 @@ fn nearest(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> Nearest {
     } else {
         (0.0, 0.0)
     };
-    Nearest {
+    ModulationFit {
         along,
         across,
         left: without + along * ct + across * st,
@@ -327,7 +329,7 @@ fn nearest(spindle_motions: &[&SpindleMotion], frequency_hz: f64) -> Nearest {
     }
 }
 
-/// A function of the time of each edge, without its linear trend over the edges.
+/// Values of the function `of` at the edge times, without their linear trend in the number of the edge.
 fn without_line(edges_s: &[f64], of: impl Fn(f64) -> f64) -> Vec<f64> {
     let values: Vec<f64> = edges_s.iter().map(|t| of(*t)).collect();
     let count = values.len() as f64;
@@ -362,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn a_swing_is_found_from_edges_and_none_where_there_is_none() {
+    fn speed_modulation_is_found_only_if_the_edges_contain_it() {
         let truth = Fluctuation {
             delta: 0.012,
             frequency_hz: 1.7,
@@ -372,21 +374,21 @@ mod tests {
             let steady = Spindle::new(rpm);
             let spindle = fluctuation.map_or(steady, |fluctuation| steady.fluctuating(fluctuation));
             let times = (0..24).map(|k| spindle.time_s(TAU * f64::from(k) + start));
-            // Jitter of two microseconds, in a fixed disorder.
+            // Jitter of the edges: two microseconds, in a fixed irregular sequence.
             times
                 .enumerate()
                 .map(|(k, t)| t + 2e-6 * (7.3 * (k * k) as f64).sin())
                 .collect::<Vec<_>>()
         };
-        let swings = [
+        let modulated = [
             spindle_motion(edges(900.0, 0.4, Some(truth))),
             spindle_motion(edges(1233.0, 2.0, Some(truth))),
         ];
         let SpeedModulation {
             fluctuation: found,
             deviation,
-        } = speed_modulation(&swings.each_ref()).unwrap();
-        // Jitter of two microseconds against an amplitude δ/ω = 1.1 ms over 24 edges.
+        } = speed_modulation(&modulated.each_ref()).unwrap();
+        // The jitter of two microseconds is small against the amplitude δ/ω = 1.1 ms over 24 edges.
         assert!((found.delta / truth.delta - 1.0).abs() < 3e-3, "{found:?}");
         assert!(
             (found.frequency_hz - truth.frequency_hz).abs() < 2e-3,
@@ -399,12 +401,12 @@ mod tests {
             found.phase_rad - truth.phase_rad,
         ];
         for (error, deviation) in errors.iter().zip(deviation) {
-            // The error by the fixed disorder agrees with the stated standard deviation.
+            // The error from this jitter agrees with the stated standard deviation.
             assert!(error.abs() < 4.0 * deviation, "{errors:?} {deviation:?}");
             assert!(deviation < 1e-2, "{deviation:?}");
         }
         let spindle = Spindle::new(900.0).fluctuating(truth);
-        let known = swings[0].with(truth);
+        let known = modulated[0].with(truth);
         for i in 0..100 {
             let t = 0.016 * f64::from(i);
             let apart = known.angle_rad(t) - (spindle.angle_rad(t) - 0.4);

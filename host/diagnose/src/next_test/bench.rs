@@ -1,4 +1,4 @@
-//! The machine and its sensors in simulated tests.
+//! The machine and its sensors, for the simulation of proposed tests.
 
 use std::f64::consts::TAU;
 
@@ -16,53 +16,54 @@ use quietcut_recording::{Channel, Quantity, Recording, TestKind};
 
 /// Largest number of samples of a simulated test.
 const SAMPLES: f64 = 8192.0;
-/// Least and largest duration of a test of the structure, in periods of the slowest mode.
+/// Least and largest duration of a test, in periods of the lowest natural frequency.
 const PERIODS: [f64; 2] = [20.0, 60.0];
-/// Samples per period of the fastest mode.
+/// Samples per period of the highest natural frequency.
 const SAMPLES_PER_PERIOD: f64 = 24.0;
-/// Duration of the transient of a cut, in longest time constants of the structure: records are of full engagement.
+/// Duration of the simulated transient before a cut is compared, in longest time constants of the structure.
 const SETTLED: f64 = 12.0;
-/// Largest duration of that transient, in durations of the record.
+/// Largest duration of the simulated transient of a cut, in durations of the compared cut.
 const WAITED: f64 = 4.0;
 
-/// A channel of motion in the records.
+/// A channel of motion that the records contain.
 pub(super) struct MeasuredChannel {
     pub(super) name: String,
     quantity: Quantity,
-    /// Standard deviation of its noise; 0 if unknown.
+    /// Standard deviation of the channel's noise; 0 if unknown.
     deviation: f64,
 }
 
-/// The first of the recorded cuts.
+/// Working point of the first recorded cut.
 #[derive(Clone)]
 pub(super) struct CutSoFar {
     pub(super) rpm: f64,
     pub(super) depth_mm: f64,
-    /// Immersion and feed, from its sidecar, else from the case.
+    /// Immersion and feed: from the cut's sidecar, otherwise from the case.
     pub(super) cut: Cut,
 }
 
-/// A machine and its sensors.
+/// The machine, the sensors of its records, and the size of the tests that suit it.
 pub(super) struct Bench<'a> {
     pub(super) case: &'a Case,
     pub(super) baseline: Baseline<'a>,
     pub(super) channels: Vec<MeasuredChannel>,
-    /// Lowest and highest natural frequency, Hz.
+    /// Lowest and highest natural frequency of the baseline, Hz.
     pub(super) modes_hz: [f64; 2],
-    /// True if the force of a cut was measured.
+    /// True if a recorded cut has a channel of force.
     pub(super) has_force: bool,
-    /// Peak force of the tests of the structure, N; without a measured force the one that reaches the displacement of the records.
+    /// Peak force of tests of the structure, N: that of the records. If they have none, the force that reaches `largest_m` at the lowest
+    /// natural frequency.
     pub(super) force_n: f64,
-    /// Peak displacement of the records.
+    /// Largest displacement in the records, m.
     pub(super) largest_m: f64,
-    /// Duration of a test, s.
+    /// Standard duration of a test, s.
     pub(super) seconds: f64,
     pub(super) rate_hz: f64,
     pub(super) cut: Option<CutSoFar>,
 }
 
 impl<'a> Bench<'a> {
-    /// `None` if the machine cannot be simulated, or has no oscillating modes.
+    /// `None` if the case cannot be simulated, has no oscillating mode, or the records contain no channel of motion.
     pub(super) fn new(case: &'a Case, recordings: &[Recording], views: &[ResidualView]) -> Option<Self> {
         let baseline = Baseline::new(case).ok()?;
         let modes_hz = [baseline.lowest_hz()?, highest_hz(&baseline)?];
@@ -110,7 +111,7 @@ impl<'a> Bench<'a> {
         compliance(&self.baseline, 0.0)
     }
 
-    /// Standard deviation of the noise of each reading.
+    /// Standard deviation of each reading's noise: that of the same channel in the records, otherwise an assumed share of the reading.
     pub(super) fn deviations(&self, readings: &[Reading]) -> Vec<f64> {
         let of = |reading: &Reading| {
             let measured = self
@@ -125,12 +126,12 @@ impl<'a> Bench<'a> {
         readings.iter().map(of).collect()
     }
 
-    /// Duration of the transient of a cut, s.
+    /// Duration of the simulated transient before a cut is compared, s.
     pub(super) fn settled_s(&self) -> f64 {
         (SETTLED * self.baseline.slowest_decay_s()).min(WAITED * self.seconds)
     }
 
-    /// The quantities of the sensors, each once.
+    /// The quantities of the mounted sensors, each once.
     pub(super) fn quantities(&self) -> Vec<Quantity> {
         let mut all: Vec<Quantity> = Vec::new();
         for measured in &self.channels {
@@ -164,7 +165,7 @@ fn peak(channel: &Channel) -> f64 {
         .fold(0.0, |most: f64, value| value.abs().max(most))
 }
 
-/// The channels of motion, each name once.
+/// The channels of motion in the recordings, each name once.
 fn measured(
     baseline: &Baseline<'_>,
     recordings: &[Recording],
@@ -198,7 +199,7 @@ fn cut_so_far(case: &Case, recording: &Recording) -> Option<CutSoFar> {
     })
 }
 
-/// Standard deviation of the noise of a channel, the quadratic mean over the records; 0 if unknown.
+/// Standard deviation of a channel's noise: the quadratic mean over the records; 0 if unknown.
 fn deviation(views: &[ResidualView], name: &str) -> f64 {
     let known: Vec<f64> = views
         .iter()
@@ -214,7 +215,7 @@ fn highest_hz(baseline: &Baseline<'_>) -> Option<f64> {
     modes.map(|pole| pole.norm() / TAU).max_by(f64::total_cmp)
 }
 
-/// The largest compliance along an axis at a frequency, m/N.
+/// The largest |receptance| along an axis at `frequency_hz`, m/N.
 fn compliance(baseline: &Baseline<'_>, frequency_hz: f64) -> f64 {
     let receptance: Matrix3<Complex64> = baseline.receptance.at(TAU * frequency_hz);
     let along = baseline.axes.iter().map(|axis| receptance[(*axis, *axis)].norm());

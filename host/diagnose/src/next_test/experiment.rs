@@ -1,10 +1,10 @@
-//! Experiments on the machine, and their simulated readings.
+//! Experiments that can be proposed, and their simulated readings.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use super::bench::Bench;
-use super::reading::{Of, Reading, Sensors};
+use super::reading::{Reading, SensorOf, Sensors};
 use crate::conclusion::answer::NextTest;
 use crate::criteria::LARGEST_PROPOSED_MOTION;
 use quietcut_model::case::Case;
@@ -15,11 +15,11 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::rig::{Impact, Rig, Signal, Step};
 use quietcut_simulate::{Effects, Entry, Recorder, TachometerModel, VirtualCut};
 
-/// Smallest peak force of an impact, N.
-const LEAST_BLOW_N: f64 = 1.0;
-/// A test without its sensors.
+/// Smallest peak force of a proposed impact, N.
+const LEAST_IMPACT_N: f64 = 1.0;
+/// Excitation of a test: a force on the structure, or a cut.
 #[derive(Clone, Debug)]
-pub(super) enum Doing {
+pub(super) enum Excitation {
     /// A force on the structure at standstill.
     Rig { direction: Direction, signal: Signal },
     /// A stable cut.
@@ -31,16 +31,16 @@ pub(super) enum Doing {
     },
 }
 
-/// A test with its sample rate and effort.
+/// An excitation with its sample rate and effort.
 #[derive(Clone, Debug)]
 pub(super) struct Experiment {
-    pub(super) doing: Doing,
+    pub(super) excitation: Excitation,
     rate_hz: f64,
-    /// Effort relative to other tests.
+    /// Effort of the test relative to others; the proposal with the least effort is preferred.
     pub(super) effort: f64,
 }
 
-/// All experiments, with their effort.
+/// All experiments that can be proposed.
 pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
     let mut all = Vec::new();
     for direction in &bench.baseline.structure.directions {
@@ -50,11 +50,12 @@ pub(super) fn experiments(bench: &Bench<'_>) -> Vec<Experiment> {
     all
 }
 
-/// An impact, sweeps at three levels and over a longer time, and three levels at the lowest resonance.
+/// Tests of the structure along a direction: an impact, sweeps at three levels, a longer sweep, and a step sine at three levels at the
+/// lowest natural frequency.
 fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
     let [lowest_hz, highest_hz] = bench.modes_hz;
     let experiment = |signal: Signal, effort: f64| Experiment {
-        doing: Doing::Rig { direction, signal },
+        excitation: Excitation::Rig { direction, signal },
         rate_hz: bench.rate_hz,
         effort,
     };
@@ -80,19 +81,19 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
         experiment(sweep(3.0, 1.0), 1.3),
         experiment(sweep(1.0, 4.0), 1.5),
     ];
-    // The spectrum of a half sine has its first zero at 1.5/pulse, above the highest mode. The impact reaches the displacement of the
-    // records: x = ω·impulse/k.
+    // The spectrum of a half-sine pulse has its first zero at 1.5/pulse, which is above the highest mode. The impact reaches the
+    // displacement x = ω·impulse/k of the records.
     let pulse_s = 0.75 / highest_hz;
     let impulse_ns = bench.largest_m / (TAU * lowest_hz * bench.static_compliance());
-    let peak_n = (impulse_ns / (2.0 / PI * pulse_s)).max(LEAST_BLOW_N);
+    let peak_n = (impulse_ns / (2.0 / PI * pulse_s)).max(LEAST_IMPACT_N);
     if peak_n.is_finite() {
-        let blow = Impact {
+        let impact = Impact {
             start_s: 0.05 * bench.seconds,
             peak_n,
             pulse_s,
         };
         let signal = Signal::Impacts {
-            impacts: vec![blow],
+            impacts: vec![impact],
             seconds: bench.seconds,
         };
         all.push(experiment(signal, 0.9));
@@ -100,13 +101,13 @@ fn of_structure(bench: &Bench<'_>, direction: Direction) -> Vec<Experiment> {
     all
 }
 
-/// The recorded cut at other speeds, depths and feeds, and over a longer time.
+/// The recorded cut at its own and at other speeds, depths and feeds, and over a longer time.
 fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
     let Some(so_far) = &bench.cut else {
         return Vec::new();
     };
-    // Factors on speed, depth, feed and duration.
-    let some = [
+    // Factors on spindle speed, axial depth, feed per tooth and duration of the recorded cut.
+    let factors = [
         (1.0, 1.0, 1.0, 1.0),
         (0.8, 1.0, 1.0, 1.0),
         (1.25, 1.0, 1.0, 1.0),
@@ -116,9 +117,10 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
         (1.0, 1.0, 2.0, 1.0),
         (1.0, 1.0, 1.0, 4.0),
     ];
-    some.into_iter()
+    factors
+        .into_iter()
         .map(|(by_rpm, by_depth, by_feed, longer)| Experiment {
-            doing: Doing::Cut {
+            excitation: Excitation::Cut {
                 rpm: by_rpm * so_far.rpm,
                 depth_mm: by_depth * so_far.depth_mm,
                 feed_per_tooth_mm: by_feed * so_far.cut.feed_per_tooth_mm,
@@ -131,18 +133,18 @@ fn of_cuts(bench: &Bench<'_>) -> Vec<Experiment> {
 }
 
 impl Experiment {
-    /// The sensor sets of this test.
+    /// The sets of sensors with which this test can be made.
     pub(super) fn sensors(&self) -> Vec<Sensors> {
-        match self.doing {
-            Doing::Rig { .. } => vec![Sensors::Mounted, Sensors::Second],
-            Doing::Cut { .. } => vec![Sensors::Mounted, Sensors::Second, Sensors::Force],
+        match self.excitation {
+            Excitation::Rig { .. } => vec![Sensors::Mounted, Sensors::Second],
+            Excitation::Cut { .. } => vec![Sensors::Mounted, Sensors::Second, Sensors::Force],
         }
     }
 
-    /// Readings of all sensors if the machine is `case`; `None` if it cannot be simulated, or moves too far.
+    /// Readings of all sensors if `case` is the true machine; `None` if it cannot be simulated, or if the cut moves too far.
     pub(super) fn readings(&self, bench: &Bench<'_>, case: &Case) -> Option<Vec<Reading>> {
         let mounted = self.recording(bench, case)?;
-        // A second sensor beside the mounted one has none of its faults.
+        // A second sensor next to the mounted one has none of its faults: the extensions of sensors are removed.
         let mut faultless = case.clone();
         faultless.extensions.retain(|name, _| {
             name.parse()
@@ -151,7 +153,7 @@ impl Experiment {
         });
         let second = self.recording(bench, &faultless)?;
         let mut all = Vec::new();
-        for (recording, of) in [(&mounted, Of::Mounted), (&second, Of::Second)] {
+        for (recording, of) in [(&mounted, SensorOf::Mounted), (&second, SensorOf::Second)] {
             for measured_channel in &bench.channels {
                 let channel = recording
                     .channels
@@ -160,11 +162,11 @@ impl Experiment {
                 all.push((measured_channel.name.clone(), of, channel.samples.clone()));
             }
         }
-        if let Doing::Cut { .. } = self.doing {
+        if let Excitation::Cut { .. } = self.excitation {
             let (of, recording) = if bench.has_force {
-                (Of::Mounted, &mounted)
+                (SensorOf::Mounted, &mounted)
             } else {
-                (Of::Force, &second)
+                (SensorOf::Force, &second)
             };
             let forces = recording
                 .channels
@@ -172,9 +174,9 @@ impl Experiment {
                 .filter(|channel| channel.quantity == Quantity::Force);
             all.extend(forces.map(|channel| (channel.name.clone(), of, channel.samples.clone())));
         }
-        let from = match self.doing {
-            Doing::Rig { .. } => 0,
-            Doing::Cut { .. } => (bench.settled_s() * self.rate_hz) as usize,
+        let from = match self.excitation {
+            Excitation::Rig { .. } => 0,
+            Excitation::Cut { .. } => (bench.settled_s() * self.rate_hz) as usize,
         };
         let whole = all
             .iter()
@@ -190,14 +192,14 @@ impl Experiment {
     }
 
     fn recording(&self, bench: &Bench<'_>, case: &Case) -> Option<Recording> {
-        match &self.doing {
-            Doing::Rig { direction, signal } => {
+        match &self.excitation {
+            Excitation::Rig { direction, signal } => {
                 let mut rig = Rig::new(*direction, signal.clone(), self.rate_hz);
                 rig.measured = bench.quantities();
                 rig.effects = Effects::of_case(case).ok()?;
                 Some(rig.record(case.structure().ok()?, Path::new("next-test")).ok()?.0)
             }
-            Doing::Cut {
+            Excitation::Cut {
                 rpm,
                 depth_mm,
                 feed_per_tooth_mm,
@@ -239,7 +241,7 @@ impl Experiment {
         }
     }
 
-    /// The test as the answer contains it.
+    /// The test in the form of the answer.
     pub(super) fn described(&self, sensors: Sensors, distance: f64, why: String) -> NextTest {
         let plain = NextTest {
             kind: "",
@@ -254,8 +256,8 @@ impl Experiment {
             distance,
             why,
         };
-        match &self.doing {
-            Doing::Rig { direction, signal } => {
+        match &self.excitation {
+            Excitation::Rig { direction, signal } => {
                 let (kind, force_n, band_hz) = match signal {
                     Signal::Sweep {
                         first_hz,
@@ -268,9 +270,11 @@ impl Experiment {
                         steps.iter().map(|step| step.amplitude_n).collect(),
                         steps.first().map(|step| [step.frequency_hz; 2]),
                     ),
-                    Signal::Impacts { impacts, .. } => {
-                        ("hammer", impacts.iter().map(|blow| blow.peak_n).collect(), None)
-                    }
+                    Signal::Impacts { impacts, .. } => (
+                        "hammer",
+                        impacts.iter().map(|impact| impact.peak_n).collect(),
+                        None,
+                    ),
                     Signal::Tones { .. } => ("shaker", Vec::new(), None),
                     Signal::Release { force_n, .. } => ("free-decay", vec![*force_n], None),
                 };
@@ -283,7 +287,7 @@ impl Experiment {
                     ..plain
                 }
             }
-            Doing::Cut {
+            Excitation::Cut {
                 rpm,
                 depth_mm,
                 feed_per_tooth_mm,

@@ -1,9 +1,9 @@
 //! The experiment that separates confounded candidate models.
 //!
-//! Every equivalent candidate model is simulated in experiments on the machine ([`experiment`]). Their readings are compared in units of
-//! the noise, after the parameters of one model are fitted to the other ([`separation`]). The proposal is the least effort that separates
-//! all of them: A. C. Atkinson and V. V. Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62
-//! (1975), T-optimality.
+//! Every equivalent candidate model is simulated in all experiments ([`experiment`]). The readings of two models are compared in units of
+//! the noise, after the parameters of one are fitted to the readings of the other ([`separation`]). The proposal is the experiment with the
+//! least effort that separates all of them: A. C. Atkinson and V. V. Fedorov, The design of experiments for discriminating between two
+//! rival models, Biometrika 62 (1975), T-optimality.
 
 mod bench;
 mod experiment;
@@ -23,11 +23,11 @@ use crate::criteria::SEPARATING_DISTANCE;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
-/// An experiment with a set of sensors, and its separation.
+/// An experiment with a set of sensors, and the distance between the candidate models that it separates least.
 struct Proposal<'a> {
     experiment: &'a Experiment,
     sensors: Sensors,
-    /// The two candidate models that it separates least.
+    /// Difference of the two candidate models that the experiment separates least; `between` holds their indices.
     least: Difference,
     between: [usize; 2],
 }
@@ -45,10 +45,10 @@ pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagn
         .par_iter()
         .flat_map_iter(|experiment| proposals(&bench, experiment, &rivals))
         .collect();
-    let plain = |proposal: &&Proposal<'_>| proposal.least.squared >= SEPARATING_DISTANCE;
+    let separates = |proposal: &&Proposal<'_>| proposal.least.squared >= SEPARATING_DISTANCE;
     let best = proposals
         .iter()
-        .filter(plain)
+        .filter(separates)
         .min_by(|a, b| {
             let by_effort = a.effort().total_cmp(&b.effort());
             by_effort.then(b.least.squared.total_cmp(&a.least.squared))
@@ -65,7 +65,7 @@ pub(super) fn next_test(case: &Case, recordings: &[Recording], diagnosis: &Diagn
     )
 }
 
-/// Proposals of one experiment, with each set of sensors.
+/// Proposals of one experiment, one for each set of sensors; empty if a candidate model cannot be simulated in it.
 fn proposals<'a>(bench: &Bench<'_>, experiment: &'a Experiment, rivals: &[Rival<'_>]) -> Vec<Proposal<'a>> {
     let readings: Option<Vec<_>> = rivals
         .iter()

@@ -1,28 +1,28 @@
 //! The readings of the sensors in an experiment.
 
-/// A set of sensors.
+/// A set of sensors in a proposed test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sensors {
     /// The sensors of the records.
     Mounted,
-    /// These, and a second one at the tool beside each.
+    /// The sensors of the records, and a second one at the tool next to each.
     Second,
-    /// These, and a dynamometer.
+    /// The sensors of the records, and a dynamometer.
     Force,
 }
 
-/// The sensor of a reading.
+/// Which sensor a reading is of: one of the records, a second one next to it, or the dynamometer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Of {
+pub(super) enum SensorOf {
     Mounted,
     Second,
     Force,
 }
 
-/// Samples of one sensor.
+/// Simulated samples of one sensor.
 pub(super) struct Reading {
     pub(super) name: String,
-    pub(super) of: Of,
+    pub(super) of: SensorOf,
     pub(super) samples: Vec<f64>,
 }
 
@@ -47,16 +47,16 @@ impl Sensors {
 impl Reading {
     pub(super) fn is_read_by(&self, sensors: Sensors) -> bool {
         match self.of {
-            Of::Mounted => true,
-            Of::Second => sensors == Sensors::Second,
-            Of::Force => sensors == Sensors::Force,
+            SensorOf::Mounted => true,
+            SensorOf::Second => sensors == Sensors::Second,
+            SensorOf::Force => sensors == Sensors::Force,
         }
     }
 
     pub(super) fn described(&self) -> String {
         match self.of {
-            Of::Second => format!("a second sensor of {}", self.name),
-            Of::Mounted | Of::Force => self.name.clone(),
+            SensorOf::Second => format!("a second sensor of {}", self.name),
+            SensorOf::Mounted | SensorOf::Force => self.name.clone(),
         }
     }
 }

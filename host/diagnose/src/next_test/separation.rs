@@ -9,10 +9,11 @@ use crate::candidates::extension_tables::joined;
 use crate::conclusion::answer::{EstimatedCause, Figure, NINETY_PERCENT};
 use quietcut_model::case::Case;
 
-/// Least step of a parameter for differences of readings, as a share of it: the simulation is exact to 1e-9.
+/// Least step of a finite difference, as a share of its parameter. The simulation is accurate to 1e-9, so that the slope is accurate to
+/// 1e-5.
 const LEAST_STEP: f64 = 1e-4;
 
-/// A candidate model: the causes that act together.
+/// A candidate model in a comparison: the causes that act together.
 pub(super) struct Rival<'a> {
     pub(super) causes: &'a [EstimatedCause],
 }
@@ -20,24 +21,24 @@ pub(super) struct Rival<'a> {
 /// Readings of an experiment under a candidate model.
 pub(super) struct Predicted {
     readings: Vec<Reading>,
-    /// By parameter: readings with the parameter moved by a step, and that step in its standard deviations.
+    /// By parameter: readings with the parameter changed by a step, and that step in standard deviations of the parameter.
     moved: Vec<(Vec<Reading>, f64)>,
 }
 
-/// Distance of two candidate models.
+/// Distance between two candidate models in an experiment.
 #[derive(Clone, Debug)]
 pub(super) struct Difference {
-    /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², the smaller of the two directions; readings in standard deviations of their noise, δ in
-    /// those of the parameters.
+    /// min over δ of ‖y_A − y_B − J_B δ‖² + ‖δ‖², or the same with A and B exchanged if that is smaller. Readings y are in standard
+    /// deviations of their noise, δ in standard deviations of the parameters.
     pub(super) squared: f64,
-    /// The channel that differs most.
+    /// The channel in which the two models differ most.
     pub(super) channel: String,
-    /// Root mean square of its difference over the noise.
+    /// Root mean square of the difference in that channel, in standard deviations of its noise.
     pub(super) times_noise: f64,
 }
 
 impl Rival<'_> {
-    /// The readings of an experiment; `None` if it cannot be simulated with this candidate model, or diverges.
+    /// The readings of an experiment with this candidate model; `None` if the simulation fails or diverges.
     pub(super) fn simulated(&self, bench: &Bench<'_>, experiment: &Experiment) -> Option<Predicted> {
         let readings = experiment.readings(bench, &self.case(bench.case, None))?;
         let moved = self
@@ -51,7 +52,7 @@ impl Rival<'_> {
         Some(Predicted { readings, moved })
     }
 
-    /// Uncertain parameters: cause, key, step, and the step in standard deviations.
+    /// Uncertain parameters: index of the cause, key, step, and the step in standard deviations.
     fn steps(&self) -> Vec<(usize, &'static str, f64, f64)> {
         let of = |(index, cause): (usize, &EstimatedCause)| {
             let figures: Vec<(&'static str, Figure)> = cause
@@ -76,7 +77,7 @@ impl Rival<'_> {
         self.causes.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The case with these causes, with one parameter of one cause moved.
+    /// The case extended by these causes. `moved` changes one parameter: index of its cause, key, and step.
     fn case(&self, case: &Case, moved: Option<(usize, &'static str, f64)>) -> Case {
         let tables: Vec<(&str, toml::Table)> = self
             .causes
@@ -98,7 +99,8 @@ impl Rival<'_> {
     }
 }
 
-/// Adds to a number of a table, or of a list in it (`ratio_2` is the second of `ratio`). Keys that restate others are in no table.
+/// Adds `step` to the number `key` of a table, or to an element of a list (`ratio_2` is the second of `ratio`). A key that restates another
+/// parameter is not in the table and changes nothing.
 fn move_by(table: &mut toml::Table, key: &str, step: f64) {
     let add = |value: &mut toml::Value| {
         if let toml::Value::Float(number) = value {
@@ -120,10 +122,10 @@ fn move_by(table: &mut toml::Table, key: &str, step: f64) {
     }
 }
 
-/// Distance of `one` and `other` for these sensors.
+/// Distance between the models `one` and `other` with these sensors.
 pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sensors: Sensors) -> Difference {
-    let there = nearest(bench, one, other, sensors);
-    let back = nearest(bench, other, one, sensors);
+    let there = difference(bench, one, other, sensors);
+    let back = difference(bench, other, one, sensors);
     if there.squared <= back.squared {
         there
     } else {
@@ -131,17 +133,17 @@ pub(super) fn between(bench: &Bench<'_>, one: &Predicted, other: &Predicted, sen
     }
 }
 
-/// Difference of `truth` from `model` after the parameters of `model` are fitted within their uncertainty.
-fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sensors) -> Difference {
+/// Difference between the readings of `truth` and of `model`, after the parameters of `model` are fitted within their uncertainty.
+fn difference(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sensors) -> Difference {
     let deviations = bench.deviations(&truth.readings);
-    let heard: Vec<usize> = (0..truth.readings.len())
+    let compared: Vec<usize> = (0..truth.readings.len())
         .filter(|index| truth.readings[*index].is_read_by(sensors))
         .collect();
     let stacked = |a: &[Reading], b: &[Reading]| -> DVector<f64> {
-        let values = heard.iter().flat_map(|&index| {
+        let values = compared.iter().flat_map(|&index| {
             let pairs = a[index].samples.iter().zip(&b[index].samples);
             let difference: Vec<f64> = pairs.map(|(a, b)| (a - b) / deviations[index]).collect();
-            // Sensors have unknown offsets.
+            // Sensors have unknown offsets: the mean is not compared.
             let mean = difference.iter().sum::<f64>() / difference.len().max(1) as f64;
             difference.into_iter().map(move |value| value - mean)
         });
@@ -156,7 +158,7 @@ fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sen
     let steps: Vec<f64> = model.moved.iter().map(|(_, step)| *step).collect();
     let (left, squared) = least(&apart, &columns, &steps);
     let mut from = 0;
-    let sizes = heard.iter().map(|&index| {
+    let sizes = compared.iter().map(|&index| {
         let count = truth.readings[index].samples.len();
         let rms = left.rows(from, count).norm() / (count.max(1) as f64).sqrt();
         from += count;
@@ -173,7 +175,7 @@ fn nearest(bench: &Bench<'_>, truth: &Predicted, model: &Predicted, sensors: Sen
     }
 }
 
-/// Residual of `apart`, and the minimum of ‖apart − Jδ‖² + Σ (step δ)².
+/// Residual of `apart` − Jδ at the minimum of ‖apart − Jδ‖² + Σ (step δ)², and that minimum. `columns` are those of J.
 pub(super) fn least(apart: &DVector<f64>, columns: &[DVector<f64>], steps: &[f64]) -> (DVector<f64>, f64) {
     if columns.is_empty() {
         return (apart.clone(), apart.norm_squared());

@@ -1,4 +1,4 @@
-//! The proposed test is carried out and must separate what was confounded.
+//! Carries out the proposed test: it must separate the confounded candidate models.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn case(name: &str) -> Case {
     Case::read(Path::new(&path)).unwrap()
 }
 
-/// Noise of 1 % on every channel.
+/// Adds noise of 1 % of the root mean square to every channel.
 fn noisy(mut recording: Recording, seed: u64) -> Recording {
     let noise = Noise {
         relative: 0.01,
@@ -26,7 +26,7 @@ fn noisy(mut recording: Recording, seed: u64) -> Recording {
     recording
 }
 
-/// Two stable cuts with measured displacement and without force, after their transient.
+/// Two stable cuts with measured displacement and without measured force, recorded after their transient.
 fn cuts(case: &Case, effects: &Effects) -> Vec<Recording> {
     [(900.0, 0.2), (1230.0, 0.15)]
         .into_iter()
@@ -58,13 +58,13 @@ fn names(diagnosis: &Diagnosis) -> Vec<&'static str> {
 }
 
 #[test]
-fn parameters_take_what_they_can_within_what_is_known_of_them() {
+fn the_distance_is_a_minimum_over_parameters_within_their_uncertainty() {
     use nalgebra::DVector;
     let apart = DVector::from_vec(vec![3.0, -1.0, 2.0, 0.5]);
     let column = DVector::from_vec(vec![1.0, 0.0, 1.0, -1.0]);
     for step in [0.1, 1.0, 30.0] {
         let (_, squared) = least(&apart, std::slice::from_ref(&column), &[step]);
-        // Brute-force minimum.
+        // The minimum by evaluation on a grid of δ.
         let brute = (-4000..=4000)
             .map(|n| 1e-3 * f64::from(n))
             .map(|delta| (&apart - &column * delta).norm_squared() + (step * delta).powi(2))
@@ -79,7 +79,7 @@ fn parameters_take_what_they_can_within_what_is_known_of_them() {
 }
 
 #[test]
-fn a_blow_separates_a_gain_from_the_cutting_force_as_it_was_said_to() {
+fn the_proposed_impact_separates_a_gain_from_the_cutting_force() {
     let case = case("kuka-kr90-half");
     let gains = Effects::parse(["sensor-gain=1.2"]).unwrap();
     let mut records = cuts(&case, &gains);
@@ -104,10 +104,10 @@ fn a_blow_separates_a_gain_from_the_cutting_force_as_it_was_said_to() {
         effects: gains,
         ..Rig::new(direction, signal, 2048.0)
     };
-    let (blow, _) = rig
-        .record(case.structure().unwrap(), Path::new("blow.csv"))
+    let (impact, _) = rig
+        .record(case.structure().unwrap(), Path::new("impact.csv"))
         .unwrap();
-    records.push(noisy(blow, 3));
+    records.push(noisy(impact, 3));
     let answer = diagnose(&case, &records, &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Cause, "{:?}", names(&answer));
     assert_eq!(names(&answer), ["sensor-gain"]);

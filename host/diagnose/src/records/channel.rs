@@ -1,4 +1,4 @@
-//! One channel of a record: its measured and its predicted samples.
+//! One channel of a record: its measured samples and their prediction by the baseline.
 
 use nalgebra::Matrix3;
 use num_complex::Complex64;
@@ -13,18 +13,19 @@ pub(crate) struct Observed {
     pub pickup: Pickup,
     /// Measured samples, SI units.
     pub measured: Vec<f64>,
-    /// Prediction of the baseline along the measured motion.
+    /// Samples that the baseline predicts along the measured motion, SI units.
     pub predicted: Vec<f64>,
-    /// Standard deviation of the channel's white noise.
+    /// Standard deviation of the channel's white noise, SI units.
     pub deviation: f64,
-    /// Averaging time of the sensor, s: one sample for accelerations where the velocity jumps, else zero.
+    /// Averaging time of the channel, s: one sampling interval for accelerations whose velocity jumps, otherwise zero.
     pub(super) mean_s: f64,
-    /// Receptance at the sensor, where the baseline has mode shapes there: see [`Record::seen_by`](super::record::Record::seen_by).
+    /// Receptance at the sensor, if the baseline has mode shapes there; otherwise `None`: see
+    /// [`Record::seen_by`](super::record::Record::seen_by).
     pub(super) seen: Option<Vec<Matrix3<Complex64>>>,
 }
 
 impl Observed {
-    /// Measured minus predicted samples.
+    /// Residual: measured minus predicted samples.
     pub(crate) fn residual(&self) -> Vec<f64> {
         self.measured
             .iter()
@@ -33,8 +34,8 @@ impl Observed {
             .collect()
     }
 
-    /// Transfer function from displacement to this channel, without its weights: (iω)^q e^(−iωτ) sinc(ωT/2), where q is the number of
-    /// derivatives, τ the delay and T the averaging time.
+    /// Transfer function from the displacement to the reading of this channel, without the channel's weights: (iω)^q e^(−iωτ) sinc(ωT/2),
+    /// where q is the number of derivatives, τ the delay and T the averaging time.
     pub(crate) fn factor(&self, omega: f64) -> Complex64 {
         let half = 0.5 * omega * self.mean_s;
         let mean = if half == 0.0 { 1.0 } else { half.sin() / half };
@@ -44,7 +45,7 @@ impl Observed {
     }
 }
 
-/// The axis with the largest weight in a channel.
+/// The axis with the largest weight in a channel; `None` if all weights are zero.
 pub(crate) fn main_axis(channel: &Observed) -> Option<usize> {
     (0..3)
         .filter(|axis| channel.pickup.weights[*axis] != 0.0)

@@ -1,4 +1,4 @@
-//! Checks that refuse a recording which cannot be compared, with a message that says what is required.
+//! Refuses recordings that cannot be compared, with a message that says what is required.
 
 use crate::baseline::Baseline;
 use crate::criteria::{
@@ -66,8 +66,8 @@ pub(crate) fn record(
     Ok(())
 }
 
-/// Ratios by which a wrong unit scales a channel, the tolerance of each as a difference of logarithms, and the unit that was probably
-/// meant.
+/// Ratios by which a wrong unit scales a channel, each with its tolerance as a difference of logarithms, and the words for the unit that
+/// was probably meant.
 const UNITS: [(f64, f64, &str); 6] = [
     (4.448, POUND_TOLERANCE, "4.45: pounds of force for N"),
     (1e3, UNIT_TOLERANCE, "a thousand: mm, kN or g for m, N or kg"),
@@ -77,10 +77,11 @@ const UNITS: [(f64, f64, &str); 6] = [
     (9.806_65, UNIT_TOLERANCE, "9.81: g for m/s²"),
 ];
 
-/// Refuses a channel whose size disagrees with the prediction by the ratio of a wrong unit.
+/// Refuses a channel whose ratio to the prediction is that of a wrong unit.
 ///
-/// `response` is the response to the forces alone that the baseline predicts for `measured`; `by_noise` is the energy of the response to
-/// the noise of the force sensors. The ratio is the least-squares factor between the two; it counts only where they correlate.
+/// `response` is the response to the forces alone that the baseline predicts, `measured` the samples of the channel, `by_noise` the energy
+/// of the response to force-sensor noise. The ratio is the least-squares factor between the first two; it is evaluated only if they
+/// correlate.
 pub(crate) fn unit(
     path: &std::path::Path,
     name: &str,
@@ -94,14 +95,14 @@ pub(crate) fn unit(
     if own <= LEAST_ENERGY_OVER_FORCE_NOISE * by_noise || whole <= 0.0 {
         return Ok(());
     }
-    // The response to a constant force carries no information on the vibration.
+    // The response to a constant force contains no information on the vibration.
     if spread(response).powi(2) * response.len() as f64 > LEAST_ENERGY_OVER_FORCE_NOISE * by_noise {
         far_off(path, name, response, measured)?;
     }
     let factor = cross.abs() / own;
     let alike = cross * cross / (own * whole);
     let likely = likely(factor);
-    // A ratio that no known unit has requires a higher correlation.
+    // A ratio that belongs to no known unit requires a higher correlation.
     let least_alike = if likely.is_some() {
         LEAST_CORRELATION_OF_KNOWN_UNIT
     } else {
@@ -119,8 +120,9 @@ pub(crate) fn unit(
     ))
 }
 
-/// The result of the checks of a cut: the first refusal, or success if one channel passes. If one unit is right, so are the others within
-/// the limits of [`far_off`]: a wrong edge coefficient alone changes a small axial force by a factor of ten.
+/// Result of the unit checks of a cut: success if one channel passes, otherwise the first refusal. If one unit is right, a ratio of another
+/// channel within the limits of [`far_off`] is not a wrong unit: a wrong edge coefficient alone changes a small axial force by a factor of
+/// ten.
 pub(crate) fn unless_one_is_right(
     checked: impl IntoIterator<Item = Result<(), DiagnoseError>>,
 ) -> Result<(), DiagnoseError> {
@@ -131,9 +133,9 @@ pub(crate) fn unless_one_is_right(
     checked.into_iter().collect()
 }
 
-/// Refuses a channel whose amplitude differs from its prediction by a factor that no machine reaches, whatever its waveform. Offsets of
-/// sensors do not count. Too large is a channel that varies more than its prediction with the mean, because the variation by evenly pitched
-/// teeth in a slot nearly vanishes.
+/// Refuses a channel whose amplitude differs from its prediction by a factor that no machine reaches, whatever its waveform. Sensor offsets
+/// are removed. A channel is too large if its variation exceeds the prediction including the mean, because evenly pitched teeth in a slot
+/// give almost no variation.
 pub(crate) fn far_off(
     path: &std::path::Path,
     name: &str,
@@ -156,18 +158,18 @@ pub(crate) fn far_off(
     ))
 }
 
-/// Standard deviation.
+/// Standard deviation of the samples from their mean.
 fn spread(samples: &[f64]) -> f64 {
     let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
     rms(&samples.iter().map(|x| x - mean).collect::<Vec<_>>())
 }
 
-/// The wrong unit that a gain may stand for, instead of a fault of the sensor.
+/// The wrong unit that a fitted gain may stand for; `None` if the gain is near no unit's ratio.
 pub(crate) fn unit_of_gain(gain: f64) -> Option<&'static str> {
     unit_within(gain.abs(), |_| GAIN_UNIT_TOLERANCE)
 }
 
-/// The unit that was probably meant if a channel is larger or smaller than predicted by `factor`.
+/// The unit that was probably meant if a channel is larger or smaller than predicted by `factor`; `None` if no known unit has this ratio.
 fn likely(factor: f64) -> Option<&'static str> {
     unit_within(factor, |share| share)
 }
@@ -184,8 +186,8 @@ fn said(likely: Option<&str>) -> String {
     likely.map_or_else(String::new, |meant| format!(" It is about {meant}."))
 }
 
-/// The level at which a channel is clipped: many flat tops of three and more equal samples at an end of its range, or a single one with
-/// steep flanks.
+/// The level at which a channel is clipped: at one end of its range it has many flat tops of at least three equal samples, or a single one
+/// with steep flanks. `None` without clipping.
 fn clipped(samples: &[f64]) -> Option<f64> {
     let (low, high) = samples
         .iter()
@@ -201,7 +203,7 @@ fn clipped(samples: &[f64]) -> Option<f64> {
         .map(|pair| (pair[1] - pair[0]).abs())
         .filter(|step| *step > 1e-9 * range)
         .fold(f64::INFINITY, f64::min);
-    // A digital channel has few levels: flat tops of a slow signal on coarse levels are no clipping.
+    // A digital signal has few levels and may be zero for long: flat tops at zero are no clipping.
     [high, low].into_iter().find(|end| {
         let at = |x: &f64| (x - end).abs() <= 1e-9 * range;
         if *end != 0.0 && has_cliff(samples, at, *end, resolution) {
@@ -223,8 +225,9 @@ fn clipped(samples: &[f64]) -> Option<f64> {
     })
 }
 
-/// True if a flat top no longer than an impact has steep flanks. Two samples beside a smooth top that three samples share, the signal is at
-/// most twelve levels lower: 9c below the peak of a parabola with curvature c that stays within a level, and one for rounding.
+/// True if a flat top no longer than an impact has steep flanks. A smooth peak that is flat over three samples is at most twelve levels
+/// lower two samples beside them: a parabola with curvature c stays within one level over three samples and falls by 9c up to there, and
+/// one level is added for rounding.
 fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f64) -> bool {
     let (mut first, mut steepest) = (0, 0.0_f64);
     while first < samples.len() {
@@ -246,7 +249,7 @@ fn has_cliff(samples: &[f64], at: impl Fn(&f64) -> bool, end: f64, resolution: f
         && steepest > CLIPPED_IMPACT_STEP * written_resolution(samples, end)
 }
 
-/// The value of the last digit of `end`, if all samples are written with as many digits as the longest has.
+/// The value of the last digit of `end`, if all samples have as many digits as the longest one.
 fn written_resolution(samples: &[f64], end: f64) -> f64 {
     let digits = |x: &f64| {
         let text = format!("{x:e}");
@@ -262,8 +265,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_clipped_blow_is_enough_and_a_coarse_one_is_not_clipped() {
-        let blow = |n: i32| {
+    fn one_clipped_impact_is_refused_and_coarse_levels_are_not_clipping() {
+        let impact = |n: i32| {
             let phase = f64::from(n - 700) / 24.0;
             if (0.0..1.0).contains(&phase) {
                 (std::f64::consts::PI * phase).sin()
@@ -272,14 +275,14 @@ mod tests {
             }
         };
         let noise = |n: i32| 1e-3 * (37.0 * f64::from(n)).sin();
-        let whole: Vec<f64> = (0..20_000).map(|n| blow(n) + noise(n)).collect();
+        let whole: Vec<f64> = (0..20_000).map(|n| impact(n) + noise(n)).collect();
         assert_eq!(clipped(&whole), None);
         let cut: Vec<f64> = whole.iter().map(|x| x.min(0.8)).collect();
         assert_eq!(clipped(&cut), Some(0.8));
-        // On 64 levels the top of an impact is flat, but its flanks fall level by level.
+        // With 64 levels the top of an impact is flat, but its flanks fall level by level.
         let coarse: Vec<f64> = whole.iter().map(|x| (64.0 * x).round() / 64.0).collect();
         assert_eq!(clipped(&coarse), None);
-        // A sample with three digits is written with finer steps beside the top than at the top.
+        // With few decimal digits, the steps of the numbers are finer beside the top than at the top.
         for digits in [2, 3] {
             let written = whole.iter().map(|x| format!("{x:.digits$e}").parse().unwrap());
             assert_eq!(clipped(&written.collect::<Vec<f64>>()), None);
@@ -290,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_tops_are_clipping_and_tones_are_not() {
+    fn repeated_flat_tops_are_clipping_and_tones_are_not() {
         let tone: Vec<f64> = (0..5000).map(|n| (0.05 * f64::from(n)).sin()).collect();
         assert_eq!(clipped(&tone), None);
         let cut: Vec<f64> = tone.iter().map(|x| x.clamp(-2.0, 0.8)).collect();

@@ -1,4 +1,4 @@
-//! Prediction of the channels of a cut along its motion.
+//! Predicts the channels of a cut along its estimated motion.
 
 use crate::baseline::Baseline;
 use crate::criteria::CLOSED_LOOP_SETTLED;
@@ -10,15 +10,15 @@ use crate::records::{amplification, checks, motion_estimate};
 use crate::signal::noise::rms;
 use quietcut_recording::{Quantity, Recording};
 
-/// Iterations in which force and motion settle: the force determines the motion, and the motion the chip thickness.
+/// Iterations between force and motion: the force determines the motion, and the motion determines the chip thickness and so the force.
 const ROUNDS: usize = 4;
-/// Largest number of iterations along the motion of a model. They end when the motion is within [`CLOSED_LOOP_SETTLED`] of its closed loop.
+/// Largest number of iterations if a candidate model supplies the motion. They end earlier if the motion is within [`CLOSED_LOOP_SETTLED`]
+/// of the closed-loop prediction.
 const ROUNDS_OF_A_MODEL: usize = 8;
 
-/// The record with the prediction of all channels of a cut, and with the motion that the residual corrects.
+/// Completes the record of a cut: predicts all channels, and corrects the motion by the residual.
 ///
-/// # Errors
-/// A cut that the case cannot describe, or a channel of impossible size.
+/// The case cannot describe the cut, or the size of a channel is impossible.
 pub(super) fn predicted(
     mut record: Record,
     baseline: &Baseline<'_>,
@@ -52,7 +52,7 @@ pub(super) fn predicted(
     };
     for round in 0..rounds {
         if round == 1 && record.amplifies {
-            cutting.cut.let_jump(record.motion.swing_m());
+            cutting.cut.let_miss(record.motion.swing_m());
             compare_without_ends(&mut record, &cutting.cut);
         }
         if round > 0 {
@@ -84,28 +84,28 @@ pub(super) fn predicted(
         if round == 0 && record.clean.is_none() {
             check_units(&record)?;
         }
-        let off = record.off_the_closed_loop();
-        // In the first iteration along the motion of a model, the force still is that along the measured motion.
+        let off = record.distance_from_closed_loop();
+        // In the first iteration with the motion of a candidate model, the force is still that along the measured motion.
         let is_along = (round > 0 || record.clean.is_none()) && !record.amplifies;
         motion_estimate::learn(&mut record, baseline, &force, is_along.then_some(&slopes));
         if record.clean.is_some() && is_along && off < CLOSED_LOOP_SETTLED {
             break;
         }
     }
-    // The regressors of causes are differences from the force along the final motion.
+    // The regressors of causes are differences from the force along the final motion, which is computed here.
     cutting.follow(&record.motion);
     record.cut = Some(cutting);
     Ok(record)
 }
 
-/// Refuses channels whose size cannot be that of this cut. The first prediction has no motion: measured forces are close to those by the
-/// feed alone, but regeneration may amplify the motion.
+/// Refuses channels whose size cannot be that of this cut. The first prediction has no motion. Measured forces are close to those by the
+/// feed alone and are compared with them; motion is only checked roughly, because regeneration may amplify it.
 fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     let mut forces = Vec::new();
     for (index, channel) in record.channels.iter().enumerate() {
         let mut response = record.decays.without(index, &channel.predicted);
         let mut measured = channel.measured.clone();
-        // Skipped samples are set to the measured value.
+        // Samples that are not compared were set to the measured value.
         for &sample in &record.skipped[index] {
             (response[sample], measured[sample]) = (0.0, 0.0);
         }
@@ -120,8 +120,8 @@ fn check_units(record: &Record) -> Result<(), DiagnoseError> {
     checks::unless_one_is_right(forces)
 }
 
-/// Leaves out the first revolution, and the last of all but short records.
+/// Excludes the first revolution from the comparison and, unless the record is short, the last.
 fn compare_without_ends(record: &mut Record, cut: &RecordedCut) {
-    let (turn, count) = (cut.first_turn(), record.grid.count());
-    record.compared = turn..if count > 4 * turn { count - turn } else { count };
+    let (ends, count) = (cut.first_revolutions(), record.grid.count());
+    record.compared = ends..if count > 4 * ends { count - ends } else { count };
 }

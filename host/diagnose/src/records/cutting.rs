@@ -12,22 +12,22 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::Cutter;
 use quietcut_simulate::path::Motion;
 
-/// A recorded cut with the force of the baseline along a motion.
+/// A recorded cut with the cutting force of the baseline along a motion.
 pub(crate) struct Cutting {
-    /// The recorded cut.
+    /// Tool, engagement and spindle angle of the cut.
     pub cut: RecordedCut,
-    /// The chips along the motion.
+    /// The chips of every tooth along the motion.
     chips: Chips,
-    /// The force of the baseline along the motion.
+    /// The cutting force of the baseline along the motion.
     pub force: CutForce,
     finer: usize,
-    /// True where forces are measured.
+    /// True if the record has a channel of cutting force.
     with_force: bool,
 }
 
 impl Cutting {
-    /// The cut of a recording along `motion`, whose samples are `finer` times as dense as those of the record; `with_force` where
-    /// forces are measured.
+    /// The cut of a recording along `motion`, which has `finer` samples per sample of the record. `with_force` is true if forces are
+    /// measured.
     ///
     /// # Errors
     /// As [`RecordedCut::new`].
@@ -49,8 +49,8 @@ impl Cutting {
         })
     }
 
-    /// Samples of a channel that are not compared. Forces and accelerations jump where a tooth enters or leaves, and the tachometer leaves
-    /// open on which side of the jump a nearby sample lies.
+    /// Indices of the samples of a channel that are not compared. Forces and accelerations jump when a tooth enters or leaves, and the
+    /// tachometer leaves open on which side of the jump a nearby sample lies.
     pub(super) fn skipped(&self, channel: &Observed) -> Vec<usize> {
         if !matches!(channel.pickup.quantity, Quantity::Force | Quantity::Acceleration) {
             return Vec::new();
@@ -59,7 +59,7 @@ impl Cutting {
         (0..channel.measured.len()).filter(is_beside).collect()
     }
 
-    /// The force linearized about the motion of the chips.
+    /// The cutting force linearized about the motion along which the chips are computed.
     pub(crate) fn mean_slopes(&self) -> MeanSlopes {
         self.chips.mean_slopes(&self.cut.cutter, &self.cut.spindle_motion)
     }
@@ -72,12 +72,12 @@ impl Cutting {
         self.force = self.force_of(&self.cut.cutter, motion);
     }
 
-    /// The force of another tool along the motion of the chips.
+    /// The cutting force of another tool with the same chips. `motion` is that of the chips.
     pub(crate) fn force_of(&self, cutter: &Cutter, motion: &Motion) -> CutForce {
         self.chips.force(cutter, &self.cut.spindle_motion, motion)
     }
 
-    /// The force of the baseline's tool with another motion of the spindle or of the tool.
+    /// The cutting force of the baseline's tool along another spindle motion or another motion of the tool, with new chips.
     pub(crate) fn force_along(&self, spindle_motion: &SpindleMotion, motion: &Motion) -> CutForce {
         self.cut
             .chips(spindle_motion, motion, self.finer, self.with_force)

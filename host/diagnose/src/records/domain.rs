@@ -1,4 +1,4 @@
-//! The quantity in which a record is compared with the baseline.
+//! The quantity in which a record is compared with the baseline: motion or force.
 
 use crate::baseline::Baseline;
 use crate::error::DiagnoseError;
@@ -7,18 +7,16 @@ use quietcut_recording::{Quantity, Recording, TestKind};
 /// The quantity in which a record is compared with the baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Domain {
-    /// The force is the input and the motion is predicted: y − H·(F − f_r).
+    /// The force F is the input, and motion is compared: y − H·(F − f_r).
     Response,
-    /// The motion is the input (`input = ["x"]`, or a structure without stiffness) and the force is predicted:
-    /// F − (M ẍ + C ẋ + K x + f_r).
+    /// The motion is the input (`input = ["x"]`, or a structure without stiffness), and force is compared: F − (M ẍ + C ẋ + K x + f_r).
     Force,
 }
 
 impl Domain {
     /// The domain of a recording, from its kind, its input and its channels.
     ///
-    /// # Errors
-    /// A missing channel, or a recording without a known excitation.
+    /// The recording lacks a channel or has no known excitation.
     pub(super) fn of(baseline: &Baseline<'_>, recording: &Recording) -> Result<Self, DiagnoseError> {
         let has = |quantity: Quantity| {
             recording

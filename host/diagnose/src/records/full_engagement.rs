@@ -1,10 +1,10 @@
-//! The part of a recorded cut with full engagement.
+//! The segment of a recorded cut with full engagement.
 //!
-//! A case describes a tool at full immersion and depth. Recordings of real cuts begin and end in air, and on its way in and out the tool
-//! crosses a face of the workpiece, where the case does not define the chips. So only the part with full engagement is compared. A
-//! revolution is in air if its vibration is small both against the other revolutions of the recording and against the response of the
-//! baseline to the feed alone: the level of a cut that grows into chatter exceeds that of the feed by far, and revolutions with the chips
-//! of the feed alone are no air.
+//! A case describes a tool at full immersion and depth. Recordings of real cuts begin and end in air, and during entry and exit the tool
+//! crosses a face of the workpiece, where the case does not define the chips. Therefore only the segment with full engagement is compared.
+//! A revolution is in air if its vibration is small both against the other revolutions of the recording and against the response of the
+//! baseline to the feed alone. The second condition is needed because chatter exceeds the response to the feed by far: before chatter has
+//! grown, revolutions are small against later ones without being in air.
 
 use std::borrow::Cow;
 use std::f64::consts::TAU;
@@ -27,14 +27,13 @@ use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::effect::Pickup;
 use quietcut_simulate::{Cutter, Passage, Spindle};
 
-/// Angles per revolution at which the chips are evaluated.
+/// Number of angles per revolution at which the cutting force is evaluated.
 const ANGLES: usize = 512;
 
-/// The recordings without the parts that lack full engagement, and a sentence about each that was shortened. Recordings with full
-/// engagement throughout, and those of other tests, stay as they are.
+/// The recordings, each shortened to its segment of full engagement, and one warning for each that was shortened or could not be examined.
+/// Recordings with full engagement throughout, and those of other tests, stay as they are.
 ///
-/// # Errors
-/// A recording with too few revolutions of full engagement.
+/// A recording has too few revolutions of full engagement.
 pub(crate) fn in_full_engagement<'a>(
     case: &Case,
     recordings: &'a [Recording],
@@ -97,7 +96,7 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
         0 => 0.0,
         start => start as f64 + (ENTRY_MARGIN * way).max(engaged_after) + 1.0,
     };
-    // A recording may stop at the end of the cut, before the vibration has decayed. Chatter stays loud until the tool has left.
+    // A recording may end with the cut, before the vibration has decayed. Chatter stays large until the tool has left.
     let to = if cut.end == levels.count && cut.end - last <= LEAST_AIR_AT_ENDS {
         f64::INFINITY
     } else {
@@ -111,7 +110,7 @@ fn range(baseline: &Baseline<'_>, recording: &Recording) -> Option<Range<usize>>
     Some(from..to.max(from))
 }
 
-/// The tool in its cut; `None` if a required value is missing, which another check reports.
+/// The tool in its cut; `None` if a required value is missing or wrong, which the preparation of the record reports as an error.
 fn cutter(baseline: &Baseline<'_>, recording: &Recording) -> Option<Cutter> {
     let case = baseline.case;
     let depth_mm = recording.sidecar.cut?.axial_depth_mm?;
@@ -120,7 +119,8 @@ fn cutter(baseline: &Baseline<'_>, recording: &Recording) -> Option<Cutter> {
     baseline.effects.cutter(cutter).ok()
 }
 
-/// Response of the baseline to the chips of the feed alone: harmonics of the revolution of force, N, and of displacement, m.
+/// Response of the baseline to the chips of the feed alone: harmonics of the spindle frequency `omega`, rad/s, in force, N, and
+/// displacement, m.
 struct Forced {
     omega: f64,
     harmonics: Vec<[Vector3<Complex64>; 2]>,
@@ -149,7 +149,7 @@ impl Forced {
         Self { omega, harmonics }
     }
 
-    /// Standard deviation of a channel over a revolution, from the harmonics below half its sample rate.
+    /// Standard deviation of a channel over a revolution, in its SI unit, from the harmonics below half the sample rate.
     fn level(&self, pickup: &Pickup, rate_hz: f64) -> f64 {
         let squares = self.harmonics.iter().enumerate().map(|(index, [force, x])| {
             let omega = (index + 1) as f64 * self.omega;
@@ -168,7 +168,7 @@ impl Forced {
     }
 }
 
-/// Cutting force of a rigid tool without runout, N.
+/// Cutting force of a rigid tool without runout at a spindle angle, N.
 fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
     let arc = cutter.exit_rad - cutter.start_rad;
     cutter
@@ -188,11 +188,11 @@ fn force_n(cutter: &Cutter, angle_rad: f64) -> Vector3<f64> {
         .sum()
 }
 
-/// Standard deviation of each channel in each revolution over that in the cut. The reference is the median of the revolutions, or the
-/// response to the feed alone where chatter makes the median larger.
+/// Level of each channel in each revolution: its standard deviation over a reference. The reference is the median over the revolutions, or
+/// the response to the feed alone if that is smaller, as in chatter.
 struct Levels {
     count: usize,
-    /// True if the median exceeds the response to the feed by the factor of chatter.
+    /// True if the median of some channel exceeds the response to the feed by the factor `CHATTER_LEVEL`.
     chatters: bool,
     /// Levels by channel and revolution.
     of: Vec<Vec<f64>>,
@@ -201,7 +201,7 @@ struct Levels {
 }
 
 impl Levels {
-    /// `None` if no channel exceeds its noise enough to show air.
+    /// Computes the levels from a recording; `None` if no channel exceeds its noise enough to show air.
     fn of(baseline: &Baseline<'_>, recording: &Recording, turn_s: f64, forced: &Forced) -> Option<Self> {
         let rate_hz = recording.sample_rate_hz;
         let per_turn = turn_s * rate_hz;
@@ -221,10 +221,11 @@ impl Levels {
                 .map(|turn| [turn, turn + 1].map(|turn| (turn as f64 * per_turn) as usize))
                 .map(|[from, to]| deviation(&channel.samples[from..to], noise))
                 .collect();
-            let (usual, fed) = (median(&mut revolutions.clone()), forced.level(&pickup, rate_hz));
-            let in_cut = usual.min(fed);
+            let (median_level, feed_level) =
+                (median(&mut revolutions.clone()), forced.level(&pickup, rate_hz));
+            let in_cut = median_level.min(feed_level);
             if in_cut > AIR_OVER_NOISE * noise {
-                levels.chatters |= usual > CHATTER_LEVEL * fed;
+                levels.chatters |= median_level > CHATTER_LEVEL * feed_level;
                 levels
                     .of
                     .push(revolutions.iter().map(|level| level / in_cut).collect());
@@ -238,9 +239,9 @@ impl Levels {
         self.of.iter().map(|of| of[turn]).fold(f64::INFINITY, f64::min)
     }
 
-    /// The ranges of revolutions in air.
+    /// Ranges of successive revolutions in air.
     fn in_air(&self) -> Vec<Range<usize>> {
-        let mut stretches = Vec::new();
+        let mut in_air = Vec::new();
         let mut turn = 0;
         while turn < self.count {
             let from = turn;
@@ -254,14 +255,15 @@ impl Levels {
                 LEAST_AIR_WITHIN
             };
             if turn - from >= fewest && (from > 0 || !self.grows_from_rest()) {
-                stretches.push(from..turn);
+                in_air.push(from..turn);
             }
             turn += 1;
         }
-        stretches
+        in_air
     }
 
-    /// True if the channels that are small in the first revolution grow at once, as a resonance does when a cut begins with the recording.
+    /// True if all channels that are small in the first revolution grow in the second, as the vibration does when a cut begins with the
+    /// recording.
     fn grows_from_rest(&self) -> bool {
         self.of
             .iter()
@@ -271,7 +273,7 @@ impl Levels {
     }
 }
 
-/// Standard deviation after the noise variance is subtracted.
+/// Standard deviation of the samples, with the noise variance subtracted.
 fn deviation(samples: &[f64], noise: f64) -> f64 {
     let count = samples.len().max(1) as f64;
     let mean = samples.iter().sum::<f64>() / count;
@@ -279,13 +281,13 @@ fn deviation(samples: &[f64], noise: f64) -> f64 {
     (square - noise * noise).max(0.0).sqrt()
 }
 
-/// The longest range of revolutions between the given ones; `None` if none is given.
-fn longest_gap(stretches: &[Range<usize>], count: usize) -> Option<Range<usize>> {
-    if stretches.is_empty() {
+/// The longest range of revolutions between the given ranges in air, of `count` revolutions; `None` if none is in air.
+fn longest_gap(in_air: &[Range<usize>], count: usize) -> Option<Range<usize>> {
+    if in_air.is_empty() {
         return None;
     }
-    let starts = std::iter::once(0).chain(stretches.iter().map(|stretch| stretch.end));
-    let ends = stretches.iter().map(|stretch| stretch.start).chain([count]);
+    let starts = std::iter::once(0).chain(in_air.iter().map(|air| air.end));
+    let ends = in_air.iter().map(|air| air.start).chain([count]);
     starts.zip(ends).map(|(from, to)| from..to).max_by_key(Range::len)
 }
 
@@ -297,7 +299,8 @@ mod tests {
     use crate::{Options, diagnose};
     use quietcut_simulate::{Entry, VirtualCut};
 
-    /// Time of the tool through a face at 900 rev/min with two teeth and a feed of 0.15 mm per tooth, s: its radius over the feed rate.
+    /// Time in which the tool crosses a face of the workpiece at 900 rev/min with two teeth and a feed of 0.15 mm per tooth, s: tool radius
+    /// over feed rate.
     const WAY_S: f64 = 6.35 / (0.3 * 15.0);
     const SECONDS: f64 = 8.0;
     const AIR_S: f64 = 0.2;
@@ -319,14 +322,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_is_in_full_cut() {
+    fn the_segment_found_is_in_full_engagement() {
         use Quantity::{Acceleration, Displacement, Force};
         let ramp = Entry::Ramp { seconds: 1.0 };
         for (name, depth_mm, entry, measured, noise) in [
             (SLOT, 1.0, Entry::Feed, &[Force, Displacement][..], 0.005),
             (SLOT, 1.0, Entry::Feed, &[Displacement], 0.005),
             (SLOT, 1.0, Entry::Feed, &[Acceleration], 0.05),
-            // Chatter grows over the whole cut.
+            // At 3 mm chatter grows over the whole cut.
             (SLOT, 3.0, Entry::Feed, &[Displacement], 0.005),
             (SLOT, 1.0, ramp, &[Displacement], 0.005),
             ("kuka-kr90-acetal", 1.0, Entry::Feed, &[Force, Acceleration], 0.02),
@@ -336,7 +339,8 @@ mod tests {
             let range = range(&Baseline::new(&case).unwrap(), &recording).unwrap();
             let [from_s, to_s] = [range.start, range.end].map(|sample| recording.time_s(sample));
             println!("{name} {depth_mm} mm {entry:?} {measured:?}: {from_s} to {to_s} s");
-            // The tool touches, and is in air again, at AIR_S from the ends. Slow free decays after the exit look like a part of the cut.
+            // The tool first touches the workpiece at `AIR_S` from the start of the recording, and leaves it at `AIR_S` from the end. Slow
+            // free decays after the exit resemble a part of the cut.
             let way_s = if entry == ramp { 1.0 } else { WAY_S };
             let touches = [AIR_S, SECONDS - AIR_S];
             assert!(from_s >= touches[0] + way_s && from_s < touches[0] + 1.6 * WAY_S);
@@ -345,11 +349,11 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_that_fills_the_recording_is_left_as_it_is() {
+    fn a_recording_without_air_is_not_shortened() {
         for (depth_mm, measured) in [
             (1.0, Quantity::Displacement),
             (1.0, Quantity::Acceleration),
-            // Grows into chatter.
+            // At 4 mm the vibration grows into chatter.
             (4.0, Quantity::Displacement),
         ] {
             let case = case(SLOT, "");
@@ -365,22 +369,23 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_is_diagnosed_where_it_is_in_full_cut() {
-        // Modulation and wear count from the start of the recording, not from that of full engagement.
-        let swings = "\n[extension.speed-fluctuation]\ndelta = 0.01\nfrequency_hz = 0.7\nphase_deg = 40.0\n";
-        let wears = "\n[extension.wear]\nrelative_rate_per_s = 0.1\n";
-        let (cut, believed) = (case(SLOT, &[swings, wears].concat()), case(SLOT, swings));
+    fn a_cut_is_diagnosed_in_its_segment_of_full_engagement() {
+        // Speed modulation and wear are functions of the time from the start of the recording, not from the start of full engagement.
+        let modulation =
+            "\n[extension.speed-fluctuation]\ndelta = 0.01\nfrequency_hz = 0.7\nphase_deg = 40.0\n";
+        let wear = "\n[extension.wear]\nrelative_rate_per_s = 0.1\n";
+        let (cut, believed) = (case(SLOT, &[modulation, wear].concat()), case(SLOT, modulation));
         let measured = [Quantity::Displacement];
         let recording = recorded(&cut, entering(Entry::Feed, 1.0, SECONDS), &measured, 0.005);
-        let asked = |case: &Case| {
+        let diagnosed = |case: &Case| {
             let recordings = std::slice::from_ref(&recording);
             let diagnosis = diagnose(case, recordings, &Options::default()).unwrap();
             let said = &diagnosis.warnings[0];
             assert!(said.starts_with("cut.csv: full engagement from 1.9"), "{said}");
             diagnosis
         };
-        assert_eq!(asked(&cut).outcome, Outcome::None);
-        let diagnosis = asked(&believed);
+        assert_eq!(diagnosed(&cut).outcome, Outcome::None);
+        let diagnosis = diagnosed(&believed);
         let [cause] = &diagnosis.causes[..] else {
             panic!("{:?}", diagnosis.causes)
         };
@@ -392,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_cut_that_is_too_short_is_refused() {
+    fn a_segment_with_too_few_revolutions_is_refused() {
         let case = case(SLOT, "");
         let short = entering(Entry::Feed, 1.0, 2.0 * (AIR_S + WAY_S) + 0.2);
         let recording = recorded(&case, short, &[Quantity::Displacement], 0.005);

@@ -1,4 +1,4 @@
-//! Recordings made ready, each beside what the baseline predicts of it.
+//! Recordings prepared for comparison, each with the prediction of the baseline.
 //!
 //! The files build on each other from the top to the bottom: `domain` and `channel`; `checks` and `full_engagement`, which refuse or
 //! shorten recordings; `cutting`; `record`; `motion_estimate` and `amplification`; `response_prediction` and `cut_prediction`;

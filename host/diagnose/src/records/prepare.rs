@@ -1,8 +1,8 @@
-//! The one place where a record is built, in stages that each return a new value.
+//! Builds records, in stages that each return a new value.
 //!
 //! 1. [`opened`]: channels, transforms and transfer functions of a recording that passed its checks.
-//! 2. The prediction of the baseline, and with it the motion: [`response_prediction`] of a test of the structure,
-//!    [`cut_prediction`] of a cut, [`motion_estimate`] where forces are compared.
+//! 2. The prediction of the baseline, and with it the motion: [`response_prediction`] for a test of the structure,
+//!    [`cut_prediction`] for a cut, [`motion_estimate`] if forces are compared.
 //! 3. [`checked`]: a record whose channels have the size that the baseline predicts.
 
 use crate::baseline::Baseline;
@@ -20,13 +20,12 @@ use crate::signal::noise::{BANDS, quiet_floor, rms, white_floor};
 use quietcut_recording::{Quantity, Recording, TestKind};
 use quietcut_simulate::path::Motion;
 
-/// Least number of finer samples per sample of a cut: its force jumps where teeth enter and leave.
+/// Least oversampling of a cut's record: its force jumps when teeth enter and leave.
 const FINER_IN_CUTS: usize = 8;
 
-/// A recording beside the prediction of the baseline.
+/// A recording with the prediction of the baseline, ready for comparison.
 ///
-/// # Errors
-/// A recording that cannot be compared: too short, clipped, without a required channel, or of a kind without a known excitation.
+/// The recording cannot be compared: too short, clipped, without a required channel, or of a kind without a known excitation.
 pub(super) fn prepare(
     baseline: &Baseline<'_>,
     recording: &Recording,
@@ -52,11 +51,11 @@ fn is_cut(recording: &Recording) -> bool {
     recording.sidecar.kind == Some(TestKind::Cutting)
 }
 
-/// A record without prediction: its channels, transforms and transfer functions.
+/// A record before its prediction: channels, transforms and transfer functions.
 fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Result<Record, DiagnoseError> {
     let domain = Domain::of(baseline, recording)?;
     let is_cut = recording.sidecar.kind == Some(TestKind::Cutting);
-    // The cut model supplies the force of a cut; measured forces are compared with it.
+    // The model predicts the force of a cut; measured forces are compared with it.
     let force_n = if is_cut {
         std::array::from_fn(|_| Vec::new())
     } else {
@@ -66,11 +65,12 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     checks::record(baseline, recording, &channels)?;
     let highest_hz = highest_hz(recording);
     let rate_hz = recording.sample_rate_hz;
-    // Harmonics of nonlinear terms up to the sixteenth stay below half the finer rate.
+    // Harmonics of nonlinear restoring forces up to the sixteenth of `highest_hz` stay below half the upsampled rate.
     let finer = ((32.0 * highest_hz / rate_hz).ceil() as usize)
         .clamp(if is_cut { FINER_IN_CUTS } else { 1 }, 8)
         .next_power_of_two();
-    // The circular convolution wraps the end of a cut around to its beginning. There it is a free decay, which is subtracted.
+    // Padding in longest time constants. In a cut it may be shorter: the circular convolution wraps its end around to its beginning, where
+    // it is a free decay, which is subtracted.
     let decays = if is_cut { 2.0 } else { 8.0 };
     let room_s = decays * baseline.slowest_decay_s();
     let grid = Grid::new(recording.len(), rate_hz, room_s, finer);
@@ -105,7 +105,7 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
         closed: None,
         highest_hz,
         lowest_hz: baseline.lowest_hz().unwrap_or(0.0),
-        // Forces of a cut have harmonics up to half the sample rate.
+        // The forces of a cut have harmonics up to half the sample rate.
         band_hz: if is_cut {
             0.5 * rate_hz
         } else {
@@ -128,12 +128,12 @@ fn opened(baseline: &Baseline<'_>, recording: &Recording, known: Known) -> Resul
     Ok(record)
 }
 
-/// The record, unless the size of a channel cannot be that of the baseline. Of a cut only channels of motion are checked here; its
-/// forces were checked before the motion was known.
+/// Returns the record unless the size of a channel cannot be that of the baseline. In a cut only channels of motion are checked here; its
+/// forces were checked in the first prediction.
 fn checked(record: Record) -> Result<Record, DiagnoseError> {
     let is_cut = record.kind == Some(TestKind::Cutting);
     let checked = |(index, channel): (usize, &Observed)| {
-        // Along an axis without force, a small cross-sensitivity exceeds the prediction.
+        // Along an axis without force, a small cross-axis sensitivity of a sensor exceeds the prediction.
         let axis = main_axis(channel)?;
         if record.force_n[axis].is_empty() || is_cut && channel.pickup.quantity == Quantity::Force {
             return None;
@@ -154,7 +154,7 @@ fn checked(record: Record) -> Result<Record, DiagnoseError> {
     Ok(record)
 }
 
-/// Energy Σ y² of a channel's response to the noise of the force sensors, over the samples of the record.
+/// Energy Σ y² of a channel's response to force-sensor noise, over the samples of the record.
 fn energy_by_force_noise(record: &Record, channel: usize) -> f64 {
     let power = record.power_by_force_noise(channel);
     power.iter().sum::<f64>() / BANDS as f64 * record.grid.count() as f64
@@ -188,7 +188,7 @@ fn floor_n(force_n: &[f64], kind: Option<TestKind>) -> f64 {
     }
 }
 
-/// Sensor locations in a sidecar that mean the tool tip.
+/// Values of `at` in a sidecar that mean the tool tip.
 const TOOL_TIP: [&str; 5] = ["tool-tip", "tool tip", "tip", "tcp", "tool"];
 
 fn elsewhere(recording: &Recording) -> Vec<String> {
@@ -214,7 +214,7 @@ fn channels(baseline: &Baseline<'_>, recording: &Recording, domain: Domain) -> V
             let pickup = baseline.pickup(&channel.name)?;
             let axes_known = (0..3).all(|axis| pickup.weights[axis] == 0.0 || baseline.axes.contains(&axis));
             let is_force = pickup.quantity == Quantity::Force;
-            // The force of a cut is an output as well.
+            // In a cut the force is an output too, and is compared.
             let compared =
                 is_force == (domain == Domain::Force) || recording.sidecar.kind == Some(TestKind::Cutting);
             let is_mean = baseline.velocity_jumps && pickup.quantity == Quantity::Acceleration;

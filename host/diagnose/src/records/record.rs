@@ -1,4 +1,4 @@
-//! One recording beside the prediction of the baseline.
+//! A record: one recording with the prediction of the baseline.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -19,70 +19,70 @@ use crate::signal::noise::{BANDS, floor_between_lines, rms, white_floor_beside};
 use quietcut_recording::{Quantity, TestKind};
 use quietcut_simulate::path::{Motion, restoring_along};
 
-/// By axis of force: response of a channel per newton at the bins of the finer samples; empty for an axis without response.
+/// By axis of the force: response of a channel per newton at the bins of the upsampled spectrum; empty for an axis without response.
 pub(crate) type Responses = [Vec<Complex64>; 3];
 
-/// Noise-free samples of the channels, as a better model predicts them.
+/// Noise-free samples of the channels, which an extended case predicts.
 #[derive(Clone, Debug)]
 pub(crate) struct Clean {
-    /// Samples by channel.
+    /// Noise-free samples, by channel.
     readings: Vec<Vec<f64>>,
-    /// Standard deviation of the noise of each channel.
+    /// Standard deviation of each channel's measurement noise.
     deviations: Vec<f64>,
 }
 
-/// One recording beside the prediction of the baseline. No room after this one changes it.
+/// One recording with the prediction of the baseline. Rooms after `records` do not change it.
 pub(crate) struct Record {
     /// File of the recording.
     pub path: PathBuf,
-    /// TestKind of the test.
+    /// Kind of the test, from the sidecar.
     pub kind: Option<TestKind>,
-    /// Quantity in which it is compared.
+    /// Quantity in which the record is compared: motion or force.
     pub domain: Domain,
     /// Channels whose sensors are not at the tool tip.
     pub elsewhere: Vec<String>,
-    /// Transforms of the record.
+    /// Time and frequency grid of the record, with its transforms.
     pub grid: Grid,
     /// Channels that are compared.
     pub channels: Vec<Observed>,
     /// Forces that excite the structure along the machine's axes, N; empty for an axis without force.
     pub force_n: [Vec<f64>; 3],
-    /// Noise floor of each force as a standard deviation of white noise, N: noise of the sensor and aliasing.
+    /// Noise floor of each force as a standard deviation of white noise, N: sensor noise and aliased force.
     pub force_deviation_n: [f64; 3],
-    /// Estimated motion: measured at frequencies where the measurement is more certain than the model, else predicted.
+    /// Estimated motion: at each frequency the measured one or the predicted one, whichever is more certain.
     pub motion: Motion,
-    /// Spectra of the displacement at the samples of the record, continued smoothly beyond both ends. The continuation adds only free
-    /// decays.
+    /// Spectra of the estimated displacement at the samples of the record, m, continued smoothly beyond both ends. The continuation adds
+    /// only free decays.
     pub displacement: [Vec<Complex64>; 3],
-    /// By channel, of a cut: samples of the estimated motion, with aliasing.
+    /// By channel, in a cut: samples of the estimated motion, with aliasing, in the unit of the channel.
     pub readings: Vec<Vec<f64>>,
-    /// Frequency below which 99.5 % of the power of the motion lies, Hz.
+    /// Frequency below which 99.5 % of the power of each channel of motion lies, Hz.
     pub highest_hz: f64,
     /// Lowest natural frequency of the baseline, Hz; 0 without oscillating modes.
     pub lowest_hz: f64,
     /// Highest frequency at which the record is compared, Hz.
     pub band_hz: f64,
-    /// Receptance H(iω) of the baseline at the bins of the finer samples, m/N. In the domain of force: dynamic stiffness at the bins of the
-    /// samples, N/m.
+    /// Receptance H(iω) of the baseline, m/N, at the bins of the upsampled spectrum. In the force domain: dynamic stiffness, N/m, at the
+    /// bins of the samples.
     pub transfer: Vec<Matrix3<Complex64>>,
-    /// Responses of each channel.
+    /// By channel: response per newton of force.
     pub(super) responses: Vec<Responses>,
-    /// Samples that are compared. Those before them only determine the chips that follow. At the end of a cut the motion is less certain,
-    /// if its sensors measure derivatives.
+    /// Range of the samples that are compared. Samples before it only determine later chips. Near the end of a cut the motion is less
+    /// certain if its sensors measure velocity or acceleration.
     pub compared: Range<usize>,
-    /// By channel: samples that are not compared.
+    /// By channel: indices of samples that are not compared.
     pub skipped: Vec<Vec<usize>>,
-    /// Free decays of the baseline in the channels.
+    /// Free decays of the baseline in each channel.
     pub decays: Decays,
-    /// The cut, if the record is of one.
+    /// The cut with its force, if the record is of a cut.
     pub cut: Option<Cutting>,
-    /// By channel, of a cut: prediction of the baseline in closed loop.
+    /// By channel, in a cut: prediction of the baseline in closed loop, in which the predicted motion determines the chips.
     pub(super) closed: Option<Vec<Vec<f64>>>,
-    /// Noise-free samples that determine the motion, if a better model supplies them.
+    /// Noise-free samples that determine the motion instead of the measured ones, if an extended case supplies them.
     pub clean: Option<Clean>,
-    /// True of a cut near chatter, whose motion is taken as measured (see `amplification`).
+    /// True for a cut near chatter, whose motion is taken as measured (see `amplification`).
     pub(crate) amplifies: bool,
-    /// By axis, of a cut: weight of the measured motion in the estimated one, at the bins of the samples.
+    /// By axis, in a cut: weight of the measured motion in the estimated one, 0 to 1, at the bins of the samples.
     pub(crate) measured_share: [Vec<f64>; 3],
 }
 
@@ -91,12 +91,12 @@ pub(crate) struct Record {
 pub(crate) struct Known {
     /// Noise-free samples of the channels.
     pub(crate) clean: Option<Clean>,
-    /// Whether the cut is near chatter; `None` to determine it from the record.
+    /// True if the cut is near chatter; `None` if the record must show it.
     pub(crate) amplifies: Option<bool>,
 }
 
 impl Record {
-    /// Power of a channel's response to the noise of the force sensors, in bands up to half the sample rate: the mean of σ² |H|² in each.
+    /// Noise variance of a channel by the noise of the force sensors, in bands up to half the sample rate: the mean of σ² |H|² in each.
     pub(super) fn power_by_force_noise(&self, channel: usize) -> [f64; BANDS] {
         let per_band = std::f64::consts::PI * self.grid.rate_hz() / BANDS as f64 / self.grid.omega(1);
         let from = |band: usize| (band as f64 * per_band).round() as usize;
@@ -107,14 +107,14 @@ impl Record {
             forces
                 .filter(|(deviation_n, _)| **deviation_n > 0.0)
                 .map(|(deviation_n, response)| {
-                    let heard = response.get(bins.clone()).unwrap_or_default();
-                    deviation_n * deviation_n * heard.iter().map(|bin| bin.norm_sqr()).sum::<f64>() / count
+                    let response = response.get(bins.clone()).unwrap_or_default();
+                    deviation_n * deviation_n * response.iter().map(|bin| bin.norm_sqr()).sum::<f64>() / count
                 })
                 .sum()
         })
     }
 
-    /// True if the motion along `axis` exceeds the noise.
+    /// True if a force acts along `axis`, or if a channel that reads `axis` exceeds its noise.
     pub(crate) fn moves(&self, axis: usize) -> bool {
         !self.motion.x[axis].is_empty()
             && (self.channels.iter().any(|channel| {
@@ -123,13 +123,13 @@ impl Record {
             }) || !self.force_n[axis].is_empty())
     }
 
-    /// Samples of a channel's response to forces along the machine's axes, given as spectra at the bins of the samples or of the finer
-    /// samples.
+    /// Samples of a channel's response to forces along the machine's axes. The forces are spectra at the bins of the samples or of the
+    /// upsampled signal.
     pub(crate) fn read_response(&self, force: &[Option<Vec<Complex64>>; 3], channel: usize) -> Vec<f64> {
         self.read_by(force, &self.responses[channel], channel)
     }
 
-    /// [`Self::read_response`] with other responses than those of the channel.
+    /// [`Self::read_response`] with the given `responses` instead of those of the channel.
     pub(crate) fn read_by(
         &self,
         force: &[Option<Vec<Complex64>>; 3],
@@ -156,8 +156,8 @@ impl Record {
         }
     }
 
-    /// The delay of a channel that reads steps, as the acceleration of a cut has them. It is applied in time, and the responses of the
-    /// channel are without it.
+    /// Delay, s, of a channel of acceleration in a cut, which reads steps. It is applied in the time domain, and the channel's `responses`
+    /// do not contain it. Zero for other channels.
     fn step_delay_s(&self, channel: &Observed) -> f64 {
         let reads_steps =
             self.kind == Some(TestKind::Cutting) && channel.pickup.quantity == Quantity::Acceleration;
@@ -169,7 +169,7 @@ impl Record {
         self.responses.iter().any(|response| !response[axis].is_empty())
     }
 
-    /// Response of a channel per newton for the receptance `transfer` at its sensor, m/N, at the bins of the finer samples.
+    /// Response of a channel per newton at the bins of the upsampled spectrum, for the receptance `transfer` at its sensor, m/N.
     pub(crate) fn responses_by(
         &self,
         channel: &Observed,
@@ -195,13 +195,13 @@ impl Record {
         })
     }
 
-    /// Receptance at a channel's sensor at the bins of the finer samples, m/N: that at the tool tip, unless the baseline has mode shapes at
-    /// the sensor.
+    /// Receptance at a channel's sensor at the bins of the upsampled spectrum, m/N: that at the tool tip, unless the baseline has mode
+    /// shapes at the sensor.
     pub(crate) fn seen_by<'a>(&'a self, channel: &'a Observed) -> &'a [Matrix3<Complex64>] {
         channel.seen.as_deref().unwrap_or(&self.transfer)
     }
 
-    /// [`Observed::factor`] at a bin. It is zero at the last bin of the finer samples, where it would not be real.
+    /// [`Observed::factor`] at a bin. It is zero at the last bin of the upsampled spectrum, where it would not be real.
     pub(crate) fn factor(&self, channel: &Observed, bin: usize) -> Complex64 {
         if bin + 1 == self.grid.fine_bins() {
             Complex64::ZERO
@@ -210,7 +210,7 @@ impl Record {
         }
     }
 
-    /// Adds the restoring forces −f_r of the baseline along the motion to `force`.
+    /// Adds −f_r, the restoring forces of the baseline along the motion, to the spectra `force`.
     pub(crate) fn add_terms(&self, baseline: &Baseline<'_>, force: &mut [Option<Vec<Complex64>>; 3]) {
         for term in &baseline.terms {
             let restoring = restoring_along(&**term, &self.motion);
@@ -228,14 +228,14 @@ impl Record {
         }
     }
 
-    /// Computes the free decays of the baseline in every channel.
+    /// Computes the unit free decays of the baseline in every channel.
     pub(crate) fn prepare_decays(&mut self, baseline: &Baseline<'_>) {
         let pickups = self.channels.iter().map(|channel| &channel.pickup);
         self.decays = Decays::of(baseline, &self.grid, pickups, &self.skipped);
     }
 
-    /// Accepts a prediction without free decay: sets skipped samples to the measured value, adds the free decay that fits best, and
-    /// estimates the noise from the residual.
+    /// Accepts `predicted`, samples without free decay: sets samples that are not compared to the measured value, adds the best-fitting
+    /// free decay, and estimates the noise from the residual.
     pub(crate) fn accept(&mut self, predicted: Vec<Vec<f64>>) {
         for ((channel, mut predicted), skipped) in self.channels.iter_mut().zip(predicted).zip(&self.skipped)
         {
@@ -267,8 +267,8 @@ impl Record {
         }
     }
 
-    /// Stores the prediction in closed loop, with skipped samples as predicted. If the motion is that of a model, it becomes this
-    /// prediction.
+    /// Stores the prediction in closed loop. Samples that are not compared take the predicted value. If an extended case supplied the
+    /// motion, this prediction becomes the motion.
     pub(crate) fn close(&mut self, mut closed: Vec<Vec<f64>>) {
         for ((closed, channel), skipped) in closed.iter_mut().zip(&self.channels).zip(&self.skipped) {
             for &sample in skipped {
@@ -281,15 +281,16 @@ impl Record {
         self.closed = Some(closed);
     }
 
-    /// Largest distance of the motion from its closed loop over all channels, in units of the noise.
-    pub(crate) fn off_the_closed_loop(&self) -> f64 {
+    /// Largest root mean square over the channels of the difference between motion and closed-loop prediction, in standard deviations of
+    /// the noise.
+    pub(crate) fn distance_from_closed_loop(&self) -> f64 {
         (0..self.channels.len())
             .filter(|index| self.channels[*index].pickup.quantity != Quantity::Force)
             .map(|index| rms(&self.to_correct(index)[self.compared.clone()]) / self.channels[index].deviation)
             .fold(0.0, f64::max)
     }
 
-    /// Noise-free samples of the channels, if the baseline is right.
+    /// Noise-free samples of the channels under the assumption that the baseline is right.
     pub(crate) fn predicted(&self) -> Clean {
         let open = || {
             self.channels
@@ -303,7 +304,8 @@ impl Record {
         }
     }
 
-    /// Correction of a channel by the motion: measured, or noise-free where known, minus predicted samples.
+    /// Difference by which the motion corrects a channel's prediction: measured samples, or noise-free ones if known, minus predicted
+    /// samples.
     pub(crate) fn to_correct(&self, channel: usize) -> Vec<f64> {
         let observed = &self.channels[channel];
         match &self.clean {
@@ -315,8 +317,8 @@ impl Record {
         }
     }
 
-    /// Samples of every channel for a cutting force: the response to it, or the force itself. The motion is sampled without filter: its
-    /// part above half the sample rate is aliased.
+    /// Samples of every channel for a cutting force: the response to it, or the force itself. Motion is sampled without anti-aliasing
+    /// filter: content above half the sample rate is aliased.
     pub(crate) fn read_cut(&self, force: &CutForce) -> Vec<Vec<f64>> {
         let spectra = self.cut_spectra(force);
         self.channels
@@ -337,7 +339,8 @@ impl Record {
             .collect()
     }
 
-    /// Spectra of a cutting force at the bins of the finer samples, corrected for the averaging over a finer sample.
+    /// Spectra of a cutting force on the upsampled grid, corrected for the averaging over its intervals; `None` along an axis without
+    /// response.
     pub(crate) fn cut_spectra(&self, force: &CutForce) -> [Option<Vec<Complex64>>; 3] {
         let step_s = 1.0 / (self.grid.rate_hz() * self.grid.finer() as f64);
         std::array::from_fn(|axis| {

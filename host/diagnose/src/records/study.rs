@@ -11,22 +11,21 @@ use quietcut_recording::Recording;
 
 /// The baseline and the recordings of one diagnosis.
 pub(crate) struct Study<'a> {
-    /// The baseline model (case file).
+    /// The baseline model: the case file with its extensions.
     pub baseline: Baseline<'a>,
-    /// Recordings of tests or cuts, each beside the prediction of the baseline.
+    /// Recordings of tests or cuts, each with the prediction of the baseline.
     pub records: Vec<Record>,
 }
 
 impl<'a> Study<'a> {
     /// Compares recordings with the baseline of a case.
     ///
-    /// # Errors
-    /// A case that cannot be simulated, or a recording that cannot be compared.
+    /// The case cannot be simulated, or a recording cannot be compared.
     pub(crate) fn new(case: &'a Case, recordings: &[Recording]) -> Result<Self, DiagnoseError> {
         Self::with(case, recordings, |_| Known::default())
     }
 
-    /// The same with information on each record from an earlier prediction, such as noise-free samples of its channels.
+    /// [`Self::new`] with information on each record from an earlier prediction, such as noise-free samples of its channels.
     ///
     /// Along a measured motion every regressor contains the noise of that motion, and so does the residual. This biases coefficients by
     /// about (noise/signal)², relative, which exceeds their standard deviation if (noise/signal)·√(number of samples) > 1. Along the motion
@@ -51,7 +50,7 @@ impl<'a> Study<'a> {
         Ok(Self { baseline, records })
     }
 
-    /// Axes that a force or a motion excites in some record, with measurable motion.
+    /// Axes of the machine along which some record has a force or a motion above the noise.
     pub(crate) fn driven_axes(&self) -> Vec<usize> {
         self.baseline
             .axes
@@ -66,7 +65,7 @@ impl<'a> Study<'a> {
         self.records.iter().all(|record| record.domain == domain)
     }
 
-    /// True if a sidecar places the sensor of a channel away from the tool tip; of any channel if none is named.
+    /// True if a sidecar places the sensor of `channel` away from the tool tip. Without a name, true if that holds for any channel.
     pub(crate) fn sits_elsewhere(&self, channel: Option<&str>) -> bool {
         self.records
             .iter()

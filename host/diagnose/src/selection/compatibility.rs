@@ -8,9 +8,9 @@ use quietcut_model::effects::{Argument, Class};
 impl Library {
     /// True if a further cause may join a candidate model.
     ///
-    /// A case holds one extension of a name, so the same cause does not act twice. Three terms in the displacement, or three in the
-    /// velocity, along one axis are the series of an unknown law and no causes. A time-varying spring counts as a spring; hysteresis, which
-    /// is friction before it slips, counts as friction.
+    /// A case holds one extension of a name, so that the same cause cannot act twice. Three terms in the displacement along one axis, or
+    /// three in the velocity, are the series expansion of an unknown law, and no causes. A time-varying spring counts as a spring.
+    /// Hysteresis, which acts like friction before it slips, counts as friction.
     pub(crate) fn may_act_together(&self, some: &[Choice], other: Choice) -> bool {
         let new = self.cause(other.candidate).names();
         let is_new = some.iter().all(|choice| {
@@ -21,12 +21,12 @@ impl Library {
         });
         let alike = some
             .iter()
-            .filter(|choice| self.are_alike(**choice, other))
+            .filter(|choice| self.are_in_same_variable(**choice, other))
             .count();
         is_new && alike < 2 && !some.iter().any(|choice| self.share_a_term(*choice, other))
     }
 
-    /// True of candidate models with the same causes, at any location.
+    /// True for two candidate models with the same causes, at whatever locations.
     pub(crate) fn are_same_causes(&self, one: &CandidateModel, other: &CandidateModel) -> bool {
         let causes = |of: &CandidateModel| {
             let mut causes: Vec<usize> = of
@@ -40,7 +40,7 @@ impl Library {
         causes(one) == causes(other)
     }
 
-    /// True of candidate models with the same causes at the same locations.
+    /// True for two candidate models with the same causes at the same locations.
     pub(crate) fn are_at_same_locations(&self, one: &CandidateModel, other: &CandidateModel) -> bool {
         let is_in = |choice: &Choice, of: &CandidateModel| {
             let known = &self.candidates[choice.candidate];
@@ -52,8 +52,8 @@ impl Library {
         one.choices.len() == other.choices.len() && one.choices.iter().all(|choice| is_in(choice, other))
     }
 
-    /// True of a cubic spring beside softening-hardening, which contains one, and of a gain beside a ratio for each mode of the same
-    /// channel: together they are not identifiable.
+    /// True for two causes of which one contains the other, and which are therefore not identifiable together: softening-hardening contains
+    /// a cubic spring, a ratio for each mode of a channel contains its gain.
     fn share_a_term(&self, one: Choice, other: Choice) -> bool {
         let effect = |choice: Choice| self.cause(choice.candidate).effect();
         if !effect(one).spec().shares_term_with.contains(&effect(other)) {
@@ -68,8 +68,8 @@ impl Library {
         }
     }
 
-    /// True of two terms in the same variable along a common axis.
-    fn are_alike(&self, one: Choice, other: Choice) -> bool {
+    /// True for two restoring forces in the same variable along a common axis.
+    fn are_in_same_variable(&self, one: Choice, other: Choice) -> bool {
         match (self.law(one), self.law(other)) {
             (Some((law, location)), Some((other_law, other_location))) => {
                 law == other_law && meet(location, other_location)
@@ -78,7 +78,7 @@ impl Library {
         }
     }
 
-    /// The variable of a cause, and its location.
+    /// The variable of a restoring force (displacement or velocity) and its location; `None` for other causes and for coupled modes.
     fn law(&self, choice: Choice) -> Option<(Argument, &Location)> {
         match self.cause(choice.candidate).effect().spec().class {
             Class::RestoringForce(Argument::TwoDisplacements) => None,
@@ -88,7 +88,7 @@ impl Library {
     }
 }
 
-/// True of equal locations, and of locations with a common axis.
+/// True for equal locations and for locations with a common axis.
 fn meet(one: &Location, other: &Location) -> bool {
     match (one, other) {
         (Location::EachOf(axes), Location::Axis(axis)) | (Location::Axis(axis), Location::EachOf(axes)) => {

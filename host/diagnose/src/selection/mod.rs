@@ -1,4 +1,4 @@
-//! Which candidate model explains the records: evidence, held-out error, equivalence.
+//! Selects the candidate model that explains the records: evidence, held-out error, equivalence.
 
 pub(crate) mod closed_selection;
 pub(crate) mod compatibility;

@@ -1,8 +1,8 @@
-//! A further cause, searched with the extended case as the baseline.
+//! Searches a further cause with the extended case as the baseline.
 //!
-//! Regressors pass through the receptance of the baseline, y = H(iω)·f. If a cause moves a resonance by more than its width, that
-//! receptance belongs to another machine, and regressors of further causes do not fit. With the extended case as the baseline, regressors
-//! and residual are linearized at the last point of Gauss and Newton's iteration in place of the first.
+//! Regressors are filtered by the receptance H of the baseline: y = H(iω)·f. If a cause moves a resonance by more than its bandwidth, that
+//! receptance is far from that of the machine, and the regressors of further causes do not fit. With the extended case as the baseline,
+//! regressors and residual are linearized at the last point of the Gauss–Newton iteration instead of the first.
 
 use nalgebra::DMatrix;
 
@@ -15,8 +15,8 @@ use crate::selection::search::singles;
 use quietcut_model::case::Case;
 use quietcut_recording::Recording;
 
-/// The best candidate models of `base` and one further cause, from the extended case of `base` as the baseline, best first. None if `base`
-/// does not change the linear structure, because the baseline would be the same.
+/// Candidate models that consist of `base` and one further cause, found with the extended case of `base` as the baseline, best first. Empty
+/// if `base` does not change the linear structure, because the baseline would be the same.
 pub(crate) fn extended_rebaselined(
     study: &Study<'_>,
     recordings: &[Recording],
@@ -30,15 +30,15 @@ pub(crate) fn extended_rebaselined(
     let mut case: Case = study.baseline.case.clone();
     case.extensions
         .extend(joined(extensions.iter().map(|(name, table)| (*name, table))));
-    let Ok(around) = Study::new(&case, recordings) else {
+    let Ok(rebaselined) = Study::new(&case, recordings) else {
         return Vec::new();
     };
-    if around.baseline.first_order.a == study.baseline.first_order.a {
+    if rebaselined.baseline.first_order.a == study.baseline.first_order.a {
         return Vec::new();
     }
-    let mut columns = Regression::new(&around);
-    let others = Library::new(&around, &mut columns);
-    let mut found: Vec<CandidateModel> = singles(&others, &around, &columns)
+    let mut columns = Regression::new(&rebaselined);
+    let others = Library::new(&rebaselined, &mut columns);
+    let mut found: Vec<CandidateModel> = singles(&others, &rebaselined, &columns)
         .into_iter()
         .filter_map(|single| {
             let choice = single.choices[0];

@@ -1,4 +1,4 @@
-//! The best candidate models of one, two and three causes along the measured motion.
+//! Searches the best candidate models of one, two and three causes along the measured motion.
 
 use rayon::prelude::*;
 
@@ -7,10 +7,10 @@ use crate::fit::library::Library;
 use crate::fit::regression::Regression;
 use crate::records::study::Study;
 
-/// Number of the best pairs that are tried with a third cause.
+/// Number of pairs, the best ones, to which a third cause is added.
 const PAIRS_KEPT: usize = 24;
 
-/// The best candidate model of each single candidate, best first.
+/// The candidate models of one cause, for each candidate the best set of nonlinear parameters; best model first.
 pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let found = library
         .choices()
@@ -20,7 +20,7 @@ pub(crate) fn singles(library: &Library, study: &Study<'_>, regression: &Regress
     best_of_each(found)
 }
 
-/// The best candidate model of each pair of candidates, best first.
+/// The candidate models of two causes, for each pair of candidates the best sets of nonlinear parameters; best model first.
 pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regression) -> Vec<CandidateModel> {
     let choices = library.choices();
     let found = choices
@@ -37,7 +37,8 @@ pub(crate) fn pairs(library: &Library, study: &Study<'_>, regression: &Regressio
     best_of_each(found)
 }
 
-/// The best candidate model of each triple that contains one of the best pairs, best first.
+/// The candidate models of three causes that contain one of the best pairs, for each triple of candidates the best sets of nonlinear
+/// parameters; best model first.
 pub(crate) fn triples(
     library: &Library,
     study: &Study<'_>,
@@ -68,10 +69,10 @@ fn best_of_each(mut found: Vec<CandidateModel>) -> Vec<CandidateModel> {
     found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
     let mut seen: Vec<Vec<usize>> = Vec::new();
     found.retain(|model| {
-        let who: Vec<usize> = model.choices.iter().map(|choice| choice.candidate).collect();
-        let new = !seen.contains(&who);
+        let candidates: Vec<usize> = model.choices.iter().map(|choice| choice.candidate).collect();
+        let new = !seen.contains(&candidates);
         if new {
-            seen.push(who);
+            seen.push(candidates);
         }
         new
     });

@@ -20,30 +20,31 @@ use quietcut_recording::Recording;
 
 /// Largest number of causes that act together.
 const CAUSES: usize = 3;
-/// Number of candidate models of the regression that are simulated, by their number of causes.
+/// Number of candidate models, the best ones of the regression, that are simulated: for one, two and three causes.
 const SIMULATED: [usize; CAUSES] = [9, 5, 3];
 
 /// The selected candidate model, and those that are equivalent to it.
 pub(crate) struct Selection {
     pub(crate) best: Option<CandidateModel>,
     pub(crate) others: Vec<CandidateModel>,
-    /// Lead of the best gain over that of the best rival.
+    /// Gain of the best model minus the gain of its best rival.
     pub(crate) ahead: f64,
-    /// Lead of the best gain over that with fewer causes.
+    /// Gain of the best model minus the gain of the best model with fewer causes.
     pub(crate) gained: f64,
 }
 
-/// Quantities by which candidate models are compared.
+/// The study with the quantities by which candidate models are compared.
 pub(crate) struct SelectionCriteria<'a> {
     pub(crate) study: &'a Study<'a>,
     pub(crate) recordings: &'a [Recording],
-    /// The prediction-error fit; `None` if the records allow none.
+    /// The prediction-error fit of candidate models; `None` if the records allow none.
     pub(crate) closed: Option<Box<dyn ClosedFit + 'a>>,
-    /// Residual of the whole library, with the error of interpolation, over the noise variance, along the measured motion.
+    /// χ² per degree of freedom that a fit of all columns of the library leaves along the measured motion, including the interpolation
+    /// error; at least 1.
     inflation: f64,
-    /// χ² of the baseline.
+    /// χ² of the baseline, simulated if candidate models are.
     pub(crate) reference: f64,
-    /// Largest χ² that errors of the computation, which are proportional to the signal, leave or give to a cause.
+    /// Largest χ² that errors of the computation cause or that a cause gains from them. They are proportional to the signal.
     pub(crate) coherent: f64,
 }
 
@@ -58,7 +59,8 @@ impl<'a> SelectionCriteria<'a> {
             Some(output_error) => Some(Box::new(output_error)),
             None => Relinearization::new(study, recordings).map(|closed| Box::new(closed) as Box<_>),
         };
-        // Simulations fit their initial states and lack the noise of the measured motion, and so must their reference.
+        // Simulations fit their initial states and do not contain the noise of the measured motion. The baseline is simulated too, for a
+        // comparison on equal terms.
         let by_baseline = closed
             .as_ref()
             .and_then(|closed| closed.left_by_baseline(library, regression));
@@ -77,7 +79,7 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// Residual of `best` over the noise variance.
+    /// χ² per degree of freedom that `best` leaves, if it is simulated; otherwise that of the whole library.
     pub(crate) fn inflation(&self, regression: &Regression, best: Option<&CandidateModel>) -> f64 {
         match best {
             Some(best) if best.simulated.is_some() => {
@@ -91,7 +93,7 @@ impl<'a> SelectionCriteria<'a> {
         }
     }
 
-    /// Least gain of a further cause, beside the gain by errors of the computation.
+    /// Least gain of a further cause, including what errors of the computation may gain.
     pub(crate) fn least_gain(&self, regression: &Regression, fewer_are_enough: bool) -> f64 {
         let noise = regression.count(Subset::Whole) as f64;
         let share = if self.coherent > 0.0 && fewer_are_enough {
@@ -102,10 +104,10 @@ impl<'a> SelectionCriteria<'a> {
         LEAST_GAIN + OVER_COMPUTATION_ERROR * self.coherent + share * noise
     }
 
-    /// Gain of a candidate model: decrease of χ² minus the price of its parameters (Schwarz).
+    /// Gain of a candidate model: decrease of χ² from the baseline, over `inflation`, minus the price of its parameters (Schwarz).
     pub(crate) fn gain(&self, regression: &Regression, model: &CandidateModel, inflation: f64) -> f64 {
         let count = regression.count(Subset::Whole).max(2) as f64;
-        // Simulated candidate models are compared with the simulated baseline.
+        // A simulated candidate model is compared with the simulated baseline.
         let reference = match model.simulated {
             Some(_) => self.reference,
             None => regression.residual(Subset::Whole),
@@ -120,7 +122,8 @@ impl<'a> SelectionCriteria<'a> {
         });
     }
 
-    /// Residual energy above the noise: as a share of the noise, and as a share of that of the baseline.
+    /// Residual energy above the noise that `best` leaves: as a share of the noise, and as a share of the baseline's residual energy above
+    /// the noise.
     pub(crate) fn excess(&self, regression: &Regression, best: Option<&CandidateModel>) -> (f64, f64) {
         let noise = regression.count(Subset::Whole) as f64;
         let left = best.map_or(self.reference, |best| best.fit.left);
@@ -130,7 +133,7 @@ impl<'a> SelectionCriteria<'a> {
         (beyond / noise, beyond / there)
     }
 
-    /// True if the residual is noise, or as small as the error by sampling.
+    /// True if the residual of `best` is noise, or as small as the error by sampling.
     fn is_enough(&self, regression: &Regression, best: Option<&CandidateModel>) -> bool {
         let (of_noise, of_excess) = self.excess(regression, best);
         let count = regression.count(Subset::Whole) as f64;
@@ -144,7 +147,8 @@ impl<'a> SelectionCriteria<'a> {
             || (best.is_some() && of_excess < sampling)
     }
 
-    /// True if the residual of the best simulation of `found` resembles a further cause, although that of `best` is close to noise.
+    /// True if the residual of a simulated model resembles a further cause, although the residual of `best` is close to noise. The
+    /// simulated model is `best` or, if that is not simulated, the first simulated one of `found`.
     fn resembles_further_cause(
         &self,
         library: &mut Library,
@@ -173,7 +177,7 @@ impl<'a> SelectionCriteria<'a> {
     }
 
     /// True if `more` explains enough of the residual energy of `fewer` above the noise, or has fewer parameters.
-    fn takes_its_share(
+    fn explains_enough(
         &self,
         regression: &Regression,
         fewer: Option<&CandidateModel>,
@@ -193,7 +197,7 @@ impl<'a> SelectionCriteria<'a> {
         before - more.fit.left > LEAST_SHARE * (before - noise).max(0.0)
     }
 
-    /// χ² on the held-out segments with the parameters of the fitted segments.
+    /// χ² of a model on the held-out segments with parameters fitted to the fitted segments.
     pub(crate) fn left_held_out(
         &self,
         library: &Library,
@@ -207,7 +211,7 @@ impl<'a> SelectionCriteria<'a> {
     }
 }
 
-/// Residual of the whole library, with the error of interpolation, over the noise variance.
+/// χ² per degree of freedom after a fit of all columns of the library, plus the interpolation error; at least 1.
 fn inflation(regression: &Regression) -> f64 {
     let whole = regression.count(Subset::Whole) as f64;
     let free = (whole - regression.columns() as f64).max(1.0);
@@ -215,7 +219,7 @@ fn inflation(regression: &Regression) -> f64 {
     (regression.left_by_all() / free + sampling).max(1.0)
 }
 
-/// Selects among one cause, pairs and triples. More causes are tried only if fewer leave a residual.
+/// Selects among single causes, pairs and triples. More causes are tried only if fewer leave a residual above the noise.
 pub(crate) fn select(
     criteria: &SelectionCriteria<'_>,
     library: &mut Library,
@@ -240,7 +244,7 @@ pub(crate) fn select(
             break;
         }
         let enough = size > 1 && criteria.is_enough(regression, selection.best.as_ref());
-        // One cause with many parameters may imitate two causes with one parameter each.
+        // One cause with many parameters may imitate two causes with one parameter each: pairs with fewer parameters are then tried.
         let mut imitated = None;
         if enough {
             let Some(best) = &selection.best else { break };
@@ -258,7 +262,7 @@ pub(crate) fn select(
             2 => best_pairs(library, study, regression),
             _ => triples(library, study, regression, &pairs),
         };
-        // Simulations of several causes start from the nonlinear parameters of each cause alone.
+        // If candidate models are simulated, several causes start from the nonlinear parameters that each single cause has.
         if size == 1 || criteria.closed.is_none() {
             refine(study, library, regression, &mut found);
         }
@@ -271,12 +275,12 @@ pub(crate) fn select(
         }
         let extended = if imitated.is_some() { &[] } else { &fewer[..] };
         let mut found = criteria.simulated(library, regression, found, extended, most, imitated.as_ref());
-        // A small effect counts only if it is simulated.
+        // If fewer causes are sufficient, a further small effect counts only if it is simulated.
         found.retain(|model| !enough || model.simulated.is_some());
         found.sort_by(|a, b| a.fit.left.total_cmp(&b.fit.left));
         let inflation = criteria.inflation(regression, found.first());
         criteria.sort(regression, &mut found, inflation);
-        // If fewer causes are sufficient, more must not win by errors of the computation.
+        // If fewer causes are sufficient, a better linearization must not let more causes win by errors of the computation.
         if !enough {
             criteria.polish(library, regression, &mut found, inflation);
         }
@@ -292,15 +296,16 @@ pub(crate) fn select(
             .as_ref()
             .map_or(0.0, |best| criteria.gain(regression, best, inflation));
         let held_out = criteria.left_held_out(library, regression, best);
-        // Held-out segments may contain nothing of an effect, as the end of a free decay; but they must not contradict it.
+        // Held-out segments may contain nothing of an effect, as the end of a free decay does not. But the model must not increase their
+        // χ².
         let chance = CHANCE * (2.0 * regression.count(Subset::HeldOut) as f64).sqrt();
-        let takes_its_share = criteria.takes_its_share(regression, selection.best.as_ref(), best);
-        // If two causes explain little, a third would compensate for the errors of the others.
-        if size > 1 && !takes_its_share {
+        let explains_enough = criteria.explains_enough(regression, selection.best.as_ref(), best);
+        // If the second of two causes explains little, a third would compensate for errors of the other two.
+        if size > 1 && !explains_enough {
             break;
         }
         if gained < reached + criteria.least_gain(regression, enough)
-            || !takes_its_share
+            || !explains_enough
             || held_out > regression.residual(Subset::HeldOut) + chance
         {
             continue;
@@ -328,7 +333,8 @@ pub(crate) fn select(
     selection
 }
 
-/// True of a candidate model of other causes with no more parameters than `best`, or of the same causes at other locations with as many.
+/// True for a candidate model of other causes with no more parameters than `best`, and for one of the same causes at other locations with
+/// as many parameters.
 fn is_rival(library: &Library, best: &CandidateModel, other: &CandidateModel) -> bool {
     if names(library, other) != names(library, best) {
         return other.parameter_count <= best.parameter_count;
@@ -367,8 +373,8 @@ fn log_best(
     }
 }
 
-/// `best`, or along the measured motion a candidate model with fewer parameters and a residual as small: further parameters may compensate
-/// for aliasing. Simulations have none.
+/// The candidate model with fewer parameters than `best` that is as good along the measured motion, otherwise `best`: further parameters
+/// may only compensate for aliasing. Simulated models have no aliasing and stay.
 fn simplest(
     criteria: &SelectionCriteria<'_>,
     regression: &Regression,

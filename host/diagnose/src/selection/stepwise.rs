@@ -1,7 +1,7 @@
-//! Candidate models with one cause more or less, from the residual of a simulation.
+//! Builds candidate models with one cause more or less, from the residual of a simulation.
 //!
-//! The residual of a simulation contains neither the noise of the measured motion nor aliasing. It shows the next cause (score test). A
-//! cause that a later one made redundant is removed again, or is replaced by a simpler one.
+//! The residual of a simulation contains neither the noise of the measured motion nor aliasing, and shows the next cause (score test). A
+//! cause that a later one made redundant is removed, or replaced by a simpler one.
 
 use nalgebra::DMatrix;
 
@@ -10,7 +10,7 @@ use crate::fit::library::Library;
 use crate::fit::regression::{Fit, Regression, Subset};
 use crate::records::study::Study;
 
-/// The best candidate models of `base` and one further cause, best first; `left` is the residual of `base`, by record and channel.
+/// Candidate models of `base` with one further cause, best first. `left` is the residual of `base`, by record and channel.
 pub(crate) fn extended(
     study: &Study<'_>,
     library: &mut Library,
@@ -80,16 +80,16 @@ fn with(
     of(1.0).or_else(|| of(0.0))
 }
 
-/// The candidate model without one of its causes.
+/// The candidate model without the cause at `position`.
 pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize) -> CandidateModel {
     let mut coefficients = Vec::new();
     for other in (0..model.choices.len()).filter(|other| *other != position) {
         coefficients.extend(library.coefficients(model, other));
     }
     let mut choices = model.choices.clone();
-    let gone = choices.remove(position);
+    let removed = choices.remove(position);
     CandidateModel {
-        parameter_count: model.parameter_count - library.parameter_count(gone),
+        parameter_count: model.parameter_count - library.parameter_count(removed),
         choices,
         fit: Fit {
             covariance: DMatrix::zeros(coefficients.len(), coefficients.len()),
@@ -100,8 +100,8 @@ pub(crate) fn without(library: &Library, model: &CandidateModel, position: usize
     }
 }
 
-/// The candidate model with one cause replaced by a simpler one at the same location, which has some of its parameters and no others (a
-/// cubic spring for softening-hardening), with the same values.
+/// Candidate models in which a simpler cause at the same location replaces the cause at `position`, such as a cubic spring for
+/// softening-hardening. The parameters of the simpler cause are some of those of the replaced one, with the same values.
 pub(crate) fn nested(
     study: &Study<'_>,
     library: &Library,
@@ -126,15 +126,15 @@ pub(crate) fn nested(
         {
             return None;
         }
-        // The coefficients of the simpler cause must be its parameters.
+        // A simpler cause qualifies if its coefficients are its reported parameters.
         let cause = library.cause(choice.candidate);
         let own: Vec<f64> = values
             .iter()
             .take(columns.len())
             .map(|(_, value)| *value)
             .collect();
-        let said = cause.parameters(study, acts_at, nonlinear_parameters, &own)?;
-        if said.is_empty() || !said.iter().all(|parameter| values.contains(parameter)) {
+        let reported = cause.parameters(study, acts_at, nonlinear_parameters, &own)?;
+        if reported.is_empty() || !reported.iter().all(|parameter| values.contains(parameter)) {
             return None;
         }
         let mut coefficients = model.fit.coefficients.clone();
@@ -158,17 +158,17 @@ pub(crate) fn nested(
     library.choices().into_iter().filter_map(simpler).collect()
 }
 
-/// The candidate models without those whose causes occur earlier in the list.
+/// Removes candidate models whose causes and locations occur earlier in the list.
 pub(crate) fn distinct(found: Vec<CandidateModel>) -> Vec<CandidateModel> {
     let mut seen: Vec<Vec<usize>> = Vec::new();
     found
         .into_iter()
         .filter(|model| {
-            let mut who: Vec<usize> = model.choices.iter().map(|choice| choice.candidate).collect();
-            who.sort_unstable();
-            let new = !seen.contains(&who);
+            let mut candidates: Vec<usize> = model.choices.iter().map(|choice| choice.candidate).collect();
+            candidates.sort_unstable();
+            let new = !seen.contains(&candidates);
             if new {
-                seen.push(who);
+                seen.push(candidates);
             }
             new
         })

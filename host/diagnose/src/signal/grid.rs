@@ -1,4 +1,4 @@
-//! Time and frequency grid of one record: zero-padded transforms, interpolated samples and spectra.
+//! Time and frequency grid of one record: zero-padded transforms, upsampled signals and their spectra.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-/// Transforms of one record of `count` samples, padded with zeros in which the response decays.
+/// Transforms of one record of `count` samples, padded with zeros while the response decays.
 ///
 /// Spectra hold bins 0 … length/2 of the unnormalized transform X_k = Σ x_n e^(−2πikn/length). Signals are band-limited to half the sample
-/// rate, so that the spectrum defines them between samples.
+/// rate, so that the spectrum defines them between samples. An upsampled signal has `finer` samples per sample of the record.
 #[derive(Clone)]
 pub(crate) struct Grid {
     count: usize,
@@ -23,7 +23,8 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// A grid for `count` samples at `rate_hz` with at least `room_s` of padding, and a finer grid with `finer` samples per sample.
+    /// Plans the transforms of `count` samples at `rate_hz` with at least `room_s` seconds of padding, and of signals upsampled by the
+    /// factor `finer`.
     pub(crate) fn new(count: usize, rate_hz: f64, room_s: f64, finer: usize) -> Self {
         let room = ((room_s * rate_hz) as usize).clamp(count.min(4096), 3 * count.max(1));
         let length = smooth_even(count + room);
@@ -45,22 +46,22 @@ impl Grid {
         self.count
     }
 
-    /// Number of samples with padding.
+    /// Number of samples including the padding.
     pub(crate) fn length(&self) -> usize {
         self.length
     }
 
-    /// Number of finer samples per sample.
+    /// Oversampling factor: samples of an upsampled signal per sample of the record.
     pub(crate) fn finer(&self) -> usize {
         self.finer
     }
 
-    /// Samples per second.
+    /// Sample rate of the record, Hz.
     pub(crate) fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Number of bins of a spectrum.
+    /// Number of bins of the spectrum of a signal that is not upsampled.
     pub(crate) fn bins(&self) -> usize {
         self.length / 2 + 1
     }
@@ -77,9 +78,9 @@ impl Grid {
         transform(&*self.forward, &mut padded)
     }
 
-    /// Spectrum of a signal that continues smoothly beyond both ends of the record: reflected at its end points, and faded out.
+    /// Spectrum of a signal that is continued smoothly beyond both ends of the record: reflected at its end points, and faded out.
     ///
-    /// Derivatives (iω)·X are then accurate up to the ends.
+    /// With this continuation, derivatives (iω)·X are accurate up to the ends of the record.
     pub(crate) fn continued_spectrum(&self, samples: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.length];
         let count = samples.len();
@@ -93,7 +94,7 @@ impl Grid {
         transform(&*self.forward, &mut padded)
     }
 
-    /// Inverse transform at the samples of the record.
+    /// Inverse transform of `spectrum` at the samples of the record.
     pub(crate) fn samples(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let mut bins = spectrum.to_vec();
         let mut samples = back(&*self.inverse, &mut bins, self.length);
@@ -101,7 +102,7 @@ impl Grid {
         samples
     }
 
-    /// Inverse transform at the finer samples of the record.
+    /// Inverse transform of `spectrum` as an upsampled signal.
     pub(crate) fn fine_samples(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let mut bins = vec![Complex64::ZERO; self.finer * self.length / 2 + 1];
         bins[..spectrum.len()].copy_from_slice(spectrum);
@@ -116,12 +117,12 @@ impl Grid {
         samples
     }
 
-    /// Number of bins of a spectrum of finer samples. Its first bins are those of [`Self::bins`].
+    /// Number of bins of an upsampled signal's spectrum. Its first bins are those of [`Self::bins`].
     pub(crate) fn fine_bins(&self) -> usize {
         self.finer * self.length / 2 + 1
     }
 
-    /// Spectrum of finer samples of a signal that is zero outside the record, in the scale of [`Self::spectrum`].
+    /// Spectrum of an upsampled signal `fine` that is zero outside the record, in the scale of [`Self::spectrum`].
     pub(crate) fn spectrum_of_fine(&self, fine: &[f64]) -> Vec<Complex64> {
         let mut padded = vec![0.0; self.finer * self.length];
         padded[..fine.len()].copy_from_slice(fine);
@@ -133,8 +134,8 @@ impl Grid {
         bins
     }
 
-    /// Samples of a spectrum of finer samples, delayed by `delay_s`. The interpolation is cubic in time, because a phase shift of the
-    /// spectrum would make steps ring.
+    /// Samples of the record from the spectrum of an upsampled signal, delayed by `delay_s`. The delay is interpolated by cubics in time,
+    /// because a phase shift of the spectrum would make steps ring.
     pub(crate) fn late_samples_of_fine(&self, spectrum: &[Complex64], delay_s: f64) -> Vec<f64> {
         let fine = self.fine_samples(spectrum);
         let late = delay_s * self.rate_hz() * self.finer() as f64;
@@ -143,8 +144,8 @@ impl Grid {
             .collect()
     }
 
-    /// Samples of the record from a spectrum of finer samples, as a sensor without anti-aliasing filter reads them: the spectrum is folded
-    /// about half the sample rate.
+    /// Samples of the record from the spectrum of an upsampled signal, as a sensor without anti-aliasing filter reads them: the spectrum is
+    /// folded about half the sample rate.
     pub(crate) fn samples_of_fine(&self, spectrum: &[Complex64]) -> Vec<f64> {
         let whole = self.finer * self.length;
         let at = |bin: usize| {
@@ -155,13 +156,13 @@ impl Grid {
             }
         };
         let folded: Vec<Complex64> = (0..self.bins())
-            .map(|bin| (0..self.finer).map(|turn| at(bin + turn * self.length)).sum())
+            .map(|bin| (0..self.finer).map(|alias| at(bin + alias * self.length)).sum())
             .collect();
         self.samples(&folded)
     }
 }
 
-/// Forward transform. It fails only if lengths differ, and here they are equal.
+/// Forward transform of real samples. It fails only if lengths differ, and here they are equal.
 fn transform(plan: &dyn RealToComplex<f64>, samples: &mut [f64]) -> Vec<Complex64> {
     let mut bins = plan.make_output_vec();
     let _ = plan.process(samples, &mut bins);
@@ -203,7 +204,7 @@ fn smooth_even(least: usize) -> usize {
     best
 }
 
-/// Real transform of a segment of a signal without padding, for regression.
+/// Transform of a segment of a signal without padding, with real values as a regression requires.
 pub(crate) struct SegmentTransform {
     plan: Arc<dyn RealToComplex<f64>>,
 }
@@ -215,7 +216,8 @@ impl SegmentTransform {
         }
     }
 
-    /// Real and imaginary parts of bins 0 … `bins` − 1, scaled so that unit-variance noise has unit variance in each part.
+    /// Appends real and imaginary parts of bins 0 … `bins` − 1 to `into`, scaled so that unit-variance noise has unit variance in each
+    /// part.
     pub(crate) fn bins(&self, samples: &[f64], bins: usize, into: &mut Vec<f64>) {
         let length = samples.len();
         let mut buffer = samples.to_vec();
@@ -232,7 +234,7 @@ impl SegmentTransform {
     }
 }
 
-/// Catmull–Rom interpolation at `place`, counted in samples.
+/// Catmull–Rom (cubic) interpolation of `samples` at `place`, a fractional index.
 pub(crate) fn catmull_rom(samples: &[f64], place: f64) -> f64 {
     let Some(last) = samples.len().checked_sub(1) else {
         return 0.0;
@@ -256,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn finer_samples_are_those_of_the_same_band_and_go_back() {
+    fn upsampled_signals_interpolate_a_tone_and_can_be_downsampled() {
         let (count, rate) = (400, 100.0);
         let tone = |t: f64| (TAU * 7.3 * t).sin() * (-(t - 2.0) * (t - 2.0) * 4.0).exp();
         let samples: Vec<f64> = (0..count).map(|n| tone(n as f64 / rate)).collect();
@@ -273,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_continued_signal_has_its_derivative_up_to_the_ends() {
+    fn the_derivative_of_a_continued_signal_is_accurate_up_to_the_ends() {
         let (count, rate) = (512, 100.0);
         let samples: Vec<f64> = (0..count)
             .map(|n| (TAU * 1.7 * n as f64 / rate + 0.4).sin())
@@ -286,13 +288,13 @@ mod tests {
         let derivative = grid.samples(&spectrum);
         for (n, value) in derivative.iter().enumerate() {
             let truth = TAU * 1.7 * (TAU * 1.7 * n as f64 / rate + 0.4).cos();
-            // The second derivative of the continuation jumps at the ends.
+            // The second derivative of the continued signal jumps at the ends of the record, which limits the accuracy there.
             assert!((value - truth).abs() < 0.03 * TAU * 1.7, "{n}: {value} {truth}");
         }
     }
 
     #[test]
-    fn parts_of_a_stretch_keep_its_energy() {
+    fn the_transform_of_a_segment_keeps_its_energy() {
         let samples: Vec<f64> = (0..30).map(|n| ((n * n) as f64).sin()).collect();
         let mut parts = Vec::new();
         SegmentTransform::new(30).bins(&samples, 16, &mut parts);
@@ -302,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn cubics_go_through_their_samples_and_are_exact_for_lines() {
+    fn cubic_interpolation_is_exact_for_lines() {
         let samples = [0.0, 1.0, 2.0, 3.0, 4.0];
         for place in [0.0, 0.7, 1.5, 2.0, 2.9, 4.0] {
             if (1.0..=3.0).contains(&place) {
@@ -314,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_step_stays_a_step() {
+    fn a_delayed_step_does_not_ring() {
         let grid = Grid::new(64, 100.0, 0.0, 8);
         let fine: Vec<f64> = (0..64 * 8).map(|k| f64::from(u8::from(k >= 32 * 8))).collect();
         // A delay of 0.3 samples puts the step between samples 32 and 33, both outside the support of the cubic.

@@ -1,34 +1,36 @@
 //! Noise floors: the noise variance of a channel, estimated from its residual.
 //!
-//! Sensor noise is white over the band of the record. Any other part of a residual rises above that floor in some bands and leaves it
-//! visible in others.
+//! Sensor noise is assumed white over the band of the record. Anything else in a residual rises above the noise floor in some bands and
+//! leaves it visible in others.
 
 use crate::criteria::{LEAST_RELATIVE_NOISE, LEAST_WHITE_SHARE};
 use crate::signal::grid::SegmentTransform;
 
-/// Number of bands of a noise floor.
+/// Number of frequency bands of equal width, up to half the sample rate, in which a noise floor is estimated.
 pub(crate) const BANDS: usize = 32;
 
 /// Standard deviation of the white noise in `residual`; `size` is the root mean square of the channel.
 ///
-/// The estimate starts at the lower quartile of the mean periodogram of 32 bands, and is then the mean of all bands within three standard
-/// deviations of it. Of noise alone these are all bands.
+/// The estimate starts at the lower quartile of the mean periodogram over 32 bands. It is then the mean of all bands within three standard
+/// deviations of it, which are all bands if the residual is noise alone.
 pub(crate) fn white_floor(residual: &[f64], size: f64) -> f64 {
     white_floor_beside(residual, size, &[0.0; BANDS])
 }
 
-/// [`white_floor`] of a residual with other noise, whose power is given in each of the [`BANDS`] from zero to half the sample rate.
+/// [`white_floor`] of a residual that also contains noise of another origin, whose variance `other` is given in each of the [`BANDS`] from
+/// zero to half the sample rate.
 pub(crate) fn white_floor_beside(residual: &[f64], size: f64, other: &[f64; BANDS]) -> f64 {
     floor(residual, size, mean, 1.0, other)
 }
 
-/// [`white_floor`] of a residual with spectral lines in every band, as of a cut. The median of a band hardly depends on its few lines.
+/// [`white_floor`] of a residual with spectral lines in every band, as in a cut. Each band uses the median of the periodogram, which few
+/// lines hardly change.
 pub(crate) fn floor_between_lines(residual: &[f64], size: f64) -> f64 {
     let of_band = |squares: &mut [f64]| median(squares) / MEDIAN;
     floor(residual, size, of_band, MEDIAN_SPREAD, &[0.0; BANDS])
 }
 
-/// Median of a squared unit-variance normal variable.
+/// Median of the square of a unit-variance normal variable.
 const MEDIAN: f64 = 0.454_936;
 /// Standard deviation of a variance estimated from a median over that of one estimated from a mean.
 const MEDIAN_SPREAD: f64 = 1.65;
@@ -37,7 +39,7 @@ fn mean(squares: &mut [f64]) -> f64 {
     squares.iter().sum::<f64>() / squares.len().max(1) as f64
 }
 
-/// The median; 0 of no values. It reorders the values.
+/// The median of `values`, whose order it changes; 0 for an empty slice.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -58,13 +60,13 @@ fn floor(
     if count < 4 * BANDS {
         return rms(residual).max(least);
     }
-    // White part of the noise of a band.
+    // White part of a band's noise: all noise minus the known other noise, at least the share `LEAST_WHITE_SHARE`.
     let white = |all: f64, other: f64| (all - other).max(LEAST_WHITE_SHARE * all);
     let bands: Vec<(f64, f64)> = band_means(residual, of_band).into_iter().zip(*other).collect();
     let mut sorted: Vec<f64> = bands.iter().map(|(all, other)| white(*all, *other)).collect();
     sorted.sort_by(f64::total_cmp);
     let per_band = (count / (2 * BANDS)) as f64;
-    // Hann's window correlates neighbouring bins: a third of them are independent.
+    // The Hann window correlates neighbouring bins: a third of them count as independent.
     let spread = 3.0 * scatter * (3.0 / per_band).sqrt();
     let mut level = sorted[BANDS / 4];
     for _ in 0..8 {
@@ -79,7 +81,8 @@ fn floor(
         if near.is_empty() {
             break;
         }
-        // The standard deviation of the power of a band is proportional to the power. Bands with much other noise have little weight.
+        // The standard deviation of a band's noise variance is proportional to that variance. A band with much other noise therefore has
+        // little weight.
         let weight = |other: f64| (level / (level + other)).powi(2);
         let whole: f64 = near.iter().map(|(_, other)| weight(*other)).sum();
         let mean = |of: fn(&(f64, f64)) -> f64| {
@@ -94,7 +97,7 @@ fn floor(
     level.sqrt().max(least)
 }
 
-/// Mean of the periodogram per real part in each band, from the estimator `of_band`: σ² of white noise.
+/// Average of the periodogram in each band by the estimator `of_band` (mean or median): σ² for white noise.
 fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
     let count = residual.len();
     let mean = residual.iter().sum::<f64>() / count as f64;
@@ -124,11 +127,12 @@ fn band_means(residual: &[f64], of_band: fn(&mut [f64]) -> f64) -> Vec<f64> {
         .collect()
 }
 
-/// Samples of a window of [`quiet_floor`].
+/// Number of samples of a window in which [`quiet_floor`] takes a variance.
 const QUIET: usize = 256;
 
-/// Standard deviation of the noise of a channel that is zero most of the time, as the force of a hammer is: the lower quartile over
-/// windows. The spectrum of impacts reaches to the end of the band and hides the floor. Infinite for a record that is too short.
+/// Standard deviation of the noise of a channel that is zero most of the time, such as the force of a hammer: from the lower quartile of
+/// the variances of windows. The spectrum of impacts reaches to the end of the band and would hide a noise floor. Infinite for a record
+/// that is too short.
 pub(crate) fn quiet_floor(samples: &[f64]) -> f64 {
     let mut squares: Vec<f64> = samples
         .chunks_exact(QUIET)
@@ -144,7 +148,7 @@ pub(crate) fn quiet_floor(samples: &[f64]) -> f64 {
     squares.select_nth_unstable_by(quarter, f64::total_cmp).1.sqrt()
 }
 
-/// Root mean square.
+/// Root mean square of the samples.
 pub(crate) fn rms(samples: &[f64]) -> f64 {
     (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
 }
@@ -163,25 +167,26 @@ mod tests {
         let residual: Vec<f64> = (0..6000)
             .map(|n| {
                 let noise: f64 = StandardNormal.sample(&mut random);
-                // A line in every forty-eighth bin, as of 24 revolutions with two teeth.
+                // Spectral lines at every 48.3rd bin, as in a cut of 24 revolutions with two teeth.
                 let t = std::f64::consts::TAU * f64::from(n) / 6000.0;
                 noise + (1..62).map(|k| (48.3 * f64::from(k) * t).sin()).sum::<f64>()
             })
             .collect();
         let size = rms(&residual);
         let floor = floor_between_lines(&residual, size);
-        // A line and its leakage through Hann's window exceed the noise in six of 48.3 bins. The median of the power is then at most the
-        // quantile 0.5/0.876 of the noise's, -ln(1 - 0.571)/ln 2 = 1.22 of its median: 10.5 % more in amplitude. 5.5 % is three standard
-        // deviations of the median of 3 000 powers of which every second is independent.
+        // A line and its leakage through the Hann window exceed the noise in 6 of 48.3 bins. The median of the power is then at most the
+        // quantile 0.5/0.876 = 0.571 of the noise alone, −ln(1 − 0.571)/ln 2 = 1.22 times its median: 10.5 % more in amplitude. Three
+        // standard deviations of the median of 3 000 powers, of which every second is independent, are 5.5 %.
         assert!((0.945..1.16).contains(&floor), "{floor}");
         assert!(white_floor(&residual, size) > 1.5);
     }
 
     #[test]
-    fn the_floor_is_that_of_the_sensor_beside_other_noise_that_is_known() {
+    fn the_floor_of_a_sensor_is_found_beside_known_other_noise() {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
-        // Differences of noise of twice the amplitude have the power 4·|1 − e^(−iω)|²: zero at ω = 0, sixteen at half the sample rate.
+        // The differences of white noise with standard deviation 2 have the power 4·|1 − e^(−iω)|²: zero at ω = 0, sixteen at half the
+        // sample rate.
         let mut last = 0.0;
         let residual: Vec<f64> = (0..6000)
             .map(|_| {
@@ -196,42 +201,42 @@ mod tests {
         };
         let size = rms(&residual);
         let floor = white_floor_beside(&residual, size, &std::array::from_fn(power));
-        // Three standard deviations are 6 % without other noise; with up to sixteen times the power of other noise the floor is half as
-        // certain.
+        // Without other noise, three standard deviations are 6 %. With other noise of up to sixteen times the power, the uncertainty is
+        // twice that.
         assert!((floor - 1.0).abs() < 0.12, "{floor}");
         assert!(white_floor(&residual, size) > 1.3);
     }
 
     #[test]
-    fn the_floor_is_that_of_the_noise_with_and_without_a_signal() {
+    fn the_floor_does_not_depend_on_tones() {
         let mut random = ChaCha8Rng::seed_from_u64(3);
-        for loud in [0.0, 50.0] {
+        for tone in [0.0, 50.0] {
             let signal: Vec<f64> = (0..6000)
                 .map(|n| {
                     let noise: f64 = StandardNormal.sample(&mut random);
                     let t = n as f64;
-                    noise + loud * ((0.31 * t).sin() + (0.2 * t + 1e-5 * t * t).sin())
+                    noise + tone * ((0.31 * t).sin() + (0.2 * t + 1e-5 * t * t).sin())
                 })
                 .collect();
             let floor = white_floor(&signal, rms(&signal));
-            // 6000 samples, most of them beside the tones: 2 % is three standard deviations.
-            assert!((floor - 1.0).abs() < 0.04, "{loud}: {floor}");
+            // With 6000 samples, most bins being away from the tones, three standard deviations are 2 %.
+            assert!((floor - 1.0).abs() < 0.04, "{tone}: {floor}");
         }
     }
 
     #[test]
-    fn the_floor_of_a_hammer_is_that_between_its_blows() {
+    fn the_floor_of_a_hammer_is_that_between_its_impacts() {
         let mut random = ChaCha8Rng::seed_from_u64(6);
         let force: Vec<f64> = (0..40_000)
             .map(|n| {
                 let noise: f64 = StandardNormal.sample(&mut random);
-                // Half a sine of 20 samples, every 5 s at 2 kHz.
-                let blow = (std::f64::consts::PI * f64::from(n % 10_000) / 20.0).sin();
-                noise + if n % 10_000 < 20 { 5000.0 * blow } else { 0.0 }
+                // Impacts: half a sine of 20 samples, every 5 s at 2 kHz.
+                let impact = (std::f64::consts::PI * f64::from(n % 10_000) / 20.0).sin();
+                noise + if n % 10_000 < 20 { 5000.0 * impact } else { 0.0 }
             })
             .collect();
         let floor = quiet_floor(&force);
-        // The lower quartile of variances of 256 samples is 6 % below their mean; 156 windows determine it to 1 %.
+        // The lower quartile of variances of 256 samples is 6 % below their mean; 156 windows determine it within 1 %.
         assert!((0.95..0.99).contains(&floor), "{floor}");
         assert!(white_floor(&force, rms(&force)) > 1.2);
     }

@@ -1,4 +1,4 @@
-//! Virtual cuts near a lobe and in grown chatter, diagnosed with the baseline case.
+//! Diagnoses virtual cuts near the stability limit and in fully developed chatter.
 
 use crate::conclusion::answer::Outcome;
 use crate::records::study::Study;
@@ -9,14 +9,14 @@ use quietcut_recording::{Quantity, Recording};
 use quietcut_simulate::{Effects, Entry, VirtualCut};
 
 const RPM: f64 = 900.0;
-/// Stability limit of this slot at that speed.
+/// Limit of axial depth of this slot at `RPM`, mm.
 const LIMIT_MM: f64 = 2.083;
 
-fn believed() -> Case {
+fn baseline() -> Case {
     case("kuka-kr90-full", "")
 }
 
-/// A slot of six seconds with 0.5 % noise in the channels of these quantities.
+/// Recording of a slot of six seconds with 0.5 % noise, by sensors of the quantities `measured`.
 fn slot(depth_mm: f64, effects: &[&str], measured: &[Quantity], seed: u64) -> Recording {
     let seconds = 6.0;
     let cut = VirtualCut {
@@ -25,44 +25,44 @@ fn slot(depth_mm: f64, effects: &[&str], measured: &[Quantity], seed: u64) -> Re
         measured: measured.to_vec(),
         ..VirtualCut::new(RPM, depth_mm, seconds)
     };
-    record(&believed(), &cut, "cut.csv", 500.0, 0.005, seed)
+    record(&baseline(), &cut, "cut.csv", 500.0, 0.005, seed)
 }
 
-fn asked(recording: Recording) -> Diagnosis {
-    let diagnosis = diagnose(&believed(), &[recording], &Options::default()).unwrap();
+fn diagnosed(recording: Recording) -> Diagnosis {
+    let diagnosis = diagnose(&baseline(), &[recording], &Options::default()).unwrap();
     println!("{:?} {:?}", diagnosis.outcome, diagnosis.causes);
     diagnosis
 }
 
 #[test]
-fn a_right_case_is_right_near_the_lobe_and_in_chatter() {
+fn a_correct_baseline_has_no_cause_near_the_limit_and_in_chatter() {
     for (depth_mm, measured) in [
         (0.96 * LIMIT_MM, &[Quantity::Displacement][..]),
         (3.0, &[Quantity::Force, Quantity::Displacement]),
         (4.0, &[Quantity::Displacement]),
     ] {
         let recording = slot(depth_mm, &[], measured, 5);
-        let case = believed();
+        let case = baseline();
         let study = Study::new(&case, std::slice::from_ref(&recording)).unwrap();
         assert!(study.records[0].amplifies, "{depth_mm} mm");
-        let diagnosis = asked(recording);
+        let diagnosis = diagnosed(recording);
         assert_eq!(diagnosis.outcome, Outcome::None, "{depth_mm} mm, {measured:?}");
     }
 }
 
 #[test]
-fn a_shallow_cut_does_not_amplify() {
-    let case = believed();
+fn a_shallow_cut_is_not_near_chatter() {
+    let case = baseline();
     let recording = slot(0.2 * LIMIT_MM, &[], &[Quantity::Displacement], 5);
     let study = Study::new(&case, &[recording]).unwrap();
     assert!(!study.records[0].amplifies);
 }
 
 #[test]
-fn what_chatter_hides_is_named() {
+fn hidden_effects_are_found_in_chatter() {
     let forces = &[Quantity::Force, Quantity::Displacement][..];
     let motion = &[Quantity::Displacement][..];
-    // The baseline has a stiffness of 1.539947 N/µm and K_tc = 76 MPa.
+    // The stiffness of the baseline is 1.539947 N/µm, K_tc is 76 MPa.
     let hidden: [(f64, &[&str], _, _, _, f64); 6] = [
         (
             3.0,
@@ -97,7 +97,7 @@ fn what_chatter_hides_is_named() {
             "ktc_mpa",
             91.2,
         ),
-        // The baseline predicts it stable by a fifth.
+        // The baseline predicts this cut to be stable, with a limit a fifth deeper.
         (
             1.7,
             &["force-coefficients=0.6"],
@@ -108,15 +108,15 @@ fn what_chatter_hides_is_named() {
         ),
     ];
     for (depth_mm, effects, measured, name, key, truth) in hidden {
-        let diagnosis = asked(slot(depth_mm, effects, measured, 7));
+        let diagnosis = diagnosed(slot(depth_mm, effects, measured, 7));
         assert_eq!(diagnosis.outcome, Outcome::Cause, "{effects:?}");
         let names: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name).collect();
         assert_eq!(names, [name], "{effects:?}");
         let found = diagnosis.causes[0].parameters[key];
-        // Twice the 90 % interval: one of six may exceed the interval, none twice.
+        // The error may reach twice the half-width of the 90 % interval: one of six errors may exceed the half-width, none its double.
         let reach = found.ci90[1] - found.ci90[0];
         assert!((found.value - truth).abs() < reach, "{effects:?}: {found:?}");
-        // 0.5 % noise in some 3 000 samples determine the strongest cause to a hundredth.
+        // With 0.5 % noise, some 3 000 samples determine the parameter of the only cause within one percent.
         assert!(reach < 0.03 * truth, "{effects:?}: {found:?}");
     }
 }

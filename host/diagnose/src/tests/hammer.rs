@@ -1,4 +1,4 @@
-//! A minute of hammer impacts: a search of the first ones, validated on the rest.
+//! Diagnoses a minute of hammer impacts: causes are searched in the first ones, and validated on the rest.
 
 use std::path::Path;
 
@@ -10,11 +10,12 @@ use quietcut_recording::Quantity;
 use quietcut_simulate::Effects;
 use quietcut_simulate::rig::{Impact, Noise, Rig, Signal};
 
-/// Ten impacts on the Stäubli with accelerometers and 1 % noise on every channel. Their spectrum reaches to the end of the band.
-fn asked(effects: &[&str]) -> Diagnosis {
-    let believed = case("staubli-tx200", "");
-    let impacts = (0..10).map(|blow| Impact {
-        start_s: 0.5 + 5.0 * f64::from(blow),
+/// Diagnosis of ten impacts on the Stäubli robot, with accelerometers and 1 % noise on every channel. The spectrum of the impacts reaches
+/// to the end of the band.
+fn diagnosed(effects: &[&str]) -> Diagnosis {
+    let baseline = case("staubli-tx200", "");
+    let impacts = (0..10).map(|index| Impact {
+        start_s: 0.5 + 5.0 * f64::from(index),
         peak_n: 200.0,
         pulse_s: 0.01,
     });
@@ -27,27 +28,27 @@ fn asked(effects: &[&str]) -> Diagnosis {
         measured: vec![Quantity::Acceleration],
         ..Rig::new(Direction::X, signal, 2048.0)
     };
-    let structure = believed.structure.as_ref().unwrap();
-    let (mut recording, _) = rig.record(structure, Path::new("blows.csv")).unwrap();
+    let structure = baseline.structure.as_ref().unwrap();
+    let (mut recording, _) = rig.record(structure, Path::new("impacts.csv")).unwrap();
     let noise = Noise {
         relative: 0.01,
         ..Noise::default()
     };
     noise.add(&mut recording, 4);
-    diagnose(&believed, &[recording], &Options::default()).unwrap()
+    diagnose(&baseline, &[recording], &Options::default()).unwrap()
 }
 
 #[test]
-fn a_right_case_is_right() {
-    let diagnosis = asked(&[]);
+fn a_correct_baseline_has_no_cause() {
+    let diagnosis = diagnosed(&[]);
     assert_eq!(diagnosis.outcome, Outcome::None, "{:?}", diagnosis.causes);
     let said = diagnosis.warnings.last().unwrap();
     assert!(said.starts_with("causes were searched in 16.0 s"), "{said}");
 }
 
 #[test]
-fn what_is_wrong_is_named() {
-    let diagnosis = asked(&["stiffness=0.1", "stiffness.direction=x"]);
+fn a_hidden_effect_is_found() {
+    let diagnosis = diagnosed(&["stiffness=0.1", "stiffness.direction=x"]);
     println!("{:?}", diagnosis.causes);
     assert_eq!(diagnosis.names(), ["stiffness"]);
 }

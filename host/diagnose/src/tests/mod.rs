@@ -1,4 +1,4 @@
-//! Diagnoses of virtual records, from end to end.
+//! Diagnoses virtual records from end to end.
 
 mod chatter;
 mod cutting;

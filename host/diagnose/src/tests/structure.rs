@@ -1,4 +1,4 @@
-//! Virtual tests of a structure with hidden effects, diagnosed with the baseline case.
+//! Diagnoses virtual tests of a structure with hidden effects.
 
 use std::path::Path;
 
@@ -10,9 +10,9 @@ use quietcut_recording::{Channel, Quantity, Recording, TestKind};
 use quietcut_simulate::Effects;
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 
-/// One mode of a robot at 17.4 Hz.
-const BELIEVED: &str = r#"
-name = "believed"
+/// Case of one mode of a robot at 17.4 Hz.
+const BASELINE: &str = r#"
+name = "baseline"
 [structure]
 kind = "matrices"
 directions = ["x"]
@@ -21,16 +21,16 @@ damping = [[305.0]]
 stiffness = [[2260000.0]]
 "#;
 
-pub(crate) fn believed() -> Case {
-    Case::parse(Path::new("believed.toml"), BELIEVED).unwrap()
+pub(crate) fn baseline() -> Case {
+    Case::parse(Path::new("baseline.toml"), BASELINE).unwrap()
 }
 
-/// Recording of a rig with effects, with 1 % noise on the displacement.
+/// Recording of a test of the baseline's structure with hidden effects, with 1 % noise on the displacement.
 fn recorded(signal: Signal, rate_hz: f64, effects: &[&str], seed: u64) -> Recording {
-    recorded_of(&believed(), Direction::X, signal, rate_hz, effects, seed)
+    recorded_of(&baseline(), Direction::X, signal, rate_hz, effects, seed)
 }
 
-/// The same of another machine, with the force along `direction`.
+/// Recording of a test of any structure with hidden effects, with the force along `direction` and 1 % noise on the displacement.
 pub(crate) fn recorded_of(
     case: &Case,
     direction: Direction,
@@ -53,7 +53,7 @@ pub(crate) fn recorded_of(
     recording
 }
 
-/// A recording of more than one second, whose samples a test replaces.
+/// A recording of more than one second whose samples the caller replaces.
 fn to_be_filled(rate_hz: f64, seed: u64) -> Recording {
     let signal = Signal::Release {
         force_n: 1.0,
@@ -63,7 +63,7 @@ fn to_be_filled(rate_hz: f64, seed: u64) -> Recording {
     recorded(signal, rate_hz, &[], seed)
 }
 
-/// Sweeps through the mode at three levels.
+/// Sweeps through the resonance at three force levels, with hidden effects.
 fn records(effects: &[&str]) -> Vec<Recording> {
     let sweep = |(seed, amplitude_n)| {
         let signal = Signal::Sweep {
@@ -77,10 +77,10 @@ fn records(effects: &[&str]) -> Vec<Recording> {
     [(7, 5.0), (8, 20.0), (9, 60.0)].map(sweep).into()
 }
 
-/// Two free decays from static forces, recorded from the release on, without the force.
-fn releases(effects: &[&str]) -> Vec<Recording> {
+/// Two free decays from static forces, recorded from their start on, without the force, with hidden effects.
+fn free_decays(effects: &[&str]) -> Vec<Recording> {
     let (rate_hz, pull_s) = (256.0, 5.0);
-    let release = |(seed, force_n)| {
+    let free_decay = |(seed, force_n)| {
         let signal = Signal::Release {
             force_n,
             pull_s,
@@ -94,11 +94,11 @@ fn releases(effects: &[&str]) -> Vec<Recording> {
         recording.sidecar.input = None;
         recording
     };
-    [(7, 500.0), (8, 200.0)].map(release).into()
+    [(7, 500.0), (8, 200.0)].map(free_decay).into()
 }
 
-fn ask(effects: &[&str]) -> Diagnosis {
-    diagnose(&believed(), &records(effects), &Options::default()).unwrap()
+fn diagnosed(effects: &[&str]) -> Diagnosis {
+    diagnose(&baseline(), &records(effects), &Options::default()).unwrap()
 }
 
 fn value(diagnosis: &Diagnosis, name: &str, key: &str) -> f64 {
@@ -107,14 +107,14 @@ fn value(diagnosis: &Diagnosis, name: &str, key: &str) -> f64 {
 }
 
 #[test]
-fn nothing_is_found_where_nothing_is_hidden() {
-    let answer = ask(&[]);
+fn records_without_hidden_effects_have_no_cause() {
+    let answer = diagnosed(&[]);
     assert_eq!(answer.outcome, Outcome::None, "{:?}", answer.causes);
 }
 
 #[test]
-fn single_causes_are_named_with_their_size() {
-    // 1 % noise in 15 000 samples: the standard deviations are well below a percent.
+fn single_causes_are_found_with_their_parameters() {
+    // With 1 % noise in 15 000 samples, the standard deviations are well below one percent.
     for (effects, name, key, truth) in [
         (
             vec!["cubic-stiffness=-1e12"],
@@ -151,7 +151,7 @@ fn single_causes_are_named_with_their_size() {
             900.0,
         ),
     ] {
-        let answer = ask(&effects);
+        let answer = diagnosed(&effects);
         assert_eq!(answer.outcome, Outcome::Cause, "{effects:?}: {:?}", answer.causes);
         assert_eq!(answer.causes[0].name, name, "{effects:?}");
         let found = value(&answer, name, key);
@@ -161,9 +161,9 @@ fn single_causes_are_named_with_their_size() {
 }
 
 #[test]
-fn a_cause_that_hardly_shows_is_named_beside_one_that_does() {
-    // Alone, the delay leaves a few percent more than the noise, which is within chance for an unknown noise variance.
-    let answer = ask(&["cubic-stiffness=-1e12", "sensor-delay=3e-5"]);
+fn a_small_cause_is_found_beside_a_large_one() {
+    // The delay alone adds a few percent to the noise, which chance may do if the noise variance is unknown.
+    let answer = diagnosed(&["cubic-stiffness=-1e12", "sensor-delay=3e-5"]);
     assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
     let names: Vec<&str> = answer.causes.iter().map(|cause| cause.name).collect();
     assert_eq!(names, ["cubic-stiffness", "sensor-delay"]);
@@ -171,9 +171,9 @@ fn a_cause_that_hardly_shows_is_named_beside_one_that_does() {
     assert!((delay_s / 3e-5 - 1.0).abs() < 0.3, "{delay_s}");
 }
 
-/// A guide whose damping depends on the position, f_r = e·x·v, which is no cause of the library; Runge–Kutta with steps of a tenth of a
-/// sample.
-fn unevenly_damped(by_place: f64, amplitude_n: f64, seed: u64) -> Recording {
+/// Recording of a sweep on a guide whose damping depends on the position, f_r = e·x·v, which is no cause of the library. It is simulated by
+/// Runge–Kutta with steps of a tenth of a sample.
+fn unevenly_damped(damping_per_m: f64, amplitude_n: f64, seed: u64) -> Recording {
     const FINER: usize = 10;
     let signal = Signal::Sweep {
         first_hz: 10.0,
@@ -183,7 +183,7 @@ fn unevenly_damped(by_place: f64, amplitude_n: f64, seed: u64) -> Recording {
     };
     let mut recording = recorded(signal.clone(), 256.0, &[], seed);
     let rate = |t: f64, [x, v]: [f64; 2]| {
-        let force = signal.force_n(t) - 305.0 * v - 2.26e6 * x - by_place * x * v;
+        let force = signal.force_n(t) - 305.0 * v - 2.26e6 * x - damping_per_m * x * v;
         [v, force / 188.0]
     };
     let moved = |state: [f64; 2], slope: [f64; 2], h: f64| [state[0] + h * slope[0], state[1] + h * slope[1]];
@@ -212,13 +212,13 @@ fn unevenly_damped(by_place: f64, amplitude_n: f64, seed: u64) -> Recording {
 }
 
 #[test]
-fn of_what_no_cause_explains_a_formula_is_guessed() {
+fn a_formula_is_guessed_for_an_unexplained_residual() {
     let records = [(7, 5.0), (8, 20.0), (9, 60.0)].map(|(seed, level)| unevenly_damped(1.5e5, level, seed));
-    let answer = diagnose(&believed(), &records, &Options::default()).unwrap();
+    let answer = diagnose(&baseline(), &records, &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Unexplained, "{:?}", answer.causes);
     let guess = answer.unexplained.guess.unwrap();
     assert!(guess.starts_with("a guess and no cause: "), "{guess}");
-    // The first term is the largest: its coefficient and its expression.
+    // The first term of the formula is the largest: its coefficient and its expression.
     let (number, words) = guess
         .split_once("force of + ")
         .and_then(|(_, formula)| formula.split_once('·'))
@@ -231,16 +231,16 @@ fn of_what_no_cause_explains_a_formula_is_guessed() {
 }
 
 #[test]
-fn a_mode_that_is_missing_shows_in_what_was_let_go() {
+fn a_missing_mode_is_found_in_free_decays() {
     let mode = [
         "missing-mode=31",
         "missing-mode.modal_mass_kg=150",
         "missing-mode.damping_ratio=0.02",
     ];
-    let answer = diagnose(&believed(), &releases(&mode), &Options::default()).unwrap();
+    let answer = diagnose(&baseline(), &free_decays(&mode), &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
     assert_eq!(answer.causes[0].name, "missing-mode");
-    // 4 000 samples with 1 % noise: a mass to about a percent, from the static force on both modes.
+    // With 1 % noise, 4 000 samples determine the modal mass within about one percent, from the static force on both modes.
     for (key, truth, bound) in [
         ("frequency_hz", 31.0, 2e-3),
         ("damping_ratio", 0.02, 0.06),
@@ -249,18 +249,18 @@ fn a_mode_that_is_missing_shows_in_what_was_let_go() {
         let found = value(&answer, "missing-mode", key);
         assert!((found / truth - 1.0).abs() < bound, "{key}: {found}");
     }
-    let plain = diagnose(&believed(), &releases(&[]), &Options::default()).unwrap();
+    let plain = diagnose(&baseline(), &free_decays(&[]), &Options::default()).unwrap();
     assert_eq!(plain.outcome, Outcome::None, "{:?}", plain.causes);
 }
 
 #[test]
-fn a_gain_is_the_same_as_mass_stiffness_and_damping_by_one_factor() {
-    let answer = ask(&["sensor-gain=1.1"]);
+fn a_gain_is_equivalent_to_one_factor_on_mass_stiffness_and_damping() {
+    let answer = diagnosed(&["sensor-gain=1.1"]);
     assert_eq!(answer.outcome, Outcome::Confounded);
     let mut group = answer.equivalent[0].clone();
     group.sort_unstable();
     assert_eq!(group, ["damping", "mass", "sensor-gain", "stiffness"]);
-    // The causes that act together.
+    // The alternatives contain all causes that act together.
     let said = answer.alternatives();
     assert_eq!(
         said,
@@ -271,7 +271,7 @@ fn a_gain_is_the_same_as_mass_stiffness_and_damping_by_one_factor() {
     assert!(json["explanations"][1][2]["confidence"].as_f64().unwrap() < 0.3);
     assert!((value(&answer, "sensor-gain", "gain") - 1.1).abs() < 0.002);
     assert!((value(&answer, "mass", "mass_kg") * 1.1 / 188.0 - 1.0).abs() < 0.002);
-    // The readings of the same sensor under the same force cannot separate them.
+    // Readings of the same sensor under the same force cannot separate a gain from a common factor.
     let test = answer.next_test.unwrap();
     assert!(
         test.measure
@@ -282,13 +282,13 @@ fn a_gain_is_the_same_as_mass_stiffness_and_damping_by_one_factor() {
 }
 
 #[test]
-fn one_law_along_two_directions_is_one_cause_with_a_number_for_each() {
-    let text = BELIEVED
+fn a_cause_along_two_directions_has_a_parameter_for_each() {
+    let text = BASELINE
         .replace("[\"x\"]", "[\"x\", \"y\"]")
         .replace("[[188.0]]", "[[188.0, 4.0], [4.0, 150.0]]")
         .replace("[[305.0]]", "[[305.0, 0.0], [0.0, 400.0]]")
         .replace("[[2260000.0]]", "[[2260000.0, 0.0], [0.0, 2600000.0]]");
-    let case = Case::parse(Path::new("believed.toml"), &text).unwrap();
+    let case = Case::parse(Path::new("baseline.toml"), &text).unwrap();
     let springs = [
         "cubic-stiffness.k3_n_per_m3=-1e12,-2e12",
         "cubic-stiffness.direction=x,y",
@@ -322,7 +322,7 @@ fn one_law_along_two_directions_is_one_cause_with_a_number_for_each() {
     else {
         panic!("{named:?}");
     };
-    // 5 000 samples per direction with 1 % noise.
+    // The noise is 1 % in 5 000 samples of each direction.
     assert!(
         (x / -1e12 - 1.0).abs() < 0.01 && (y / -2e12 - 1.0).abs() < 0.01,
         "{named:?}"
@@ -338,8 +338,8 @@ fn one_law_along_two_directions_is_one_cause_with_a_number_for_each() {
     assert_eq!(again.outcome, Outcome::None, "{:?}", again.causes);
 }
 
-/// Imposed motion of two tones, and its force: of the machine, of 150 N of dry friction, of an unknown force with the amplitude
-/// `unknown_n`, and 5 N of noise.
+/// Recording of an imposed motion of two tones and its force. The force is that of the machine, 150 N of dry friction, an unknown force
+/// with the amplitude `unknown_n`, and 5 N of noise.
 fn imposed(unknown_n: f64, seed: u64) -> Recording {
     use rand::SeedableRng;
     use rand_distr::Distribution;
@@ -348,7 +348,7 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
     let (mut moved, mut force) = (Vec::new(), Vec::new());
     for n in 0..4096 {
         let t = f64::from(n) / rate_hz;
-        // Position, velocity and acceleration over whole periods.
+        // Position, velocity and acceleration of both tones over whole periods.
         let (mut x, mut v, mut a) = (0.0, 0.0, 0.0);
         for (size, hz) in [(2e-3, 1.0), (1e-3, 2.75)] {
             let omega = std::f64::consts::TAU * hz;
@@ -358,10 +358,10 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
         }
         let noise: f64 = rand_distr::StandardNormal.sample(&mut random);
         moved.push(x);
-        // An irregular modulation as of real friction, three times in a period of the first tone.
-        let turn = 3.0 * std::f64::consts::TAU * t + 0.8 * (0.4 * t).sin();
+        // The unknown force varies irregularly, as real friction does, three times per two periods of the first tone.
+        let phase = 3.0 * std::f64::consts::TAU * t + 0.8 * (0.4 * t).sin();
         force.push(
-            188.0 * a + 305.0 * v + 2.26e6 * x + 150.0 * v.signum() + unknown_n * turn.cos() + 5.0 * noise,
+            188.0 * a + 305.0 * v + 2.26e6 * x + 150.0 * v.signum() + unknown_n * phase.cos() + 5.0 * noise,
         );
     }
     let channel = |name: &str, quantity, samples| Channel {
@@ -380,8 +380,8 @@ fn imposed(unknown_n: f64, seed: u64) -> Recording {
 }
 
 #[test]
-fn where_the_motion_is_imposed_the_force_is_what_is_explained() {
-    let answer = diagnose(&believed(), &[imposed(0.0, 5)], &Options::default()).unwrap();
+fn friction_is_found_in_the_force_of_an_imposed_motion() {
+    let answer = diagnose(&baseline(), &[imposed(0.0, 5)], &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
     assert_eq!(answer.causes[0].name, "coulomb-friction");
     let found = value(&answer, "coulomb-friction", "fc_n");
@@ -389,21 +389,22 @@ fn where_the_motion_is_imposed_the_force_is_what_is_explained() {
 }
 
 #[test]
-fn of_forces_the_record_that_is_described_worst_counts_least() {
+fn the_record_with_the_largest_residual_of_force_has_the_least_weight() {
     let records = [imposed(0.0, 5), imposed(120.0, 6)];
-    let answer = diagnose(&believed(), &records, &Options::default()).unwrap();
+    let answer = diagnose(&baseline(), &records, &Options::default()).unwrap();
     assert_eq!(answer.causes[0].name, "coulomb-friction", "{:?}", answer.causes);
     let friction = &answer.causes[0].parameters["fc_n"];
-    // The record without the unknown force is biased by 0.15 %, where the velocity is noise. Both records with equal weight would be biased
-    // by 0.44 %.
+    // The record without the unknown force is biased by 0.15 %, because noise decides the sign of small velocities. Both records with equal
+    // weight would be biased by 0.44 %.
     assert!((friction.value / 150.0 - 1.0).abs() < 2.5e-3, "{friction:?}");
 }
 
 #[test]
-fn simulations_are_as_exact_as_the_smallest_motion_is_measured() {
-    // Free decay of a spindle from some micrometers, with the noise of an interferometer: the solution of a damped oscillator.
+fn simulations_are_accurate_to_the_noise_of_an_interferometer() {
+    // Free decay of a spindle from some micrometers, with the noise of an interferometer. The samples are the exact solution of a damped
+    // oscillator.
     let (mass, damping, stiffness) = (0.048, 1.78, 2.2e5);
-    let case = BELIEVED
+    let case = BASELINE
         .replace("188.0", &format!("{mass:?}"))
         .replace("305.0", &format!("{damping:?}"))
         .replace("2260000.0", &format!("{stiffness:?}"));
@@ -434,13 +435,13 @@ fn simulations_are_as_exact_as_the_smallest_motion_is_measured() {
 }
 
 #[test]
-fn what_was_found_is_not_found_again() {
+fn an_extended_case_has_no_further_cause() {
     let records = records(&["cubic-stiffness=-2e11"]);
-    let first = diagnose(&believed(), &records, &Options::default()).unwrap();
-    let text = first.extended_case(BELIEVED).unwrap();
-    // A case cannot have the extension twice, but its structure can have the term.
+    let first = diagnose(&baseline(), &records, &Options::default()).unwrap();
+    let text = first.extended_case(BASELINE).unwrap();
+    // A case holds the extension only once, but its structure can have the cubic stiffness as well.
     let k3 = value(&first, "cubic-stiffness", "k3_n_per_m3");
-    let inside = BELIEVED.replacen(
+    let inside = BASELINE.replacen(
         "stiffness = [[",
         &format!("cubic_stiffness = [[{k3:e}]]\nstiffness = [["),
         1,
@@ -453,12 +454,12 @@ fn what_was_found_is_not_found_again() {
 }
 
 #[test]
-fn records_that_tell_nothing_are_refused_with_what_is_needed() {
+fn unusable_records_are_refused_with_their_requirement() {
     let good = records(&[]).swap_remove(0);
     let refused = |change: &dyn Fn(&mut Recording), words: &str| {
         let mut record = good.clone();
         change(&mut record);
-        let error: DiagnoseError = diagnose(&believed(), &[record], &Options::default()).unwrap_err();
+        let error: DiagnoseError = diagnose(&baseline(), &[record], &Options::default()).unwrap_err();
         let said = error.to_string();
         assert!(said.contains(words), "{said}");
     };
@@ -507,7 +508,7 @@ fn records_that_tell_nothing_are_refused_with_what_is_needed() {
     );
 }
 
-/// Four records of a minute at 2 kHz, of tones with no common period.
+/// Four records of one minute at 2 kHz, of tones without a common period, with hidden effects.
 fn long_records(effects: &[&str]) -> Vec<Recording> {
     let tones = |(index, last_n): (u32, f64)| {
         let tones = (0..25).map(|k: u32| (10.0 + f64::from(k).powf(0.9), f64::from(k * k + index)));
@@ -525,9 +526,9 @@ fn long_records(effects: &[&str]) -> Vec<Recording> {
 }
 
 #[test]
-fn of_long_records_the_beginnings_are_searched_and_all_is_checked() {
+fn long_records_are_searched_in_part_and_validated_on_the_rest() {
     let recordings = long_records(&["cubic-stiffness=2e12"]);
-    let answer = diagnose(&believed(), &recordings, &Options::default()).unwrap();
+    let answer = diagnose(&baseline(), &recordings, &Options::default()).unwrap();
     assert_eq!(answer.outcome, Outcome::Cause, "{:?}", answer.causes);
     assert_eq!(answer.causes[0].name, "cubic-stiffness");
     let found = value(&answer, "cubic-stiffness", "k3_n_per_m3");
@@ -543,12 +544,12 @@ fn of_long_records_the_beginnings_are_searched_and_all_is_checked() {
     );
 }
 
-/// A drift of 4 % per minute is a quarter of a percent in the first seconds.
+/// A drift of 4 % per minute is only 0.25 % in the first seconds, in which causes are searched.
 #[test]
-fn what_only_the_whole_of_long_records_shows_is_not_overlooked() {
+fn a_drift_over_long_records_is_not_overlooked() {
     let recordings = long_records(&["drift.relative_rate_per_s=0.0007"]);
     let beginning =
-        crate::conclusion::long_records::concluded(&believed(), &recordings, &Options::default(), &|_| ());
+        crate::conclusion::long_records::concluded(&baseline(), &recordings, &Options::default(), &|_| ());
     assert!(
         beginning.is_none_or(|answer| answer.outcome != Outcome::None),
         "nothing is said to be wrong"

@@ -1,8 +1,8 @@
-//! Two effects, of which one masks the other.
+//! Diagnoses records with two effects of which one masks the other.
 
 use std::path::Path;
 
-use crate::tests::structure::{believed, recorded_of};
+use crate::tests::structure::{baseline, recorded_of};
 use crate::{Diagnosis, Options, diagnose};
 use quietcut_model::case::Case;
 use quietcut_model::structure::Direction;
@@ -28,9 +28,9 @@ fn assert_found(diagnosis: &Diagnosis, expected: &[(&str, &str, f64, f64)]) {
 }
 
 #[test]
-fn beside_a_cause_that_moves_the_resonance_another_is_sought_around_it() {
-    let case = believed();
-    // The baseline has 2.26e6 N/m: the resonance moves from 24 to 33 Hz, many times its width.
+fn a_second_cause_is_found_after_the_first_moved_the_resonance() {
+    let case = baseline();
+    // The stiffness of the baseline is 2.26e6 N/m. The resonance moves from 24 to 33 Hz, many times its bandwidth.
     let effects = [
         "stiffness=0.9",
         "softening-hardening.k3_n_per_m3=-3e10",
@@ -56,7 +56,7 @@ fn beside_a_cause_that_moves_the_resonance_another_is_sought_around_it() {
     );
 }
 
-/// The mode of x at 507 Hz appears along y too, at one fiftieth of the 339 Hz mode there.
+/// The mode of x at 507 Hz also appears along y, with 1/50 of the inverse modal mass of the mode at 339 Hz.
 const COUPLED: &str = r#"
 [structure]
 kind = "matrices"
@@ -67,8 +67,8 @@ stiffness = [[4.72e6, 2.2e4], [2.2e4, 2.293e6]]
 "#;
 
 #[test]
-fn a_mode_is_found_where_a_weaker_one_of_the_other_direction_is_near() {
-    let case = Case::parse(Path::new("believed.toml"), COUPLED).unwrap();
+fn a_missing_mode_is_found_near_a_weaker_mode_of_the_other_direction() {
+    let case = Case::parse(Path::new("baseline.toml"), COUPLED).unwrap();
     let effects = [
         "missing-mode.direction=y",
         "missing-mode.frequency_hz=524",

@@ -1,5 +1,5 @@
-//! Accelerations of a structure whose modal masses add up to no mass: a step of the force makes the velocity jump, and an accelerometer
-//! reads the average over a sample.
+//! Diagnoses accelerations of a structure whose modal masses add up to no mass: a step of the force makes the velocity jump, and an
+//! accelerometer reads the average over a sampling interval.
 
 use crate::conclusion::answer::Outcome;
 use crate::tests::virtual_records::{case, record};
@@ -10,7 +10,7 @@ use quietcut_recording::Quantity;
 use quietcut_simulate::rig::{Noise, Rig, Signal};
 use quietcut_simulate::{Effects, Entry, VirtualCut};
 
-fn believed() -> Case {
+fn baseline() -> Case {
     case("kuka-kr90-acetal", "")
 }
 
@@ -22,8 +22,8 @@ fn of_a_cut(effects: &[&str]) -> Diagnosis {
         measured: vec![Quantity::Force, Quantity::Acceleration],
         ..VirtualCut::new(900.0, 0.5, seconds)
     };
-    let recording = record(&believed(), &cut, "cut.csv", 1000.0, 0.005, 2);
-    diagnose(&believed(), &[recording], &Options::default()).unwrap()
+    let recording = record(&baseline(), &cut, "cut.csv", 1000.0, 0.005, 2);
+    diagnose(&baseline(), &[recording], &Options::default()).unwrap()
 }
 
 fn of_a_sweep(effects: &[&str]) -> Diagnosis {
@@ -38,25 +38,25 @@ fn of_a_sweep(effects: &[&str]) -> Diagnosis {
         measured: vec![Quantity::Acceleration],
         ..Rig::new(Direction::X, signal, 256.0)
     };
-    let structure = believed().structure.unwrap();
+    let structure = baseline().structure.unwrap();
     let (mut recording, _) = rig.record(&structure, std::path::Path::new("sweep.csv")).unwrap();
     let noise = Noise {
         relative: 0.01,
         ..Noise::default()
     };
     noise.add(&mut recording, 2);
-    diagnose(&believed(), &[recording], &Options::default()).unwrap()
+    diagnose(&baseline(), &[recording], &Options::default()).unwrap()
 }
 
 #[test]
-fn a_right_case_is_right() {
+fn a_correct_baseline_has_no_cause() {
     for diagnosis in [of_a_cut(&[]), of_a_sweep(&[])] {
         assert_eq!(diagnosis.outcome, Outcome::None, "{:?}", diagnosis.causes);
     }
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn a_hidden_effect_is_found() {
     for (diagnosis, name, key, truth) in [
         (of_a_cut(&["damping=0.3"]), "damping", "relative_change", 0.3),
         (
@@ -69,7 +69,7 @@ fn what_is_wrong_is_named() {
         assert_eq!(diagnosis.names(), [name]);
         let [low, high] = diagnosis.causes[0].parameters[key].ci90;
         println!("{name}: {low} to {high}");
-        // Twice the 90 % interval.
+        // The error may reach twice the half-width of the 90 % interval.
         assert!(
             (truth - 0.5 * (low + high)).abs() < high - low,
             "{name}: {low} to {high}"

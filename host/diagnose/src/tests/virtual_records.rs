@@ -1,4 +1,4 @@
-//! Cases and virtual cuts for these tests.
+//! Cases and virtual cuts that several tests share.
 
 use std::path::Path;
 
@@ -7,14 +7,15 @@ use quietcut_recording::Recording;
 use quietcut_simulate::rig::Noise;
 use quietcut_simulate::{Recorder, TachometerModel, VirtualCut};
 
-/// A case of the tests with further lines.
+/// The case `name` of the folder `tests/cases`, with the further lines `more`.
 pub(crate) fn case(name: &str, more: &str) -> Case {
     let path = format!("{}/../../tests/cases/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&path).unwrap();
     Case::parse(Path::new(&path), &format!("{text}\n{more}")).unwrap()
 }
 
-/// Recording of a cut by ideal sensors and a tachometer without jitter, with this share of noise on every channel.
+/// Recording of a cut by ideal sensors and a tachometer without jitter. `noise` is the noise on every channel, as a share of its root mean
+/// square.
 pub(crate) fn record(
     case: &Case,
     cut: &VirtualCut,
