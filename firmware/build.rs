@@ -1,5 +1,5 @@
-//! Link scripts: the real board links with cortex-m-rt's `link.x` and the root `memory.x`, the
-//! emulator's images with a script of their own (see `qemu_mps2.ld`).
+//! Selects the link scripts: the image of the real board uses `link.x` of cortex-m-rt and the root `memory.x`, the images for
+//! the emulator use `qemu_mps2.ld`.
 
 fn main() {
     println!("cargo:rerun-if-changed=qemu_mps2.ld");

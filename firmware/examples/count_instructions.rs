@@ -1,10 +1,10 @@
-//! Counts the instructions of pieces of the signal chain on the emulated Cortex-M4F.
+//! Counts the instructions of the stages of the signal chain on the emulated Cortex-M4F.
 //!
-//! Run with `-icount shift=6`: the emulator then advances its clock by 64 ns per instruction, and
-//! SysTick, at 25 MHz, by 1.6 ticks. Every count is printed as one line `NAME COUNT`; an empty
-//! piece is subtracted. Instructions are not cycles; compare only counts of one compiler version.
+//! Run with `-icount shift=6`. The emulator then advances its clock by 64 ns per instruction, and SysTick, at 25 MHz, by 1.6
+//! ticks. Every count is printed as one line `NAME COUNT`, without the count of an empty function. Instructions are not cycles:
+//! compare only counts of one compiler version.
 //!
-//! Lines `bits-of-NAME NUMBER` say what the chain computes, for comparison with the host.
+//! Lines `bits-of-NAME NUMBER` give digests of the computed results, for comparison with the host.
 #![no_std]
 #![no_main]
 #![deny(clippy::undocumented_unsafe_blocks)]
@@ -21,7 +21,7 @@ use quietcut_core::lobes::LobeTable;
 use quietcut_core::units::{Hertz, Rpm};
 use quietcut_core::{fft, math};
 
-// The tests that compare its numbers are another crate.
+// The tests that compare the digests include these files too, with `pub` items.
 #[allow(unreachable_pub)]
 #[path = "../../tests/support/chain_bits.rs"]
 mod chain_bits;
@@ -62,7 +62,7 @@ fn main() -> ! {
     }
 }
 
-/// The fixed-point transforms beside microfft's in single precision, on the same samples.
+/// Counts the fixed-point transforms and the single-precision transforms of microfft, on the same samples.
 fn transforms(counter: &mut Counter) {
     let (Some(fixed), Some(float)) = (
         singleton!(FIXED: [i32; 4096] = [0; 4096]),
@@ -93,7 +93,7 @@ fn transforms(counter: &mut Counter) {
     both!(4096, fft::rfft_4096, microfft::real::rfft_4096);
 }
 
-/// The spectra over three axes and the search in them.
+/// Counts the spectra of both bands, summed over three axes, and the search for a tone in them.
 fn spectra(counter: &mut Counter) {
     let Some(memory) = singleton!(MEMORY: chain_bits::Memory = chain_bits::Memory::new()) else {
         fail()
@@ -107,7 +107,7 @@ fn spectra(counter: &mut Counter) {
     counter.print("structure-search", || keep(chain_bits::search(spectrum)));
 }
 
-/// 4000 samples at the sensor's rate through both bands.
+/// Counts the decimation of 4000 sensor samples to both bands.
 fn decimation(counter: &mut Counter) {
     let Ok(decimation) = Decimation::new(Hertz(26_667.0)) else {
         fail()
@@ -121,7 +121,7 @@ fn decimation(counter: &mut Counter) {
     });
 }
 
-/// Lookup and advice in a table of 96 KB.
+/// Counts lookups and advice in a lobe table of 96 KB.
 fn lobe_table(counter: &mut Counter) {
     let Some(memory) = singleton!(TABLE: table_bits::Memory = table_bits::Memory::new()) else {
         fail()
@@ -141,19 +141,19 @@ fn lobe_table(counter: &mut Counter) {
     });
 }
 
-/// Keeps the compiler from leaving out what nobody looks at.
+/// Keeps the compiler from removing the computation of an unused value.
 fn keep<T>(value: T) {
     black_box(value);
 }
 
-/// Counts instructions by SysTick.
+/// Counter of instructions, with the timer SysTick.
 struct Counter {
     timer: SYST,
     empty_ticks: u32,
 }
 
 impl Counter {
-    /// SysTick counts down 24 bits: 10.4 million instructions at most.
+    /// Largest count of SysTick, which has 24 bits: 10.4 million instructions.
     const MAX_TICKS: u32 = 0x00ff_ffff;
 
     fn start(mut timer: SYST) -> Self {
@@ -180,10 +180,10 @@ impl Counter {
         before.wrapping_sub(after) & Self::MAX_TICKS
     }
 
-    /// Prints how many instructions `piece` took.
+    /// Prints the number of instructions of `piece`.
     fn print(&mut self, name: &str, piece: impl FnOnce()) {
         let ticks = self.ticks(piece).saturating_sub(self.empty_ticks);
-        // 1.6 ticks per instruction.
+        // One instruction takes 1.6 ticks.
         hprintln!("{} {}", name, (u64::from(ticks) * 5 + 4) / 8);
     }
 }

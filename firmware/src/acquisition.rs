@@ -8,15 +8,7 @@ use quietcut_core::event_clock::{EventClock, EventClockState};
 use quietcut_core::units::Nanoseconds;
 
 use crate::accelerometer::{Accelerometer, Queue};
-
-/// Number of stamps after which the weight of a stamp has decayed to 1/e: 0.6 s of blocks of 64 samples at 26 667 Hz. Unfounded.
-const CLOCK_MEMORY_STAMPS: f32 = 256.0;
-
-/// Largest relative deviation of the true sample rate from the nominal one: data sheets allow 3 %, and the bound is wider.
-const RATE_TOLERANCE: f32 = 0.05;
-
-/// Initial estimate of the stamps' standard deviation: some ticks of the device's timer. Unfounded.
-const STAMP_JITTER_NS: f32 = 100.0;
+use crate::criteria::{CLOCK_MEMORY_STAMPS, RATE_TOLERANCE, STAMP_JITTER_NS};
 
 /// The acquisition of one accelerometer.
 pub struct Acquisition<A> {
@@ -26,11 +18,11 @@ pub struct Acquisition<A> {
     /// The line fitted to the stamps; its newest event is sample number [`Self::stamped_sample`].
     line: Option<EventClockState>,
     stamped_sample: u64,
-    /// Number of the next sample, if none is lost.
+    /// Number of the next sample to read, if none is lost.
     next_sample: u64,
-    /// True after a restart of the sensor: the number of samples lost meanwhile is not counted by the sensor.
+    /// True after a restart of the sensor. The sensor does not count the samples lost during the restart.
     uncounted: bool,
-    /// Number of samples left in the queue after the last read.
+    /// Number of samples that the last read left in the queue.
     left: u16,
     block: Block,
     next_sequence: u32,
@@ -57,15 +49,16 @@ impl<A: Accelerometer> Acquisition<A> {
         }
     }
 
-    /// The sensor.
+    /// The driver of the sensor.
     pub fn accelerometer(&mut self) -> &mut A {
         &mut self.accelerometer
     }
 
-    /// Starts the sensor, or restarts it after an error. The samples lost meanwhile are estimated from the clock.
+    /// Starts the sensor, or restarts it after an error. The number of samples lost during the restart is estimated from the
+    /// fitted clock.
     ///
     /// # Errors
-    /// Those of the sensor.
+    /// Those of the sensor's driver.
     pub fn start(&mut self) -> Result<(), A::Error> {
         self.accelerometer.start()?;
         self.uncounted = self.line.is_some();
@@ -73,19 +66,19 @@ impl<A: Accelerometer> Acquisition<A> {
         Ok(())
     }
 
-    /// True if the last read left at least the watermark in the queue. The line then stays high, and the next read must not wait for
-    /// its rise.
+    /// True if the last read left at least the watermark in the queue. The watermark line then stays high, and the next read
+    /// must not wait for its rise.
     pub fn is_behind(&self) -> bool {
         self.left >= self.accelerometer.watermark()
     }
 
     /// Reads the next block; `None` if the queue is empty.
     ///
-    /// `now` is the time just before the call. `rise` is the time of the line's rise after the end of the preceding read. A rise
-    /// *during* a read belongs to no known sample and must be discarded by the caller.
+    /// `now` is the time just before the call. `rise` is the time of the last rise of the watermark line, if it rose after the
+    /// end of the preceding read. A rise *during* a read belongs to no known sample; the caller must discard it.
     ///
     /// # Errors
-    /// Those of the sensor, which must then be restarted.
+    /// Those of the sensor's driver. The sensor must then be restarted.
     pub fn read(&mut self, rise: Option<Nanoseconds>, now: Nanoseconds) -> Result<Option<&Block>, A::Error> {
         let queue = self.accelerometer.read(&mut self.block.counts)?;
         let count = self.block.counts.len();
@@ -114,7 +107,7 @@ impl<A: Accelerometer> Acquisition<A> {
         Ok(Some(&self.block))
     }
 
-    /// Updates the clock with the time stamp of the sample that raised the line.
+    /// Updates the fitted clock with the time stamp of the sample that raised the watermark line.
     fn observe(&mut self, rise: Nanoseconds) {
         let sample = self.next_sample + u64::from(self.accelerometer.watermark()) - 1;
         match &mut self.line {
@@ -133,27 +126,28 @@ impl<A: Accelerometer> Acquisition<A> {
         self.stamped_sample = sample;
     }
 
-    /// Number of samples lost between the last one read and the first of this block.
+    /// Number of samples lost between the last sample read and the first of this block.
     ///
-    /// The sensor's count is exact modulo a small number. The clock gives the multiple of it.
+    /// The sensor's count is exact modulo a small number. The fitted clock gives the multiple of that number.
     fn lost(&self, queue: Queue, now: Nanoseconds) -> u32 {
         let gap = queue.gap.filter(|_| !self.uncounted);
         let remainder = gap.map_or(0, |gap| i64::from(gap.remainder));
         if !(queue.overrun || self.uncounted || remainder != 0) {
             return 0;
         }
-        // An overrun without a gap gives 0: an overrun between the reads of status and samples was counted in the preceding read.
+        // An overrun without a gap gives 0: the overrun came after the preceding call had read the status, and that call has
+        // counted the lost samples.
         let Some(line) = &self.line else {
             return remainder as u32;
         };
-        // Number of the newest sample in the queue, from the whole sample periods since the stamped sample.
+        // Number of the newest sample in the queue: that of the stamped sample plus the whole sample periods since.
         let newest = self.stamped_sample as i64 + line.events_to(now) as i64;
         let lost = newest + 1 - i64::from(queue.level) - self.next_sample as i64;
         let lost = match gap {
             None => lost,
             Some(gap) => {
                 let modulus = i64::from(gap.modulus).max(1);
-                // The number closest to the clock's estimate that has this remainder.
+                // The number nearest to the clock's estimate that has the sensor's remainder.
                 lost - (lost - remainder + modulus / 2).rem_euclid(modulus) + modulus / 2
             }
         };
@@ -167,7 +161,8 @@ impl<A: Accelerometer> Acquisition<A> {
         };
         match (&self.line, rise) {
             (None, _) => before(now, f32::from(queue.level), self.nominal_period_ns),
-            // From the stamp itself, not from the fit: the sample clock of the signal chain fits the block times again.
+            // The time is computed from the stamp itself, not from the fitted line, because the signal chain fits the block
+            // times again.
             (Some(line), Some(rise)) if first <= self.stamped_sample => {
                 before(rise, (self.stamped_sample - first) as f32, line.period_ns())
             }
@@ -189,10 +184,10 @@ mod tests {
     use crate::accelerometer::iis3dwb_model::{Bus, Delay, Model};
 
     const NOMINAL_PERIOD_NS: f64 = 1e9 / 26_667.0;
-    /// One tick of the timer that stamps the line: 80 MHz, whole nanoseconds.
+    /// One tick of the timer that stamps the line: 12.5 ns at 80 MHz, rounded down.
     const TICK_NS: u64 = 12;
 
-    /// A board around the sensor: its timer, and the loop that waits for the line.
+    /// A sensor model with its acquisition, in place of a board.
     struct Bench {
         model: Rc<RefCell<Model>>,
         acquisition: Acquisition<Iis3dwb<Bus, Delay>>,
@@ -212,7 +207,7 @@ mod tests {
             }
         }
 
-        /// Waits for the line, is late by some time, and reads.
+        /// Waits for the watermark line, then for `late_ns`, and reads a block.
         fn block(&mut self, late_ns: u64) -> Block {
             while !self.model.borrow().line() {
                 let now = self.model.borrow().now_ns;
@@ -228,7 +223,7 @@ mod tests {
             block.unwrap()
         }
 
-        /// The true number of a block's first sample and the error of its time stamp.
+        /// The true number of the block's first sample, and the error of its time stamp in ns.
         fn truth(&self, block: &Block) -> (u64, i64) {
             let [low, _, high] = block.counts[0];
             let first = low as u64 + high as u64 * 30_000;
@@ -250,7 +245,7 @@ mod tests {
             let mut bench = Bench::new(rate_error);
             let mut next = 0;
             for number in 0..600 {
-                // Up to a third of a block late.
+                // The reads are late by up to a third of a block.
                 let late_ns = number * 12_345 % 800_000;
                 let block = bench.block(late_ns);
                 let (first, error_ns) = bench.truth(&block);
@@ -258,8 +253,8 @@ mod tests {
                 assert_eq!(u64::from(block.sequence), number);
                 assert_eq!(block.lost, 0);
                 next += block.counts.len() as u64;
-                // Before the period is known it is off by 3 % over 63 samples; then a tick of the
-                // timer, and as much for what the period is off by.
+                // Before the period is fitted it errs by 3 % over 63 samples. Later the error is a tick of the timer, and at
+                // most as much from the fitted period.
                 let bound_ns = if number < 8 { 75_000 } else { 2 * TICK_NS as i64 };
                 assert!(
                     error_ns.abs() <= bound_ns,
@@ -278,15 +273,15 @@ mod tests {
         let mut next = None;
         let mut behind = 0;
         for turn in 0..400 {
-            // Every 20 turns so late that several blocks wait: their line does not rise again.
+            // Every 20th read is so late that several blocks wait. The line does not rise for them again.
             let block = bench.block(if turn % 20 == 0 { 12_000_000 } else { 0 });
             behind += u32::from(bench.acquisition.is_behind());
             let (first, error_ns) = bench.truth(&block);
             assert_eq!(first, next.unwrap_or(first), "turn {turn}");
             next = Some(first + block.counts.len() as u64);
             assert_eq!(block.lost, 0, "turn {turn}");
-            // Without a stamp of its own the time is extrapolated over less than a full queue: 20 ms at the
-            // period's error of some 1e-5 after 100 stamps.
+            // A block without a stamp of its own is extrapolated over less than a full queue: 20 ms times the relative error of
+            // the period, some 1e-5 after 100 stamps.
             assert!(error_ns.abs() <= 300, "turn {turn}: {error_ns} ns");
         }
         assert!(behind > 20, "{behind}");
@@ -320,7 +315,8 @@ mod tests {
                     losses += u32::from(block.lost > 0);
                 }
                 next = Some(first + block.counts.len() as u64);
-                // At worst the period is known from two stamps, to a tick over 2.4 ms: 1.5 µs in 300 ms.
+                // In the worst case the period is known from two stamps 2.4 ms apart, each to a tick: an error of 1.5 µs in 300
+                // ms.
                 assert!(error_ns.abs() <= 3_000, "turn {turn}: {error_ns} ns");
             }
             assert!(losses > 10, "{losses}");
@@ -338,7 +334,7 @@ mod tests {
         bench.acquisition.start().unwrap();
         let block = bench.block(0);
         let (_, error_ns) = bench.truth(&block);
-        // One sample: the new sampling grid is anywhere within the old one.
+        // One sample period: after a restart the sample times have any phase relative to those before.
         let period_ns = bench.model.borrow().period_ns;
         assert!((error_ns as f64).abs() <= period_ns, "{error_ns} ns");
         let missing = (block.time.0 - end_ns) as f64 / period_ns;

@@ -37,7 +37,7 @@ use outbox::Outbox;
 
 /// The clock that stamps samples and tachometer edges.
 pub trait Clock {
-    /// Time since the start.
+    /// Time since the start of the device.
     fn now(&self) -> Nanoseconds;
 }
 
@@ -63,9 +63,9 @@ pub struct Device<'a, M, C> {
     session: Session,
     outbox: Outbox,
     subscription: Subscription,
-    /// The last report sent to a subscriber of changes.
+    /// Verdict, reason and advice of the last report sent to a host that subscribes to changes.
     last_sent: Option<ReportKey>,
-    /// Tachometer edges from the host for its next block.
+    /// Tachometer edges from the host for the next block that it feeds.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
     is_fed: bool,
     blocks: u32,
@@ -75,7 +75,7 @@ pub struct Device<'a, M, C> {
     input: Vec<u8, 64>,
 }
 
-/// The parts of a report whose change is sent to a subscriber of changes.
+/// The parts of a report that count as its change.
 type ReportKey = (Verdict, Reason, Option<Advice>);
 
 /// The session of one host.
@@ -93,7 +93,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     /// The state is borrowed because it is large: a board keeps it in static memory.
     ///
     /// # Errors
-    /// Invalid settings.
+    /// The settings are invalid.
     pub fn new(
         identity: Identity,
         settings: Settings,
@@ -135,8 +135,8 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as much as the line accepts, and receives until one request is done. Returns true if it did anything: call it again
-    /// then.
+    /// Sends as many bytes as the line accepts, and receives until one request is done. Returns true if it did anything; the
+    /// caller then calls it again.
     ///
     /// # Errors
     /// Those of the line.
@@ -159,7 +159,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Sends as much as the line accepts, and receives nothing.
+    /// Sends as many bytes as the line accepts, and receives nothing.
     ///
     /// # Errors
     /// Those of the line.
@@ -170,14 +170,14 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         Ok(())
     }
 
-    /// Processes bytes from the host and returns how many it took.
+    /// Processes bytes from the host. Returns how many it has taken.
     ///
-    /// While earlier replies wait to be sent it does not take all: call it again with the rest.
+    /// While earlier replies wait to be sent it does not take all bytes; the caller then calls it again with the rest.
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         let mut taken = 0;
         loop {
             self.pump();
-            // Room for two frames: a reply, and the refusal of an unreadable frame.
+            // The output queue must have room for two frames: the reply to a request, and the refusal of an unreadable frame.
             if self.link.room() < 2 || self.outbox.has_reply() {
                 return taken;
             }
@@ -214,14 +214,14 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         self.storage.into_memory()
     }
 
-    /// Moves waiting messages to the link, as far as it has room.
+    /// Moves waiting messages to the output queue of the link, as far as it has room.
     fn pump(&mut self) {
         if let Some(reply) = self.outbox.pump(&mut self.link, self.state) {
             self.session.last = Some(reply);
         }
     }
 
-    /// Resets the signal chain and discards waiting messages.
+    /// Resets the signal chain and discards the waiting messages.
     fn restart(&mut self) {
         self.state.reset();
         self.outbox.clear();
@@ -231,7 +231,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     }
 
     fn step(&mut self, block: &Block, edges: &[Edge]) {
-        self.outbox.make_way();
+        self.outbox.drop_overwritten();
         let table = self.storage.table().map(|table| match self.feed_direction {
             Some(direction) => table.towards(direction),
             None => table,
@@ -261,7 +261,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Performs a request and queues its reply or refusal.
+    /// Performs a request. Queues its reply, or the reason of its refusal.
     fn answer(&mut self, sequence: u16, request: Request) {
         if request == Request::Hello {
             self.begin_session(sequence);
@@ -285,7 +285,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         }
     }
 
-    /// Begins a session with a host: resets subscription and feed of the preceding session.
+    /// Begins a session with a host: ends subscription and feed of the preceding session.
     fn begin_session(&mut self, sequence: u16) {
         self.session = Session {
             is_open: true,
@@ -336,7 +336,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
         Ok(Reply::Done)
     }
 
-    /// Keeps edges for the next block of the host: all of them, or none where they are too many.
+    /// Stores tachometer edges for the next block of the host: all of them, or none if they are too many.
     fn hold(&mut self, edges: &[Edge]) -> Result<(), Refusal> {
         self.edges
             .extend_from_slice(edges)
@@ -348,7 +348,7 @@ impl<'a, M: TableMemory, C: Clock> Device<'a, M, C> {
     fn feed(&mut self, block: &Block) {
         let edges = core::mem::take(&mut self.edges);
         if !self.is_fed {
-            // Samples of the sensor and of the host must not mix.
+            // Blocks of the sensor and of the host must not mix.
             self.restart();
             self.is_fed = true;
         }

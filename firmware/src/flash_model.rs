@@ -9,7 +9,7 @@ use embedded_storage::nor_flash::{
 
 use crate::storage::TableMemory;
 
-/// Flash with words of `WRITE` bytes and pages of `ERASE` bytes, stored in `B`.
+/// Flash memory with words of `WRITE` bytes and pages of `ERASE` bytes. Its content is stored in `B`.
 #[derive(Clone, Debug)]
 pub struct FlashModel<B, const WRITE: usize, const ERASE: usize> {
     bytes: B,
@@ -28,7 +28,7 @@ enum Power {
     Off,
 }
 
-/// Outcome of an operation.
+/// Outcome of an operation when the power may fail.
 enum Fate {
     Done,
     Cut(Noise),
@@ -54,7 +54,7 @@ impl Noise {
         }
     }
 
-    /// A byte after an interrupted change: the old value, the new value, or a mixture of their bits.
+    /// The value of a byte after an interrupted change: the old value, the new value, or a mixture of their bits.
     fn between(&mut self, before: u8, wanted: u8) -> u8 {
         match self.below(3) {
             0 => before,
@@ -68,7 +68,7 @@ impl Noise {
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> FlashModel<B, WRITE, ERASE> {
-    /// Flash with this content; erased flash is all ones.
+    /// Flash with this content. In erased flash all bits are ones.
     pub const fn new(bytes: B) -> Self {
         Self {
             bytes,
@@ -78,9 +78,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> Flash
 
     /// Lets the power fail during a write or an erase, after the next `operations` complete ones.
     ///
-    /// The seed `noise` determines what the interrupted operation leaves behind. A write leaves the words before the cut written, one word
-    /// with a mixture of old and new bits, and the rest unchanged. An erase leaves any value in every byte of the page. All later
-    /// operations fail.
+    /// The seed `noise` determines the content after the interruption. An interrupted write leaves the earlier words written,
+    /// one word with a mixture of old and new bits, and the rest unchanged. An interrupted erase leaves any value in every byte
+    /// of the page. All later operations fail.
     pub fn fail_after(&mut self, operations: u32, noise: u64) {
         // Xorshift cannot leave the state 0.
         self.power = Power::FailsAfter {
@@ -161,7 +161,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>, const WRITE: usize, const ERASE: usize> NorFl
                 Ok(())
             }
             Fate::Cut(mut noise) => {
-                // Random content; in one of four cases the old content.
+                // The bytes become random; in one of four cases they keep the old content.
                 let is_as_before = noise.below(4) == 0;
                 for byte in bytes.iter_mut().filter(|_| !is_as_before) {
                     *byte = match noise.below(2) {

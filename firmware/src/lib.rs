@@ -46,6 +46,7 @@
 
 pub mod accelerometer;
 pub mod acquisition;
+mod criteria;
 pub mod defaults;
 pub mod device;
 pub mod flash_model;

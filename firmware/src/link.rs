@@ -66,7 +66,7 @@ impl Link {
         (bytes.len(), None)
     }
 
-    /// Counts a frame that was readable and refused later.
+    /// Counts a frame that was readable but was refused later, because of its sequence number.
     pub fn count(&mut self, error: &FrameError) {
         self.errors.count(error);
     }

@@ -1,4 +1,4 @@
-//! Lobe tables in flash. Of two slots one always holds a complete table, so power may fail at any moment.
+//! Lobe tables in flash. One of two slots always holds a complete table, so that power may fail at any moment.
 //!
 //! The memory is divided into two equal slots. A slot is
 //!

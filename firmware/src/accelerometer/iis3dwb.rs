@@ -37,7 +37,7 @@ const SETTLING_MILLISECONDS: u32 = 10;
 
 /// Number of polls of the reset bit. A reset takes about 50 µs.
 const RESET_POLLS: u32 = 20;
-/// Interval of the polls.
+/// Interval between two polls of the reset bit.
 const RESET_POLL_MICROSECONDS: u32 = 100;
 
 /// Error of the sensor driver.
@@ -51,14 +51,14 @@ pub enum Error<B> {
         /// Value of the identity register; 0x7B is expected.
         found: u8,
     },
-    /// The reset did not end in time.
+    /// The reset of the sensor did not end in time.
     ResetTimeout,
-    /// The watermark is out of range.
+    /// The requested watermark is out of range.
     WatermarkOutOfRange {
         /// The requested watermark; 1 to 511 are possible.
         asked: u16,
     },
-    /// A register does not have the value written to it.
+    /// A register does not hold the value that was written to it.
     NotWritten {
         /// Address of the register.
         register: u8,
@@ -67,12 +67,12 @@ pub enum Error<B> {
         /// The value read back.
         found: u8,
     },
-    /// The level exceeds the capacity of the queue.
+    /// The queue level read from the sensor exceeds its capacity.
     LevelOutOfRange {
         /// The level read from the sensor; at most 512 is possible.
         found: u16,
     },
-    /// A word of the queue has a tag other than acceleration, or wrong parity.
+    /// A word of the queue has a tag other than acceleration, or a wrong parity bit.
     BadTag {
         /// The tag byte.
         found: u8,
@@ -90,7 +90,7 @@ pub struct Iis3dwb<S, D> {
     spi: S,
     delay: D,
     configuration: Configuration,
-    /// The sensor's count of the last sample read, modulo 4.
+    /// The 2-bit sample count in the tag of the last word read from the queue.
     last_slot: Option<u8>,
 }
 
@@ -121,7 +121,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         }
     }
 
-    /// Resets all registers to their defaults.
+    /// Resets all registers of the sensor to their defaults.
     fn reset(&mut self) -> Result<(), Error<S::Error>> {
         self.write_register(register::CTRL3_C, bits::IF_INC | bits::SW_RESET)?;
         for _ in 0..RESET_POLLS {
@@ -152,7 +152,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         let settings = [
             (register::CTRL3_C, bits::BDU | bits::IF_INC),
             (register::CTRL4_C, bits::I2C_OFF),
-            // All three axes.
+            // Writing 0 enables all three axes.
             (register::CTRL6_C, 0),
             (register::CTRL8_XL, corner << 5),
             (register::FIFO_CTRL1, watermark_low),
@@ -183,7 +183,7 @@ impl<S: SpiDevice, D: DelayNs> Iis3dwb<S, D> {
         Ok(())
     }
 
-    /// Level of the queue, and whether it has overflowed since the preceding call.
+    /// Level of the queue in words, and whether the queue has overflowed since the preceding call.
     fn queue(&mut self) -> Result<(u16, bool), Error<S::Error>> {
         let mut status = [0; 2];
         self.read_registers(register::FIFO_STATUS1, &mut status)?;
@@ -240,7 +240,7 @@ impl<S: SpiDevice, D: DelayNs> Accelerometer for Iis3dwb<S, D> {
             return Err(Error::LevelOutOfRange { found: level });
         };
         if count > 0 {
-            // The address counts from 0x78 to 0x7E and wraps, one word after the other.
+            // The sensor's address counts from 0x78 to 0x7E and wraps, so that one transfer reads word after word.
             self.read_registers(register::FIFO_DATA_OUT_TAG, words)?;
         }
         let mut gap = None;
@@ -260,7 +260,7 @@ impl<S: SpiDevice, D: DelayNs> Accelerometer for Iis3dwb<S, D> {
             }
             self.last_slot = Some(slot);
             let counts = [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes);
-            // Cannot fail: no more words were read than samples fit.
+            // The push cannot fail: the number of words read is limited to the room in `samples`.
             let _ = samples.push(counts);
         }
         Ok(Queue { level, overrun, gap })

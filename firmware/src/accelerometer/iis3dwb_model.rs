@@ -1,7 +1,6 @@
-//! A model of the IIS3DWB at its registers, with a clock: what the data sheet and AN5444 say, written
-//! apart from the driver.
+//! A model of the IIS3DWB with its registers and a clock, from the data sheet and AN5444. It shares no code with the driver.
 //!
-//! Bus transfers and delays let the model's time run, so that samples come in while the driver reads.
+//! Bus transfers and delays advance the model's clock, so that new samples arrive while the driver reads.
 
 use core::convert::Infallible;
 use std::cell::RefCell;
@@ -12,39 +11,39 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use quietcut_core::acceleration::Counts;
 
-/// Time of one byte on a bus of 10 MHz.
+/// Time of one byte on an SPI bus of 10 MHz.
 const BYTE_NS: u64 = 800;
-/// Turning chip select on and off, and the code between two transfers.
+/// Time between two transfers: chip select off and on, and the driver's code.
 const SELECT_NS: u64 = 2_000;
 const RESET_NS: u64 = 50_000;
-/// Before this the sensor does not answer.
+/// Time after power-on before which the sensor does not answer.
 const BOOT_NS: u64 = 10_000_000;
-/// Samples before this are of a filter that has not settled.
+/// Time after the start of sampling before which the sensor's filter has not settled.
 const SETTLING_NS: u64 = 10_000_000;
 const QUEUE_WORDS: usize = 512;
 
-/// Output of the sensor before its filter has settled.
+/// Output of the model before its filter has settled.
 pub(crate) const UNSETTLED: Counts = [i16::MAX; 3];
 
-/// A sensor and the time around it.
+/// The modelled sensor with its clock.
 pub(crate) struct Model {
-    /// Time since power came.
+    /// Time since power-on.
     pub(crate) now_ns: u64,
-    /// True sampling period, off by up to some percent from nominal.
+    /// True sample period, which differs from the nominal one by up to a few percent.
     pub(crate) period_ns: f64,
     registers: [u8; 128],
     queue: VecDeque<[u8; 7]>,
     shown: [u8; 7],
     overrun_latched: bool,
     reset_ends_ns: Option<u64>,
-    /// When the sensor was last turned on.
+    /// Time at which sampling last started; `None` while it is off.
     on_since_ns: Option<u64>,
-    /// Samples taken since it was turned on.
+    /// Number of samples since sampling last started.
     taken: u64,
-    /// When pin INT1 rose.
+    /// Times at which pin INT1 rose.
     pub(crate) rises_ns: Vec<u64>,
     line: bool,
-    /// When each sample that went to the queue was taken; the sample's x, y, z carry its index.
+    /// Sample times of all samples that went to the queue. The counts x, y, z of a sample encode its index in this list.
     pub(crate) queued_ns: Vec<u64>,
     fault: Fault,
 }
@@ -53,13 +52,13 @@ pub(crate) struct Model {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
     None,
-    /// It is another sensor.
+    /// The identity register has this other value.
     Identity(u8),
     /// The reset never ends.
     ResetHangs,
-    /// Nothing written to this register stays.
-    Deaf(u8),
-    /// A bit of each tag is turned over on the way.
+    /// Writes to the register with this address have no effect.
+    WritesIgnored(u8),
+    /// This bit of every tag is inverted in the transfer.
     TagBit(u8),
 }
 
@@ -84,7 +83,7 @@ impl Model {
         Rc::new(RefCell::new(model))
     }
 
-    /// The counts of sample number `index` of the queue: different on each axis, and unlike any neighbour.
+    /// The counts of sample number `index`: they encode the index and differ between the axes.
     pub(crate) fn counts(index: u64) -> Counts {
         let low = (index % 30_000) as i16;
         [low, -low, (index / 30_000) as i16]
@@ -103,13 +102,13 @@ impl Model {
         self.registers[usize::from(address)]
     }
 
-    /// Breaks the sensor before it is turned on.
+    /// Sets a fault of the sensor before sampling starts.
     pub(crate) fn break_with(&mut self, fault: Fault) {
         self.fault = fault;
         self.set_defaults();
     }
 
-    /// Turns over a bit of every tag from now on.
+    /// Inverts this bit of every tag from now on.
     pub(crate) fn break_tags(&mut self, bit: u8) {
         self.fault = Fault::TagBit(bit);
     }
@@ -221,7 +220,7 @@ impl Model {
             self.reset_ends_ns.is_none(),
             "register {address:#04x} is written during a reset"
         );
-        // Bits that the data sheet names for each register; the others must keep their default.
+        // Bits that the data sheet defines for each register. Writes must keep all other bits at zero.
         let may = match address {
             0x07 => 0xff,
             0x08 => 0b1000_0001,
@@ -236,7 +235,7 @@ impl Model {
             _ => panic!("register {address:#04x} must not be written"),
         };
         assert_eq!(value & !may, 0, "reserved bits of register {address:#04x}");
-        if self.fault == Fault::Deaf(address) {
+        if self.fault == Fault::WritesIgnored(address) {
             return;
         }
         match address {
@@ -258,7 +257,7 @@ impl Model {
         self.update_line();
     }
 
-    /// The address of the next byte of a transfer. After the last output byte of the queue it wraps to the tag.
+    /// The register address of the next byte of a transfer. From the last output byte of the queue it wraps to the tag.
     fn next(&self, address: u8) -> u8 {
         let counts_up = self.registers[0x12] & 0b100 != 0;
         match address {
@@ -269,7 +268,7 @@ impl Model {
     }
 }
 
-/// The bus to the model.
+/// An SPI bus that is connected to the model.
 pub(crate) struct Bus(pub(crate) Rc<RefCell<Model>>);
 
 impl ErrorType for Bus {
@@ -304,7 +303,7 @@ impl SpiDevice for Bus {
                     for byte in bytes.iter_mut() {
                         let at = address.expect("a transfer begins with an address");
                         assert!(reading, "a byte is read in a write");
-                        // The byte is taken when its transfer begins.
+                        // The sensor takes the value of a byte at the beginning of its transfer.
                         *byte = if model.now_ns < BOOT_NS {
                             0xff
                         } else {
@@ -321,7 +320,7 @@ impl SpiDevice for Bus {
     }
 }
 
-/// A delay that lets the model's time run.
+/// A delay that advances the model's clock.
 pub(crate) struct Delay(pub(crate) Rc<RefCell<Model>>);
 
 impl DelayNs for Delay {

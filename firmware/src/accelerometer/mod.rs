@@ -34,7 +34,7 @@ pub trait Accelerometer {
 pub struct Queue {
     /// Level of the queue at the beginning of the read, in samples.
     pub level: u16,
-    /// True if the queue has overflowed since the preceding read, so that samples were overwritten.
+    /// True if the queue has overflowed since the preceding read, so that samples are lost.
     pub overrun: bool,
     /// Samples missing between the preceding read and this one; `None` if the sensor does not number its samples.
     pub gap: Option<Gap>,

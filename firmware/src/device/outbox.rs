@@ -1,4 +1,4 @@
-//! Messages that wait for room on the line.
+//! Messages that wait for room in the output queue of the link.
 
 use heapless::Vec;
 use quietcut_core::monitor::{Band, Report, State};
@@ -16,7 +16,7 @@ pub(super) struct Outbox {
     report: Option<Report>,
     strobes: Option<Strobes>,
     spectra: [Option<Spectrum>; BANDS.len()],
-    /// The reply to the current request, with its sequence number.
+    /// The reply to the current request, with the sequence number of the request.
     reply: Option<(u16, Reply)>,
     /// True if the reply follows all messages that the request caused, false if it precedes them.
     is_reply_last: bool,
@@ -31,9 +31,9 @@ struct Strobes {
 
 /// A spectrum that is being sent.
 struct Spectrum {
-    /// Sequence number of the block that completed it.
+    /// Sequence number of the block that completed the spectrum.
     sequence: u32,
-    /// Index of the first bin that was not sent.
+    /// Index of the first bin of the spectrum that is not sent.
     next: usize,
 }
 
@@ -43,12 +43,12 @@ impl Outbox {
         self.dropped
     }
 
-    /// True while a reply waits. The next request then waits too.
+    /// True while a reply waits. The next request is not received until the reply is sent.
     pub(super) fn has_reply(&self) -> bool {
         self.reply.is_some()
     }
 
-    /// Discards all waiting messages, after the state was reset.
+    /// Discards all waiting messages, after the state of the signal chain was reset.
     pub(super) fn clear(&mut self) {
         *self = Self {
             dropped: self.dropped,
@@ -56,16 +56,16 @@ impl Outbox {
         };
     }
 
-    /// Drops waiting reports and points before the next step overwrites them. Spectra stay, because the next step may leave them
-    /// unchanged.
-    pub(super) fn make_way(&mut self) {
+    /// Drops waiting reports and stroboscopic points, because the next step overwrites them. Spectra stay, because the next step
+    /// may leave them unchanged.
+    pub(super) fn drop_overwritten(&mut self) {
         self.dropped = self
             .dropped
             .saturating_add(u32::from(self.report.take().is_some()))
             .saturating_add(u32::from(self.strobes.take().is_some()));
     }
 
-    /// Queues the results of a step that are subscribed to.
+    /// Queues the results of a step to which the host subscribes.
     pub(super) fn fill(
         &mut self,
         report: Option<Report>,
@@ -79,7 +79,7 @@ impl Outbox {
         }
         for (band, sending) in BANDS.into_iter().zip(&mut self.spectra) {
             if state.has_fresh_spectrum(band) {
-                // The new spectrum has overwritten one that was not completely sent.
+                // The new spectrum has overwritten one that was only partly sent.
                 self.dropped = self.dropped.saturating_add(u32::from(sending.is_some()));
                 *sending = subscription.spectra.then_some(Spectrum { sequence, next: 0 });
             }
@@ -98,7 +98,7 @@ impl Outbox {
         self.is_reply_last = true;
     }
 
-    /// Sends as much as the link has room for. Returns the reply if it was sent.
+    /// Sends as much as the output queue has room for. Returns the reply if it was sent.
     pub(super) fn pump(&mut self, link: &mut Link, state: &State) -> Option<(u16, Reply)> {
         let mut sent = None;
         while link.room() > 0 {
@@ -128,7 +128,7 @@ impl Outbox {
         Some((request, reply))
     }
 
-    /// The next spectrum to send: its band, the slot for the unsent rest, and its progress.
+    /// The next spectrum to send: its band, the field for the unsent rest, and its progress.
     fn next_spectrum(&mut self) -> Option<(Band, &mut Option<Spectrum>, Spectrum)> {
         BANDS.into_iter().zip(&mut self.spectra).find_map(|(band, slot)| {
             let spectrum = slot.take()?;
@@ -137,7 +137,7 @@ impl Outbox {
     }
 }
 
-/// Sends the next points of the map. Returns the progress if some are left.
+/// Sends the next points of the stroboscopic map. Returns the progress if some points are left.
 fn send_strobes(link: &mut Link, state: &State, strobes: Strobes) -> Option<Strobes> {
     let rest = state.strobes().get(strobes.next..).unwrap_or_default();
     let mut chunk = StrobeChunk {

@@ -16,16 +16,20 @@ impl<M: TableMemory> Storage<M> {
 
     /// Examines a slot with a full check of its table.
     pub(super) fn examine(&mut self, slot: usize) {
-        self.note(slot, |table| LobeTable::parse(table).map(|_| ()));
+        self.record_contents(slot, |table| LobeTable::parse(table).map(|_| ()));
     }
 
-    /// Checks the entries of a table whose CRC-32 was verified before.
+    /// Checks the entries of a table whose CRC-32 has been verified.
     pub(super) fn entries_checked(table: &[u8]) -> Result<(), TableError> {
         LobeTable::reopen(table)?.check_entries()
     }
 
-    /// Records the content of a slot. `check` refuses bytes that are not a valid table.
-    pub(super) fn note(&mut self, slot: usize, check: impl FnOnce(&[u8]) -> Result<(), TableError>) {
+    /// Records the content of a slot. `check` decides whether its bytes are a valid table.
+    pub(super) fn record_contents(
+        &mut self,
+        slot: usize,
+        check: impl FnOnce(&[u8]) -> Result<(), TableError>,
+    ) {
         let bytes = self.slot_bytes(slot);
         let is_empty = bytes.iter().take(HEADER_LENGTH).all(|&byte| byte == ERASED);
         let read = || {
@@ -53,14 +57,14 @@ impl<M: TableMemory> Storage<M> {
             _ => None,
         };
         let slots = || (0..SLOTS).filter(|slot| generation(slot).is_some());
-        // Generation numbers wrap at 2³². The newer of two is less than 2³¹ ahead.
+        // Generation numbers wrap at 2³². The newer of two numbers is less than 2³¹ ahead of the other.
         slots().reduce(|a, b| match (generation(&a), generation(&b)) {
             (Some(of_a), Some(of_b)) if of_b.wrapping_sub(of_a) < u32::MAX / 2 => b,
             _ => a,
         })
     }
 
-    /// The generation number of the next table.
+    /// The generation number of the next uploaded table.
     pub(super) fn next_generation(&self) -> u32 {
         match self.in_use.map(|slot| self.contents_of(slot)) {
             Some(Contents::Valid(header)) => header.generation.wrapping_add(1),

@@ -10,8 +10,9 @@
 //! | 40 | 24 | erased |
 //! | 64 | U each | marks: mark k is written after section k of the slot |
 //!
-//! A section is one page, or several pages if the marks would not fit otherwise. A mark of U bytes, one or more flash words, holds the CRC-32 of
-//! the file's header and the number k, so that no mark is valid by chance. The highest valid mark counts, whatever the lower ones are.
+//! A section is one page, or several pages if the marks of single pages would not fit. A mark of U bytes, one or more flash
+//! words, holds the CRC-32 of the file's header and the number k, so that random bytes are no valid mark. The highest valid mark
+//! counts, even if lower marks are damaged.
 
 use core::marker::PhantomData;
 
@@ -38,17 +39,17 @@ pub(super) struct Journal<M> {
 }
 
 impl<M: NorFlash> Journal<M> {
-    /// Distance of two marks in bytes: whole flash words.
+    /// Distance of two marks in bytes, a multiple of the flash word.
     const MARK_STEP: usize = if M::WRITE_SIZE < MARK_LENGTH {
         MARK_LENGTH
     } else {
         M::WRITE_SIZE
     };
 
-    /// Smallest page in bytes: the record and one mark.
+    /// Smallest page in bytes that holds the record and one mark.
     pub(super) const LEAST_PAGE: usize = MARKS_OFFSET + Self::MARK_STEP;
 
-    /// The journal at offset `start` of the memory, for a slot of `capacity` bytes.
+    /// The journal at offset `start` of the memory, for a slot with `capacity` bytes for the table.
     pub(super) fn new(start: u32, capacity: u32) -> Self {
         let page = M::ERASE_SIZE as u32;
         let room = ((M::ERASE_SIZE - MARKS_OFFSET) / Self::MARK_STEP) as u32;
@@ -78,7 +79,7 @@ impl<M: NorFlash> Journal<M> {
         record
     }
 
-    /// The next offset of the slot after `written` at which a mark is due: the end of a section.
+    /// The offset in the slot of the next mark after `written` bytes: the end of a section.
     pub(super) fn next_mark(&self, written: u32) -> u32 {
         (written / self.section + 1) * self.section
     }
@@ -88,7 +89,7 @@ impl<M: NorFlash> Journal<M> {
         written > 0 && written.is_multiple_of(self.section)
     }
 
-    /// Offset in the memory and bytes of the mark for `written` bytes.
+    /// Offset in the memory and content of the mark for `written` bytes.
     pub(super) fn mark(&self, header: &Header, written: u32) -> (u32, Vec<u8, MAX_WRITE_SIZE>) {
         let number = written.div_ceil(self.section).saturating_sub(1);
         let value = mark_value(header, number);
@@ -96,7 +97,7 @@ impl<M: NorFlash> Journal<M> {
         (self.start + self.offset_of(number), bytes)
     }
 
-    /// Header of the file and number of received bytes; `None` if the journal has no valid record.
+    /// Header of the uploaded file and number of received bytes; `None` if the journal has no valid record.
     pub(super) fn read(&self, memory: &[u8]) -> Option<(Header, u32)> {
         let page = memory.get(self.start as usize..)?.get(..M::ERASE_SIZE)?;
         let record = page.get(..RECORD_LENGTH)?;

@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 use quietcut_core::lobes::format::HEADER_LENGTH;
 
-/// Largest supported [`NorFlash::WRITE_SIZE`]: one word must not exceed the header.
+/// Largest supported [`NorFlash::WRITE_SIZE`]: a flash word must not exceed the header of a table.
 pub(super) const MAX_WRITE_SIZE: usize = HEADER_LENGTH;
 
 /// Value of an erased byte.
@@ -11,8 +11,8 @@ pub(super) const ERASED: u8 = 0xFF;
 
 /// Memory-mapped flash.
 ///
-/// After a loss of power during a write or an erase, the affected word or page may read as anything. Reading it must not
-/// fault: if the error correction of the memory raises an interrupt, its handler must return.
+/// After a loss of power during a write or an erase, the affected word or page may hold any value. Reading it must not fail: if
+/// the error correction of the memory raises an interrupt, its handler must return.
 pub trait TableMemory: NorFlash {
     /// All bytes of the memory, as mapped into the address space.
     fn mapped(&self) -> &[u8];

@@ -13,22 +13,23 @@ pub(super) struct Progress {
     pub(super) slot: usize,
     /// Header of the uploaded file.
     pub(super) header: Header,
-    /// Received bytes of the table, with its header.
+    /// Number of received bytes of the table, header included.
     pub(super) received: u32,
     /// The slot is erased or written up to this offset.
     pub(super) erased_to: u32,
     /// Received bytes that do not yet fill a flash word.
     pub(super) tail: Vec<u8, MAX_WRITE_SIZE>,
-    /// The header to be written into the slot, with the device's generation number; its CRC is set at the end.
+    /// The header to be written to the slot. It has the device's generation number; its CRC is set at the end of the upload.
     renewed: Header,
-    /// Running CRC-32 with the file's header. Computing it at the end of an upload would delay the device.
+    /// Running CRC-32 of the received table with the file's header. A computation at the end of the upload would delay the
+    /// device.
     crc: Crc32,
-    /// Running CRC-32 with the header for the slot.
+    /// Running CRC-32 of the received table with the header for the slot.
     renewed_crc: Crc32,
 }
 
 impl Progress {
-    /// Resumes after `payload`: the bytes after the header that are already in the slot, up to the end of a page.
+    /// Resumes an upload. `payload` are the bytes after the header that are already in the slot, up to the end of a page.
     pub(super) fn resumed(slot: usize, header: Header, generation: u32, payload: &[u8]) -> Self {
         let received = (HEADER_LENGTH + payload.len()) as u32;
         let renewed = Header { generation, ..header };
@@ -36,7 +37,7 @@ impl Progress {
             slot,
             header,
             received,
-            // The page after the last complete one may be partly written, so it is erased again.
+            // The page after the last complete page may be partly written. It is erased again.
             erased_to: if payload.is_empty() { 0 } else { received },
             tail: Vec::new(),
             renewed,

@@ -13,7 +13,7 @@ use super::progress::Progress;
 use super::slots::Storage;
 
 impl<M: TableMemory> Storage<M> {
-    /// The unfinished upload, according to the journals.
+    /// The unfinished upload that the journals record, if there is one.
     pub(super) fn unfinished(&self) -> Option<Progress> {
         let empty = |&slot: &usize| matches!(self.contents_of(slot), Contents::Empty);
         (0..SLOTS).filter(empty).find_map(|slot| {
@@ -26,13 +26,13 @@ impl<M: TableMemory> Storage<M> {
 
     /// Discards the upload into a slot by erasing its journal.
     ///
-    /// A failure to erase is ignored: the slot has no header, so it holds no valid table.
-    pub(super) fn forget(&mut self, slot: usize) {
+    /// An error of the erase is ignored: the slot has no header, so it holds no valid table.
+    pub(super) fn discard(&mut self, slot: usize) {
         let journal = self.journal(slot).start();
         let _ = self.erase(journal, Self::PAGE);
     }
 
-    /// Appends received data: writes whole words at once and keeps the rest in the tail.
+    /// Appends received data: writes whole flash words at once and keeps the rest in the tail.
     pub(super) fn receive(&mut self, mut upload: Progress, mut data: &[u8]) -> Result<Progress, Refusal> {
         let journal = self.journal(upload.slot);
         while !data.is_empty() {
@@ -69,7 +69,7 @@ impl<M: TableMemory> Storage<M> {
         Ok(upload)
     }
 
-    /// Writes whole words at an offset of the slot. Erases each page before its first word.
+    /// Writes whole flash words at an offset of the slot. Erases each page before the first word of it.
     fn program(&mut self, upload: &mut Progress, offset: u32, words: &[u8]) -> Result<(), Refusal> {
         let start = self.start_of(upload.slot);
         let end = offset + words.len() as u32;
@@ -87,7 +87,7 @@ impl<M: TableMemory> Storage<M> {
 
     /// Marks the number of written bytes in the journal.
     ///
-    /// A loss of power may have left this mark partly written. It is then skipped, since the next mark implies it.
+    /// A loss of power may have left this mark partly written. It is then skipped, since the next mark includes it.
     fn mark(&mut self, journal: &Journal<M>, upload: &Progress) -> Result<(), Refusal> {
         let (offset, mark) = journal.mark(&upload.header, upload.written());
         let range = offset as usize..offset as usize + mark.len();

@@ -1,4 +1,4 @@
-//! The requests of the host: list the slots, and upload a table.
+//! The requests of the host: list the slots, upload a table.
 
 use quietcut_core::lobes::format::{HEADER_LENGTH, SCHEMA};
 use quietcut_core::lobes::{Header, LobeTable, TableError};
@@ -13,7 +13,7 @@ use super::progress::Progress;
 use super::slots::Storage;
 
 impl<M: TableMemory> Storage<M> {
-    /// Examines the memory. The newest valid table is in use, and an unfinished upload is resumed.
+    /// Examines the memory. The newest valid table becomes the table in use, and an unfinished upload is resumed.
     ///
     /// A memory of fewer than four pages cannot hold tables.
     pub fn new(memory: M) -> Self {
@@ -101,7 +101,8 @@ impl<M: TableMemory> Storage<M> {
         let slot = self.free_slot();
         self.upload = None;
         let journal = self.journal(slot);
-        // The journal is written first: it identifies the table of which the slot holds a part. Pages are erased when they are reached.
+        // The journal is written first, because it identifies the table whose part is in the slot. Pages are erased when they
+        // are reached.
         self.erase(journal.start(), Self::PAGE)?;
         let record = Journal::<M>::record(&header);
         self.write(journal.start(), &record)?;
@@ -134,7 +135,7 @@ impl<M: TableMemory> Storage<M> {
         Ok(state)
     }
 
-    /// Checks the received table and uses it from now on.
+    /// Checks the received table and puts it in use.
     ///
     /// # Errors
     /// [`Refusal::NoUpload`], [`Refusal::Incomplete`]; after [`Refusal::Table`] or [`Refusal::Flash`] the upload is
@@ -154,8 +155,8 @@ impl<M: TableMemory> Storage<M> {
             Ok(renewed) => self
                 .write(self.start_of(slot), &renewed.to_bytes())
                 .and_then(|()| {
-                    // The CRC was computed from the bytes that were written and read back, so only the entries need a check.
-                    self.note(slot, Self::entries_checked);
+                    // The CRC was computed from bytes that were written and read back, so only the entries need a check.
+                    self.record_contents(slot, Self::entries_checked);
                     match self.contents_of(slot) {
                         Contents::Valid(_) => Ok(()),
                         Contents::Damaged(why) => Err(Refusal::Table(why)),
@@ -166,7 +167,7 @@ impl<M: TableMemory> Storage<M> {
         };
         match committed {
             Ok(()) => self.in_use = Some(slot),
-            Err(_) => self.forget(slot),
+            Err(_) => self.discard(slot),
         }
         committed
     }
@@ -177,7 +178,7 @@ impl<M: TableMemory> Storage<M> {
     /// [`Refusal::NoUpload`].
     pub fn abort(&mut self) -> Result<(), Refusal> {
         let slot = self.upload.take().ok_or(Refusal::NoUpload)?.slot;
-        self.forget(slot);
+        self.discard(slot);
         Ok(())
     }
 

@@ -45,7 +45,7 @@ impl<M: TableMemory> Storage<M> {
         self.memory.mapped().get(start..end).unwrap_or_default()
     }
 
-    /// The bytes of the table in a slot, with the length given in its header.
+    /// The bytes of the table in a slot, with the length that its header gives.
     pub(super) fn table_bytes(&self, slot: usize) -> Option<&[u8]> {
         let bytes = self.slot_bytes(slot);
         let header = Header::read(bytes).ok()?;
@@ -56,7 +56,7 @@ impl<M: TableMemory> Storage<M> {
         self.memory.erase(from, from + length).map_err(|_| Refusal::Flash)
     }
 
-    /// Writes words and verifies them by reading back.
+    /// Writes flash words and verifies them by reading back.
     pub(super) fn write(&mut self, offset: u32, words: &[u8]) -> Result<(), Refusal> {
         self.memory.write(offset, words).map_err(|_| Refusal::Flash)?;
         let range = offset as usize..offset as usize + words.len();

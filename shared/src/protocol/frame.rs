@@ -345,7 +345,8 @@ impl Sequence {
 
     /// Checks the sequence number of a received frame. The first frame may have any number.
     ///
-    /// # Errors [`FrameError::OutOfOrder`] if `found` is not the expected number, which then stays the same.
+    /// # Errors
+    /// [`FrameError::OutOfOrder`] if `found` is not the expected number, which then stays the same.
     pub fn check(&mut self, found: u16) -> Result<(), FrameError> {
         match self.due {
             Some(expected) if expected != found => Err(FrameError::OutOfOrder { expected, found }),

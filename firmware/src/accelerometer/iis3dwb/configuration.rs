@@ -84,7 +84,8 @@ pub struct Configuration {
 }
 
 impl Default for Configuration {
-    /// The full range and band; the watermark leaves 17 ms until the queue is full.
+    /// The largest range and the full band, with an interrupt every 64 samples. 17 ms remain from the interrupt until the queue
+    /// is full.
     fn default() -> Self {
         Self {
             range: Range::default(),

@@ -142,7 +142,7 @@ fn each_fault_has_its_error() {
         (Fault::Identity(0xff), Error::WrongIdentity { found: 0xff }),
         (Fault::ResetHangs, Error::ResetTimeout),
         (
-            Fault::Deaf(0x10),
+            Fault::WritesIgnored(0x10),
             Error::NotWritten {
                 register: 0x10,
                 written: 0b1010_0100,

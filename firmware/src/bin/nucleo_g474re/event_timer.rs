@@ -24,11 +24,11 @@ const TICKS_PER_SECOND: u32 = 80_000_000;
 const TACHOMETER: Channel = Channel::Ch1;
 const WATERMARK: Channel = Channel::Ch2;
 
-/// Capacity of the edge queue: 0.1 s of a wheel with 60 positions at 1 500 rev/min, or twice the edges at 6 000 rev/min during a page
-/// erase.
+/// Capacity of the edge queue: 0.17 s of a wheel with 60 positions at 1 500 rev/min, or about twice the edges at 6 000 rev/min
+/// during a page erase of 22 ms.
 const MAX_EDGES: usize = 256;
 
-/// Edges of the tachometer, in order of time. If the queue is full, the newest are dropped.
+/// Edges of the tachometer, in order of time. If the queue is full, the newest edges are dropped.
 pub(crate) static EDGES: Queue<CriticalSectionRawMutex, Edge, MAX_EDGES> = Queue::new();
 
 /// Time of the last rise of the sensor's watermark line.
@@ -82,7 +82,7 @@ pub(crate) fn now() -> Nanoseconds {
 /// The time of a timer count that is at most half a period of the timer from the newest one.
 fn carry_on(token: CriticalSection<'_>, count: u32) -> Nanoseconds {
     let newest = TICKS.borrow(token).get();
-    // Two events of one interrupt may be out of order, so the difference is signed.
+    // Two captures served in one interrupt may be out of order, so the difference is signed.
     let difference = count.wrapping_sub(newest as u32).cast_signed();
     let ticks = newest.saturating_add_signed(i64::from(difference));
     TICKS.borrow(token).set(newest.max(ticks));

@@ -10,9 +10,9 @@ use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 
 use crate::WORK;
 
-/// Capacity of the queue to the device: 22 ms of the line, the time of a page erase.
+/// Capacity in bytes of the queue from host to device: 22 ms at 921 600 baud, the time of a page erase.
 static RECEIVED: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
-/// Capacity of the queue to the host.
+/// Capacity in bytes of the queue from device to host.
 static SENT: Pipe<CriticalSectionRawMutex, 2048> = Pipe::new();
 
 /// Task: passes received bytes to the device.
@@ -58,7 +58,7 @@ impl ReadReady for LinkLine {
 }
 
 impl Read for LinkLine {
-    /// Reads the available bytes; 0 if there are none.
+    /// Reads the bytes that have arrived; returns 0 if there are none.
     fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
         Ok(RECEIVED.try_read(bytes).unwrap_or(0))
     }

@@ -67,10 +67,10 @@ const IDENTITY: Identity = Identity {
 const LINK_BAUD: u32 = 921_600;
 const SENSOR_BUS: Hertz = Hertz(10_000_000);
 const WATCHDOG_MICROSECONDS: u32 = 2_000_000;
-/// Longest wait of the main loop without events.
-const TURN: Duration = Duration::from_millis(500);
+/// Longest sleep of the main loop if nothing happens.
+const LONGEST_SLEEP: Duration = Duration::from_millis(500);
 
-/// Signals work for the device: blocks, bytes, or room for bytes.
+/// Wakes the main loop: a block has arrived, bytes have arrived, or the line accepts bytes again.
 static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static IO_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
@@ -138,8 +138,8 @@ async fn main(_spawner: Spawner) {
     defmt::info!("quietcut on NUCLEO-G474RE");
     let mut edges = BlockEdges::default();
     loop {
-        // Process all waiting blocks before a request, which may erase a page. The number is limited, so that requests are done even if
-        // the signal chain cannot keep up.
+        // All waiting blocks are processed before a request, which may erase a page. Their number is limited, so that requests
+        // are done even if the signal chain is too slow for the samples.
         for _ in 0..2 * MAX_BLOCKS {
             let Ok(block) = BLOCKS.try_receive() else { break };
             device.take(&block, edges.until_the_end_of(&block));
@@ -148,11 +148,11 @@ async fn main(_spawner: Spawner) {
         }
         let Ok(is_busy) = device.poll(&mut LinkLine);
         watchdog.pet();
-        // Extends the timer's count if there was no event.
+        // Reads the timer at least once per wrap, which extends its count beyond 32 bits.
         event_timer::now();
         if !is_busy {
-            // A timeout is no error: the loop continues.
-            let _ = with_timeout(TURN, WORK.wait()).await;
+            // A timeout is no error: the loop then runs once without an event.
+            let _ = with_timeout(LONGEST_SLEEP, WORK.wait()).await;
         }
     }
 }
@@ -169,12 +169,12 @@ fn first<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
 #[derive(Default)]
 struct BlockEdges {
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
-    /// An edge after the end of the newest block.
+    /// An edge that lies after the end of the newest block.
     ahead: Option<Edge>,
 }
 
 impl BlockEdges {
-    /// The new edges up to the end of a block.
+    /// The new tachometer edges up to the end of a block.
     fn until_the_end_of(&mut self, block: &Block) -> &[Edge] {
         let period_ns = (1e9 / Sensor::IIS3DWB_16G.nominal_rate.0) as u64;
         let end = Nanoseconds(block.time.0 + block.counts.len() as u64 * period_ns);
@@ -187,7 +187,7 @@ impl BlockEdges {
                 self.ahead = Some(edge);
                 break;
             }
-            // Cannot fail: the list is not full.
+            // The push cannot fail: the loop ends when the list is full.
             let _ = self.edges.push(edge);
         }
         &self.edges

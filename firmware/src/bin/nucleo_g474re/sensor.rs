@@ -22,16 +22,16 @@ use crate::event_timer::{self, RISE};
 pub(crate) type Sensor =
     Iis3dwb<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, Delay>, Delay>;
 
-/// Capacity of the block queue: 38 ms, for a page erase or the check of a table. A test in the emulator asserts that no request takes
-/// longer.
+/// Capacity of the block queue: 38 ms of blocks, for the duration of a page erase or of the check of a table. A test in the
+/// emulator asserts that no request takes longer.
 pub(crate) const MAX_BLOCKS: usize = 16;
 
-/// Longest wait for the watermark line, which rises every 2.4 ms. If it is not connected, the sensor's queue is read at this interval. The
-/// queue is full after 19 ms.
+/// Longest wait for the watermark line, which rises every 2.4 ms. If the line is not connected, the sensor's queue is read at
+/// this interval; it is full after 19 ms.
 const LINE_TIMEOUT: Duration = Duration::from_millis(10);
 const RETRY: Duration = Duration::from_secs(1);
 
-/// Blocks in order. If the queue is full, the newest are dropped.
+/// Blocks of samples, in order. If the queue is full, the newest blocks are dropped.
 pub(crate) static BLOCKS: Channel<CriticalSectionRawMutex, Block, MAX_BLOCKS> = Channel::new();
 
 /// The reason why the sensor is restarted.
@@ -39,7 +39,7 @@ pub(crate) static BLOCKS: Channel<CriticalSectionRawMutex, Block, MAX_BLOCKS> = 
 enum Failure {
     /// The driver returned an error.
     Driver(<Sensor as Accelerometer>::Error),
-    /// No samples came.
+    /// The sensor gave no samples.
     Silent,
 }
 
@@ -63,7 +63,7 @@ pub(crate) async fn read(sensor: Sensor) {
 /// Queues blocks until the sensor fails.
 async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible, Failure> {
     loop {
-        // While the line is high it cannot rise: the queue already holds the watermark.
+        // While the watermark line is high it cannot rise: the queue already holds the watermark.
         let rise = if watermark_is_reached() || acquisition.is_behind() {
             RISE.try_take()
         } else {
@@ -80,7 +80,7 @@ async fn read_blocks(acquisition: &mut Acquisition<Sensor>) -> Result<Infallible
             );
         }
         WORK.signal(());
-        // Discards a rise during the read, which belongs to no known sample.
+        // Discards a rise of the line during the read, which belongs to no known sample.
         RISE.reset();
     }
 }

@@ -13,16 +13,16 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use quietcut_firmware::storage::TableMemory;
 
 unsafe extern "C" {
-    /// Linker symbol: its address is the start of the first slot.
+    /// Linker symbol whose address is the start of the first table slot.
     static __table_slots_start: u8;
-    /// Linker symbol: its address is the end of the second slot.
+    /// Linker symbol whose address is the end of the second table slot.
     static __table_slots_end: u8;
 }
 
-/// The flash from the start of the first slot to the end of the second.
+/// The flash of both table slots, from the start of the first to the end of the second.
 pub(crate) struct TableFlash {
     flash: Flash<'static, Blocking>,
-    /// Offset of the first slot in the flash.
+    /// Offset of the first table slot in the flash.
     start: u32,
     bytes: u32,
 }
@@ -38,7 +38,7 @@ impl TableFlash {
         }
     }
 
-    /// Offset in the flash for an offset in the slots.
+    /// Offset in the flash of a range of the table slots, if the slots contain the range.
     fn place(&self, offset: u32, length: usize) -> Result<u32, Error> {
         let end = u32::try_from(length)
             .ok()

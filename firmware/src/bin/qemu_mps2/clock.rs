@@ -14,23 +14,23 @@ const TICKS_PER_MICROSECOND: u32 = 25;
 static WRAPS: AtomicU32 = AtomicU32::new(0);
 
 pub(crate) fn start() {
-    // SAFETY: registers of timer 0, which no other code uses.
+    // SAFETY: the addresses are registers of timer 0, which no other code uses.
     unsafe {
         (RELOAD as *mut u32).write_volatile(u32::MAX);
         (VALUE as *mut u32).write_volatile(u32::MAX);
-        // Enables the timer and its interrupt at zero.
+        // Enables the timer and its interrupt when it reaches zero.
         (CONTROL as *mut u32).write_volatile(0b1001);
     }
 }
 
-/// Handles the interrupt of the timer.
+/// Handles the interrupt of the timer, which counts its wraps.
 pub(crate) fn wrap() {
     // SAFETY: clears the interrupt flag of timer 0.
     unsafe { (INTERRUPT as *mut u32).write_volatile(1) };
     WRAPS.store(WRAPS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
 }
 
-/// Ticks of 40 ns, modulo 2³².
+/// Time in ticks of 40 ns, modulo 2³².
 pub(crate) fn ticks() -> u32 {
     // SAFETY: reads the value of timer 0.
     u32::MAX - unsafe { (VALUE as *const u32).read_volatile() }
@@ -56,7 +56,7 @@ impl device::Clock for BoardClock {
     }
 }
 
-/// Busy-waits.
+/// Waits in a loop for this time.
 pub(crate) fn wait_microseconds(microseconds: u32) {
     let start = ticks();
     while ticks().wrapping_sub(start) < microseconds * TICKS_PER_MICROSECOND {}

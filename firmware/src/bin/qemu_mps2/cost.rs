@@ -1,25 +1,26 @@
 //! Cost of the device: stack depth, and processing time of blocks and of polls of the link.
 //!
-//! The memory below the stack is filled with a pattern at the start, and the overwritten part is measured later. Time is that of the
-//! board's timer. If the emulator counts instructions (`-icount shift=6`), one instruction takes 64 ns.
+//! The memory below the stack is filled with a pattern at the start. Later the overwritten part gives the stack depth. Times
+//! come from the board's timer. If the emulator counts instructions (`-icount shift=6`), one instruction takes 64 ns.
 
 use crate::{clock, flash};
 
-/// Measured depth of the stack in bytes: more than the memory of the real board.
+/// Largest stack depth that can be measured, in bytes: it exceeds the RAM of the real board.
 const PAINTED_BYTES: usize = 128 * 1024;
-/// Allowance for the stack frame of the filling function, in bytes.
+/// Bytes below the stack pointer that are not filled, because the filling function uses them.
 const SPARED_BYTES: usize = 256;
 const PAINT: u32 = 0xdead_beef;
 
-/// The costs so far.
+/// The largest costs measured so far.
 pub(crate) struct Cost {
-    /// The stack pointer when the memory below it was filled.
+    /// The stack pointer at which the memory below was filled.
     top: usize,
     blocks: u32,
     ticks: u64,
     most_ticks: u32,
-    /// The longest poll of the link, with the request it performed: time without flash operations, and time of flash operations.
+    /// Largest time of a poll of the link without its flash operations, in ticks. A poll performs at most one request.
     request_ticks: u32,
+    /// Largest time of the flash operations of one poll of the link, in ticks.
     flash_ticks: u32,
 }
 
@@ -46,7 +47,7 @@ impl Cost {
         }
     }
 
-    /// Processes a block and records the time.
+    /// Runs the processing of a block and records its time.
     pub(crate) fn of_block(&mut self, work: impl FnOnce()) {
         let start = clock::ticks();
         work();
@@ -56,7 +57,7 @@ impl Cost {
         self.most_ticks = self.most_ticks.max(ticks);
     }
 
-    /// Polls the link and records the time.
+    /// Runs a poll of the link and records its time.
     pub(crate) fn of_request<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let (start, flash_start) = (clock::ticks(), flash::busy_ticks());
         let done = work();
@@ -82,7 +83,7 @@ impl Cost {
 
     fn stack_bytes(&self) -> usize {
         let is_painted = |word: &usize| {
-            // SAFETY: reads memory that exists, and was written.
+            // SAFETY: the address is in RAM that was written at the start.
             unsafe { (*word as *const u32).read_volatile() == PAINT }
         };
         let painted = (self.top - PAINTED_BYTES..self.top)

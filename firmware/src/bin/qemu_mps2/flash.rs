@@ -23,7 +23,7 @@ const WRITE_DOUBLE_WORD_MICROSECONDS: u32 = 82;
 
 static BUSY_TICKS: AtomicU32 = AtomicU32::new(0);
 
-/// Busy time of the flash in ticks of the clock, modulo 2³².
+/// Total time for which the flash was busy, in ticks of the clock, modulo 2³².
 pub(crate) fn busy_ticks() -> u32 {
     BUSY_TICKS.load(Ordering::Relaxed)
 }
@@ -56,7 +56,7 @@ impl ErrorType for Flash {
 
 impl TableMemory for Flash {
     fn mapped(&self) -> &[u8] {
-        // SAFETY: the memory exists, holds bytes of any value, and is written through `self` only.
+        // SAFETY: the memory exists, may hold any bytes, and is written through `self` only.
         unsafe { core::slice::from_raw_parts(PSRAM_BASE as *const u8, FLASH_BYTES) }
     }
 }
@@ -88,8 +88,8 @@ impl NorFlash for Flash {
         for page in (from as usize..to as usize).step_by(PAGE_BYTES) {
             be_busy(ERASE_PAGE_MICROSECONDS);
             for offset in (page..page + PAGE_BYTES).step_by(DOUBLE_WORD_BYTES) {
-                // SAFETY: the range was checked to lie in the flash; volatile, so that the writes reach the
-                // file in this order.
+                // SAFETY: the range was checked to lie in the flash. The write is volatile, so that the words reach the
+                // emulator's file in this order.
                 unsafe { Self::word(offset).write_volatile(u64::MAX) };
             }
         }
@@ -103,14 +103,14 @@ impl NorFlash for Flash {
             .zip(bytes.chunks_exact(DOUBLE_WORD_BYTES))
         {
             let word = word.try_into().map_or(0, u64::from_le_bytes);
-            // SAFETY: as in `erase`.
+            // SAFETY: the range was checked to lie in the flash.
             let erased = unsafe { Self::word(offset).read_volatile() } == u64::MAX;
             // The real flash refuses to overwrite a written double word, except with zeros.
             if !erased && word != 0 {
                 return Err(NorFlashErrorKind::Other);
             }
             be_busy(WRITE_DOUBLE_WORD_MICROSECONDS);
-            // SAFETY: as in `erase`.
+            // SAFETY: the range was checked to lie in the flash.
             unsafe { Self::word(offset).write_volatile(word) };
         }
         Ok(())

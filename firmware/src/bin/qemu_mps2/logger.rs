@@ -1,4 +1,4 @@
-//! Logger: defmt frames on the log port.
+//! Logger: sends the frames of defmt to the log port.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -13,8 +13,8 @@ struct State {
     restore: UnsafeCell<critical_section::RestoreState>,
 }
 
-// SAFETY: both cells are touched between `acquire` and `release` only, with interrupts off on a
-// single core; `TAKEN` stops a second taker.
+// SAFETY: both cells are accessed only between `acquire` and `release`, with interrupts off on a single core. `TAKEN` excludes a
+// second access.
 unsafe impl Sync for State {}
 
 static TAKEN: AtomicBool = AtomicBool::new(false);
@@ -27,14 +27,14 @@ fn send(bytes: &[u8]) {
     LOG.send(bytes);
 }
 
-// SAFETY: `acquire` turns interrupts off and refuses a second taker; `release` undoes it.
+// SAFETY: `acquire` turns interrupts off and refuses a second caller; `release` undoes both.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
-        // SAFETY: released by `release`, which defmt calls once after each `acquire`.
+        // SAFETY: `release` ends the critical section; defmt calls it once after each `acquire`.
         let restore = unsafe { critical_section::acquire() };
         // A nested log statement is dropped.
         assert!(!TAKEN.swap(true, Ordering::Relaxed));
-        // SAFETY: interrupts are off and nobody else holds the logger.
+        // SAFETY: interrupts are off and no other code holds the logger.
         unsafe {
             *STATE.restore.get() = restore;
             (*STATE.encoder.get()).start_frame(send);
@@ -44,7 +44,7 @@ unsafe impl defmt::Logger for Logger {
     unsafe fn flush() {}
 
     unsafe fn release() {
-        // SAFETY: the logger is held, see `acquire`.
+        // SAFETY: the logger is held since `acquire`.
         unsafe {
             (*STATE.encoder.get()).end_frame(send);
             TAKEN.store(false, Ordering::Relaxed);
@@ -53,7 +53,7 @@ unsafe impl defmt::Logger for Logger {
     }
 
     unsafe fn write(bytes: &[u8]) {
-        // SAFETY: the logger is held, see `acquire`.
+        // SAFETY: the logger is held since `acquire`.
         unsafe { (*STATE.encoder.get()).write(bytes, send) };
     }
 }

@@ -38,8 +38,9 @@ const IDENTITY: Identity = Identity {
     sensor: None,
 };
 
-/// Number of idle polls before sleep. Waking takes the emulator longer than passing a byte, so the board stays awake within a message.
-const IDLE_TURNS_BEFORE_SLEEP: u32 = 2000;
+/// Number of polls without an event before the board sleeps. The emulator takes longer to wake the board than to pass a byte, so
+/// the board stays awake within a message.
+const IDLE_POLLS_BEFORE_SLEEP: u32 = 2000;
 
 /// Memory for the state of the signal chain, which the device resets. All-zero bits take no space in the image.
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(NO_BITS);
@@ -49,15 +50,15 @@ const NO_BITS: State = unsafe { core::mem::zeroed() };
 
 #[entry]
 fn main() -> ! {
-    // SAFETY: no interrupt is on, and this is the first function.
+    // SAFETY: no interrupt is enabled, and no other function of the program has run.
     let cost = unsafe { Cost::watch() };
     clock::start();
     LOG.open(false);
     LINK.open(true);
     SPINDLE.open(true);
-    // SAFETY: the handler of this interrupt shares an atomic with this function.
+    // SAFETY: the interrupt handler and this function share an atomic only.
     unsafe { NVIC::unmask(Irq::Clock) };
-    // SAFETY: the only call.
+    // SAFETY: this is the only call.
     let flash = unsafe { Flash::take() };
 
     let settings = defaults::settings(Sensor::IIS3DWB_16G);
@@ -78,7 +79,7 @@ fn main() -> ! {
             }
         }
         idle_turns = if is_busy { 0 } else { idle_turns.saturating_add(1) };
-        if idle_turns > IDLE_TURNS_BEFORE_SLEEP && device.outgoing().is_empty() {
+        if idle_turns > IDLE_POLLS_BEFORE_SLEEP && device.outgoing().is_empty() {
             sleep();
         }
     }
@@ -93,7 +94,7 @@ fn sleep() {
     for (port, irq) in [(LINK, Irq::Link), (SPINDLE, Irq::Spindle)] {
         port.clear_interrupt();
         NVIC::unpend(irq);
-        // SAFETY: the critical section begun above prevents that it is served.
+        // SAFETY: interrupts are masked globally, so that the handler does not run.
         unsafe { NVIC::unmask(irq) };
     }
     if !LINK.has_received() && !SPINDLE.has_received() {
@@ -102,11 +103,11 @@ fn sleep() {
     for irq in [Irq::Link, Irq::Spindle] {
         NVIC::mask(irq);
     }
-    // SAFETY: ends the section begun above; no other critical section is open here.
+    // SAFETY: this ends the global mask set above; no other critical section is open here.
     unsafe { cortex_m::interrupt::enable() };
 }
 
-/// The used interrupts of this board, by number.
+/// Numbers of the interrupts of this board that the program uses.
 #[derive(Clone, Copy)]
 enum Irq {
     Link = 0,
@@ -114,7 +115,7 @@ enum Irq {
     Clock = 8,
 }
 
-// SAFETY: the numbers are those of the board's interrupt controller, each once.
+// SAFETY: the numbers are those of the board's interrupt controller, each used once.
 unsafe impl cortex_m::interrupt::InterruptNumber for Irq {
     fn number(self) -> u16 {
         self as u16

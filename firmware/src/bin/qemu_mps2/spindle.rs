@@ -11,14 +11,14 @@ use crate::cost::Cost;
 use crate::flash::{Flash, PSRAM_BASE};
 use crate::uart::Uart;
 
-/// Receives stimuli and passes them to the device.
+/// Receiver of stimuli, which passes them to the device.
 pub(crate) struct Spindle {
     frame: Vec<u8, MAX_FRAME_BYTES>,
     /// True while the rest of an overlong frame is skipped.
     is_skipping: bool,
     /// Tachometer edges for the next block.
     edges: Vec<Edge, MAX_BLOCK_EDGES>,
-    /// Costs of the device.
+    /// Measured costs of the device.
     pub(crate) cost: Cost,
 }
 
@@ -34,7 +34,7 @@ impl Spindle {
         }
     }
 
-    /// Processes a byte of the port. Returns the answer at the end of a frame.
+    /// Processes a byte of the stimulus port. Returns the answer at the end of a frame.
     pub(crate) fn take(&mut self, byte: u8, device: &mut BoardDevice, line: &mut Uart) -> Option<u8> {
         if self.is_skipping {
             self.is_skipping = byte != 0;
@@ -58,13 +58,13 @@ impl Spindle {
         Some(if is_done.is_some() { TAKEN } else { REFUSED })
     }
 
-    /// Passes all stimuli in the board's memory to the device.
+    /// Passes the stimuli stored in the board's memory to the device.
     fn play(&mut self, bytes: usize, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         if bytes > MEMORY_BYTES - STORE_OFFSET {
             return None;
         }
-        // SAFETY: the range lies within the PSRAM, no section is linked there, and the host does not
-        // write to it between its message and our answer.
+        // SAFETY: the range lies within the PSRAM, where the linker places nothing. The host does not write to it between its
+        // message and the answer.
         let mut rest =
             unsafe { core::slice::from_raw_parts((PSRAM_BASE + STORE_OFFSET) as *const u8, bytes) };
         while !rest.is_empty() {
@@ -75,14 +75,14 @@ impl Spindle {
         Some(())
     }
 
-    /// Processes a stimulus; `None` if it is refused.
+    /// Passes a stimulus to the device; `None` if the stimulus is refused.
     fn give(&mut self, stimulus: Stimulus, device: &mut BoardDevice, line: &mut Uart) -> Option<()> {
         match stimulus {
             Stimulus::Edge(edge) => self.edges.push(edge).ok()?,
             Stimulus::Block(block) => {
                 self.cost.of_block(|| device.take(&block, &self.edges));
                 self.edges.clear();
-                // A simulated spindle can wait for the line, so that no report is dropped.
+                // Waits until all messages are sent, which a simulated spindle can do, so that no report is dropped.
                 loop {
                     let Ok(is_busy) = device.poll(line);
                     if !is_busy && device.outgoing().is_empty() {

@@ -1,13 +1,13 @@
 //! The board's serial ports.
 //!
-//! Each holds one byte per direction. While a byte is not read, the emulator stops the sender, so that none is lost. The ports are
-//! polled, and their interrupts only wake the board.
+//! Each port holds one byte per direction. The emulator stops the sender while a byte is not read, so that no byte is lost. The
+//! ports are polled; their interrupts only wake the board.
 
 use core::convert::Infallible;
 
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 
-/// A serial port of the CMSDK: data, state, control, interrupt flags and divider by word.
+/// A serial port of type CMSDK. Its registers are data, state, control, interrupt flags and divider, one word each.
 #[derive(Clone, Copy)]
 pub(crate) struct Uart {
     base: usize,
@@ -34,14 +34,14 @@ impl Uart {
     const RX_INTERRUPT_ON: u32 = 8;
     const RX_INTERRUPT: u32 = 2;
 
-    /// Enables the port, for sending only or for both directions.
+    /// Enables the port, for sending only or, with `receive`, for both directions.
     pub(crate) fn open(self, receive: bool) {
         // 16 is the smallest divider; the emulator ignores the baud rate.
         self.write(Self::DIVIDER, 16);
         self.write(Self::CONTROL, Self::TX_ON);
         if receive {
             self.write(Self::CONTROL, Self::TX_ON | Self::RX_ON | Self::RX_INTERRUPT_ON);
-            // A read makes QEMU check its input again. Otherwise the first byte waits for a second.
+            // A read makes QEMU check its input again. Without it the first byte arrives a second later.
             self.read(Self::DATA);
         }
     }
@@ -65,7 +65,7 @@ impl Uart {
         self.read(Self::STATE) & Self::TX_FULL == 0
     }
 
-    /// Clears the interrupt of the last byte.
+    /// Clears the interrupt of the port.
     pub(crate) fn clear_interrupt(self) {
         self.write(Self::INTERRUPT, Self::RX_INTERRUPT);
     }
@@ -76,7 +76,7 @@ impl Uart {
     }
 
     fn write(self, register: usize, value: u32) {
-        // SAFETY: as in `read`; no register of a port makes it write to memory.
+        // SAFETY: `base` and `register` are as in `read`. No register of a port makes it write to memory.
         unsafe { ((self.base + 4 * register) as *mut u32).write_volatile(value) }
     }
 }
@@ -92,7 +92,7 @@ impl ReadReady for Uart {
 }
 
 impl Read for Uart {
-    /// Reads the available bytes; 0 if there are none.
+    /// Reads the bytes that have arrived; returns 0 if there are none.
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
         let bytes = core::iter::from_fn(|| self.receive());
         Ok(buffer
